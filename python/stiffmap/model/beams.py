@@ -1,4 +1,5 @@
-"""Beams: sections (area, torsion, bending about the two axes across the beam), and the cantilever's compliance.
+"""Beams: sections (area, torsion, bending about the two axes across the beam), the cantilever's compliance, and both by
+the numbers of a machine file.
 
 Elementary formulas of the strength of materials; torsion of a solid rectangle by Saint-Venant's
 series (Timoshenko & Goodier, Theory of Elasticity, art. 109), of a thin-walled tube by Bredt's
@@ -8,10 +9,16 @@ formula on the mid-line.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from stiffmap.common.errors import StiffmapError
+from stiffmap.common.units import BENDING, DENSITY, FORCE, LENGTH, MODULUS, NONE, Dimension
+from stiffmap.model.description import BeamNumbers
+from stiffmap.model.description.strokes import Matrix6
 
 
 class Section(NamedTuple):
@@ -80,3 +87,67 @@ def cantilever_compliance(
     k[b, 3 + c] = k[3 + c, b] = sign * length**2 / (2 * ei_last)
     k[c, 3 + b] = k[3 + b, c] = -sign * length**2 / (2 * ei_next)
     return k
+
+
+SECTIONS: dict[str, tuple[tuple[str, ...], Callable[..., Section]]] = {
+    "round": (("diameter",), round_section),
+    "tube": (("outer", "inner"), tube_section),
+    "rectangle": (("width", "height"), rectangle_section),
+    "hollow": (("width", "height", "wall"), hollow_section),
+}
+
+
+def dimension(key: str) -> Dimension:
+    """Unit of a number of a beam."""
+    if key == "material.density":
+        return DENSITY
+    if key.startswith("material."):
+        return NONE if key == "material.nu" else MODULUS
+    return FORCE if key == "EA" else BENDING if key.startswith(("EI", "GJ")) else LENGTH
+
+
+def products(along: str) -> tuple[str, str, str, str]:
+    """Names of the four stiffness products of a beam along this axis."""
+    k = "xyz".index(along[-1])
+    return ("EA", "GJ", "EI" + "xyz"[(k + 1) % 3], "EI" + "xyz"[(k + 2) % 3])
+
+
+def changed(beam: BeamNumbers, key: str, value: float) -> BeamNumbers:
+    """The beam with another value under a key that it has."""
+    return BeamNumbers(beam.along, tuple((k, value if k == key else v) for k, v in beam.numbers))
+
+
+def compliance(beam: BeamNumbers) -> Matrix6:
+    """(6, 6) at the far end, local axes; StiffmapError where the numbers make no beam."""
+    n = dict(beam.numbers)
+    wrong = [k for k, v in beam.numbers if not v > 0.0 and k != "material.nu"]
+    if wrong:
+        raise StiffmapError(f"beam.{wrong[0]}: must be positive; found {n[wrong[0]]:g}")
+    if "EA" in n:
+        values = [n[key] for key in products(beam.along)]
+    else:
+        sort = next(s for s in SECTIONS if any(k.startswith(f"{s}.") for k in n))
+        fault = section_fault(sort, n)
+        if fault:
+            raise StiffmapError(f"beam.{sort}: {fault}")
+        s = section(sort, n)
+        e = n["material.E"]
+        g = n["material.G"] if "material.G" in n else e / (2 * (1 + n["material.nu"]))
+        values = [e * s.area, g * s.torsion, e * s.about_width, e * s.about_height]
+    matrix = cantilever_compliance(n["length"], beam.along, *values)
+    return tuple(tuple(float(v) for v in row) for row in np.asarray(matrix))
+
+
+def section(sort: str, n: dict[str, float]) -> Section:
+    """Section of this sort by the numbers of a beam."""
+    keys, of = SECTIONS[sort]
+    return of(*(n[f"{sort}.{key}"] for key in keys))
+
+
+def section_fault(sort: str, n: dict[str, float]) -> str:
+    """Why such positive numbers make no section; empty where they make one."""
+    if sort == "tube" and n["tube.inner"] >= n["tube.outer"]:
+        return "the inner diameter must be smaller than the outer one"
+    if sort == "hollow" and 2 * n["hollow.wall"] >= min(n["hollow.width"], n["hollow.height"]):
+        return "twice the wall must be smaller than width and height"
+    return ""

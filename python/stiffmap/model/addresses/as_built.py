@@ -37,7 +37,8 @@ def moved(description: MachineDescription, key: str, delta: float) -> MachineDes
     """
     outside = _outside(description, key)
     if outside is not None:
-        return outside.put(outside.value + delta)  # type: ignore[return-value]  # a number outside the legs: a description
+        built: MachineDescription = outside.put(outside.value + delta)
+        return built
     full, _, field = key.partition("/")
 
     def change(element: Element) -> Element | None:

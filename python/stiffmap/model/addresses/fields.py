@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.model.addresses import beam as beams
-from stiffmap.model.addresses import units
-from stiffmap.model.description import Body, Cable, Element, Joint, Law, Offset, Point, Pose, Spring
-from stiffmap.model.description.elements import Matrix6
-from stiffmap.model.description.numbers import numbers_of
+from stiffmap.common.units import INERTIA, Dimension
+from stiffmap.model import beams
+from stiffmap.model.addresses.units import unit_text
+from stiffmap.model.description import Body, Cable, Element, Joint, Law, Offset, Pose, Spring
+from stiffmap.model.description.numbers import DIRECTIONS, numbers_of, with_part
 from stiffmap.model.description.pose import Vector
-
-DIRECTIONS = ("tx", "ty", "tz", "rx", "ry", "rz")
+from stiffmap.model.description.strokes import Matrix6, entry_dimension
 
 
 class Field(NamedTuple):
@@ -27,24 +27,29 @@ class Field(NamedTuple):
 
     value: float
     unit: str
-    put: Callable[[float], Element]
+    put: Callable[[float], Any]
     listed: bool = True
 
+    def inside(self, around: Callable[[Any], Any]) -> Field:
+        """The same number where its element is a part of something else."""
+        return self._replace(put=lambda x: around(self.put(x)))
 
-def fields(element: Element) -> dict[str, Field]:
+
+Fields = dict[str, Field]
+
+
+def fields(element: Element) -> Fields:
     """Field names and numbers of one element, in the order of a file."""
     match element:
         case Offset():
-            return dict(_offset(element))
+            return _offset(element)
         case Joint():
-            return dict(_joint(element))
+            return _joint(element)
         case Spring():
-            return dict(_spring(element))
+            return _spring(element)
         case Body():
-            return dict(_body(element))
-        case Point():
-            return dict(vector_fields(element, "offset", "at", units.METRE))
-    return {}
+            return _body(element)
+    return declared(element)
 
 
 def field_of(element: Element, key: str) -> Field | None:
@@ -55,17 +60,26 @@ def field_of(element: Element, key: str) -> Field | None:
     return fields(element).get(key)
 
 
-def vector_fields(holder: Any, name: str, key: str, unit: str) -> Iterator[tuple[str, Field]]:
-    """The three components of a vector that a dataclass holds."""
-    v: Vector = getattr(holder, name)
+def declared(holder: Any, angular: bool = False) -> Fields:
+    """The numbers that a dataclass declares and has."""
+    out: Fields = {}
+    for n in numbers_of(holder):
+        value = getattr(holder, n.name)
+        if value is None or not n.address:
+            continue
+        for i, key in enumerate(n.keys(value)):
+            unit = unit_text(n.dimension(n.turns(i, angular)), n.time)
+            out[key] = Field(value[i] if n.shape else value, unit, partial(with_part, holder, n, i))
+    return out
+
+
+def vector_fields(v: Vector, key: str, unit: str, put: Callable[[Any], Any]) -> Iterator[tuple[str, Field]]:
+    """The three components of a vector; ``put`` makes what holds it from three other numbers."""
     for i, part in enumerate("xyz"):
-        yield (
-            f"{key}.{part}",
-            Field(v[i], unit, lambda x, i=i: replace(holder, **{name: (*v[:i], x, *v[i + 1 :])})),  # type: ignore[misc]
-        )
+        yield key + part, Field(v[i], unit, lambda x, i=i: put((*v[:i], x, *v[i + 1 :])))  # type: ignore[misc]
 
 
-def _offset(e: Offset) -> Iterator[tuple[str, Field]]:
+def _offset(e: Offset) -> Fields:
     def shifted(translation: Any) -> Offset:
         """Nominal at `translation`; an error of the machine as built is kept."""
         new = Pose.of(translation, e.nominal.r)
@@ -74,27 +88,16 @@ def _offset(e: Offset) -> Iterator[tuple[str, Field]]:
         return replace(e, nominal=new, actual=Pose.of(e.actual.p + new.p - e.nominal.p, e.actual.r))
 
     t = e.nominal.translation
-    for i, part in enumerate("xyz"):
-        yield (
-            f"translation.{part}",
-            Field(t[i], units.METRE, lambda x, i=i: shifted((*t[:i], x, *t[i + 1 :]))),  # type: ignore[misc]
-        )
+    out = dict(vector_fields(t, "translation.", "m", shifted))
     length = float(np.linalg.norm(t))
     if length > 0.0:
-        yield "length", Field(length, units.METRE, lambda x: shifted(_along(t, length, x)), listed=False)
-    if e.actual is not None:
-        a = e.actual
-        for i, part in enumerate("xyz"):
-            yield (
-                f"actual.translation.{part}",
-                Field(
-                    a.translation[i],
-                    units.METRE,
-                    lambda x, i=i: replace(  # type: ignore[misc]
-                        e, actual=Pose((*a.translation[:i], x, *a.translation[i + 1 :]), a.rotation)
-                    ),
-                ),
-            )
+        out["length"] = Field(length, "m", lambda x: shifted(_along(t, length, x)), listed=False)
+    if (a := e.actual) is not None:
+        built = vector_fields(
+            a.translation, "actual.translation.", "m", lambda v: replace(e, actual=Pose(v, a.rotation))
+        )
+        out |= dict(built)
+    return out
 
 
 def _along(t: Vector, length: float, new: float) -> tuple[float, ...]:
@@ -104,78 +107,42 @@ def _along(t: Vector, length: float, new: float) -> tuple[float, ...]:
     return tuple(0.0 if v == 0.0 else float(np.copysign(new, v)) if one else v / length * new for v in t)
 
 
-def _joint(e: Joint) -> Iterator[tuple[str, Field]]:
+def _joint(e: Joint) -> Fields:
     angular = e.kind != "prismatic"
-    if not isinstance(e, Cable):
-        yield from _listed_numbers(e, "home", "home", units.coordinate(angular))
-        if e.rest is not None:
-            yield from _listed_numbers(e, "rest", "rest", units.coordinate(angular))
-        yield from _laws(e, angular)
-    else:
-        yield from vector_fields(e, "anchor", "anchor", units.METRE)
-        yield from vector_fields(e, "at", "at", units.METRE)
-    for holder in (e, e.drive):
-        for n in () if holder is None else numbers_of(holder):
-            value = getattr(holder, n.name)
-            if value is None:
-                continue
-            unit = units.of_joint_number(n, angular)
-
-            def put(new: Any, holder: Any = holder, name: str = n.name) -> Element:
-                changed = replace(holder, **{name: new})
-                return changed if isinstance(changed, Joint) else replace(e, drive=changed)
-
-            if not n.interval:
-                yield n.key, Field(value, unit, put)
-                continue
-            low, high = value
-            yield f"{n.key}.low", Field(low, unit, lambda x, put=put, high=high: put((x, high)))  # type: ignore[misc]
-            yield f"{n.key}.high", Field(high, unit, lambda x, put=put, low=low: put((low, x)))  # type: ignore[misc]
+    own = declared(e, angular)
+    places = ("home", "rest", "anchor.", "at.")
+    before_laws = {key: field for key, field in own.items() if key.startswith(places)}
+    laws = {} if isinstance(e, Cable) else _laws(e, angular)
+    drive = {} if e.drive is None else declared(e.drive, angular)
+    of_drive = {key: field.inside(lambda new: replace(e, drive=new)) for key, field in drive.items()}
+    return {**before_laws, **laws, **own, **of_drive}
 
 
-def _listed_numbers(holder: Any, name: str, key: str, unit: str) -> Iterator[tuple[str, Field]]:
-    values = getattr(holder, name)
-    for i, value in enumerate(values):
-        yield (
-            key if len(values) == 1 else f"{key}.{i + 1}",
-            Field(value, unit, lambda x, i=i: replace(holder, **{name: (*values[:i], x, *values[i + 1 :])})),  # type: ignore[misc]
-        )
-
-
-def _laws(e: Joint, angular: bool) -> Iterator[tuple[str, Field]]:
-    for i, own in enumerate(e.axis_laws):
-        yield (
-            f"stiffness.{i + 1}",
-            Field(
-                own.stiffness,
-                units.STIFFNESS[2 * angular],
-                lambda x, i=i, law=own: replace(  # type: ignore[misc]
-                    e,
-                    axis_laws=(
-                        *e.axis_laws[:i],
-                        replace(law, stiffness=_positive(x)),
-                        *e.axis_laws[i + 1 :],
-                    ),
-                ),
-            ),
-        )
+def _laws(e: Joint, angular: bool) -> Fields:
+    out: Fields = {}
+    for i, one in enumerate(e.axis_laws):
+        around = lambda new, i=i: replace(e, axis_laws=(*e.axis_laws[:i], new, *e.axis_laws[i + 1 :]))  # noqa: E731
+        out[f"stiffness.{i + 1}"] = _stiffness(one, angular).inside(around)
     law = e.law
     if law is None:
-        return
-
-    def put(x: float, law: Law = law) -> Joint:
-        return replace(e, law=replace(law, stiffness=_positive(x)))
-
+        return out
     plain = not law.cubic and not law.knots
-    stiffness = Field(law.stiffness, units.STIFFNESS[2 * angular], put)
-    yield "stiffness", stiffness._replace(listed=plain)
-    yield "law.stiffness", stiffness._replace(listed=not plain)
+    stiffness = _stiffness(law, angular).inside(lambda new: replace(e, law=new))
+    out["stiffness"] = stiffness._replace(listed=plain)
+    out["law.stiffness"] = stiffness._replace(listed=not plain)
     if plain:
-        inverse = Field(1.0 / law.stiffness, units.COMPLIANCE[2 * angular], lambda x: put(1.0 / _positive(x)))
-        yield "compliance", inverse._replace(listed=False)
-    unit = "N·m/rad³" if angular else "N/m³"
-    cubic = Field(law.cubic, unit, lambda x: replace(e, law=replace(law, cubic=x)))
-    yield "law.cubic", cubic._replace(listed=law.cubic != 0.0)
+        unit = unit_text(entry_dimension("compliance", *(3 * angular,) * 2))
+        out["compliance"] = Field(
+            1.0 / law.stiffness, unit, lambda x: stiffness.put(1.0 / _positive(x)), listed=False
+        )
+    cubic = declared(law, angular)["cubic"].inside(lambda new: replace(e, law=new))
+    out["law.cubic"] = cubic._replace(listed=law.cubic != 0.0)
+    return out
+
+
+def _stiffness(law: Law, angular: bool) -> Field:
+    field = declared(law, angular)["stiffness"]
+    return field._replace(put=lambda x: field.put(_positive(x)))
 
 
 def _positive(value: float) -> float:
@@ -184,71 +151,47 @@ def _positive(value: float) -> float:
     return value
 
 
-def _spring(e: Spring) -> Iterator[tuple[str, Field]]:
+def _spring(e: Spring) -> Fields:
+    out: Fields = {}
     word = "compliance" if e.compliance is not None else "stiffness"
     matrix: Matrix6 = getattr(e, word)
     beam = e.beam if e.beam is not None and beams.compliance(e.beam) == matrix else None
-    if beam is not None:
-        for key, value in beam.numbers:
+    for key, value in beam.numbers if beam is not None else ():
 
-            def put(x: float, key: str = key) -> Spring:
-                new = beams.changed(beam, key, x)
-                return replace(e, compliance=beams.compliance(new), beam=new)
+        def put(x: float, key: str = key) -> Spring:
+            assert beam is not None
+            new = beams.changed(beam, key, x)
+            return replace(e, compliance=beams.compliance(new), beam=new)
 
-            yield f"beam.{key}", Field(value, units.of_beam(key), put)
-    for i in range(6):
-        for j in range(i, 6):
-            there = matrix[i][j] != 0.0 or i == j
-            yield (
-                f"{word}.k{i + 1}{j + 1}",
-                Field(
-                    matrix[i][j],
-                    units.of_entry(i, j, word),
-                    lambda x, i=i, j=j: replace(e, **{word: with_entry(matrix, i, j, x)}),  # type: ignore[misc,arg-type]
-                    listed=beam is None and there,
-                ),
-            )
-    for i, law in e.laws:
-        yield (
-            f"laws.{DIRECTIONS[i]}.stiffness",
-            Field(
-                law.stiffness,
-                units.STIFFNESS[2 * (i > 2)],
-                lambda x, i=i, law=law: replace(  # type: ignore[misc]
-                    e, laws=tuple((k, replace(law, stiffness=x) if k == i else o) for k, o in e.laws)
-                ),
-            ),
-        )
-    for i, value in enumerate(e.rest):
-        if value:
-            yield (
-                f"rest.{DIRECTIONS[i]}",
-                Field(
-                    value,
-                    units.coordinate(i > 2),
-                    lambda x, i=i: replace(e, rest=(*e.rest[:i], x, *e.rest[i + 1 :])),  # type: ignore[misc]
-                ),
-            )
+        out[f"beam.{key}"] = Field(value, unit_text(beams.dimension(key)), put)
+    entries = _symmetric(matrix, partial(entry_dimension, word), lambda m: replace(e, **{word: m}))
+    for (i, j), field in entries.items():
+        there = matrix[i][j] != 0.0 or i == j
+        out[f"{word}.k{i + 1}{j + 1}"] = field._replace(listed=beam is None and there)
+    for at, (i, law) in enumerate(e.laws):
+        around = lambda new, at=at, i=i: replace(e, laws=(*e.laws[:at], (i, new), *e.laws[at + 1 :]))  # noqa: E731
+        out[f"laws.{DIRECTIONS[i]}.stiffness"] = declared(law, i > 2)["stiffness"].inside(around)
+    zero_rest = {f"rest.{d}" for d, value in zip(DIRECTIONS, e.rest, strict=True) if not value}
+    return out | {key: field for key, field in declared(e).items() if key not in zero_rest}
 
 
-def with_entry(matrix: Matrix6, i: int, j: int, value: float) -> Matrix6:
-    """A symmetric matrix with another value at (i, j) and (j, i)."""
-    rows = [list(row) for row in matrix]
-    rows[i][j] = rows[j][i] = value
-    return tuple(tuple(row) for row in rows)
+def _symmetric(
+    matrix: tuple[tuple[float, ...], ...], unit: Callable[[int, int], Dimension], put: Callable[[Any], Any]
+) -> dict[tuple[int, int], Field]:
+    """The entries of the upper triangle by row and column; ``put`` makes the element with another matrix."""
+
+    def changed(x: float, i: int, j: int) -> Any:
+        rows = [list(row) for row in matrix]
+        rows[i][j] = rows[j][i] = x
+        return put(tuple(tuple(row) for row in rows))
+
+    pairs = [(i, j) for i in range(len(matrix)) for j in range(i, len(matrix))]
+    return {(i, j): Field(matrix[i][j], unit_text(unit(i, j)), partial(changed, i=i, j=j)) for i, j in pairs}
 
 
-def _body(e: Body) -> Iterator[tuple[str, Field]]:
-    yield "mass", Field(e.mass, units.KILOGRAM, lambda x: replace(e, mass=_positive(x) if x else x))
-    yield from vector_fields(e, "com", "com", units.METRE)
-    for i in range(3):
-        for j in range(i, 3):
-            if e.inertia[i][j] == 0.0:
-                continue
-
-            def put(x: float, i: int = i, j: int = j) -> Body:
-                rows = [list(row) for row in e.inertia]
-                rows[i][j] = rows[j][i] = x
-                return replace(e, inertia=tuple(tuple(row) for row in rows))  # type: ignore[arg-type]
-
-            yield f"inertia.{'xyz'[i]}{'xyz'[j]}", Field(e.inertia[i][j], "kg·m²", put)
+def _body(e: Body) -> Fields:
+    out = declared(e)
+    mass = out["mass"]
+    out["mass"] = mass._replace(put=lambda x: mass.put(_positive(x) if x else x))
+    entries = _symmetric(e.inertia, lambda i, j: INERTIA, lambda m: replace(e, inertia=m))
+    return out | {f"inertia.{'xyz'[i]}{'xyz'[j]}": f for (i, j), f in entries.items() if f.value != 0.0}

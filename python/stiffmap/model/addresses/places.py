@@ -10,12 +10,10 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.model.addresses import units
-from stiffmap.model.addresses.fields import Field, fields, vector_fields
+from stiffmap.model.addresses.fields import Field, declared, fields, vector_fields
 from stiffmap.model.description import (
     Block,
     Body,
-    ExternalSpring,
     MachineDescription,
     Offset,
     Point,
@@ -23,8 +21,6 @@ from stiffmap.model.description import (
     tree,
 )
 from stiffmap.model.description.tree import Elements
-
-MACHINE = ("home", "gravity", "workspace")
 
 
 def split(address: str) -> tuple[str, str]:
@@ -72,54 +68,26 @@ def _stands_for(full: list[str], legs: list[str], rest: list[str]) -> bool:
 
 def machine_fields(d: MachineDescription) -> Iterator[tuple[str, Field]]:
     """Numbers of the machine itself, by whole addresses; what `Field.put` makes is a description."""
-    t = d.home.translation
-    for i, part in enumerate("xyz"):
-        yield (
-            f"home/translation.{part}",
-            Field(
-                t[i],
-                units.METRE,
-                lambda x, i=i: replace(d, home=replace(d.home, translation=(*t[:i], x, *t[i + 1 :]))),  # type: ignore
-            ),
-        )
+    yield from vector_fields(
+        d.home.translation,
+        "home/translation.",
+        "m",
+        lambda t: replace(d, home=replace(d.home, translation=t)),
+    )
     if d.gravity is not None:
-        g = d.gravity
-        for i, part in enumerate("xyz"):
-            yield (
-                f"gravity/{part}",
-                Field(g[i], "m/s²", lambda x, i=i: replace(d, gravity=(*g[:i], x, *g[i + 1 :]))),  # type: ignore
-            )
-    for i, part in enumerate("xyz" if d.workspace is not None else ""):
-        for end, word in enumerate(("low", "high")):
-            assert d.workspace is not None
-            yield (
-                f"workspace/{part}.{word}",
-                Field(d.workspace[end][i], units.METRE, lambda x, i=i, end=end: _box(d, i, end, x)),  # type: ignore
-            )
-    for spring in d.external_springs:
-        for field, number in _external(spring):
-            yield (
-                f"{spring.name}/{field}",
-                number._replace(put=lambda x, s=spring, n=number: _with_spring(d, s, n.put(x))),  # type: ignore
-            )
-
-
-def _box(d: MachineDescription, i: int, end: int, value: float) -> MachineDescription:
-    assert d.workspace is not None
-    corners = [list(corner) for corner in d.workspace]
-    corners[end][i] = value
-    return replace(d, workspace=(tuple(corners[0]), tuple(corners[1])))  # type: ignore[arg-type]
-
-
-def _external(s: ExternalSpring) -> Iterator[tuple[str, Field]]:
-    yield "stiffness", Field(s.stiffness, "N/m", lambda x: replace(s, stiffness=x))  # type: ignore
-    yield "length", Field(s.length, units.METRE, lambda x: replace(s, length=x))  # type: ignore
-    yield from vector_fields(s, "anchor", "anchor", units.METRE)
-
-
-def _with_spring(d: MachineDescription, old: ExternalSpring, new: object) -> MachineDescription:
-    assert isinstance(new, ExternalSpring)
-    return replace(d, external_springs=tuple(new if s is old else s for s in d.external_springs))
+        yield from vector_fields(d.gravity, "gravity/", "m/s²", lambda g: replace(d, gravity=g))
+    if d.workspace is not None:
+        low, high = d.workspace
+        lows = vector_fields(low, "workspace/", "m", lambda v: replace(d, workspace=(v, high)))
+        highs = vector_fields(high, "workspace/", "m", lambda v: replace(d, workspace=(low, v)))
+        for (axis, least), (_, most) in zip(lows, highs, strict=True):
+            yield from ((f"{axis}.low", least), (f"{axis}.high", most))
+    springs = d.external_springs
+    for i, spring in enumerate(springs):
+        around = lambda s, i=i: replace(d, external_springs=(*springs[:i], s, *springs[i + 1 :]))  # noqa: E731
+        numbers = declared(spring)
+        for key, number in sorted(numbers.items(), key=lambda item: item[0].startswith("anchor")):
+            yield f"{spring.name}/{key}", number.inside(around)
 
 
 def bar_offset(d: MachineDescription, full: str) -> str | None:

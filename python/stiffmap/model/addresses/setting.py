@@ -44,7 +44,8 @@ def known_values(description: MachineDescription, address: str) -> list[float]:
 def _with_value(description: MachineDescription, address: str, value: float) -> MachineDescription:
     whole = dict(machine_fields(description))
     if address in whole:
-        return whole[address].put(value)  # type: ignore[return-value]  # of a machine's own numbers: a description
+        changed_machine: MachineDescription = whole[address].put(value)
+        return changed_machine
     field = split(address)[1]
     changed: set[str] = set()
     for full in _named(description, address):

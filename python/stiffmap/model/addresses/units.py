@@ -2,40 +2,19 @@
 
 from __future__ import annotations
 
-from stiffmap.model.description.numbers import JointNumber
+from stiffmap.common.units import MODULUS, Dimension
 
-METRE, RADIAN, NEWTON, KILOGRAM = "m", "rad", "N", "kg"
-STIFFNESS = ("N/m", "N/rad", "N·m/rad")
-"""By the number of rotations among the two directions of an entry; also those of laws (first and last)."""
-COMPLIANCE = ("m/N", "1/N", "rad/(N·m)")
-IN_TIME = {"speed": "{c}/s", "friction.viscous": "{e}·s/{c}"}
+SHORT = {MODULUS: "Pa", Dimension(force=-1, angle=1): "1/N"}
+POWERS = {1: "", 2: "²", 3: "³"}
 
 
-def coordinate(angular: bool) -> str:
-    """Of a joint's coordinate."""
-    return RADIAN if angular else METRE
-
-
-def of_joint_number(n: JointNumber, angular: bool) -> str:
-    """Of a declared number of a joint or drive; dimensionless: empty."""
-    c, e = coordinate(angular), "N·m" if angular else NEWTON
-    if n.key in IN_TIME:
-        return IN_TIME[n.key].format(c=c, e=e)
-    above = [t for t, power in ((e, n.effort), (c, n.coordinate)) if power > 0]
-    below = [t for t, power in ((e, n.effort), (c, n.coordinate)) if power < 0]
-    top = "·".join(above) or ("1" if below else "")
-    return "/".join([top, *below]) if below else top
-
-
-def of_entry(i: int, j: int, word: str) -> str:
-    """Of the entry (i, j) of a spring's matrix, counted from 0."""
-    return (COMPLIANCE if word == "compliance" else STIFFNESS)[(i > 2) + (j > 2)]
-
-
-def of_beam(key: str) -> str:
-    """Of a number of a beam by its key."""
-    if key == "material.nu":
-        return ""
-    if key.startswith("material."):
-        return "Pa"
-    return {"EA": "N"}.get(key, "N·m²" if key.startswith(("EI", "GJ")) else METRE)
+def unit_text(d: Dimension, time: int = 0) -> str:
+    """``N·m/rad``; dimensionless: empty."""
+    if d in SHORT:
+        return SHORT[d]
+    units = (("N", d.force), ("kg", d.mass), ("m", d.length), ("rad", d.angle), ("s", time))
+    above = "·".join(name + POWERS[power] for name, power in units if power > 0)
+    below = [name + POWERS[-power] for name, power in units if power < 0]
+    if not below:
+        return above
+    return f"{above or '1'}/{below[0]}" if len(below) == 1 else f"{above or '1'}/({'·'.join(below)})"

@@ -8,11 +8,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from stiffmap.common.units import LENGTH, MASS
 from stiffmap.model.description.beam import BeamNumbers
 from stiffmap.model.description.laws import CommandError, GuideError, JointFriction, Law
-from stiffmap.model.description.numbers import interval, number
+from stiffmap.model.description.numbers import interval, number, required
 from stiffmap.model.description.pose import IDENTITY, Pose, Rows, Vector
 from stiffmap.model.description.strokes import BeamStroke, Matrix6, TableStroke
+
+ORIGIN: Vector = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -32,12 +35,12 @@ class Drive:
     (`description.numbers`), and one in the core's ``DriveNumbers`` if a calculation there uses it."""
 
     range: tuple[float, float] | None = interval("range", "Stroke that the drive can take.")
-    speed: float | None = number("speed", "Largest speed.", coordinate=1, lower=0.0)
+    speed: float | None = number("speed", "Largest speed.", coordinate=1, time=-1, lower=0.0)
     force: float | None = number("force", "Largest force or torque.", effort=1, lower=0.0, core="force_limit")
     encoder_error: float | None = number("encoder_error", "Error of the encoder.", coordinate=1, lower=0.0)
     coulomb_friction: float | None = number("friction.coulomb", "Coulomb friction.", effort=1, lower=0.0)
     viscous_friction: float | None = number(
-        "friction.viscous", "Friction per speed.", coordinate=-1, effort=1, lower=0.0
+        "friction.viscous", "Friction per speed.", coordinate=-1, effort=1, time=1, lower=0.0
     )
 
 
@@ -68,11 +71,20 @@ class Joint:
     name: str
     kind: str
     axes: tuple[Vector, ...]
-    home: tuple[float, ...] = (0.0,)
+    home: tuple[float, ...] = number(
+        "home",
+        "Coordinates in the home configuration.",
+        default=(0.0,),
+        coordinate=1,
+        shape="axes",
+        saved=True,
+    )
     actuated: bool = False
     law: Law | None = None
     axis_laws: tuple[Law, ...] = ()
-    rest: tuple[float, ...] | None = None
+    rest: tuple[float, ...] | None = number(
+        "rest", "Coordinates at which its laws are free of force.", coordinate=1, shape="axes"
+    )
     compliance_slope: float = number(
         "compliance_slope",
         "Relative change of the drive's compliance per travel.",
@@ -124,9 +136,9 @@ class Cable(Joint):
 
     kind: str = "prismatic"
     axes: tuple[Vector, ...] = ((0.0, 0.0, 1.0),)
+    home: tuple[float, ...] = (0.0,)
     actuated: bool = True
-    anchor: Vector = (0.0, 0.0, 0.0)
-    at: Vector = (0.0, 0.0, 0.0)
+    rest: tuple[float, ...] | None = None
     guide: Vector = (0.0, 0.0, 1.0)
     elasticity: float | None = number("elasticity", "Axial stiffness EA.", effort=1, lower=0.0)
     stiffness: float | None = number(
@@ -144,6 +156,17 @@ class Cable(Joint):
     )
     radius: float = number(
         "radius", "Of the guide's pulley; 0: an eye.", default=0.0, coordinate=1, lower=0.0
+    )
+    anchor: tuple[float, float, float] = number(
+        "anchor", default=ORIGIN, fixed=LENGTH, shape="vector", saved=True, needed=True
+    )
+    at: tuple[float, float, float] = number(
+        "at",
+        "Where it is fixed, in the current frame.",
+        default=ORIGIN,
+        fixed=LENGTH,
+        shape="vector",
+        saved=True,
     )
     stretch: float = 1.0
     """Factor of the real cable's compliance on the one that is believed in."""
@@ -174,10 +197,10 @@ class Spring:
     compliance: Matrix6 | None = None
     stiffness: Matrix6 | None = None
     laws: tuple[tuple[int, Law], ...] = ()
-    rest: tuple[float, ...] = (0.0,) * 6
+    rest: tuple[float, ...] = number("rest", default=(0.0,) * 6, coordinate=1, shape="directions")
     stroke: BeamStroke | TableStroke | None = None
     beam: BeamNumbers | None = field(default=None, compare=False, repr=False, metadata={"derived": True})
-    loss_factor: float | None = None
+    loss_factor: float | None = number("loss_factor", "Structural loss factor.", lower=0.0, address=False)
 
 
 @dataclass(frozen=True)
@@ -186,8 +209,8 @@ class Body:
     inertia about that centre in its axes (kg·m²)."""
 
     name: str
-    mass: float
-    com: Vector = (0.0, 0.0, 0.0)
+    mass: float = required("mass", fixed=MASS, lower=0.0)
+    com: tuple[float, float, float] = number("com", default=ORIGIN, fixed=LENGTH, shape="vector")
     inertia: Rows = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 
@@ -196,7 +219,9 @@ class Point:
     """A named point that moves with the current frame, at ``offset`` in it (m)."""
 
     name: str
-    offset: Vector = (0.0, 0.0, 0.0)
+    offset: tuple[float, float, float] = number(
+        "at", default=ORIGIN, fixed=LENGTH, shape="vector", saved=True
+    )
 
 
 @dataclass(frozen=True)

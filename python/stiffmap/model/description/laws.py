@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from stiffmap.common.units import ANGLE
+from stiffmap.model.description.numbers import number, required
 from stiffmap.model.description.pose import Vector
 
 Knot = tuple[float, float]
@@ -23,8 +25,8 @@ class Law:
     A free coordinate has no law at all (``None``), a rigid one none either but is actuated.
     """
 
-    stiffness: float
-    cubic: float = 0.0
+    stiffness: float = required("stiffness", coordinate=-1, effort=1)
+    cubic: float = number("cubic", default=0.0, coordinate=-3, effort=1)
     knots: tuple[Knot, ...] = ()
     friction: float = 0.0
 
@@ -52,12 +54,12 @@ class CommandError:
     beyond the ends. ``reference=None``: the coordinate of the closed home configuration.
     """
 
-    offset: float = 0.0
-    slope: float = 0.0
-    amplitude: float = 0.0
-    period: float = 1.0
-    phase: float = 0.0
-    reference: float | None = 0.0
+    offset: float = number("offset", default=0.0, coordinate=1)
+    slope: float = number("slope", default=0.0)
+    amplitude: float = number("amplitude", default=0.0, coordinate=1)
+    period: float = number("period", default=1.0, coordinate=1)
+    phase: float = number("phase", default=0.0, fixed=ANGLE)
+    reference: float | None = number("reference", default=0.0, coordinate=1)
     knots: tuple[tuple[float, float], ...] = ()
 
 

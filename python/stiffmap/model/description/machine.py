@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from stiffmap.common.units import UnitSystem
+from stiffmap.common.units import LENGTH, UnitSystem
 from stiffmap.model.description.elements import Element
+from stiffmap.model.description.numbers import required
 from stiffmap.model.description.pose import Pose, Vector
 
 
@@ -28,9 +29,9 @@ class ExternalSpring:
 
     name: str
     point: str
-    anchor: Vector
-    stiffness: float
-    length: float
+    anchor: tuple[float, float, float] = required("anchor", fixed=LENGTH, shape="vector")
+    stiffness: float = required("stiffness", coordinate=-1, effort=1, lower=0.0)
+    length: float = required("length", fixed=LENGTH, lower=0.0)
     tension_only: bool = False
 
 

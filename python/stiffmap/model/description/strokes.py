@@ -5,7 +5,21 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from stiffmap.common.units import Dimension
+
 Matrix6 = tuple[tuple[float, ...], ...]
+COMPLIANCE = (
+    Dimension(length=1, force=-1),
+    Dimension(force=-1, angle=1),
+    Dimension(length=-1, force=-1, angle=1),
+)
+"""By the number of rotations among the two directions of an entry."""
+
+
+def entry_dimension(word: str, i: int, j: int) -> Dimension:
+    """Unit of the entry (i, j), counted from 0, of a spring's ``compliance`` or ``stiffness``."""
+    compliance = COMPLIANCE[(i > 2) + (j > 2)]
+    return compliance if word == "compliance" else Dimension(*(-power for power in compliance))
 
 
 @dataclass(frozen=True)

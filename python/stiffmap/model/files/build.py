@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from stiffmap.common.units import LENGTH, NONE, Dimension, UnitSystem
+from stiffmap.common.units import LENGTH, NONE, UnitSystem
 from stiffmap.common.yaml_text import Document
 from stiffmap.model.description import (
     TASK,
@@ -20,9 +20,10 @@ from stiffmap.model.description import (
 )
 from stiffmap.model.description.pose import Pose, Vector
 from stiffmap.model.description.tree import point_names
-from stiffmap.model.files.build_elements import build_elements, build_range
+from stiffmap.model.files.build_elements import build_elements
 from stiffmap.model.files.build_geometry import build_pose, build_vector
 from stiffmap.model.files.build_legs import build_leg
+from stiffmap.model.files.build_numbers import build_numbers, build_range
 from stiffmap.model.files.build_strokes import with_strokes
 from stiffmap.model.files.context import Context, Gathered, LinkUse
 from stiffmap.model.files.schema import MachineFile
@@ -141,17 +142,8 @@ def _ratios(given: Number | list[Number] | None, context: Context) -> tuple[floa
 def _external_spring(name: str, model: ExternalSpringModel, context: Context) -> ExternalSpring:
     context.note(model.note)
     context.mark(model.source)
-    for key in ("stiffness", "length"):
-        if getattr(model, key).value < 0.0:
-            context.at(key).fail(f"must not be negative; found {getattr(model, key).value}")
-    return ExternalSpring(
-        name,
-        model.point,
-        build_vector(model.anchor, LENGTH, context, "anchor"),
-        context.si(model.stiffness, Dimension(length=-1, force=1), "stiffness"),
-        context.si(model.length, LENGTH, "length"),
-        model.tension_only,
-    )
+    numbers = build_numbers(model, ExternalSpring, False, context)
+    return ExternalSpring(name, model.point, **numbers, tension_only=model.tension_only)
 
 
 def build_effect(model: EffectModel) -> AppliedEffect:

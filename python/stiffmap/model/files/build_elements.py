@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import partial
 from itertools import pairwise
 from typing import Any
@@ -11,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffmap.common.units import ANGLE, INERTIA, LENGTH, MASS, NONE, Dimension
+from stiffmap.common.units import ANGLE, INERTIA, LENGTH
 from stiffmap.model.description import (
     Block,
     Body,
@@ -25,9 +24,11 @@ from stiffmap.model.description import (
     Offset,
     Point,
 )
-from stiffmap.model.description.numbers import JointNumber, numbers_of
+from stiffmap.model.description.numbers import numbers_of
 from stiffmap.model.description.pose import Rows, Vector, vector
-from stiffmap.model.files.build_geometry import build_pose, build_vector
+from stiffmap.model.description.strokes import entry_dimension
+from stiffmap.model.files.build_geometry import build_pose
+from stiffmap.model.files.build_numbers import build_number, build_numbers
 from stiffmap.model.files.build_springs import beam_body, build_law, build_spring
 from stiffmap.model.files.context import Context
 from stiffmap.model.files.schema.base import Number
@@ -45,6 +46,7 @@ from stiffmap.model.files.schema.elements import (
 )
 
 ZERO = Number(value=0.0)
+HOME, REST = (n for n in numbers_of(Joint) if n.shape == "axes")
 
 
 def build_elements(models: Sequence[ElementModel], context: Context) -> tuple[Element, ...]:
@@ -90,7 +92,10 @@ def build_element(
         case BodyModel():
             return _body(model, _named(model.body, model, context), *among)
         case PointModel():
-            return _point(model, _named(model.point, model, context))
+            return Point(
+                model.point,
+                **build_numbers(model, Point, False, _named(model.point, model, context)),
+            )
         case BlockModel():
             return _block(model, context)
 
@@ -112,21 +117,16 @@ def _offset(model: OffsetModel, context: Context) -> Offset:
 def _joint(model: JointModel, context: Context) -> Joint:
     axes = tuple(model.axes) if model.axes is not None else (model.axis,)
     angular = model.kind != "prismatic"
-    coordinate = ANGLE if angular else LENGTH
-    home = _list(model.home) if model.home is not None else [ZERO] * len(axes)
+    home = [ZERO] * len(axes) if model.home is None else model.home
     return Joint(
         model.joint,
         model.kind,
         tuple(a for a in axes if a is not None),
-        coordinates(home, coordinate, context),
+        build_number(HOME, home, angular, context),
         **_laws(model, angular, context),
-        rest=None if model.rest is None else coordinates(_list(model.rest), coordinate, context, "rest"),
+        rest=None if model.rest is None else build_number(REST, model.rest, angular, context),
         **build_numbers(model, Joint, angular, context),
     )
-
-
-def _list(numbers: Number | list[Number]) -> list[Number]:
-    return numbers if isinstance(numbers, list) else [numbers]
 
 
 def _laws(model: JointModel, angular: bool, context: Context) -> dict[str, Any]:
@@ -142,14 +142,6 @@ def _laws(model: JointModel, angular: bool, context: Context) -> dict[str, Any]:
     return {"law": _law(model, angular, context)}
 
 
-def coordinates(
-    numbers: Sequence[Number], dimension: Dimension, context: Context, key: str = "home"
-) -> tuple[float, ...]:
-    """SI coordinates, one per axis."""
-    names = [key] if len(numbers) == 1 else [f"{key}.{i + 1}" for i in range(len(numbers))]
-    return tuple(context.si(n, dimension, name) for n, name in zip(numbers, names, strict=True))
-
-
 def _law(model: JointModel | ActuatorModel, angular: bool, context: Context) -> Law | None:
     for key in ("stiffness", "compliance"):
         number = getattr(model, key)
@@ -162,62 +154,25 @@ def _law(model: JointModel | ActuatorModel, angular: bool, context: Context) -> 
 
 def _linear_law(key: str, number: Number, angular: bool, context: Context, axis: str = "") -> Law:
     """The law of one stiffness or compliance at this place of the file."""
-    linear = Dimension(length=1, force=1, angle=-1) if angular else Dimension(length=-1, force=1)
+    dimension = entry_dimension(key, *(3 * angular,) * 2)
     if key == "compliance":
-        return Law(context.inverse(number, Dimension(*(-n for n in linear)), f"stiffness{axis}"))
+        return Law(context.inverse(number, dimension, f"stiffness{axis}"))
     if number.value <= 0.0:
         context.fail(f"must be positive; found {number.value}")
-    return Law(context.si(number, linear, f"stiffness{axis}"))
-
-
-def build_range(pair: list[Number], dimension: Dimension, context: Context, name: str) -> tuple[float, float]:
-    """SI interval; raises `FileError` where it is empty."""
-    low, high = (context.si(n, dimension, f"{name}.{w}") for n, w in zip(pair, ("min", "max"), strict=True))
-    if low >= high:
-        context.at(name).fail(f"the lower end {pair[0].value} is not below the upper end {pair[1].value}")
-    return (low, high)
-
-
-def build_numbers(
-    model: JointModel | ActuatorModel | CableModel, holder: type, angular: bool, context: Context
-) -> dict[str, Any]:
-    """Values of the numbers that `holder` declares and the file gives, SI; raises `FileError` out of bounds."""
-    out: dict[str, Any] = {}
-    for n in numbers_of(holder):
-        keys = n.key.split(".")
-        given: Any = model
-        for key in keys:
-            given = getattr(given, key, None)
-        if given is None:
-            continue
-        if n.interval:
-            out[n.name] = build_range(given, n.dimension(angular), context, n.key)
-            continue
-        out[n.name] = context.si(given, n.dimension(angular), n.key)
-        if not n.lower <= out[n.name] <= n.upper:
-            context.at(*keys).fail(f"expected {_bounds(n)}; found {given.value}")
-    return out
-
-
-def _bounds(n: JointNumber) -> str:
-    if n.upper == float("inf"):
-        return "a number that is not negative" if n.lower == 0.0 else f"{n.lower:g} or more (SI)"
-    return f"{n.lower:g} to {n.upper:g} (SI)"
+    return Law(context.si(number, dimension, f"stiffness{axis}"))
 
 
 def _actuator(model: ActuatorModel, context: Context) -> Joint:
     angular = model.kind == "revolute"
-    coordinate = ANGLE if angular else LENGTH
-
     drive = Drive(**build_numbers(model, Drive, angular, context))
     return Joint(
         model.actuator,
         model.kind,
         (model.axis,),
-        coordinates([model.home or ZERO], coordinate, context),
+        build_number(HOME, model.home or ZERO, angular, context),
         actuated=True,
         law=_law(model, angular, context),
-        command_errors=tuple(_command_error(e, coordinate, context) for e in model.command_errors or []),
+        command_errors=_command_errors(model, angular, context),
         **build_numbers(model, Joint, angular, context),
         drive=drive,
     )
@@ -228,51 +183,39 @@ def _cable(model: CableModel, context: Context) -> Cable:
     numbers = build_numbers(model, Cable, False, context)
     if not (numbers.get("elasticity") or numbers.get("stiffness")):
         context.fail("a cable without elasticity and stiffness; at least one must be positive")
-    return Cable(
-        model.cable,
-        anchor=build_vector(model.anchor, LENGTH, context, "anchor"),
-        at=build_vector(model.at, LENGTH, context, "at") if model.at else (0.0, 0.0, 0.0),
-        guide=model.guide or (0.0, 0.0, 1.0),
-        command_errors=tuple(_command_error(e, LENGTH, context) for e in model.command_errors or []),
-        drive=drive,
-        **numbers,
-    )
+    errors = _command_errors(model, False, context)
+    return Cable(model.cable, guide=model.guide or Cable.guide, command_errors=errors, drive=drive, **numbers)
 
 
-def _command_error(model: CommandErrorModel, coordinate: Dimension, context: Context) -> CommandError:
-    dimensions = {"slope": NONE, "phase": ANGLE}
-    given = {
-        key: context.si(getattr(model, key), dimensions.get(key, coordinate), f"command_errors.{key}")
-        for key in CommandErrorModel.model_fields
-        if key != "knots" and getattr(model, key) is not None
-    }
+def _command_errors(
+    model: ActuatorModel | CableModel, angular: bool, context: Context
+) -> tuple[CommandError, ...]:
+    return tuple(_command_error(e, angular, context) for e in model.command_errors or [])
+
+
+def _command_error(model: CommandErrorModel, angular: bool, context: Context) -> CommandError:
+    given = build_numbers(model, CommandError, angular, context, "command_errors.")
+    coordinate = ANGLE if angular else LENGTH
     knots = tuple(
         (context.si(u, coordinate), context.si(error, coordinate)) for u, error in model.knots or []
     )
     if any(b <= a for (a, _), (b, _) in pairwise(knots)):
         context.at("command_errors").at("knots").fail("knots need rising coordinates")
-    return replace(CommandError(), **given, knots=knots)
+    return CommandError(**given, knots=knots)
 
 
 def _body(model: BodyModel, context: Context, place: int, models: Sequence[ElementModel]) -> Body:
-    mass, com, inertia = 0.0, (0.0, 0.0, 0.0), None
+    of: dict[str, Any] = {}
+    inertia = None
     if model.of is not None:
         mass, com, inertia = _of_beam(model.of, context, place, models)
-    if model.mass is not None:
-        if model.mass.value < 0.0:
-            context.at("mass").fail(f"must not be negative; found {model.mass.value}")
-        declared = context.si(model.mass, MASS, "mass")
-        if inertia is not None:  # a link as heavy as declared, spread as its section says
-            inertia = inertia * (declared / mass)
-        mass = declared
-    if model.com is not None:
-        com = build_vector(model.com, LENGTH, context, "com")
+        of = {"mass": mass, "com": com}
+    numbers = {**of, **build_numbers(model, Body, False, context)}
+    if inertia is not None:  # a link as heavy as declared, spread as its section says
+        numbers["inertia"] = _rows(inertia * (numbers["mass"] / of["mass"]))
     if model.inertia is not None:
-        return Body(model.body, mass, com, _inertia(model.inertia, context))
-    if inertia is None:
-        return Body(model.body, mass, com)
-    a, b, c = (vector(row) for row in inertia)
-    return Body(model.body, mass, com, (a, b, c))
+        numbers["inertia"] = _inertia(model.inertia, context)
+    return Body(model.body, **numbers)
 
 
 def _of_beam(
@@ -320,14 +263,12 @@ def _inertia(terms: list[Number | list[Number]], context: Context) -> Rows:
     principal = np.linalg.eigvalsh(matrix)
     if principal[0] < -1e-12 * principal[2]:
         here.fail(f"the inertia has a negative principal moment ({principal[0]:.3g} kg m^2)")
+    return _rows(matrix)
+
+
+def _rows(matrix: NDArray[np.float64]) -> Rows:
     a, b, c = (vector(row) for row in matrix)
     return (a, b, c)
-
-
-def _point(model: PointModel, context: Context) -> Point:
-    if model.at is None:
-        return Point(model.point)
-    return Point(model.point, build_vector(model.at, LENGTH, context, "at"))
 
 
 def _block(model: BlockModel, context: Context) -> Block:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 from stiffmap.common.errors import FileError
-from stiffmap.common.units import ANGLE, LENGTH
 from stiffmap.model.description import Element, Joint, Leg, Offset, Pose
 from stiffmap.model.description.tree import Elements, edit_path, walk
-from stiffmap.model.files.build_elements import build_elements, coordinates
+from stiffmap.model.files.build_elements import HOME, build_elements
 from stiffmap.model.files.build_geometry import build_pose
+from stiffmap.model.files.build_numbers import build_number
 from stiffmap.model.files.context import Context, Gathered
 from stiffmap.model.files.schema.base import Number, suggestion
 from stiffmap.model.files.schema.elements import ElementModel
@@ -83,8 +83,7 @@ def _joint(joint: Joint, home: Home, context: Context) -> Joint:
     numbers = home if isinstance(home, list) else [home]
     if len(numbers) != len(joint.axes):
         context.fail(f"joint '{joint.name}' has {len(joint.axes)} coordinates; found {len(numbers)}")
-    dimension = LENGTH if joint.kind == "prismatic" else ANGLE
-    return replace(joint, home=coordinates(numbers, dimension, context))
+    return replace(joint, home=build_number(HOME, numbers, joint.kind != "prismatic", context))
 
 
 def _unknown(elements: Elements, path: str, context: Context) -> FileError:

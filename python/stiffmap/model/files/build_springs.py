@@ -2,27 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from stiffmap.common.units import ANGLE, BENDING, DENSITY, FORCE, LENGTH, MODULUS, MOMENT, NONE, Dimension
+from stiffmap.common.units import ANGLE, FORCE, LENGTH, MOMENT
 from stiffmap.model import beams
-from stiffmap.model.addresses.beam import SECTIONS
 from stiffmap.model.description import BeamNumbers, Law, Spring
-from stiffmap.model.description.elements import Matrix6
+from stiffmap.model.description.numbers import DIRECTIONS
+from stiffmap.model.description.strokes import Matrix6, entry_dimension
+from stiffmap.model.files.build_numbers import build_numbers
 from stiffmap.model.files.context import Context, LinkUse, StrokeUse
-from stiffmap.model.files.schema.base import Number
+from stiffmap.model.files.schema.base import FileModel, Number
 from stiffmap.model.files.schema.elements import SpringModel
-from stiffmap.model.files.schema.springs import DIRECTIONS, Beam, LawModel, Matrix
-
-_COMPLIANCE = {
-    0: Dimension(length=1, force=-1),
-    1: Dimension(force=-1, angle=1),
-    2: Dimension(length=-1, force=-1, angle=1),
-}
-_STIFFNESS = {turns: Dimension(*(-n for n in d)) for turns, d in _COMPLIANCE.items()}
+from stiffmap.model.files.schema.springs import Beam, LawModel, Material, Matrix
 
 
 def build_spring(model: SpringModel, context: Context) -> Spring:
@@ -32,12 +27,10 @@ def build_spring(model: SpringModel, context: Context) -> Spring:
         (DIRECTIONS.index(d), build_law(law, DIRECTIONS.index(d) > 2, context.at("laws", d), f"laws.{d}"))
         for d, law in (model.laws or {}).items()
     )
-    rest = tuple(
-        context.si(n, ANGLE if i > 2 else LENGTH, f"rest.{DIRECTIONS[i]}")
-        for i, n in enumerate(model.rest or [])
-    )
+    numbers = build_numbers(model, Spring, False, context)
     word = "stiffness" if model.stiffness is not None else "compliance"
-    matrix = _spring_matrix(model, context)
+    beam = None if model.beam is None else build_beam(model.beam, context.at("beam"))
+    matrix = _spring_matrix(model, context) if beam is None else beams.compliance(beam)
     for i, _ in laws:
         if any(matrix[i][j] != 0.0 for j in range(6) if j != i):
             context.at("laws", DIRECTIONS[i]).fail(
@@ -46,16 +39,10 @@ def build_spring(model: SpringModel, context: Context) -> Spring:
     stiffness, compliance = (matrix, None) if word == "stiffness" else (None, matrix)
     if model.stroke is not None:
         context.gathered.strokes.append(StrokeUse(context.full, model, context.at("stroke")))
-    beam = None if model.beam is None else _beam_numbers(model.beam, context.at("beam"))
-    loss = None if model.loss_factor is None else context.si(model.loss_factor, NONE, "loss_factor")
-    if loss is not None and loss < 0.0:
-        context.at("loss_factor").fail(f"must not be negative; found {loss:g}")
-    return Spring(model.spring, compliance, stiffness, laws, rest or (0.0,) * 6, beam=beam, loss_factor=loss)
+    return Spring(model.spring, compliance, stiffness, laws, beam=beam, **numbers)
 
 
 def _spring_matrix(model: SpringModel, context: Context) -> Matrix6:
-    if model.beam is not None:
-        return as_rows(build_beam(model.beam, context.at("beam")))
     if model.link is not None:
         return load_link(model.link, context.at("link"))
     if model.stiffness is not None:
@@ -69,12 +56,11 @@ def _spring_matrix(model: SpringModel, context: Context) -> Matrix6:
 
 def build_matrix(model: Matrix, word: str, context: Context) -> Matrix6:
     """Symmetric positive semidefinite 6x6 in SI, exactly as written."""
-    dimensions = _COMPLIANCE if word == "compliance" else _STIFFNESS
     matrix = np.zeros((6, 6))
 
     def read(number: Number, i: int, j: int) -> float:
         low, high = sorted((i, j))
-        return context.si(number, dimensions[(i > 2) + (j > 2)], f"{word}.k{low + 1}{high + 1}")
+        return context.si(number, entry_dimension(word, i, j), f"{word}.k{low + 1}{high + 1}")
 
     for i, row in enumerate(model.rows or []):
         matrix[i] = [read(number, i, j) for j, number in enumerate(row)]
@@ -102,110 +88,75 @@ def _check(matrix: NDArray[np.float64], word: str, context: Context) -> None:
         )
 
 
-def build_beam(beam: Beam, context: Context) -> NDArray[np.float64]:
-    """Compliance (6, 6) of a beam, SI."""
-    length = _positive(beam.length, LENGTH, "length", context)
+def build_beam(beam: Beam, context: Context) -> BeamNumbers:
+    """What a beam is computed from, SI; raises `FileError` where the numbers make no beam."""
+    length = _read(beam, ("length",), context)
     if beam.EA is not None:
-        dims = (FORCE, BENDING, BENDING, BENDING)
-        given = [(name, getattr(beam, name), dim) for name, dim in zip(beam.products, dims, strict=True)]
-        values = [_positive(number, dim, name, context) for name, number, dim in given]
-    else:
-        e, g = _moduli(beam, context)
-        s = _section(beam, context)
-        values = [e * s.area, g * s.torsion, e * s.about_width, e * s.about_height]
-    return beams.cantilever_compliance(length, beam.along, *values)
-
-
-def _beam_numbers(beam: Beam, context: Context) -> BeamNumbers:
-    """What a beam that has been built was computed from, SI."""
-    given: list[tuple[str, Number, Dimension]] = [("length", beam.length, LENGTH)]
-    material = context.materials[beam.material] if isinstance(beam.material, str) else beam.material
+        return BeamNumbers(beam.along, (*length, *_read(beam, beams.products(beam.along), context)))
+    material = _material(beam, context)
     if material is None:
-        dimensions = (FORCE, BENDING, BENDING, BENDING)
-        pairs = zip(beam.products, dimensions, strict=True)
-        given += [(name, getattr(beam, name), dimension) for name, dimension in pairs]
-    else:
-        sort = next(s for s in SECTIONS if getattr(beam, s) is not None)
-        given += [(f"{sort}.{k}", getattr(getattr(beam, sort), k), LENGTH) for k in SECTIONS[sort][0]]
-        given.append(("material.E", material.E, MODULUS))
-        second, dimension = ("G", MODULUS) if material.G is not None else ("nu", NONE)
-        given.append((f"material.{second}", getattr(material, second), dimension))
-    return BeamNumbers(beam.along, tuple((name, context.si(n, d)) for name, n, d in given))
+        known = ", ".join(context.materials) or "none"
+        context.at("material").fail(f"unknown material '{beam.material}'; declared under materials: {known}")
+    shear = "G" if material.G is not None else "nu"
+    moduli = _read(material, ("E", shear), context, "material.")
+    return BeamNumbers(beam.along, (*length, *_section(beam, context)[1], *moduli))
+
+
+def _read(
+    holder: FileModel, keys: Sequence[str], context: Context, prefix: str = ""
+) -> tuple[tuple[str, float], ...]:
+    """Numbers of a beam, SI, by their keys; all but Poisson's ratio are positive."""
+    out = []
+    for key in keys:
+        full, given = prefix + key, getattr(holder, key)
+        if given.value <= 0.0 and key != "nu":
+            context.at(*full.split(".")).fail(f"must be positive; found {given.value}")
+        out.append((full, context.si(given, beams.dimension(full), f"beam.{full}")))
+    return tuple(out)
+
+
+def _material(beam: Beam, context: Context) -> Material | None:
+    """None where none of this name is declared."""
+    return context.materials.get(beam.material) if isinstance(beam.material, str) else beam.material
+
+
+def _section(beam: Beam, context: Context) -> tuple[str, tuple[tuple[str, float], ...]]:
+    """Which section a beam has, and its numbers."""
+    sort = next(s for s in beams.SECTIONS if getattr(beam, s) is not None)
+    numbers = _read(getattr(beam, sort), beams.SECTIONS[sort][0], context, f"{sort}.")
+    fault = beams.section_fault(sort, dict(numbers))
+    if fault:
+        context.at(sort).fail(fault)
+    return sort, numbers
 
 
 def beam_body(beam: Beam, context: Context) -> tuple[float, float, NDArray[np.float64]]:
     """Mass, length and inertia (3, 3) about its centre, SI, of a uniform beam with a section and a density."""
-    material = beam.material
-    if isinstance(material, str):
-        material = context.materials.get(material)  # an unknown one is refused where the spring is built
+    material = _material(beam, context)  # an unknown one is refused where the spring is built
     if beam.EA is not None or material is None or material.density is None:
         lacks = "a section" if beam.EA is not None else "a material with a density"
         context.fail(f"no mass: the beam has not {lacks}; give one, or the body's mass")
-    density = _positive(material.density, DENSITY, "material.density", context)
-    length, section = _positive(beam.length, LENGTH, "length", context), _section(beam, context)
-    mass = density * section.area * length
+    ((_, density),) = _read(material, ("density",), context, "material.")
+    ((_, length),) = _read(beam, ("length",), context)
+    sort, numbers = _section(beam, context)
+    s = beams.section(sort, dict(numbers))
+    mass = density * s.area * length
     i = "xyz".index(beam.along[-1])
     about = np.zeros(3)
-    about[i] = density * length * (section.about_width + section.about_height)
-    about[(i + 1) % 3] = mass * length**2 / 12 + density * length * section.about_width
-    about[(i + 2) % 3] = mass * length**2 / 12 + density * length * section.about_height
+    about[i] = density * length * (s.about_width + s.about_height)
+    about[(i + 1) % 3] = mass * length**2 / 12 + density * length * s.about_width
+    about[(i + 2) % 3] = mass * length**2 / 12 + density * length * s.about_height
     return mass, length, np.diag(about)
-
-
-def _moduli(beam: Beam, context: Context) -> tuple[float, float]:
-    material = beam.material
-    if isinstance(material, str):
-        if material not in context.materials:
-            known = ", ".join(context.materials) or "none"
-            context.at("material").fail(f"unknown material '{material}'; declared under materials: {known}")
-        material = context.materials[material]
-    assert material is not None  # the schema asks for it next to a section
-    e = _positive(material.E, MODULUS, "material.E", context)
-    if material.G is not None:
-        return e, _positive(material.G, MODULUS, "material.G", context)
-    assert material.nu is not None
-    return e, e / (2 * (1 + context.si(material.nu, NONE, "beam.material.nu")))
-
-
-def _section(beam: Beam, context: Context) -> beams.Section:
-    if beam.round is not None:
-        return beams.round_section(_positive(beam.round.diameter, LENGTH, "round.diameter", context))
-    if beam.tube is not None:
-        outer = _positive(beam.tube.outer, LENGTH, "tube.outer", context)
-        inner = _positive(beam.tube.inner, LENGTH, "tube.inner", context)
-        if inner >= outer:
-            context.at("tube").fail("the inner diameter must be smaller than the outer one")
-        return beams.tube_section(outer, inner)
-    shape, sort = (beam.rectangle, "rectangle") if beam.rectangle is not None else (beam.hollow, "hollow")
-    assert shape is not None
-    width = _positive(shape.width, LENGTH, f"{sort}.width", context)
-    height = _positive(shape.height, LENGTH, f"{sort}.height", context)
-    if beam.hollow is None:
-        return beams.rectangle_section(width, height)
-    wall = _positive(beam.hollow.wall, LENGTH, "hollow.wall", context)
-    if 2 * wall >= min(width, height):
-        context.at("hollow").fail("twice the wall must be smaller than width and height")
-    return beams.hollow_section(width, height, wall)
-
-
-def _positive(number: Number, dimension: Dimension, name: str, context: Context) -> float:
-    if number.value <= 0.0:
-        context.at(*name.split(".")).fail(f"must be positive; found {number.value}")
-    return context.si(number, dimension, f"beam.{name}")
 
 
 def build_law(model: LawModel, angular: bool, context: Context, name: str) -> Law:
     """SI law of a translation or a rotation."""
-    stiffness = context.si(model.stiffness, _STIFFNESS[2 if angular else 0], f"{name}.stiffness")
-    cubic = 0.0
-    if model.cubic is not None:
-        dimension = Dimension(length=1, force=1, angle=-3) if angular else Dimension(force=1, length=-3)
-        cubic = context.si(model.cubic, dimension, f"{name}.cubic")
+    numbers = build_numbers(model, Law, angular, context, f"{name}.")
     across, along = (ANGLE, MOMENT) if angular else (LENGTH, FORCE)
     knots = tuple((context.si(a, across), context.si(f, along)) for a, f in model.knots or [])
     if any(b < a or g < f for (a, f), (b, g) in pairwise(knots)):
         context.at("knots").fail("knots must not decrease in deflection or force")
-    return Law(stiffness, cubic, knots)
+    return Law(**numbers, knots=knots)
 
 
 def load_link(name: str, context: Context) -> Matrix6:

@@ -22,14 +22,12 @@ from stiffmap.model.description import (
     Spring,
     TableStroke,
 )
-from stiffmap.model.description.numbers import numbers_of
+from stiffmap.model.description.numbers import DIRECTIONS, numbers_of
 from stiffmap.model.description.pose import IDENTITY, Rows
 from stiffmap.model.description.strokes import present_rows
 from stiffmap.model.files.schema.geometry import NAMED
-from stiffmap.model.files.schema.springs import DIRECTIONS
 
 Plain = dict[str, Any]
-ZERO3 = (0.0, 0.0, 0.0)
 _NAMES = {vector: name for name, vector in NAMED.items()}
 
 
@@ -58,7 +56,7 @@ def dump_element(element: Element) -> Plain:
         case Body():
             return _body(element)
         case Point():
-            return {"point": element.name, "at": floats(element.offset)}
+            return {"point": element.name, **dump_numbers(element)}
         case Block():
             branches = {branch.name: dump_elements(branch.elements) for branch in element.branches}
             return {"block": element.name, "branches": branches}
@@ -95,16 +93,12 @@ def _refuse_unsaved(joint: Joint) -> None:
 
 def _joint(joint: Joint) -> Plain:
     _refuse_unsaved(joint)
+    axes = [_axis(axis) for axis in joint.axes]
     plain: Plain = {"joint": joint.name, "kind": joint.kind}
-    if len(joint.axes) == 1:
-        plain["axis"] = _axis(joint.axes[0])
-    else:
-        plain["axes"] = [_axis(axis) for axis in joint.axes]
-    plain["home"] = float(joint.home[0]) if len(joint.home) == 1 else floats(joint.home)
-    plain.update(_numbers(joint))
-    if joint.rest is not None:
-        plain["rest"] = float(joint.rest[0]) if len(joint.rest) == 1 else floats(joint.rest)
-    return {**plain, **_law(joint.law), **_axis_laws(joint)}
+    plain.update({"axis": axes[0]} if len(axes) == 1 else {"axes": axes})
+    numbers = dump_numbers(joint)
+    rest = {"rest": numbers.pop("rest")} if "rest" in numbers else {}
+    return {**plain, **numbers, **rest, **_law(joint.law), **_axis_laws(joint)}
 
 
 def _axis_laws(joint: Joint) -> Plain:
@@ -117,50 +111,51 @@ def _axis_laws(joint: Joint) -> Plain:
 
 def _actuator(joint: Joint) -> Plain:
     _refuse_unsaved(joint)
-    plain: Plain = {
+    numbers = dump_numbers(joint)
+    return {
         "actuator": joint.name,
         "kind": joint.kind,
         "axis": _axis(joint.axes[0]),
-        "home": float(joint.home[0]),
+        "home": numbers.pop("home"),
         **(_law(joint.law) or {"rigid": True}),
+        **numbers,
+        **_drive(joint),
     }
-    plain.update(_numbers(joint))
+
+
+def _cable(cable: Cable) -> Plain:
+    _refuse_unsaved(cable)
+    numbers = dump_numbers(cable)
+    places = {"anchor": numbers.pop("anchor"), "at": numbers.pop("at")}
+    guide = {} if cable.guide == Cable.guide else {"guide": _axis(cable.guide)}
+    return {"cable": cable.name, **places, **guide, **numbers, **_drive(cable)}
+
+
+def _drive(joint: Joint) -> Plain:
+    """Numbers of the motor, and errors of its commands."""
+    plain = {} if joint.drive is None else dump_numbers(joint.drive)
     if joint.command_errors:
         plain["command_errors"] = [_command_error(error) for error in joint.command_errors]
     return plain
 
 
-def _cable(cable: Cable) -> Plain:
-    _refuse_unsaved(cable)
-    plain: Plain = {"cable": cable.name, "anchor": floats(cable.anchor), "at": floats(cable.at)}
-    if cable.guide != Cable.guide:
-        plain["guide"] = _axis(cable.guide)
-    plain.update(_numbers(cable))
-    if cable.command_errors:
-        plain["command_errors"] = [_command_error(error) for error in cable.command_errors]
-    return plain
-
-
-def _numbers(joint: Joint) -> Plain:
-    """What the joint and its drive declare and have, under the keys of a file."""
+def dump_numbers(holder: Any) -> Plain:
+    """The numbers that a dataclass declares and has, under the keys of a file."""
     plain: Plain = {}
-    for holder in (joint, joint.drive):
-        for n in () if holder is None else numbers_of(holder):
-            value = getattr(holder, n.name)
-            if value is None or value == n.default:
-                continue
-            outer, _, inner = n.key.partition(".")
-            entry = floats(value) if n.interval else float(value)
-            if inner:
-                plain.setdefault(outer, {})[inner] = entry
-            else:
-                plain[outer] = entry
+    for n in numbers_of(holder):
+        value = getattr(holder, n.name)
+        if value is None or (value == n.default and not n.saved):
+            continue
+        outer, _, inner = n.key.partition(".")
+        single = not n.shape or (n.shape == "axes" and len(value) == 1)
+        entry = floats(value if n.shape else [value])
+        holds = plain.setdefault(outer, {}) if inner else plain
+        holds[inner or outer] = entry[0] if single else entry
     return plain
 
 
 def _command_error(error: CommandError) -> Plain:
-    changed = {key: value for key, value in vars(error).items() if value != getattr(CommandError, key)}
-    return {key: floats(value) if key == "knots" else float(value) for key, value in changed.items()}
+    return {**dump_numbers(error), **({"knots": floats(error.knots)} if error.knots else {})}
 
 
 def _law(law: Law | None) -> Plain:
@@ -171,12 +166,7 @@ def _law(law: Law | None) -> Plain:
 
 
 def _law_terms(law: Law) -> Plain:
-    plain: Plain = {"stiffness": float(law.stiffness)}
-    if law.cubic:
-        plain["cubic"] = float(law.cubic)
-    if law.knots:
-        plain["knots"] = floats(law.knots)
-    return plain
+    return {**dump_numbers(law), **({"knots": floats(law.knots)} if law.knots else {})}
 
 
 def _spring(spring: Spring) -> Plain:
@@ -186,11 +176,7 @@ def _spring(spring: Spring) -> Plain:
             plain[word] = dump_matrix(getattr(spring, word))
     if spring.laws:
         plain["laws"] = {DIRECTIONS[i]: _law_terms(law) for i, law in spring.laws}
-    if any(spring.rest):
-        plain["rest"] = floats(spring.rest)
-    if spring.loss_factor is not None:
-        plain["loss_factor"] = float(spring.loss_factor)
-    return {**plain, **_stroke(spring)}
+    return {**plain, **dump_numbers(spring), **_stroke(spring)}
 
 
 def _stroke(spring: Spring) -> Plain:
@@ -228,9 +214,7 @@ def dump_matrix(rows: Any) -> Any:
 
 
 def _body(body: Body) -> Plain:
-    plain: Plain = {"body": body.name, "mass": float(body.mass)}
-    if body.com != ZERO3:
-        plain["com"] = floats(body.com)
+    plain: Plain = {"body": body.name, **dump_numbers(body)}
     inertia = np.array(body.inertia)
     if np.any(inertia != np.diag(np.diag(inertia))):
         plain["inertia"] = floats(body.inertia)

@@ -23,7 +23,7 @@ from stiffmap.model.description import (
     MachineDescription,
     Offset,
 )
-from stiffmap.model.files.dump_elements import Plain, dump_elements, dump_pose, floats
+from stiffmap.model.files.dump_elements import Plain, dump_elements, dump_numbers, dump_pose, floats
 from stiffmap.model.files.load import description_from_text
 
 
@@ -104,9 +104,7 @@ def _box(box: Any) -> Plain:
 def _external_spring(spring: ExternalSpring) -> Plain:
     return {
         "point": spring.point,
-        "anchor": floats(spring.anchor),
-        "stiffness": float(spring.stiffness),
-        "length": float(spring.length),
+        **dump_numbers(spring),
         "tension_only": bool(spring.tension_only),
     }
 

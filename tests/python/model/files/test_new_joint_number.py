@@ -13,7 +13,7 @@ import stiffmap
 from stiffmap import _core
 from stiffmap.common.units import Dimension
 from stiffmap.model.description import Drive, Joint
-from stiffmap.model.description.numbers import JointNumber, numbers_of
+from stiffmap.model.description.numbers import DeclaredNumber, numbers_of
 
 LINE = '    lash: float | None = number("wear.lash", "Lost motion.", coordinate=1, lower=0.0, upper=0.01)\n'
 BEFORE = '    speed: float | None = number("speed"'
@@ -96,7 +96,7 @@ def test_keys_are_unique_and_bounds_in_order(holder: type) -> None:
 
 
 def test_units_follow_the_joint() -> None:
-    viscous = JointNumber("friction.viscous", "", coordinate=-1, effort=1)
+    viscous = DeclaredNumber("friction.viscous", "", coordinate=-1, effort=1)
     assert viscous.dimension(angular=False) == Dimension(length=-1, force=1)
     assert viscous.dimension(angular=True) == Dimension(length=1, force=1, angle=-1)
 

@@ -7,53 +7,59 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from pydantic import Discriminator, Field, Tag, create_model, model_validator
 from pydantic_core import PydanticCustomError
 
-from stiffmap.model.description import Cable, Drive, Joint
-from stiffmap.model.description.numbers import JointNumber, numbers_of
+from stiffmap.model.description import Body, Cable, CommandError, Drive, Joint, Point, Spring
+from stiffmap.model.description.numbers import DIRECTIONS, DeclaredNumber, numbers_of
 from stiffmap.model.files.schema.base import FileModel, Name, Number, Numbers, Pair, Source, Vector3
 from stiffmap.model.files.schema.geometry import Axis, Frame
-from stiffmap.model.files.schema.springs import DIRECTIONS, Beam, LawModel, Matrix, Stroke
+from stiffmap.model.files.schema.springs import Beam, LawModel, Matrix, Stroke
 
 SORTS = ("offset", "joint", "actuator", "spring", "body", "point", "block", "cable")
+SHAPES: dict[str, Any] = {
+    "": Number,
+    "interval": Pair,
+    "vector": Vector3,
+    "directions": Annotated[list[Number], Field(min_length=6, max_length=6)],
+}
 AXES_OF = {"revolute": 1, "prismatic": 1, "universal": 2, "spherical": 3}
 
 
-def _model(name: str, numbers: dict[str, JointNumber]) -> type[FileModel]:
+def _model(name: str, numbers: dict[str, DeclaredNumber]) -> type[FileModel]:
     """Keys of these numbers; those with a dot in their key in mappings of their own."""
     keys: dict[str, Any] = {}
-    inner: dict[str, dict[str, JointNumber]] = {}
+    inner: dict[str, dict[str, DeclaredNumber]] = {}
     for key, n in numbers.items():
         outer, _, rest = key.partition(".")
         if rest:
             inner.setdefault(outer, {})[rest] = n
         else:
-            keys[key] = ((Pair if n.interval else Number) | None, Field(default=None, description=n.doc))
+            keys[key] = (SHAPES[n.shape] | None, Field(default=None, description=n.doc or None))
     keys |= {k: (_model(k.capitalize(), v) | None, None) for k, v in inner.items()}
     return create_model(name, __base__=FileModel, **keys)
 
 
-def _numbers(name: str, *, passive: bool, of: type = Joint) -> type[FileModel]:
-    """Keys of all declared numbers of a joint with a drive, or of a passive one."""
-    found = (*numbers_of(of), *(() if passive else numbers_of(Drive)))
-    return _model(name, {n.key: n for n in found if n.passive or not passive})
+def _numbers(name: str, *holders: type, passive: bool = False) -> type[FileModel]:
+    """Keys of the numbers that these declare, all or those that a passive joint has; those that a file must have and
+    those of each axis have rules of their own, below."""
+    found = [n for holder in holders for n in numbers_of(holder) if n.passive or not passive]
+    return _model(name, {n.key: n for n in found if not n.needed and n.shape != "axes"})
 
 
-if TYPE_CHECKING:  # the keys are made from the numbers that Joint and Drive declare
-
-    class PassiveNumbers(FileModel):
-        """Keys of the numbers of a passive joint."""
-
-    class DriveNumbers(FileModel):
-        """Keys of the numbers of a joint with a drive."""
-
-    class CableNumbers(FileModel):
-        """Keys of the numbers of a cable and its winch."""
-
+if TYPE_CHECKING:  # the keys are made from the numbers that the elements declare
+    from stiffmap.model.files.schema.base import FileModel as BodyNumbers
+    from stiffmap.model.files.schema.base import FileModel as CableNumbers
+    from stiffmap.model.files.schema.base import FileModel as CommandErrorNumbers
+    from stiffmap.model.files.schema.base import FileModel as DriveNumbers
+    from stiffmap.model.files.schema.base import FileModel as PassiveNumbers
+    from stiffmap.model.files.schema.base import FileModel as PointNumbers
+    from stiffmap.model.files.schema.base import FileModel as SpringNumbers
 else:
-    PassiveNumbers, DriveNumbers, CableNumbers = (
-        _numbers("PassiveNumbers", passive=True),
-        _numbers("DriveNumbers", passive=False),
-        _numbers("CableNumbers", passive=False, of=Cable),
-    )
+    PassiveNumbers = _numbers("PassiveNumbers", Joint, passive=True)
+    DriveNumbers = _numbers("DriveNumbers", Joint, Drive)
+    CableNumbers = _numbers("CableNumbers", Cable, Drive)
+    CommandErrorNumbers = _numbers("CommandErrorNumbers", CommandError)
+    SpringNumbers = _numbers("SpringNumbers", Spring)
+    BodyNumbers = _numbers("BodyNumbers", Body)
+    PointNumbers = _numbers("PointNumbers", Point)
 
 
 class OffsetModel(Frame):
@@ -107,16 +113,10 @@ class JointModel(PassiveNumbers):
         return self
 
 
-class CommandErrorModel(FileModel):
+class CommandErrorModel(CommandErrorNumbers):
     """Error added to the commanded coordinate u: offset + slope*(u - reference) + amplitude*sin(...), and the
     axis positioning error at u by ``knots``: [coordinate, error] by rising coordinate."""
 
-    offset: Number | None = None
-    slope: Number | None = None
-    amplitude: Number | None = None
-    period: Number | None = None
-    phase: Number | None = None
-    reference: Number | None = None
     knots: list[Pair] | None = None
 
 
@@ -147,7 +147,6 @@ class CableModel(CableNumbers):
 
     cable: Name
     anchor: Annotated[Vector3, Field(description="Where it enters its guide, base axes.")]
-    at: Annotated[Vector3 | None, Field(description="Where it is fixed, in the current frame.")] = None
     guide: Annotated[Axis | None, Field(description="Axis about which the pulley turns, base axes.")] = None
     command_errors: list[CommandErrorModel] | None = None
     source: Source | None = None
@@ -160,7 +159,7 @@ class CableModel(CableNumbers):
         return self
 
 
-class SpringModel(FileModel):
+class SpringModel(SpringNumbers):
     """Virtual spring of a link, at the place where its compliance holds."""
 
     spring: Name
@@ -169,9 +168,7 @@ class SpringModel(FileModel):
     beam: Beam | None = None
     link: Annotated[str, Field(description="Identified link file, relative to this file.")] | None = None
     laws: dict[Literal[DIRECTIONS], LawModel] | None = None  # type: ignore[valid-type]
-    rest: Annotated[list[Number], Field(min_length=6, max_length=6)] | None = None
     stroke: Stroke | None = None
-    loss_factor: Annotated[Number | None, Field(description="Structural loss factor.")] = None
     source: Source | None = None
     note: str = ""
 
@@ -196,30 +193,27 @@ class SpringModel(FileModel):
         return self
 
 
-class BodyModel(FileModel):
+class BodyModel(BodyNumbers):
     """Rigid body that moves with the current frame; of a link with a section, mass, centre and inertia follow from it
     where they are not given."""
 
     body: Name
-    mass: Number | None = None
     of: Annotated[Name | None, Field(description="Spring of the same sequence whose beam it is.")] = None
-    com: Vector3 | None = None
     inertia: list[Number | Vector3] | None = None
     source: Source | None = None
     note: str = ""
 
     @model_validator(mode="after")
     def _mass(self) -> BodyModel:
-        if self.mass is None and self.of is None:
+        if getattr(self, "mass", None) is None and self.of is None:
             raise PydanticCustomError("mass", "a body needs a mass, or of: the spring whose beam it is")
         return self
 
 
-class PointModel(FileModel):
+class PointModel(PointNumbers):
     """Named point that moves with the current frame."""
 
     point: Name
-    at: Vector3 | None = None
     source: Source | None = None
     note: str = ""
 

@@ -9,7 +9,6 @@ from pydantic_core import PydanticCustomError
 
 from stiffmap.model.files.schema.base import FileModel, Name, Number, Pair, describe
 
-DIRECTIONS = ("tx", "ty", "tz", "rx", "ry", "rz")
 ENTRIES = tuple(f"k{i}{j}" for i in range(1, 7) for j in range(i, 7))
 DIAGONAL = tuple(f"k{i}{i}" for i in range(1, 7))
 
