@@ -25,6 +25,8 @@ from stiffmap.model.description import (
     Spring,
 )
 from stiffmap.model.effects import apply_records
+from stiffmap.model.effects.edit import built as as_built
+from stiffmap.model.effects.library.geometry import about, home_position
 
 FRAME = ("x", "y", "z", "rx", "ry", "rz")
 END = "end"
@@ -74,27 +76,19 @@ def _sequence(
             out.append(e)
             continue
         if isinstance(e, Joint) and any(k in change for k in FRAME):
-            out.append(Offset(f"{e.name}_frame", Pose(), _about(_pivot(e), _pose(change))))
+            frame = _pose(change)
+            turned = about(home_position(e), frame.r)
+            out.append(as_built(f"{e.name}_frame", Pose.of(turned.p + frame.p, frame.r)))
         out.append(_changed(e, change))
     last = of.get(f"{path}.{END}")
     if end and last is not None:
-        out.append(Offset(f"{path}_{END}", Pose(), _pose(last)))
+        out.append(as_built(f"{path}_{END}", _pose(last)))
     return tuple(out)
 
 
 def _pose(change: Mapping[str, Any]) -> Pose:
     t, r = (np.array([change.get(k, 0.0) for k in part]) for part in (FRAME[:3], FRAME[3:]))
     return Pose.of(t, Rotation.from_rotvec(r).as_matrix())
-
-
-def _about(pivot: np.ndarray[tuple[int], np.dtype[np.float64]], pose: Pose) -> Pose:
-    return Pose.of(pivot - pose.r @ pivot + pose.p, pose.r)
-
-
-def _pivot(e: Element) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-    """Where a sliding joint stands at home; the frame itself for all others."""
-    slides = isinstance(e, Joint) and e.kind == "prismatic"
-    return np.array(e.axes[0]) * e.home[0] if slides and isinstance(e, Joint) else np.zeros(3)
 
 
 def _changed(e: Element, change: Mapping[str, Any]) -> Element:
@@ -112,20 +106,14 @@ def _length(e: Element, by: float) -> Element:
     return replace(e, actual=Pose.of(now.p + by * along, now.r))
 
 
-def _zero(e: Element, by: float) -> Element:
+def _with_error(e: Element, error: CommandError) -> Element:
     assert isinstance(e, Joint)
-    return replace(e, command_errors=(*e.command_errors, CommandError(offset=by)))
+    return replace(e, command_errors=(*e.command_errors, error))
 
 
 def _gain(e: Element, by: float) -> Element:
     assert isinstance(e, Joint)
-    error = CommandError(slope=by, reference=e.home[0])
-    return replace(e, command_errors=(*e.command_errors, error))
-
-
-def _travel(e: Element, knots: Knots) -> Element:
-    assert isinstance(e, Joint)
-    return replace(e, command_errors=(*e.command_errors, CommandError(knots=knots)))
+    return _with_error(e, CommandError(slope=by, reference=e.home[0]))
 
 
 def _compliance(e: Element, by: float) -> Element:
@@ -150,9 +138,9 @@ def _mass(e: Element, by: float) -> Element:
 
 CHANGES: dict[str, tuple[tuple[type, ...], Callable[[Element, Any], Element]]] = {
     "length": ((Offset,), _length),
-    "zero": ((Joint,), _zero),
+    "zero": ((Joint,), lambda e, by: _with_error(e, CommandError(offset=by))),
     "gain": ((Joint,), _gain),
-    "travel": ((Joint,), _travel),
+    "travel": ((Joint,), lambda e, knots: _with_error(e, CommandError(knots=knots))),
     "compliance": ((Joint, Spring), _compliance),
     "mass": ((Body,), _mass),
 }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from stiffmap.model.addresses.fields import Field, field_of
+from stiffmap.model.addresses.fields import Field, field_of, vector_fields
 from stiffmap.model.addresses.places import machine_fields
 from stiffmap.model.description import (
     Body,
@@ -73,17 +73,10 @@ def _field(element: Element, field: str) -> Field | None:
             return None
     elif not field.startswith(COUNTED.get(type(element), ())):
         return None
-    found = field_of(element, field)
-    if found is None or not isinstance(element, Offset):
-        return found
-    if field.startswith("actual."):
-        return found
-    if element.actual is not None:
-        return None  # an error that the file states goes before
-    i, nominal = "xyz".index(field[-1]), element.nominal
-
-    def put(value: float) -> Element:
-        t = nominal.translation
-        return replace(element, actual=Pose((*t[:i], value, *t[i + 1 :]), nominal.rotation))  # type: ignore[arg-type]
-
-    return found._replace(put=put)
+    if isinstance(element, Offset) and field.startswith("translation."):
+        if element.actual is not None:
+            return None  # an error that the file states goes before
+        t, r = element.nominal.translation, element.nominal.rotation
+        built = vector_fields(t, "translation.", "m", lambda v: replace(element, actual=Pose(v, r)))
+        return dict(built).get(field)
+    return field_of(element, field)

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import NamedTuple
 
-from stiffmap.model.addresses.fields import fields
-from stiffmap.model.addresses.places import machine_fields
-from stiffmap.model.description import Block, MachineDescription, tree
+from stiffmap.model.addresses.fields import Field
+from stiffmap.model.addresses.places import all_fields
+from stiffmap.model.description import MachineDescription
 
 
 class Listed(NamedTuple):
@@ -23,29 +22,15 @@ class Listed(NamedTuple):
 
 def listed(description: MachineDescription) -> list[Listed]:
     """Every number under the address by which files keep its uncertainty."""
-    uncertainty, notes = dict(description.uncertainty), dict(description.notes)
-    sources = dict(getattr(description, "sources", ()))
-    rows = []
-    for address, value, unit in _plain(description):
+    uncertainty, notes, sources = (
+        dict(description.uncertainty),
+        dict(description.notes),
+        dict(description.sources),
+    )
+
+    def row(address: str, field: Field) -> Listed:
         name = address.partition("/")[0]
-        rows.append(
-            Listed(
-                address,
-                float(value),
-                unit,
-                uncertainty.get(address),
-                str(sources.get(address, sources.get(name, ""))),
-                notes.get(address, notes.get(name, "")),
-            )
-        )
-    return rows
+        source, note = (known.get(address, known.get(name, "")) for known in (sources, notes))
+        return Listed(address, float(field.value), field.unit, uncertainty.get(address), source, note)
 
-
-def _plain(description: MachineDescription) -> Iterator[tuple[str, float, str]]:
-    for address, field in machine_fields(description):
-        yield address, field.value, field.unit
-    for full, element in tree.all_elements(description):
-        if not isinstance(element, Block):
-            for key, field in fields(element).items():
-                if field.listed:
-                    yield f"{full}/{key}", field.value, field.unit
+    return [row(address, field) for address, field in all_fields(description) if field.listed]

@@ -31,6 +31,14 @@ def split(address: str) -> tuple[str, str]:
     return name, field
 
 
+def all_fields(description: MachineDescription) -> Iterator[tuple[str, Field]]:
+    """Every number by its address, in the order of the machine's file."""
+    yield from machine_fields(description)
+    for full, element in tree.all_elements(description):
+        for key, field in fields(element).items():
+            yield f"{full}/{key}", field
+
+
 def full_names(description: MachineDescription, name: str) -> list[str]:
     """Full names of the elements that a name stands for, each once; none: there is no such element."""
     every = list(

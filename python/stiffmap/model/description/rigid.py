@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+from collections.abc import Hashable
 from dataclasses import replace
 from functools import lru_cache
 
-from stiffmap.model.description.elements import Block, Body, Element, Joint, Offset, Spring
+from stiffmap.model.description.elements import Body, Element, Joint, Offset, Spring
 from stiffmap.model.description.laws import Law
 from stiffmap.model.description.machine import MachineDescription
-from stiffmap.model.description.tree import Elements, edit_sequences
+from stiffmap.model.description.tree import Elements, edit_elements
 
-Change = Callable[[Element], Element]
 KEPT = 128
 """Sequences whose geometry is kept: variants of a machine share most of theirs."""
 
@@ -27,23 +26,16 @@ def nominal_geometry(description: MachineDescription) -> Hashable:
 def straight(description: MachineDescription) -> MachineDescription:
     """The machine with linear drives and link springs; itself where they are."""
     d = description
-    legs = tuple(replace(leg, elements=_edited(leg.elements, _straight)) for leg in d.legs)
-    ends = _edited(d.base, _straight), _edited(d.platform, _straight)
+    legs = tuple(replace(leg, elements=edit_elements(leg.elements, _straight)) for leg in d.legs)
+    ends = edit_elements(d.base, _straight), edit_elements(d.platform, _straight)
     if (*ends, legs) == (d.base, d.platform, d.legs):
         return description
     return replace(d, base=ends[0], platform=ends[1], legs=legs, effects=(), declared=None)
 
 
-def _edited(elements: Elements, change: Change) -> Elements:
-    def each(sequence: Elements) -> Elements:
-        return tuple(e if isinstance(e, Block) else change(e) for e in sequence)
-
-    return edit_sequences(elements, each)
-
-
 @lru_cache(maxsize=KEPT)
 def _nominal_elements(elements: Elements) -> Elements:
-    return _edited(elements, _nominal)
+    return edit_elements(elements, _nominal)
 
 
 def _nominal(e: Element) -> Element:

@@ -78,6 +78,13 @@ def edit_sequences(elements: Elements, edit: Edit) -> Elements:
     return edit(tuple(inside(element) for element in elements))
 
 
+def edit_elements(elements: Elements, change: Callable[[Element], Element]) -> Elements:
+    """The sequence with ``change`` applied to every element but blocks, those in branches included."""
+    return edit_sequences(
+        elements, lambda sequence: tuple(e if isinstance(e, Block) else change(e) for e in sequence)
+    )
+
+
 def edit_path(elements: Elements, path: str, change: Change) -> Elements | None:
     """The sequence with the elements of a name (branches, then element) changed; None: nothing was."""
     first, _, rest = path.partition(".")

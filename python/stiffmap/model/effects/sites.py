@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -22,88 +23,65 @@ from stiffmap.model.effects.edit import Sites
 from stiffmap.model.effects.types import Place
 
 
-def _by_name(elements: Elements, match: Callable[[Element], bool]) -> dict[str, tuple[int, ...]]:
-    found: dict[str, tuple[int, ...]] = {}
-    for i, e in enumerate(elements):
-        if match(e):
-            found[e.name] = (*found.get(e.name, ()), i)
-    return found
+def named(match: Callable[[Element], bool]) -> Sites:
+    """The elements of a sequence that match, by their names."""
+
+    def find(elements: Elements) -> dict[str, tuple[int, ...]]:
+        found: dict[str, tuple[int, ...]] = {}
+        for i, e in enumerate(elements):
+            if match(e):
+                found[e.name] = (*found.get(e.name, ()), i)
+        return found
+
+    return find
 
 
-def drives(elements: Elements) -> dict[str, tuple[int, ...]]:
-    """Actuated joints."""
-    return _by_name(elements, lambda e: isinstance(e, Joint) and e.actuated)
-
-
-def elastic_drives(elements: Elements) -> dict[str, tuple[int, ...]]:
-    """Actuated joints with a compliance."""
-    return _by_name(elements, lambda e: isinstance(e, Joint) and e.actuated and e.law is not None)
+drives = named(lambda e: isinstance(e, Joint) and e.actuated)
+"""Actuated joints."""
+elastic_drives = named(lambda e: isinstance(e, Joint) and e.actuated and e.law is not None)
+"""Actuated joints with a compliance."""
+elastic_joints = named(lambda e: isinstance(e, Joint) and e.law is not None)
+"""Joints with a law for all axes."""
+guides = named(
+    lambda e: isinstance(e, Joint) and e.actuated and e.kind == "prismatic" and not isinstance(e, Cable)
+)
+"""Actuated sliders."""
+cables = named(lambda e: isinstance(e, Cable))
+"""Cables and belts."""
+led_cables = named(lambda e: isinstance(e, Cable) and e.lead > 0.0)
+"""Cables with a lead between winch and guide."""
+free_joints = named(lambda e: isinstance(e, Joint) and e.free)
+"""Passive joints without a law."""
+passive_joints = named(lambda e: isinstance(e, Joint) and not e.actuated)
+"""Passive joints."""
+joints = named(lambda e: isinstance(e, Joint) and not isinstance(e, Cable))
+"""All joints; a cable is none."""
+springs = named(lambda e: isinstance(e, Spring))
+"""Link springs."""
+bodies = named(lambda e: isinstance(e, Body))
+"""Bodies."""
+offsets = named(lambda e: isinstance(e, Offset) and bool(np.any(e.nominal.p)))
+"""Offsets that are longer than zero."""
+blocks = named(lambda e: isinstance(e, Block) and len(e.branches) == 2)
+"""Parallel blocks of two branches."""
 
 
 def elastic_directions(elements: Elements) -> dict[str, tuple[int, ...]]:
     """Elastic joints, and single directions of link springs by names such as ``foot.k22``, where no other
     direction is coupled to them."""
-    out = _by_name(elements, lambda e: isinstance(e, Joint) and e.law is not None)
+    out = elastic_joints(elements)
     for i in range(6):
-        for name, at in _by_name(elements, lambda e: _alone(e, i)).items():  # noqa: B023 - used at once
+        for name, at in named(partial(_alone, i))(elements).items():
             out[f"{name}.k{i + 1}{i + 1}"] = at
     return out
 
 
-def _alone(e: Element, i: int) -> bool:
+def _alone(i: int, e: Element) -> bool:
     if not isinstance(e, Spring):
         return False
     m = e.compliance or e.stiffness
     assert m is not None
     return m[i][i] > 0.0 and not any(m[i][k] or m[k][i] for k in range(6) if k != i)
-
-
-def guides(elements: Elements) -> dict[str, tuple[int, ...]]:
-    """Actuated sliders."""
-    return _by_name(
-        elements,
-        lambda e: isinstance(e, Joint) and e.actuated and e.kind == "prismatic" and not isinstance(e, Cable),
-    )
-
-
-def cables(elements: Elements) -> dict[str, tuple[int, ...]]:
-    """Cables and belts."""
-    return _by_name(elements, lambda e: isinstance(e, Cable))
-
-
-def led_cables(elements: Elements) -> dict[str, tuple[int, ...]]:
-    """Cables with a lead between winch and guide."""
-    return _by_name(elements, lambda e: isinstance(e, Cable) and e.lead > 0.0)
-
-
-def free_joints(elements: Elements) -> dict[str, tuple[int, ...]]:
-    """Passive joints without a law."""
-    return _by_name(elements, lambda e: isinstance(e, Joint) and e.free)
-
-
-def passive_joints(elements: Elements) -> dict[str, tuple[int, ...]]:
-    """Passive joints."""
-    return _by_name(elements, lambda e: isinstance(e, Joint) and not e.actuated)
-
-
-def joints(elements: Elements) -> dict[str, tuple[int, ...]]:
-    """All joints; a cable is none."""
-    return _by_name(elements, lambda e: isinstance(e, Joint) and not isinstance(e, Cable))
-
-
-def springs(elements: Elements) -> dict[str, tuple[int, ...]]:
-    """Link springs."""
-    return _by_name(elements, lambda e: isinstance(e, Spring))
-
-
-def bodies(elements: Elements) -> dict[str, tuple[int, ...]]:
-    """Bodies."""
-    return _by_name(elements, lambda e: isinstance(e, Body))
-
-
-def offsets(elements: Elements) -> dict[str, tuple[int, ...]]:
-    """Offsets that are longer than zero."""
-    return _by_name(elements, lambda e: isinstance(e, Offset) and bool(np.any(e.nominal.p)))
 
 
 def links(elements: Elements) -> dict[str, tuple[int, ...]]:
@@ -118,11 +96,6 @@ def links(elements: Elements) -> dict[str, tuple[int, ...]]:
 def lengths(elements: Elements) -> dict[str, tuple[int, ...]]:
     """Links, and offsets by their own names."""
     return {**offsets(elements), **links(elements)}
-
-
-def blocks(elements: Elements) -> dict[str, tuple[int, ...]]:
-    """Parallel blocks of two branches."""
-    return _by_name(elements, lambda e: isinstance(e, Block) and len(e.branches) == 2)
 
 
 def _offset_before(elements: Elements, k: int) -> int | None:

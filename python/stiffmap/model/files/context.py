@@ -104,13 +104,27 @@ class Context:
 
     def si(self, number: Number, dimension: Dimension, field_name: str = "") -> float:
         """SI value; its uncertainty and note are kept under ``field_name`` of the element."""
-        if field_name:
-            self.note(number.note, field_name)
-            self.mark(number.source, field_name)
-            if number.u is not None:
-                u = self._converted(number.u, dimension)
-                self.gathered.uncertainty[f"{self.full}/{field_name}"] = u
+        self._keep(number, dimension, field_name)
         return self._converted(number.value, dimension)
+
+    def inverse(self, number: Number, dimension: Dimension, field_name: str) -> float:
+        """SI value of 1/number (a stiffness from a compliance); the uncertainty follows to first order."""
+        value = self._converted(number.value, dimension)
+        if value <= 0.0 or math.isinf(1.0 / value):
+            self.fail(f"a compliance must be positive (use rigid: true for none); found {number.value}")
+        self._keep(number, dimension, field_name, value**2)
+        return 1.0 / value
+
+    def _keep(self, number: Number, dimension: Dimension, field_name: str, over: float = 1.0) -> None:
+        """What a file says of a number of the element; its uncertainty divided by ``over``."""
+        if not field_name:
+            return
+        self.note(number.note, field_name)
+        self.mark(number.source, field_name)
+        if number.u is not None:
+            self.gathered.uncertainty[f"{self.full}/{field_name}"] = (
+                self._converted(number.u, dimension) / over
+            )
 
     def _converted(self, value: float, dimension: Dimension) -> float:
         try:
@@ -123,15 +137,3 @@ class Context:
                 f"the number is too {size}: {value} (no machine has it; squares and products must be finite)"
             )
         return si
-
-    def inverse(self, number: Number, dimension: Dimension, field_name: str) -> float:
-        """SI value of 1/number (a stiffness from a compliance); the uncertainty follows to first order."""
-        value = self._converted(number.value, dimension)
-        if value <= 0.0 or math.isinf(1.0 / value):
-            self.fail(f"a compliance must be positive (use rigid: true for none); found {number.value}")
-        self.note(number.note, field_name)
-        self.mark(number.source, field_name)
-        if number.u is not None:
-            u = self._converted(number.u, dimension)
-            self.gathered.uncertainty[f"{self.full}/{field_name}"] = u / value**2
-        return 1.0 / value

@@ -14,8 +14,6 @@ from stiffmap.common.yaml_text import text_of
 from stiffmap.model.description import (
     TASK,
     AppliedEffect,
-    Block,
-    Branch,
     Element,
     ExternalSpring,
     Joint,
@@ -23,6 +21,7 @@ from stiffmap.model.description import (
     MachineDescription,
     Offset,
 )
+from stiffmap.model.description.tree import Elements, edit_elements, walk
 from stiffmap.model.files.dump_elements import Plain, dump_elements, dump_numbers, dump_pose, floats
 from stiffmap.model.files.load import description_from_text
 
@@ -126,7 +125,8 @@ def _legs(legs: tuple[Leg, ...]) -> Plain:
     placed = [_placed(leg) for leg in legs]
     middles = [middle for _, middle, _ in placed]
     template = middles[0]
-    shared = len(legs) > 1 and all(_without_home(m) == _without_home(template) for m in middles)
+    bare = [edit_elements(middle, _without_home) for middle in middles]
+    shared = len(legs) > 1 and all(b == bare[0] for b in bare)
     plain = {}
     for leg, (frame, middle, attach) in zip(legs, placed, strict=True):
         chain: Plain = {"template": TEMPLATE} if shared else {"elements": dump_elements(middle)}
@@ -135,7 +135,7 @@ def _legs(legs: tuple[Leg, ...]) -> Plain:
     return {"templates": {TEMPLATE: dump_elements(template)} if shared else {}, "legs": plain}
 
 
-def _placed(leg: Leg) -> tuple[Plain, tuple[Element, ...], Plain]:
+def _placed(leg: Leg) -> tuple[Plain, Elements, Plain]:
     """Frame, elements between, and attachment of a leg."""
     middle = leg.elements
     frame: Plain = {}
@@ -151,29 +151,17 @@ def _is_plain_offset(element: Element, name: str) -> bool:
     return isinstance(element, Offset) and element.name == name and element.actual is None
 
 
-def _without_home(elements: tuple[Element, ...]) -> tuple[Element, ...]:
-    def strip(element: Element) -> Element:
-        if isinstance(element, Joint):
-            return replace(element, home=(0.0,) * len(element.home))
-        if isinstance(element, Block):
-            return replace(
-                element, branches=tuple(Branch(b.name, _without_home(b.elements)) for b in element.branches)
-            )
-        return element
-
-    return tuple(strip(element) for element in elements)
+def _without_home(element: Element) -> Element:
+    return replace(element, home=(0.0,) * len(element.home)) if isinstance(element, Joint) else element
 
 
-def _different_homes(elements: tuple[Element, ...], template: tuple[Element, ...], prefix: str = "") -> Plain:
-    homes: Plain = {}
-    for element, other in zip(elements, template, strict=True):
-        if isinstance(element, Joint) and isinstance(other, Joint) and element.home != other.home:
-            home = floats(element.home)
-            homes[prefix + element.name] = home[0] if len(home) == 1 else home
-        if isinstance(element, Block) and isinstance(other, Block):
-            for a, b in zip(element.branches, other.branches, strict=True):
-                homes.update(_different_homes(a.elements, b.elements, f"{prefix}{a.name}."))
-    return homes
+def _different_homes(elements: Elements, template: Elements) -> Plain:
+    pairs = zip(walk(elements, ""), walk(template, ""), strict=True)
+    return {
+        name.removeprefix("."): dump_numbers(joint)["home"]
+        for (name, joint), (_, other) in pairs
+        if isinstance(joint, Joint) and isinstance(other, Joint) and joint.home != other.home
+    }
 
 
 def _lists(value: Any) -> Any:

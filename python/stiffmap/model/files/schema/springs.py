@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
+from stiffmap.model import beams
 from stiffmap.model.files.schema.base import FileModel, Name, Number, Pair, describe
 
 ENTRIES = tuple(f"k{i}{j}" for i in range(1, 7) for j in range(i, 7))
@@ -85,6 +86,9 @@ class Material(FileModel):
         return self
 
 
+Along = Literal["x", "y", "z", "-x", "-y", "-z"]
+
+
 class Round(FileModel):
     """Solid circular section."""
 
@@ -122,7 +126,7 @@ class Beam(FileModel):
     """
 
     length: Number
-    along: Literal["x", "y", "z", "-x", "-y", "-z"] = "x"
+    along: Along = "x"
     material: Material | Name | None = None
     round: Round | None = None
     tube: Tube | None = None
@@ -134,18 +138,13 @@ class Beam(FileModel):
     EIy: Number | None = None
     EIz: Number | None = None
 
-    @property
-    def products(self) -> tuple[str, str, str, str]:
-        """Names of the four stiffness products of a beam along this axis."""
-        k = "xyz".index(self.along[-1])
-        return ("EA", "GJ", "EI" + "xyz"[(k + 1) % 3], "EI" + "xyz"[(k + 2) % 3])
-
     @model_validator(mode="after")
     def _one_form(self) -> Beam:
-        sections = [k for k in ("round", "tube", "rectangle", "hollow") if getattr(self, k) is not None]
+        sections = [k for k in beams.SECTIONS if getattr(self, k) is not None]
+        needed = beams.products(self.along)
         given = [k for k in ("EA", "GJ", "EIx", "EIy", "EIz") if getattr(self, k) is not None]
         by_section = len(sections) == 1 and self.material is not None and not given
-        by_products = not sections and self.material is None and set(given) == set(self.products)
+        by_products = not sections and self.material is None and set(given) == set(needed)
         if not (by_section or by_products):
             raise PydanticCustomError(
                 "beam",
@@ -153,7 +152,7 @@ class Beam(FileModel):
                 "or exactly {products}; found {found}",
                 {
                     "along": self.along,
-                    "products": ", ".join(self.products),
+                    "products": ", ".join(needed),
                     "found": ", ".join(sections + given + (["material"] if self.material else []))
                     or "neither",
                 },
@@ -190,9 +189,7 @@ class Stroke(FileModel):
     joint: Annotated[str, Field(description="Name in the same sequence or one around it, or a full name.")]
     at: Number | None = None
     length: Annotated[Number | None, Field(description="Left out: that of the beam.")] = None
-    along: Annotated[
-        Literal["x", "y", "z", "-x", "-y", "-z"] | None, Field(description="Left out: that of the beam.")
-    ] = None
+    along: Annotated[Along | None, Field(description="Left out: that of the beam.")] = None
     rate: Annotated[Number | None, Field(description="Left out: 1.")] = None
     table: Annotated[list[StrokeRow] | None, Field(min_length=2)] = None
 
