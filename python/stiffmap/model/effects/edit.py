@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 from stiffmap.model.description import Element, MachineDescription, Offset, Pose
 from stiffmap.model.description.tree import Edit, Elements, edit_sequences
+from stiffmap.model.effects.types import Apply, Placed
 
 Sites = Callable[[Elements], dict[str, tuple[int, ...]]]
 Change = Callable[[Element], Elements]
@@ -37,6 +39,15 @@ def change_sites(
         return out
 
     return edit_legs(description, legs, edit)
+
+
+def changing(sites: Sites, change: Callable[[Any, Placed], Elements]) -> Apply:
+    """The ``apply`` of an effect that makes other elements of each one at its place."""
+
+    def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
+        return change_sites(description, placed.legs, placed.element, sites, lambda e: change(e, placed))
+
+    return apply
 
 
 def splice(elements: Elements, i: int, piece: Elements) -> Elements:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from stiffmap.model.description import Element, Joint, MachineDescription, Pose
+from stiffmap.model.description import Joint, Pose
 from stiffmap.model.description.tree import Elements
-from stiffmap.model.effects.edit import built, change_sites
+from stiffmap.model.effects.edit import built, changing
 from stiffmap.model.effects.library.geometry import about, home_position, names_of, rotation_of, rotations
 from stiffmap.model.effects.sites import at_sites, joints
 from stiffmap.model.effects.types import EffectType, Parameter, Placed
@@ -12,16 +12,11 @@ from stiffmap.model.effects.types import EffectType, Parameter, Placed
 PARAMETERS: tuple[Parameter, ...] = rotations("rotation of the axis")
 
 
-def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
+def tilted(e: Joint, placed: Placed) -> Elements:
     """The rotation before the joint, and its inverse behind it."""
     turn = rotation_of(placed)
-
-    def change(e: Element) -> Elements:
-        assert isinstance(e, Joint)
-        before = built(f"{e.name}_axis_tilt", about(home_position(e), turn))
-        return (before, e, built(f"{e.name}_axis_tilt_back", Pose.of(rotation=turn.T)))
-
-    return change_sites(description, placed.legs, placed.element, joints, change)
+    before = built(f"{e.name}_axis_tilt", about(home_position(e), turn))
+    return (before, e, built(f"{e.name}_axis_tilt_back", Pose.of(rotation=turn.T)))
 
 
 EFFECT = EffectType(
@@ -35,7 +30,7 @@ EFFECT = EffectType(
     ),
     parameters=PARAMETERS,
     places=at_sites(joints),
-    apply=apply,
+    apply=changing(joints, tilted),
     pivot="home position of the carriage; origin of a revolute joint",
     frame="local axes before the joint; about x, then the turned y, then the twice turned z",
     moves="the axis alone",

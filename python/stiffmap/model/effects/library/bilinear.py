@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from stiffmap.model.description import Law, MachineDescription
+from stiffmap.model.description import Law
 from stiffmap.model.effects.evidence import Probe, Signature, Tried, shares_of_load
-from stiffmap.model.effects.library.drive_law import change_law, in_unit_of_joint, linear
+from stiffmap.model.effects.library.drive_law import changing_law, in_unit_of_joint, linear
 from stiffmap.model.effects.sites import at_sites, elastic_directions, elastic_drives
 from stiffmap.model.effects.types import EffectType, Parameter, Placed
 
@@ -18,15 +18,11 @@ PARAMETERS = (
 )
 
 
-def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
+def law(old: Law, placed: Placed) -> Law:
     """A polyline through the knees, continued with the other slope; plain at ratio 1."""
     ratio, knee = placed.values["ratio"], placed.values["knee"]
-
-    def law(old: Law) -> Law:
-        a = knee / linear(old).stiffness
-        return old if ratio == 1.0 else Law(old.stiffness / ratio, knots=((-a, -knee), (a, knee)))
-
-    return change_law(description, placed, law)
+    a = knee / linear(old).stiffness
+    return old if ratio == 1.0 else Law(old.stiffness / ratio, knots=((-a, -knee), (a, knee)))
 
 
 def signature(probe: Probe, tried: Tried) -> Iterator[Signature]:
@@ -45,7 +41,7 @@ EFFECT = EffectType(
     ),
     parameters=PARAMETERS,
     places=at_sites(elastic_directions),
-    apply=apply,
+    apply=changing_law(law),
     signature=signature,
     tried=at_sites(elastic_drives),
     frame="the coordinate",

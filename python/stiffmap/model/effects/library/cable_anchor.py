@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from stiffmap.model.description import Cable, MachineDescription
-from stiffmap.model.effects.edit import change_sites
+from stiffmap.model.description import Cable
+from stiffmap.model.description.tree import Elements
+from stiffmap.model.effects.edit import changing
 from stiffmap.model.effects.sites import at_sites, cables
 from stiffmap.model.effects.types import EffectType, Parameter, Placed
 
@@ -15,15 +16,11 @@ OFF = tuple(
 )
 
 
-def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
+def displaced(e: Cable, placed: Placed) -> Elements:
     """The controller computes its lengths with the declared anchor."""
-    v = placed.values
-
-    def change(e: Cable) -> Cable:
-        x, y, z = e.anchor_error
-        return replace(e, anchor_error=(x + v["dx"], y + v["dy"], z + v["dz"]))
-
-    return change_sites(description, placed.legs, placed.element, cables, lambda e: (change(e),))  # type: ignore[arg-type]  # sites of cables
+    x, y, z = e.anchor_error
+    dx, dy, dz = (placed.values[p.name] for p in OFF)
+    return (replace(e, anchor_error=(x + dx, y + dy, z + dz)),)
 
 
 EFFECT = EffectType(
@@ -33,7 +30,7 @@ EFFECT = EffectType(
     doc="The cable enters its guide (dx, dy, dz) away from where its controller believes.",
     parameters=OFF,
     places=at_sites(cables),
-    apply=apply,
+    apply=changing(cables, displaced),
     frame="base axes",
     moves="nothing",
     vector=("dx", "dy", "dz"),

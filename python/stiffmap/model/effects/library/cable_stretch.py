@@ -4,19 +4,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from stiffmap.model.description import Cable, MachineDescription
-from stiffmap.model.effects.edit import change_sites
+from stiffmap.model.description import Cable
+from stiffmap.model.description.tree import Elements
+from stiffmap.model.effects.edit import changing
 from stiffmap.model.effects.sites import at_sites, cables
 from stiffmap.model.effects.types import EffectType, Parameter, Placed
 
 
-def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
+def stretched(e: Cable, placed: Placed) -> Elements:
     """The real cable yields that many times as much as the one that lengths are commanded for."""
-
-    def change(e: Cable) -> Cable:
-        return replace(e, stretch=e.stretch * placed.values["scale"])
-
-    return change_sites(description, placed.legs, placed.element, cables, lambda e: (change(e),))  # type: ignore[arg-type]  # sites of cables
+    return (replace(e, stretch=e.stretch * placed.values["scale"]),)
 
 
 EFFECT = EffectType(
@@ -29,7 +26,7 @@ EFFECT = EffectType(
     ),
     parameters=(Parameter("scale", "1", 0.05, 50.0, 1.0, 0.1, "of the compliance", plausible=(0.3, 5.0)),),
     places=at_sites(cables),
-    apply=apply,
+    apply=changing(cables, stretched),
     moves="nothing",
     compared=("soft", "stiff"),
 )

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from stiffmap.model.description import Law, MachineDescription
-from stiffmap.model.effects.library.drive_law import change_law, in_unit_of_joint, linear
+from stiffmap.model.description import Law
+from stiffmap.model.effects.library.drive_law import changing_law, in_unit_of_joint, linear
 from stiffmap.model.effects.sites import at_sites, elastic_directions, elastic_drives
 from stiffmap.model.effects.types import EffectType, Parameter, Placed
 
@@ -21,14 +21,10 @@ HALF_WIDTH = Parameter(
 )
 
 
-def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
+def law(old: Law, placed: Placed) -> Law:
     """A polyline law with a piece of zero force; plain at zero width."""
     half = placed.values["half_width"]
-
-    def law(old: Law) -> Law:
-        return Law(linear(old).stiffness, knots=((-half, 0.0), (half, 0.0))) if half > 0.0 else linear(old)
-
-    return change_law(description, placed, law)
+    return Law(linear(old).stiffness, knots=((-half, 0.0), (half, 0.0))) if half > 0.0 else linear(old)
 
 
 EFFECT = EffectType(
@@ -42,7 +38,7 @@ EFFECT = EffectType(
     ),
     parameters=(HALF_WIDTH,),
     places=at_sites(elastic_directions),
-    apply=apply,
+    apply=changing_law(law),
     tried=at_sites(elastic_drives),
     frame="the coordinate",
     excludes=("dead_zone", "hardening", "tabulated"),

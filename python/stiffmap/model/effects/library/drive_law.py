@@ -10,7 +10,7 @@ from stiffmap.model.description import Element, Joint, Law, MachineDescription, 
 from stiffmap.model.description.tree import Elements, sequences
 from stiffmap.model.effects.edit import change_sites
 from stiffmap.model.effects.sites import elastic_directions
-from stiffmap.model.effects.types import Parameter, ParametersAt, Placed
+from stiffmap.model.effects.types import Apply, Parameter, ParametersAt, Placed
 
 
 def change_law(
@@ -27,6 +27,11 @@ def change_law(
         return (_with_direction(e, int(entry[1]) - 1, change),)
 
     return change_sites(description, placed.legs, placed.element, elastic_directions, element)
+
+
+def changing_law(change: Callable[[Law, Placed], Law]) -> Apply:
+    """The ``apply`` of an effect that makes another law of that at its place."""
+    return lambda description, placed: change_law(description, placed, lambda old: change(old, placed))
 
 
 def _with_direction(e: Spring, i: int, change: Callable[[Law], Law]) -> Spring:

@@ -8,7 +8,7 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.model.description import Law, MachineDescription
 from stiffmap.model.effects.library.drive_law import change_law, is_revolute
 from stiffmap.model.effects.sites import at_sites, elastic_directions, elastic_drives
-from stiffmap.model.effects.types import EffectType, Option, Parameter, Placed
+from stiffmap.model.effects.types import EffectType, Option, Parameter, ParametersAt, Placed
 
 FORCE = Parameter("force", "N", 0.0, 1e5, 0.0, 10.0, "Coulomb level where it slides")
 TORQUE = Parameter("torque", "N·m", 0.0, 1e5, 0.0, 1.0, "Coulomb level where it turns")
@@ -16,12 +16,16 @@ TORQUE = Parameter("torque", "N·m", 0.0, 1e5, 0.0, 1.0, "Coulomb level where it
 
 def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
     """One branch of the friction loop as a monotone polyline, a dead zone in series included."""
+    level, branch = level_of(description, placed), placed.options["branch"]
+    return change_law(description, placed, lambda old: _law(old, level, branch))
+
+
+def level_of(description: MachineDescription, placed: Placed) -> float:
+    """Coulomb level (N, N·m) at the place; StiffmapError where it is given in the other unit."""
     turns = is_revolute(description, placed.element)
     if ("torque" in placed.values) != turns:
         raise StiffmapError("give torque (N·m) where it turns and force (N) where it slides")
-    level = placed.values["torque" if turns else "force"]
-    branch = placed.options["branch"]
-    return change_law(description, placed, lambda old: _law(old, level, branch))
+    return placed.values["torque" if turns else "force"]
 
 
 def _law(old: Law, level: float, branch: str) -> Law:
@@ -44,10 +48,14 @@ def _gap(law: Law) -> float:
     return law.knots[1][0] if law.knots else 0.0
 
 
-def at(description: MachineDescription, element: str, legs: tuple[str, ...]) -> tuple[Parameter, ...]:
-    """Force for a prismatic drive, torque for a revolute one: the other is not to be fitted."""
-    turns = is_revolute(description, element)
-    return (replace(FORCE, fitted=not turns), replace(TORQUE, fitted=turns))
+def force_or_torque(force: Parameter, torque: Parameter) -> ParametersAt:
+    """Torque where it turns, force where it slides: the other is not to be fitted."""
+
+    def at(description: MachineDescription, element: str, legs: tuple[str, ...]) -> tuple[Parameter, ...]:
+        turns = is_revolute(description, element)
+        return (replace(force, fitted=not turns), replace(torque, fitted=turns))
+
+    return at
 
 
 EFFECT = EffectType(
@@ -78,5 +86,5 @@ EFFECT = EffectType(
     excludes=("friction", "hardening", "position_dependent_compliance", "tabulated"),
     stage=20,
     better_with=("branch",),
-    at=at,
+    at=force_or_torque(FORCE, TORQUE),
 )

@@ -4,19 +4,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from stiffmap.model.description import Cable, MachineDescription
-from stiffmap.model.effects.edit import change_sites
+from stiffmap.model.description import Cable
+from stiffmap.model.description.tree import Elements
+from stiffmap.model.effects.edit import changing
 from stiffmap.model.effects.sites import at_sites, led_cables
 from stiffmap.model.effects.types import EffectType, Parameter, Placed
 
 
-def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
+def rubbing(e: Cable, placed: Placed) -> Elements:
     """The lead between winch and guide has another tension than the free length, and stretches as it asks."""
-
-    def change(e: Cable) -> Cable:
-        return replace(e, lead_tension=e.lead_tension * (1.0 - placed.values["share"]))
-
-    return change_sites(description, placed.legs, placed.element, led_cables, lambda e: (change(e),))  # type: ignore[arg-type]  # sites of cables
+    return (replace(e, lead_tension=e.lead_tension * (1.0 - placed.values["share"])),)
 
 
 EFFECT = EffectType(
@@ -30,6 +27,6 @@ EFFECT = EffectType(
     ),
     parameters=(Parameter("share", "1", -1.0, 1.0, 0.0, 0.05, "of the tension", plausible=(-0.3, 0.3)),),
     places=at_sites(led_cables),
-    apply=apply,
+    apply=changing(led_cables, rubbing),
     moves="nothing",
 )

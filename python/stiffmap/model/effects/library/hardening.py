@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from stiffmap.model.description import Law, MachineDescription
-from stiffmap.model.effects.library.drive_law import change_law, in_unit_of_joint, linear
+from stiffmap.model.description import Law
+from stiffmap.model.effects.library.drive_law import changing_law, in_unit_of_joint, linear
 from stiffmap.model.effects.sites import at_sites, elastic_directions, elastic_drives
 from stiffmap.model.effects.types import EffectType, Parameter, Placed
 
@@ -20,13 +20,9 @@ CUBIC = Parameter(
 )
 
 
-def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
+def law(old: Law, placed: Placed) -> Law:
     """force = a/c + cubic a^3."""
-
-    def law(old: Law) -> Law:
-        return Law(linear(old).stiffness, cubic=placed.values["cubic"])
-
-    return change_law(description, placed, law)
+    return Law(linear(old).stiffness, cubic=placed.values["cubic"])
 
 
 EFFECT = EffectType(
@@ -39,7 +35,7 @@ EFFECT = EffectType(
     ),
     parameters=(CUBIC,),
     places=at_sites(elastic_directions),
-    apply=apply,
+    apply=changing_law(law),
     tried=at_sites(elastic_drives),
     frame="the coordinate",
     excludes=("hardening", "dead_zone", "friction", "position_dependent_compliance", "tabulated"),

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from stiffmap.common.errors import StiffmapError
 from stiffmap.model.description import Element, Joint, JointFriction, MachineDescription
 from stiffmap.model.description.tree import Elements
 from stiffmap.model.effects.edit import change_sites
 from stiffmap.model.effects.library import friction
-from stiffmap.model.effects.library.drive_law import is_revolute
 from stiffmap.model.effects.sites import at_sites, free_joints
-from stiffmap.model.effects.types import EffectType, Option, Parameter, Placed
+from stiffmap.model.effects.types import EffectType, Option, Placed
 
 FORCE = replace(friction.FORCE, doc="Coulomb level of a sliding joint")
 TORQUE = replace(friction.TORQUE, doc="Coulomb level about each axis of a joint that turns")
@@ -19,23 +17,14 @@ TORQUE = replace(friction.TORQUE, doc="Coulomb level about each axis of a joint 
 
 def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
     """Friction on each joint of the place; none at the level 0."""
-    turns = is_revolute(description, placed.element)
-    if ("torque" in placed.values) != turns:
-        raise StiffmapError("give torque (N·m) where the joint turns and force (N) where it slides")
-    level = placed.values["torque" if turns else "force"]
+    level = friction.level_of(description, placed)
+    new = JointFriction(level, placed.options["branch"]) if level > 0.0 else None
 
     def change(e: Element) -> Elements:
         assert isinstance(e, Joint)
-        friction = JointFriction(level, placed.options["branch"]) if level > 0.0 else None
-        return (replace(e, friction=friction),)
+        return (replace(e, friction=new),)
 
     return change_sites(description, placed.legs, placed.element, free_joints, change)
-
-
-def at(description: MachineDescription, element: str, legs: tuple[str, ...]) -> tuple[Parameter, ...]:
-    """Torque where the joint turns, force where it slides: the other is not to be fitted."""
-    turns = is_revolute(description, element)
-    return (replace(FORCE, fitted=not turns), replace(TORQUE, fitted=turns))
 
 
 EFFECT = EffectType(
@@ -63,5 +52,5 @@ EFFECT = EffectType(
     excludes=("joint_friction",),
     stage=20,
     better_with=("branch",),
-    at=at,
+    at=friction.force_or_torque(FORCE, TORQUE),
 )

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from stiffmap.model.description import Element, MachineDescription, Offset, Pose
+from stiffmap.model.description import Element, Offset, Pose
 from stiffmap.model.description.tree import Elements
-from stiffmap.model.effects.edit import change_sites
+from stiffmap.model.effects.edit import changing
 from stiffmap.model.effects.sites import at_sites, lengths
 from stiffmap.model.effects.types import EffectType, Parameter, Placed
 
@@ -21,13 +21,9 @@ def longer(e: Element, error: float = 0.0, strain: float = 0.0) -> Offset:
     return replace(e, actual=Pose.of(actual.p + step, actual.r))
 
 
-def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
+def changed(e: Element, placed: Placed) -> Elements:
     """Offsets along their own direction."""
-
-    def change(e: Element) -> Elements:
-        return (longer(e, placed.values["error"]),)
-
-    return change_sites(description, placed.legs, placed.element, lengths, change)
+    return (longer(e, placed.values["error"]),)
 
 
 EFFECT = EffectType(
@@ -41,7 +37,7 @@ EFFECT = EffectType(
     ),
     parameters=(Parameter("error", "m", -0.1, 0.1, 0.0, 1e-4, "added to the declared length"),),
     places=at_sites(lengths),
-    apply=apply,
+    apply=changing(lengths, changed),
     pivot="the link's near end",
     frame="direction of the link",
     moves="all behind the link; nothing turns",

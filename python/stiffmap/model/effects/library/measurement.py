@@ -9,16 +9,17 @@ of a pose; joints and distances are read by other instruments.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.model.description import AppliedEffect
-from stiffmap.model.effects.evidence import Load, Plan, Reading
+from stiffmap.model.effects.evidence import Plan, Reading
 from stiffmap.model.effects.library.geometry import AXES, names_of, rotations
 from stiffmap.model.effects.sites import at
-from stiffmap.model.effects.types import EffectType, Option, Parameter
+from stiffmap.model.effects.types import EffectType, Parameter
 
 ANGLES: tuple[Parameter, ...] = rotations("rotation")
 
@@ -83,34 +84,20 @@ def measured(
     precedence: int,
     *,
     frame: str = "base axes",
-    pivot: str = "none",
-    options: tuple[Option, ...] = (),
-    needs: tuple[str, ...] = (),
-    load: Load | None = None,
-    reading: Reading | None = None,
-    hidden: Callable[[Plan], bool] | None = None,
-    certified: bool = False,
-    instrument_scale: str = "",
+    **more: Any,
 ) -> EffectType:
-    """A kind that lives in the measurement."""
+    """A kind that lives in the measurement; `more` as in `EffectType`."""
     return EffectType(
-        kind=kind,
-        title=title,
-        doc=doc,
-        parameters=parameters,
-        places=at(element),
-        apply=None,
+        kind,
+        title,
+        doc,
+        parameters,
+        at(element),
+        None,
         precedence=precedence,
-        pivot=pivot,
         frame=frame,
         moves="nothing of the machine",
-        options=options,
         vector=names_of(parameters),
         excludes=(kind,),
-        needs=needs,
-        load=load,
-        reading=reading,
-        hidden=hidden,
-        certified=certified,
-        instrument_scale=instrument_scale,
+        **more,
     )

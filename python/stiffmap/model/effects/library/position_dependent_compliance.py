@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.model.description import Element, Joint, MachineDescription
+from stiffmap.model.description import Joint
 from stiffmap.model.description.tree import Elements
-from stiffmap.model.effects.edit import change_sites
+from stiffmap.model.effects.edit import changing
 from stiffmap.model.effects.library.drive_law import in_unit_of_joint
 from stiffmap.model.effects.sites import at_sites, elastic_drives
 from stiffmap.model.effects.types import EffectType, Parameter, Placed
@@ -17,18 +17,13 @@ SLOPE = Parameter(
 )
 
 
-def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
+def sloped(e: Joint, placed: Placed) -> Elements:
     """Adds to the slope of the drive's compliance."""
-
-    def change(e: Element) -> Elements:
-        assert isinstance(e, Joint)
-        slope = e.compliance_slope + placed.values["slope"]
-        for end in (e.drive.range or ()) if e.drive else ():
-            if 1.0 + slope * (end - e.home[0]) <= 0.0:
-                raise StiffmapError(f"slope {slope:g}: no compliance is left at {end:g}")
-        return (replace(e, compliance_slope=slope),)
-
-    return change_sites(description, placed.legs, placed.element, elastic_drives, change)
+    slope = e.compliance_slope + placed.values["slope"]
+    for end in (e.drive.range or ()) if e.drive else ():
+        if 1.0 + slope * (end - e.home[0]) <= 0.0:
+            raise StiffmapError(f"slope {slope:g}: no compliance is left at {end:g}")
+    return (replace(e, compliance_slope=slope),)
 
 
 EFFECT = EffectType(
@@ -41,7 +36,7 @@ EFFECT = EffectType(
     ),
     parameters=(SLOPE,),
     places=at_sites(elastic_drives),
-    apply=apply,
+    apply=changing(elastic_drives, sloped),
     pivot="the drive's home coordinate",
     frame="the drive's coordinate",
     excludes=("hardening", "friction"),

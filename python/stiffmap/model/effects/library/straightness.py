@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.model.description import CommandError, Element, GuideError, Joint, MachineDescription
+from stiffmap.model.description import CommandError, GuideError, Joint
 from stiffmap.model.description.tree import Elements
-from stiffmap.model.effects.edit import change_sites
+from stiffmap.model.effects.edit import changing
 from stiffmap.model.effects.library import periodic_error
 from stiffmap.model.effects.sites import at_sites, guides
 from stiffmap.model.effects.types import EffectType, Option, Placed
@@ -21,20 +21,15 @@ PARAMETERS = (
 )
 
 
-def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
+def bent(e: Joint, placed: Placed) -> Elements:
     """One harmonic of the deviation, on each guide of the place."""
     axis = AXES[placed.options["across"]]
-
-    def change(e: Element) -> Elements:
-        assert isinstance(e, Joint)
-        along = sum(a * b for a, b in zip(axis, e.axes[0], strict=True))
-        if abs(along) > 1e-9:
-            raise StiffmapError(f"across={placed.options['across']} is not across the guide {e.axes[0]}")
-        amplitude, period, phase = (placed.values[p.name] for p in PARAMETERS)
-        error = CommandError(amplitude=amplitude, period=period, phase=phase, reference=None)
-        return (replace(e, guide_errors=(*e.guide_errors, GuideError(axis, error))),)
-
-    return change_sites(description, placed.legs, placed.element, guides, change)
+    along = sum(a * b for a, b in zip(axis, e.axes[0], strict=True))
+    if abs(along) > 1e-9:
+        raise StiffmapError(f"across={placed.options['across']} is not across the guide {e.axes[0]}")
+    amplitude, period, phase = (placed.values[p.name] for p in PARAMETERS)
+    error = CommandError(amplitude=amplitude, period=period, phase=phase, reference=None)
+    return (replace(e, guide_errors=(*e.guide_errors, GuideError(axis, error))),)
 
 
 EFFECT = EffectType(
@@ -48,7 +43,7 @@ EFFECT = EffectType(
     ),
     parameters=PARAMETERS,
     places=at_sites(guides),
-    apply=apply,
+    apply=changing(guides, bent),
     pivot="the drive's home coordinate",
     frame="axes of the guide before it moves",
     moves="all that the drive carries, without turning",

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.description import Law, MachineDescription
-from stiffmap.model.effects.library.drive_law import change_law, is_revolute, linear
+from stiffmap.model.effects.library.drive_law import changing_law, is_revolute, linear
 from stiffmap.model.effects.sites import at_sites, elastic_directions
 from stiffmap.model.effects.types import EffectType, Parameter, Placed
 
@@ -21,18 +21,12 @@ FACTORS = tuple(
 )
 
 
-def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
+def law(old: Law, placed: Placed) -> Law:
     """An odd polyline through the points, its last piece going on; plain where all factors are 1."""
-    step = placed.values["step"]
-    factors = [placed.values[p.name] for p in FACTORS]
-
-    def law(old: Law) -> Law:
-        if all(f == 1.0 for f in factors):
-            return linear(old)
-        points = [(i * step, f * linear(old).stiffness * i * step) for i, f in enumerate(factors, 1)]
-        return _odd(points)
-
-    return change_law(description, placed, law)
+    step, factors = placed.values["step"], [placed.values[p.name] for p in FACTORS]
+    if all(f == 1.0 for f in factors):
+        return linear(old)
+    return _odd([(i * step, f * linear(old).stiffness * i * step) for i, f in enumerate(factors, 1)])
 
 
 def _odd(points: list[tuple[float, float]]) -> Law:
@@ -60,7 +54,7 @@ EFFECT = EffectType(
     ),
     parameters=(STEP, *FACTORS),
     places=at_sites(elastic_directions),
-    apply=apply,
+    apply=changing_law(law),
     frame="the coordinate",
     vector=tuple(p.name for p in FACTORS),
     excludes=(

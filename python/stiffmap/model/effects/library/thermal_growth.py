@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from stiffmap.model.description import Element, MachineDescription
+from stiffmap.model.description import Element
 from stiffmap.model.description.tree import Elements
-from stiffmap.model.effects.edit import change_sites
+from stiffmap.model.effects.edit import changing
 from stiffmap.model.effects.library.length import longer
 from stiffmap.model.effects.sites import at_sites, lengths
 from stiffmap.model.effects.types import EffectType, Parameter, Placed
@@ -35,14 +35,10 @@ PARAMETERS = (
 )
 
 
-def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
-    """Each link longer by the same share."""
+def grown(e: Element, placed: Placed) -> Elements:
+    """Longer by the share of its length that all links grow."""
     strain = placed.values["coefficient"] * placed.values["temperature_difference"]
-
-    def change(e: Element) -> Elements:
-        return (longer(e, strain=strain),)
-
-    return change_sites(description, placed.legs, placed.element, lengths, change)
+    return (longer(e, strain=strain),)
 
 
 EFFECT = EffectType(
@@ -52,7 +48,7 @@ EFFECT = EffectType(
     doc="The link is longer by coefficient·temperature_difference times its declared length.",
     parameters=PARAMETERS,
     places=at_sites(lengths),
-    apply=apply,
+    apply=changing(lengths, grown),
     pivot="the link's near end",
     frame="direction of the link",
     moves="all behind the link; nothing turns",

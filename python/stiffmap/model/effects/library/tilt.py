@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from stiffmap.model.description import Element, Joint, MachineDescription
+from stiffmap.model.description import Joint
 from stiffmap.model.description.tree import Elements
-from stiffmap.model.effects.edit import built, change_sites
+from stiffmap.model.effects.edit import built, changing
 from stiffmap.model.effects.library.geometry import about, home_position, names_of, rotation_of, rotations
 from stiffmap.model.effects.sites import at_sites, joints
 from stiffmap.model.effects.types import EffectType, Parameter, Placed
@@ -12,14 +12,9 @@ from stiffmap.model.effects.types import EffectType, Parameter, Placed
 PARAMETERS: tuple[Parameter, ...] = rotations("rotation")
 
 
-def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
+def tilted(e: Joint, placed: Placed) -> Elements:
     """A rotation about the joint's home position, before the joint."""
-
-    def change(e: Element) -> Elements:
-        assert isinstance(e, Joint)
-        return (built(f"{e.name}_tilt", about(home_position(e), rotation_of(placed))), e)
-
-    return change_sites(description, placed.legs, placed.element, joints, change)
+    return (built(f"{e.name}_tilt", about(home_position(e), rotation_of(placed))), e)
 
 
 EFFECT = EffectType(
@@ -32,7 +27,7 @@ EFFECT = EffectType(
     ),
     parameters=PARAMETERS,
     places=at_sites(joints),
-    apply=apply,
+    apply=changing(joints, tilted),
     pivot="home position of the carriage; origin of a revolute joint",
     frame="local axes before the joint; about x, then the turned y, then the twice turned z",
     moves="the joint and all that it carries, up to the platform",
