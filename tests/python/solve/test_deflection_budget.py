@@ -11,7 +11,7 @@ import pytest
 import stiffmap as sm
 from stiffmap import plot
 from stiffmap.model.files.load import description_from_text
-from stiffmap.model.files.shipped import shipped_names
+from stiffmap.model.files.shipped import machine_names
 from stiffmap.ui.cli import main
 from stiffmap.ui.plot.loaded import loaded_shape, round_factor
 
@@ -41,7 +41,7 @@ def test_drive_and_beam_in_series() -> None:
     assert b.shares.sum() == pytest.approx(1.0, abs=1e-5)
 
 
-@pytest.mark.parametrize("name", shipped_names())
+@pytest.mark.parametrize("name", machine_names())
 def test_shares_sum_to_the_deflection(name: str) -> None:
     machine = sm.load_machine(name)
     p = machine.description.home.p

@@ -26,20 +26,15 @@ def machine_folder() -> Path:
     return Path(__file__).resolve().parent.parent / "machines"
 
 
-def shipped_names() -> list[str]:
-    """Names that `load_description` knows, sorted."""
-    return sorted(path.stem for path in machine_folder().glob("*.yaml"))
-
-
 def machine_names() -> list[str]:
-    """Names of the machines that come with stiffmap."""
-    return shipped_names()
+    """Names of the machines that come with stiffmap, sorted."""
+    return sorted(path.stem for path in machine_folder().glob("*.yaml"))
 
 
 def shipped_machines() -> list[ShippedMachine]:
     """The shipped machines, sorted by name."""
     machines = []
-    for name in shipped_names():
+    for name in machine_names():
         path = machine_folder() / f"{name}.yaml"
         data = read(path).data
         machines.append(ShippedMachine(name, data.get("title", ""), data.get("source", ""), path))
@@ -48,7 +43,7 @@ def shipped_machines() -> list[ShippedMachine]:
 
 def find(name_or_path: str | PathLike[str]) -> Path:
     """File of a shipped machine or of a path; raises `UnknownMachineError`, which lists what exists."""
-    names = shipped_names()
+    names = machine_names()
     if str(name_or_path) in names:
         return machine_folder() / f"{name_or_path}.yaml"
     path = Path(name_or_path)

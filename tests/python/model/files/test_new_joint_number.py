@@ -65,7 +65,48 @@ print("known everywhere")
 """
 
 
-def test_one_line_declares_a_number(tmp_path: Path) -> None:
+OF_A_BODY = (
+    '    share: float | None = number("filling.share", "Of the body that is filled.", lower=0.0, upper=1.0)\n'
+)
+BEFORE_IT = "    inertia: Rows = "
+
+SCRIPT_OF_A_BODY = """
+import sys
+
+sys.meta_path = [m for m in sys.meta_path if "Editable" not in type(m).__name__ and "Scikit" not in type(m).__name__]
+sys.path.insert(0, sys.argv[1])
+from pathlib import Path
+import stiffmap as sm
+from stiffmap.model.addresses import listed
+
+assert sm.__file__.startswith(sys.argv[1]), sm.__file__
+folder = Path(sys.argv[1])
+text = (folder / "stiffmap/model/machines/orthoglide-revised.yaml").read_text()
+
+
+def machine(value):
+    return sm.load_machine(text.replace("body: platform", f"body: platform\\n    filling: {{share: {value}}}"))
+
+
+filled = machine("{value: 0.4, u: 0.1}")
+(row,) = [r for r in listed(filled.description) if r.address == "platform.platform/filling.share"]
+assert (row.value, row.unit, row.u) == (0.4, "", 0.1)
+filled.save(folder / "again.yaml")
+assert sm.load_machine(folder / "again.yaml").description == filled.description
+try:
+    machine(2)
+except sm.StiffmapError as error:
+    assert "share: expected 0 to 1 (SI); found 2" in str(error), error
+else:
+    raise AssertionError
+print("known everywhere")
+"""
+
+
+@pytest.mark.parametrize(
+    ("line", "before", "script"), [(LINE, BEFORE, SCRIPT), (OF_A_BODY, BEFORE_IT, SCRIPT_OF_A_BODY)]
+)
+def test_one_line_declares_a_number(tmp_path: Path, line: str, before: str, script: str) -> None:
     copy = tmp_path / "stiffmap"
     shutil.copytree(
         Path(stiffmap.__file__).parent, copy, ignore=shutil.ignore_patterns("__pycache__", "*.so")
@@ -74,9 +115,9 @@ def test_one_line_declares_a_number(tmp_path: Path) -> None:
         (copy / library.name).symlink_to(library)
     file = copy / "model/description/elements.py"
     text = file.read_text(encoding="utf-8")
-    assert text.count(BEFORE) == 1
-    file.write_text(text.replace(BEFORE, LINE + BEFORE), encoding="utf-8")
-    command = [sys.executable, "-c", SCRIPT, str(tmp_path)]
+    assert text.count(before) == 1
+    file.write_text(text.replace(before, line + before), encoding="utf-8")
+    command = [sys.executable, "-c", script, str(tmp_path)]
     done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert done.stdout.strip() == "known everywhere"

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import stiffmap as sm
-from stiffmap.model.files.shipped import shipped_names
+from stiffmap.model.files.shipped import machine_names
 from stiffmap.workspace.performance import drive_kinematics
 
 RNG = np.random.default_rng(15)
@@ -46,7 +46,7 @@ def test_diagonal_factors_and_the_near_miss_of_the_revised_machine():
     assert v.sphere_max[0] == pytest.approx(2.244, abs=1e-3)
 
 
-@pytest.mark.parametrize("name", shipped_names())
+@pytest.mark.parametrize("name", machine_names())
 def test_jacobian_against_forward_kinematics(name):
     """Central differences of closed positions, observed order two."""
     machine = sm.load_machine(name)
