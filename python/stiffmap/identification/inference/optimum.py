@@ -53,14 +53,20 @@ def optimum(
     here = residual(x)
     if not len(x):
         return Optimum(x, here, np.zeros((len(here), 0)))
+    last: list[Floats] = []
+
+    def held(x: Floats) -> Floats:
+        last[:] = [slopes(x)]
+        return _held(last[0])
+
     found = least_squares(
         lambda x: np.append(possible(residual, x, len(here)), np.zeros(len(x))),
         x,
-        lambda x: _held(slopes(x)),
+        held,
         bounds,
         max_nfev=steps,
     )
-    return Optimum(found.x, found.fun[: len(here)], slopes(found.x))
+    return Optimum(found.x, found.fun[: len(here)], last[0])
 
 
 def possible(residual: Residual, x: Floats, n: int) -> Floats:
