@@ -58,16 +58,14 @@ class Problem:
             self.machine = Machine(replace(d, modal_damping=(ASSUMED,)), like=self.machine)
         spread = SPREAD if self.declared.assumed else 0.0
         self.size = np.linalg.norm(np.nan_to_num(t.flexibility), axis=1)[:, None]
-        real = np.nan_to_num(
-            t.ratio
-        )  # modes are taken as real: dampers shift frequencies by the square of the ratio, shapes by it
+        # modes are taken as real: dampers shift frequencies by the square of the ratio, shapes by it
+        real = np.nan_to_num(t.ratio)
         with np.errstate(divide="ignore", invalid="ignore"):
             of_shape = np.hypot(t.u_flexibility / self.size, real[:, None]).ravel()
         merged = np.where(np.isfinite(t.hammer[:, 0]), predict_taps(self.machine, t).merged, 0.0)
         of_damping = np.sqrt((t.u_ratio / t.ratio) ** 2 + spread**2 + real**2)
-        of_damping[merged > 0] = of_shape.reshape(-1, 3)[merged > 0] = (
-            np.nan
-        )  # of two modes that were found as one
+        # of two modes that were found as one
+        of_damping[merged > 0] = of_shape.reshape(-1, 3)[merged > 0] = np.nan
         of_frequency = np.sqrt((t.u / t.frequency) ** 2 + real**4 + merged**2)
         self.noise = np.concatenate([of_frequency, of_damping, of_shape])
         self.kind = np.repeat(["frequency", "damping", "flexibility"], [len(t), len(t), 3 * len(t)])
@@ -84,10 +82,8 @@ class Problem:
             free.append((MODAL, ASSUMED, LEVEL * ASSUMED))
         for key, value, u in free:
             other = shifted(self.machine.description, [(key, value, u)], np.ones(1))
-            column = np.where(
-                self.used, (self._raw(Machine(other, like=self.machine), t) - base) / self.noise, 0
-            )
-            column = np.nan_to_num(column)
+            change = self._raw(Machine(other, like=self.machine), t) - base
+            column = np.nan_to_num(np.where(self.used, change / self.noise, 0))
             if np.abs(column).max() > FELT:
                 self.numbers.append((key, value, u))
                 columns.append(column)
