@@ -21,8 +21,8 @@ import numpy as np
 
 import stiffmap as sm
 from stiffmap.experiment import simulate
+from stiffmap.experiment.calls import placed
 from stiffmap.identification.planning import design, estimate, follow
-from stiffmap.ui.cli.inputs import placed
 
 MORE = (12, 16, 24, 32, 48)
 POSES = 40

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import OrderedDict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -132,20 +132,9 @@ def sensitivity_at(
     """The same unknowns with columns at `values` (p,); those that fail there keep the old ones, and so do rows that do."""
     columns = s.columns.copy()
     base = predicted(predictor, s.unknowns, values)
-    slopes = Slopes(predictor, s.unknowns, values)
-    for k in range(len(s.unknowns)):
-        if time.monotonic() > until:
-            break
-        moved = values.copy()
-        moved[k] += STEP
-        try:
-            column = slopes.of(k)
-            if column is None:
-                column = (_changed(predictor, s.unknowns, moved, s.unknowns[k].setup, base) - base) / STEP
-        except StiffmapError:
-            continue
-        solved = np.isfinite(base)
-        if np.isfinite(column[solved]).all():
+    solved = np.isfinite(base)
+    for k, column, _ in _columns(predictor, s.unknowns, values, base, until):
+        if column is not None:
             columns[..., k] = np.where(solved, column, columns[..., k])
     return replace(s, columns=columns, at=values)
 
@@ -163,33 +152,41 @@ def _changed(
     return out
 
 
-def _differences(
-    predictor: Predictor, unknowns: Sequence[Unknown], until: float, progress: Progress | None
-) -> Sensitivity:
-    base = predictor()
-    found: list[Unknown] = []
-    columns: list[Floats] = []
-    failed: list[tuple[str, str]] = []
-    stopped = False
-    slopes = Slopes(predictor, unknowns, np.zeros(len(unknowns)))
+def _columns(
+    predictor: Predictor,
+    unknowns: Sequence[Unknown],
+    values: Floats,
+    base: Floats,
+    until: float,
+    progress: Progress | None = None,
+) -> Iterator[tuple[int, Floats | None, str]]:
+    """Each unknown with (n, c) its slopes at `values`, where the machine shows `base`, or why there are none; until time is over."""
+    slopes, solved = Slopes(predictor, unknowns, values), np.isfinite(base)
     for k, u in enumerate(unknowns):
         if time.monotonic() > until:
-            stopped = True
-            break
+            return
         if progress is not None:
             progress(u.name, k, len(unknowns))
         try:
             column = slopes.of(k)
             if column is None:
-                column = (predicted(predictor, [u], np.array([STEP])) - base) / STEP
+                moved = values + STEP * (np.arange(len(values)) == k)
+                column = (_changed(predictor, unknowns, moved, u.setup, base) - base) / STEP
         except StiffmapError as problem:
-            failed.append((u.name, str(problem)))
+            yield k, None, str(problem)
             continue
-        if not np.isfinite(column[np.isfinite(base)]).all():
-            failed.append((u.name, "the machine has no equilibrium with it at some poses"))
-            continue
-        if np.abs(np.nan_to_num(column)).max(initial=0.0) > 0.0:
-            found.append(u)
-            columns.append(column)
-    stack = np.stack(columns, axis=-1) if columns else np.zeros((*base.shape, 0))
-    return Sensitivity(tuple(found), stack, base, tuple(failed), stopped)
+        if np.isfinite(column[solved]).all():
+            yield k, column, ""
+        else:
+            yield k, None, "the machine has no equilibrium with it at some poses"
+
+
+def _differences(
+    predictor: Predictor, unknowns: Sequence[Unknown], until: float, progress: Progress | None
+) -> Sensitivity:
+    base = predictor()
+    each = list(_columns(predictor, unknowns, np.zeros(len(unknowns)), base, until, progress))
+    shown = [(unknowns[k], c) for k, c, _ in each if c is not None and np.any(np.nan_to_num(c))]
+    stack = np.stack([c for _, c in shown], axis=-1) if shown else np.zeros((*base.shape, 0))
+    failed = tuple((unknowns[k].name, why) for k, c, why in each if c is None)
+    return Sensitivity(tuple(u for u, _ in shown), stack, base, failed, len(each) < len(unknowns))

@@ -15,8 +15,6 @@ from scipy.stats import t as student
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.experiment import Experiment
-from stiffmap.experiment.noise.level import noise_of
-from stiffmap.experiment.noise.whitening import Problem
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.identification.planning.estimate import Estimate, fitted, slopes
 from stiffmap.model.description import AppliedEffect
@@ -104,28 +102,17 @@ def budgets(
         For a number that does not exist.
     """
     predictor = Predictor(machine, experiment)
-    e = predictor.experiment
-    problem = Problem.of(e, noise_of(e).sigma, predictor())
-    parameters = fitted(machine.description, found.terms)
-    scale = np.array([p.scale for _, p in parameters])
-    columns = np.column_stack([problem.white(c) for c in slopes(predictor, found.terms, parameters)]) * scale
-    inverse = np.linalg.pinv(columns) * scale[:, None]
-    shifts = [
-        (name, u, inverse @ move) for name, u, move in _moves(machine, predictor, problem, found, others)
-    ]
+    scale = np.array([p.scale for _, p in fitted(machine.description, found.terms)])
+    inverse = np.linalg.pinv(found.jacobian * scale) * scale[:, None]
+    shifts = [(name, u, inverse @ move) for name, u, move in _moves(machine, predictor, found, others)]
     form = float(np.sqrt(max(0.0, found.misfit**2 - 1.0)))
+    freedom = float(max(found.freedom, 1))
     out = []
     for k, (name, unit, value) in enumerate(zip(found.names, found.units, found.values, strict=True)):
-        lines = [Line("noise of the readings", "A", float(found.sigma[k]), float(max(found.freedom, 1)))]
+        sigma = float(found.sigma[k])
+        lines = [Line("noise of the readings", "A", sigma, freedom)]
         if form > 0:
-            lines.append(
-                Line(
-                    "misfit beyond noise",
-                    "model form",
-                    form * float(found.sigma[k]),
-                    float(max(found.freedom, 1)),
-                )
-            )
+            lines.append(Line("misfit beyond noise", "model form", form * sigma, freedom))
         lines += [Line(source, "B", abs(u * float(s[k])), float("inf")) for source, u, s in shifts]
         out.append(Budget(name, unit, float(value), tuple(lines)))
     return out
@@ -134,7 +121,6 @@ def budgets(
 def _moves(
     machine: Machine,
     predictor: Predictor,
-    problem: Problem,
     found: Estimate,
     others: Sequence[tuple[AppliedEffect, Mapping[str, float]]],
 ) -> list[tuple[str, float, Floats]]:
@@ -145,12 +131,13 @@ def _moves(
         unknown = set(given) - {p.name for _, p in parameters}
         if unknown:
             raise StiffmapError(f"budget: {term.kind} has no number '{sorted(unknown)[0]}' at this place")
-        both = (*found.terms, term)
         moved = [(len(found.terms), p) for _, p in parameters]
-        for (_, p), column in zip(moved, slopes(predictor, both, moved), strict=True):
-            out.append(
-                (f"{term.kind} of {term.element}: {p.name}", float(given[p.name]), problem.white(column))
-            )
+        columns = found.problem.white(slopes(predictor, (*found.terms, term), moved))
+        names = [p.name for _, p in parameters]
+        out += [
+            (f"{term.kind} of {term.element}: {n}", float(given[n]), c)
+            for n, c in zip(names, columns.T, strict=True)
+        ]
     return out
 
 

@@ -19,11 +19,11 @@ import numpy as np
 from stiffmap.common.broadcasting import Floats, one_of, random_numbers, whole_number
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.short import short_repr
-from stiffmap.experiment.experiment import Experiment
+from stiffmap.experiment.experiment import PER_ROW, Experiment
 from stiffmap.experiment.virtual.plans import load_set, plan_of_poses, random_poses
 from stiffmap.identification.planning.estimate import Estimate, estimate, fitted
-from stiffmap.identification.planning.exchange import Value, exchange
-from stiffmap.identification.planning.information import Information, map_weight
+from stiffmap.identification.planning.exchange import exchange
+from stiffmap.identification.planning.information import Information, information_of, map_weight, of_map
 from stiffmap.model.description import AppliedEffect
 from stiffmap.solve.kinematics import inverse_kinematics
 from stiffmap.solve.machine import Machine
@@ -109,51 +109,46 @@ def design(
     StiffmapError
         For bad input.
     """
-    _check(aim, rival, rows)
+    one_of(aim, AIMS, "aim")
+    if aim == "separate" and not rival:
+        raise StiffmapError("rival: separating two explanations needs the other one")
+    whole_number(rows, "rows", 1)
     one_of(frame, UNKNOWN, "frame")
     one_of(tool, UNKNOWN, "tool")
     if candidates is None:
-        candidates = candidate_rows(machine, quantity, poses, force, axes, noise, seed)
+        where, loads = random_poses(machine, poses, seed), load_set("axes", [force])
+        candidates = plan_of_poses(machine, quantity, where, loads, axes=axes, noise=noise)
     pool = replace(in_limits(machine, candidates), frame=frame, tool=tool)
     old = 0 if done is None else len(done)
-    both = pool if done is None else joined(replace(done, frame=frame, tool=tool), pool)
-    information = Information(machine, both, tuple(rival if aim == "separate" else terms))
-    count = len(information.names)
+    both = pool if done is None else _numbered(joined(replace(done, frame=frame, tool=tool), pool))
+    each = Information(machine, both, tuple(terms), tuple(rival) if aim == "separate" else ())
     weight = map_weight(machine, tuple(terms), at, load, force) if aim == "map" else None
-    value = _value(information, aim, tuple(terms), weight)
-    start = information.matrices[:old].sum(axis=0)
+
+    def value(m: Floats) -> Floats:
+        return information_of(m, each.wanted) if weight is None else of_map(m, weight)
+
+    start = each.matrices[:old].sum(axis=0)
     free = np.arange(old, len(both), dtype=np.intp)
     if rows > len(free):
         raise StiffmapError(
             f"rows: expected at most the {len(free)} candidates that can be reached, got {rows}"
         )
-    picked = exchange(information.matrices, start, free, rows, value)
+    picked = exchange(each.matrices, start, free, rows, value)
     rng = random_numbers(seed)
-    random = [
-        start + information.matrices[rng.choice(free, rows, replace=False)].sum(axis=0) for _ in range(RANDOM)
-    ]
-    total = start + information.matrices[picked].sum(axis=0)
-    scores = value(np.stack([total, *random]))
+    plans = [picked, *(rng.choice(free, rows, replace=False) for _ in range(RANDOM))]
+    sigma = [each.sigma(np.append(np.arange(old, dtype=np.intp), p)) for p in plans]
+    scores = value(np.stack([start + each.matrices[p].sum(axis=0) for p in plans]))
+    natural = scores if aim == "identify" else np.exp(scores / 2) if weight is None else np.sqrt(-scores)
     return Design(
         _numbered(both.rows(np.sort(picked).astype(np.intp))),
         aim,
-        information.names,
-        information.units,
-        information.sigma(total)[:count],
-        np.median([information.sigma(m)[:count] for m in random], axis=0),
-        information.in_natural_unit(aim, scores[0]),
-        information.in_natural_unit(aim, float(np.median(scores[1:]))),
+        each.names,
+        each.units,
+        sigma[0],
+        np.median(sigma[1:], axis=0),
+        float(natural[0]),
+        float(np.median(natural[1:])),
     )
-
-
-def _value(
-    information: Information, aim: str, terms: tuple[AppliedEffect, ...], weight: Floats | None
-) -> Value:
-    """What the exchange makes as large as it can."""
-    if aim == "separate":
-        information.add_signal(terms)
-        return information.separate
-    return information.identify if weight is None else information.map_of(weight)
 
 
 def _numbered(rows: Experiment) -> Experiment:
@@ -188,7 +183,7 @@ def follow(
     while data is None or len(data) < most:
         plan = design(machine, now, rows=batch, done=data, seed=seed + len(found), **options)  # type: ignore[arg-type]
         new = measure(plan.experiment)
-        data = new if data is None else joined(data, new)
+        data = new if data is None else _numbered(joined(data, new))
         result = estimate(machine, data, now)
         found.append((len(data), result))
         now = result.terms
@@ -198,28 +193,7 @@ def follow(
     return found
 
 
-def _check(aim: str, rival: Sequence[AppliedEffect], rows: int) -> None:
-    one_of(aim, AIMS, "aim")
-    if aim == "separate" and not rival:
-        raise StiffmapError("rival: separating two explanations needs the other one")
-    whole_number(rows, "rows", 1)
-
-
 OFF_LIMITS = Flag.DRIVE_RANGE | Flag.JOINT_LIMIT
-
-
-def candidate_rows(
-    machine: Machine,
-    quantity: str,
-    poses: int,
-    force: float,
-    axes: Sequence[str],
-    noise: float | None,
-    seed: int,
-) -> Experiment:
-    """Random poses of the workspace, for deflections under loads along the axes."""
-    where = random_poses(machine, poses, seed)
-    return plan_of_poses(machine, quantity, where, load_set("axes", [force]), axes=axes, noise=noise)
 
 
 def in_limits(machine: Machine, plan: Experiment) -> Experiment:
@@ -234,33 +208,14 @@ def in_limits(machine: Machine, plan: Experiment) -> Experiment:
 
 
 def joined(a: Experiment, b: Experiment) -> Experiment:
-    """Rows of one after the other; fields that only one has are left out."""
-    whole = [len(a), len(b)]
+    """The rows of both; what one of them does not record is recorded by neither."""
 
-    def both(x: object, y: object) -> object:
-        if isinstance(x, np.ndarray) and isinstance(y, np.ndarray):
-            return np.concatenate([x, y])
-        if isinstance(x, tuple) and isinstance(y, tuple) and [len(x), len(y)] == whole:
-            return x + y
-        return x
+    def both(name: str) -> object:
+        one, other = getattr(a, name), getattr(b, name)
+        if one is None or other is None:
+            return None
+        if isinstance(one, tuple):
+            return (*one, *other) if len(one) and len(other) else ()
+        return np.concatenate([one, other])
 
-    fields = (
-        "position",
-        "wrench",
-        "reading",
-        "sigma",
-        "rotation",
-        "approach",
-        "branch",
-        "setup",
-        "temperature",
-    )
-    joined: dict[str, Any] = {name: both(getattr(a, name), getattr(b, name)) for name in fields}
-    n = sum(whole)
-    return replace(
-        a,
-        **joined,
-        ids=tuple(str(i + 1) for i in range(n)),
-        order=np.arange(1.0, n + 1),
-        repeat=None,
-    )
+    return replace(a, **{name: both(name) for name in PER_ROW}, absolute={})  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""Values of given effects from an experiment: Gauss-Newton on whitened readings, nuisances projected out."""
+"""Values of given effects from an experiment: least squares of whitened readings, nuisances projected out."""
 
 from __future__ import annotations
 
@@ -11,8 +11,10 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.common.short import short_repr
 from stiffmap.experiment.experiment import Experiment
 from stiffmap.experiment.noise.level import noise_of
-from stiffmap.experiment.noise.whitening import Problem, nuisance_part
+from stiffmap.experiment.noise.whitening import Problem
 from stiffmap.experiment.prediction.predict import Predictor
+from stiffmap.identification.candidates.slopes import step_of
+from stiffmap.identification.inference.optimum import covariance, optimum
 from stiffmap.model import effects
 from stiffmap.model.description import AppliedEffect, MachineDescription
 from stiffmap.model.effects.types import Parameter
@@ -20,10 +22,8 @@ from stiffmap.solve.machine import Machine
 
 STEP = 1e-3
 """Share of a parameter's typical size over which predictions are differenced."""
-STEPS, DONE = 15, 1e-6
-RANK, FELT = 1e-8, 1e-6
-"""Singular values of the columns in typical sizes, relative to the largest, below which a direction is not identifiable; the
-share of a number in such directions from which on it is not."""
+STEPS = 30
+"""Evaluations of a fit at most."""
 Terms = tuple[AppliedEffect, ...]
 
 
@@ -47,8 +47,6 @@ class Estimate:
     """(N, k) change of the whitened readings per unit of each number."""
     residual: Floats = field(repr=False)
     """(N,) whitened, with the fitted values."""
-    left: Floats = field(repr=False)
-    """(n, c) m, rad: reading minus prediction, less unknown frames and zeros."""
 
     @property
     def experiment(self) -> Experiment:
@@ -75,71 +73,34 @@ def estimate(machine: Machine, experiment: Experiment, terms: Sequence[AppliedEf
     e, begun = predictor.experiment, tuple(terms)
     problem = Problem.of(e, noise_of(e).sigma, predictor())
     parameters = fitted(machine.description, begun)
-    x = values_of(begun, parameters)
-    low, high = (np.array([getattr(p, side) for _, p in parameters]) for side in ("lower", "upper"))
-    residual = problem.residual(predictor(begun))
-    jacobian = np.zeros((len(problem), len(x)))
-    for _ in range(STEPS):
-        jacobian = np.column_stack([problem.white(c) for c in slopes(predictor, begun, parameters)])
-        scale = np.array([p.scale for _, p in parameters])
-        step = np.linalg.lstsq(jacobian * scale, residual, rcond=RANK)[0] * scale
-        x, moved, residual = _shortened(predictor, problem, begun, parameters, x, step, residual, (low, high))
-        begun = with_values(begun, parameters, x)
-        if not moved > DONE:
-            break
-    scale = np.array([p.scale for _, p in parameters])
-    covariance, rank = _covariance(jacobian * scale)
-    covariance = covariance * np.outer(scale, scale)
-    freedom = problem.freedom - rank
-    names = tuple(f"{_place(begun[i])}: {p.name}" for i, p in parameters)
-    units = tuple(p.unit for _, p in parameters)
-    left = e.reading - predictor(begun)
-    left = left - nuisance_part(problem, left)
-    return Estimate(
-        names,
-        units,
-        x,
-        covariance,
-        begun,
-        float(residual @ residual),
-        freedom,
-        problem,
-        jacobian,
-        residual,
-        left,
+    scale, low, high = (np.array([getattr(p, s) for _, p in parameters]) for s in ("scale", "lower", "upper"))
+
+    def at(x: Floats) -> Terms:
+        return with_values(begun, parameters, x * scale)
+
+    def columns(x: Floats) -> Floats:
+        return -problem.white(slopes(predictor, at(x), parameters) * scale)
+
+    found = optimum(
+        lambda x: problem.residual(predictor(at(x))),
+        values_of(begun, parameters) / scale,
+        (low / scale, high / scale),
+        columns,
+        STEPS,
     )
-
-
-def _covariance(jacobian: Floats) -> tuple[Floats, int]:
-    """(k, k) of the numbers with columns (n, k), infinite variances of those that the readings do not determine; the rank."""
-    _, size, v = np.linalg.svd(jacobian, full_matrices=len(jacobian) < jacobian.shape[1])
-    size = np.append(size, np.zeros(len(v) - len(size)))
-    told = size > RANK * size.max(initial=0.0)
-    out: Floats = (v[told].T / size[told] ** 2) @ v[told]
-    untold = np.flatnonzero(np.linalg.norm(v[~told], axis=0) > FELT)
-    out[untold, untold] = np.inf
-    return out, int(told.sum())
-
-
-def _shortened(
-    predictor: Predictor,
-    problem: Problem,
-    terms: Terms,
-    parameters: list[tuple[int, Parameter]],
-    x: Floats,
-    step: Floats,
-    residual: Floats,
-    bounds: tuple[Floats, Floats],
-) -> tuple[Floats, float, Floats]:
-    """The step, halved until it pays; how far it went in typical sizes."""
-    scale = np.array([p.scale for _, p in parameters])
-    for _ in range(6):
-        tried = np.clip(x + step, *bounds)
-        new = problem.residual(predictor(with_values(terms, parameters, tried)))
-        if new @ new <= residual @ residual:
-            return tried, float(np.abs((tried - x) / scale).max(initial=0.0)), new
-        step = step / 2
-    return x, 0.0, residual
+    spread, rank = covariance(found.jacobian)
+    return Estimate(
+        tuple(f"{_place(begun[i])}: {p.name}" for i, p in parameters),
+        tuple(p.unit for _, p in parameters),
+        found.x * scale,
+        spread * np.outer(scale, scale),
+        at(found.x),
+        found.chi2,
+        problem.freedom - rank,
+        problem,
+        -found.jacobian / scale,
+        found.residual,
+    )
 
 
 def fitted(description: MachineDescription, terms: Terms) -> list[tuple[int, Parameter]]:
@@ -166,17 +127,26 @@ def with_values(terms: Terms, parameters: list[tuple[int, Parameter]], values: F
     return tuple(replace(t, parameters=tuple(g.items())) for t, g in zip(terms, given, strict=True))
 
 
-def slopes(predictor: Predictor, terms: Terms, parameters: list[tuple[int, Parameter]]) -> list[Floats]:
-    """(n, c) change of the readings per unit of each parameter, by central differences inside its bounds."""
+def slopes(predictor: Predictor, terms: Terms, parameters: list[tuple[int, Parameter]]) -> Floats:
+    """(n, c, k) change of the readings per unit of each parameter: by one step from the equilibria with the terms, or, where that does
+    not hold, by differences of whole predictions, inside the bounds."""
     x = values_of(terms, parameters)
-    out = []
-    for k, (_, p) in enumerate(parameters):
-        ahead, behind = x.copy(), x.copy()
-        ahead[k] = min(x[k] + STEP * p.scale, p.upper)
-        behind[k] = max(x[k] - STEP * p.scale, p.lower)
-        up, down = (predictor(with_values(terms, parameters, v)) for v in (ahead, behind))
-        out.append(np.nan_to_num((up - down) / (ahead[k] - behind[k])))
-    return out
+
+    def at(k: int, value: float) -> Terms:
+        return with_values(terms, parameters, np.where(np.arange(len(x)) == k, value, x))
+
+    ahead = [
+        v + h if v + (h := step_of(p)) <= p.upper else v - h for v, (_, p) in zip(x, parameters, strict=True)
+    ]
+    near = predictor.changes([at(k, v) for k, v in enumerate(ahead)], terms)
+    out = np.zeros((*predictor.experiment.reading.shape, len(x)))
+    for k, (change, (_, p)) in enumerate(zip(near, parameters, strict=True)):
+        if change is not None:
+            out[..., k] = change / (ahead[k] - x[k])
+            continue
+        high, low = min(x[k] + STEP * p.scale, p.upper), max(x[k] - STEP * p.scale, p.lower)
+        out[..., k] = (predictor(at(k, high)) - predictor(at(k, low))) / (high - low)
+    return np.nan_to_num(out)
 
 
 def _place(t: AppliedEffect) -> str:

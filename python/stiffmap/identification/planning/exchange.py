@@ -14,8 +14,10 @@ Value = Callable[[Floats], Floats]
 """Worth (...) of information matrices (..., k, k)."""
 
 
-def exchange(matrices: Floats, start: Floats, free: Integers, rows: int, value: Value) -> Integers:
-    """Indices of the rows chosen: greedily, then exchanged while that gains."""
+def exchange(
+    matrices: Floats, start: Floats, free: Integers, rows: int, value: Value, passes: int = PASSES
+) -> Integers:
+    """Indices of the rows chosen: greedily, then exchanged while that gains, in so many passes."""
     left = [int(i) for i in free]
     picked: list[int] = []
     total = start.copy()
@@ -24,7 +26,7 @@ def exchange(matrices: Floats, start: Floats, free: Integers, rows: int, value: 
         picked.append(best)
         left.remove(best)
         total = total + matrices[best]
-    for _ in range(PASSES):
+    for _ in range(passes):
         changed = False
         for place, old in enumerate(picked):
             bare = total - matrices[old]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import block_diag, cholesky, solve_triangular
@@ -12,11 +12,12 @@ from scipy.stats import chi2
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.number_text import with_uncertainty, within
 from stiffmap.common.short import short_repr
-from stiffmap.experiment.experiment import PER_ROW, Experiment
+from stiffmap.experiment.experiment import Experiment
 from stiffmap.experiment.noise.whitening import basis, complement, readings_of
 from stiffmap.identification.inference.amplitudes import Fit, Part, fitted
 from stiffmap.identification.inference.columns import Columns, drawn
 from stiffmap.identification.inference.kernels import Points, gaps
+from stiffmap.identification.planning.design import joined
 from stiffmap.identification.planning.estimate import Estimate, estimate
 from stiffmap.model.description import AppliedEffect
 from stiffmap.solve.machine import Machine
@@ -137,7 +138,7 @@ def _gaps(
 ) -> tuple[Fit, dict[str, Floats]]:
     """The amplitudes of all gaps that whitened readings (N,) of both can hold, numbers (N, 2 k) left open, and the covariance (N, N)
     that each is of."""
-    e = _together(a.experiment, b.experiment)
+    e = joined(a.experiment, b.experiment)
     read = [readings_of(x.experiment, x.problem.base) for x in (a, b)]
     rows = np.concatenate([read[0][0], read[1][0] + len(a.experiment)])
     channel = np.concatenate([read[0][1], read[1][1]])
@@ -154,20 +155,6 @@ def _gaps(
             parts.append(Part(kernel.name, kernel.kind, full=free.T @ kernels[kernel.name] @ free))
     columns = Columns.bare(e, rows, channel, free, free.T @ residual)
     return fitted(columns, parts), kernels
-
-
-def _together(a: Experiment, b: Experiment) -> Experiment:
-    """The rows of both; what one of them does not record is recorded by neither."""
-
-    def joined(name: str) -> object:
-        one, other = getattr(a, name), getattr(b, name)
-        if one is None or other is None:
-            return None
-        if isinstance(one, tuple):
-            return (*one, *other) if len(one) and len(other) else ()
-        return np.concatenate([one, other])
-
-    return replace(a, **{name: joined(name) for name in PER_ROW}, absolute={})  # type: ignore[arg-type]
 
 
 def _some(e: Experiment) -> Experiment:

@@ -11,16 +11,16 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from scipy.optimize import least_squares
 from scipy.stats import chi2
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment import Experiment
 from stiffmap.identification.candidates.candidates import Candidate
+from stiffmap.identification.inference.optimum import Optimum, covariance, differences, optimum, possible
 from stiffmap.identification.taps.causes import causes, scaled, term
 from stiffmap.identification.taps.predict import predict_taps
-from stiffmap.identification.taps.problem import LEAST, STEPS, Problem, slopes_of
+from stiffmap.identification.taps.problem import LEAST, STEP, STEPS, Problem
 from stiffmap.identification.taps.table import TapTest
 from stiffmap.solve.machine import Machine, takes_machine
 
@@ -123,7 +123,7 @@ def explain_taps(
     Raises StiffmapError for bad input.
     """
     problem = Problem(machine, taps, statics, default_u)
-    before, _ = problem.settled()
+    before = problem.settled().chi2
     n = int(problem.used.sum())
     tried = [c for c in causes(problem) if only is None or c.kind in only]
     if not tried:
@@ -135,7 +135,7 @@ def explain_taps(
         promising = sorted(tried, key=lambda c: -_promise(problem, c))[: max(FEWEST, len(tried) // 3)]
         first = sorted((e for c in promising if (e := _fitted(problem, c))), key=lambda e: e.chi2)[:REFINED]
         found = sorted((_refined(problem, e) for e in first), key=lambda e: e.chi2)
-        before = min([before, *(problem.settled(start=e.off)[0] for e in found[:2] if e.off is not None)])
+        before = min([before, *(problem.settled(e.off).chi2 for e in found[:2] if e.off is not None)])
     fall, poor = before - found[0].chi2 if found else 0.0, before >= chi2.isf(UNLIKELY, n)
     if fall < (likely if poor else certain):
         lead = "The readings do not fit, and no single effect explains them: chi-square" if poor else (
@@ -196,11 +196,10 @@ def _sentence(best: Explained, alike: tuple[Explained, ...], before: float, n: i
 
 def _promise(problem: Problem, c: Candidate) -> float:
     """Fall of chi-square that one small step promises, to first order."""
-    to, _, _ = scaled(c.parameters[0])
     rows, W = problem.whitener()
     r0 = W @ problem.residual()[rows]
     try:
-        slope = (W @ problem.residual(term(c, to(0.1)))[rows] - r0) / 0.1
+        slope = (W @ problem.residual(term(c, scaled(c.parameters[0])[0](0.1)))[rows] - r0) / 0.1
     except StiffmapError:
         return -1.0
     size = float(slope @ slope)
@@ -208,64 +207,41 @@ def _promise(problem: Problem, c: Candidate) -> float:
 
 
 def _fitted(problem: Problem, c: Candidate, part: str = "") -> Explained | None:
-    """With uncertain numbers to first order; None where the readings say nothing of it."""
+    """With uncertain numbers to first order; None where the readings do not identify it."""
     p = c.parameters[0]
     to, low, high = scaled(p)
     rows, W = problem.whitener(part)
 
     def residual(t: Floats) -> Floats:
-        try:
-            return np.asarray(W @ problem.residual(term(c, to(float(t[0]))))[rows])
-        except StiffmapError:
-            return np.full(int(rows.sum()), 1e3)
+        return np.asarray(W @ problem.residual(term(c, to(float(t[0]))))[rows])
 
-    starts = [t for t in (STARTS if p.null == 1.0 else SIZES) if low < t < high]
-    grid = [(float((residual(np.array([t])) ** 2).sum()), t) for t in starts]
-    fit = least_squares(
-        residual,
-        [min(max(min(grid)[1], low), high)],
-        bounds=([low], [high]),
-        diff_step=1e-4,
-        x_scale=0.3,
-        max_nfev=25,
-    )
-    curvature = float((fit.jac**2).sum())
-    if not curvature > 0:
+    starts = [t for t in (STARTS if p.null == 1.0 else SIZES) if low < t < high] or [low]
+    least, start = min((float((possible(residual, np.array([t]), 1) ** 2).sum()), t) for t in starts)
+    if not np.isfinite(least):
         return None
-    value, u = to(float(fit.x[0])), 1 / np.sqrt(curvature)
-    u *= value if p.null == 1.0 else p.scale
-    return Explained(
-        c, {p.name: value}, {p.name: float(u)}, float(2 * fit.cost),
-        machine=problem.real(term(c, value))[0],
-    )  # fmt: skip
+    bounds = np.array([low]), np.array([high])
+    fit = optimum(residual, np.array([start]), bounds, lambda t: differences(residual, t, STEP), STEPS)
+    found = _explained(problem, c, fit)
+    return found if np.isfinite(found.u[p.name]) else None
 
 
 def _refined(problem: Problem, e: Explained) -> Explained:
     """The fit again with the uncertain numbers as unknowns of their own, which are not taken to be small."""
     p = e.place.parameters[0]
     to, low, high = scaled(p)
-    k = len(problem.numbers)
     value = e.parameters[p.name]
-    start = np.clip(np.log(value) if p.null == 1.0 else value / p.scale, low + 1e-9, high - 1e-9)
+    start = np.log(value) if p.null == 1.0 else value / p.scale
+    begin = np.r_[start, np.zeros(len(problem.numbers))]
+    return _explained(problem, e.place, problem.settled(begin, lambda t: term(e.place, to(t)), (low, high)))
 
-    def residual(t: Floats) -> Floats:
-        try:
-            r = problem.residual(term(e.place, to(float(t[0]))), t[1:])
-        except StiffmapError:
-            r = np.full(int(problem.used.sum()), 1e3)
-        return np.concatenate([r, t[1:]])
 
-    fit = least_squares(
-        residual, np.r_[start, np.zeros(k)], slopes_of(residual), x_scale=1.0, max_nfev=STEPS,
-        bounds=(np.r_[low, np.full(k, -6.0)], np.r_[high, np.full(k, 6.0)]),
-    )  # fmt: skip
-    value = to(float(fit.x[0]))
-    covariance = np.linalg.pinv(fit.jac.T @ fit.jac)
-    u = float(np.sqrt(covariance[0, 0])) * (value if p.null == 1.0 else p.scale)
-    machine, _ = problem.real(term(e.place, value), fit.x[1:])
-    return replace(
-        e, parameters={p.name: value}, u={p.name: u}, chi2=float(2 * fit.cost), machine=machine, off=fit.x[1:]
-    )
+def _explained(problem: Problem, c: Candidate, fit: Optimum) -> Explained:
+    """A candidate where the first number of a fit is its own, and further ones are the uncertain numbers."""
+    p, off = c.parameters[0], fit.x[1:]
+    value = scaled(p)[0](float(fit.x[0]))
+    u = float(np.sqrt(covariance(fit.jacobian)[0][0, 0])) * (value if p.null == 1.0 else p.scale)
+    machine, _ = problem.real(term(c, value), off)
+    return Explained(c, {p.name: value}, {p.name: u}, fit.chi2, machine=machine, off=off)
 
 
 def _both(problem: Problem, best: Explained) -> Explained:

@@ -6,6 +6,8 @@ import numpy as np
 
 from stiffmap.common.broadcasting import Floats, whole_number
 from stiffmap.common.errors import StiffmapError
+from stiffmap.identification.planning.exchange import exchange
+from stiffmap.identification.planning.information import information_of
 from stiffmap.identification.taps.causes import causes, scaled, term
 from stiffmap.identification.taps.problem import Problem
 from stiffmap.identification.taps.table import TapTest
@@ -58,18 +60,17 @@ def where_to_tap(
         raise StiffmapError(
             f"{machine.name}: {len(np.unique(pose))} of {pool} poses can be reached, {wanted} are wanted"
         )
-    chosen: list[int] = []
-    while len(chosen) < wanted:
-        rest = [k for k in np.unique(pose) if k not in chosen]
-        chosen.append(max(rest, key=lambda k: information(A, J, np.isin(pose, [*chosen, k]))))
+    x = np.hstack([A, J])
+    matrices = np.stack([x[pose == k].T @ x[pose == k] for k in range(pool)])
+    chosen = exchange(
+        matrices,
+        np.zeros_like(matrices[0]),
+        np.unique(pose),
+        wanted,
+        lambda m: information_of(m, A.shape[1], 1.0),
+        0,
+    )
     return np.asarray(position[chosen])
-
-
-def information(A: Floats, J: Floats, rows: np.ndarray) -> float:
-    """Logarithm of the determinant of the information on effects (readings, effects), numbers (readings, numbers) being free."""
-    a, j = A[rows], J[rows]
-    V = np.eye(len(a)) + j @ j.T
-    return float(np.linalg.slogdet(np.eye(A.shape[1]) + a.T @ np.linalg.solve(V, a))[1])
 
 
 def _own_modes(machine: Machine, position: Floats, count: int) -> tuple[TapTest, np.ndarray]:

@@ -7,13 +7,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from stiffmap.common.broadcasting import Floats
-from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment import Experiment
 from stiffmap.experiment.noise.level import noise_of
 from stiffmap.experiment.prediction.predict import Predictor
+from stiffmap.identification.inference.optimum import Optimum, differences, optimum
 from stiffmap.identification.taps.predict import predict_taps
 from stiffmap.identification.taps.table import TapTest
 from stiffmap.model.addresses import moved, number
@@ -26,9 +25,11 @@ FELT = 0.05
 """Numbers whose uncertainty shifts no reading by more than this share of its noise are not fitted."""
 LOST = 3.0
 """Residual, relative, of a mode that a machine no longer has."""
-STEPS = 15
+STEPS = 25
 STEP = 0.02
 """Of a difference, in standard uncertainties or logarithms of a factor."""
+WIDEST = 6.0
+"""Standard uncertainties by which a number is off at most."""
 SPREAD, LEVEL = 0.5, 1.0
 """Logarithms: what damping ratios of one machine differ by from mode to mode, and what their level is off by, where none is declared."""
 LEAST = 1e-4
@@ -57,16 +58,14 @@ class Problem:
             self.machine = Machine(replace(d, modal_damping=(ASSUMED,)), like=self.machine)
         spread = SPREAD if self.declared.assumed else 0.0
         self.size = np.linalg.norm(np.nan_to_num(t.flexibility), axis=1)[:, None]
-        real = np.nan_to_num(
-            t.ratio
-        )  # modes are taken as real: dampers shift frequencies by the square of the ratio, shapes by it
+        # modes are taken as real: dampers shift frequencies by the square of the ratio, shapes by it
+        real = np.nan_to_num(t.ratio)
         with np.errstate(divide="ignore", invalid="ignore"):
             of_shape = np.hypot(t.u_flexibility / self.size, real[:, None]).ravel()
         merged = np.where(np.isfinite(t.hammer[:, 0]), predict_taps(self.machine, t).merged, 0.0)
         of_damping = np.sqrt((t.u_ratio / t.ratio) ** 2 + spread**2 + real**2)
-        of_damping[merged > 0] = of_shape.reshape(-1, 3)[merged > 0] = (
-            np.nan
-        )  # of two modes that were found as one
+        # of two modes that were found as one
+        of_damping[merged > 0] = of_shape.reshape(-1, 3)[merged > 0] = np.nan
         of_frequency = np.sqrt((t.u / t.frequency) ** 2 + real**4 + merged**2)
         self.noise = np.concatenate([of_frequency, of_damping, of_shape])
         self.kind = np.repeat(["frequency", "damping", "flexibility"], [len(t), len(t), 3 * len(t)])
@@ -83,10 +82,8 @@ class Problem:
             free.append((MODAL, ASSUMED, LEVEL * ASSUMED))
         for key, value, u in free:
             other = shifted(self.machine.description, [(key, value, u)], np.ones(1))
-            column = np.where(
-                self.used, (self._raw(Machine(other, like=self.machine), t) - base) / self.noise, 0
-            )
-            column = np.nan_to_num(column)
+            change = self._raw(Machine(other, like=self.machine), t) - base
+            column = np.nan_to_num(np.where(self.used, change / self.noise, 0))
             if np.abs(column).max() > FELT:
                 self.numbers.append((key, value, u))
                 columns.append(column)
@@ -123,41 +120,23 @@ class Problem:
         J = self.slopes[self.used][rows]
         return rows, np.linalg.inv(np.linalg.cholesky(np.eye(len(J)) + J @ J.T))
 
-    def settled(self, term: Term | None = None, start: Floats | None = None) -> tuple[float, Floats]:
-        """Least chi-square near a start with the uncertain numbers free within their uncertainty, and where they then are."""
-        k = len(self.numbers)
-        if not k:
-            r = self.residual(term)
-            return float(r @ r), np.zeros(0)
+    def settled(
+        self,
+        start: Floats | None = None,
+        cause: Callable[[float], Term] | None = None,
+        bounds: tuple[float, float] = (0.0, 0.0),
+    ) -> Optimum:
+        """Least chi-square near a start (numbers,) with the uncertain numbers free within their uncertainty; or (1 + numbers,), where
+        a cause with a free number between bounds is the first."""
+        k, free = len(self.numbers), int(cause is not None)
 
-        def both(off: Floats) -> Floats:
-            return np.concatenate([self._safe(term, off), off])
+        def both(x: Floats) -> Floats:
+            term = cause(float(x[0])) if cause else None
+            return np.concatenate([self.residual(term, x[free:]), x[free:]])
 
-        fit = least_squares(
-            both,
-            np.zeros(k) if start is None else start,
-            slopes_of(both),
-            bounds=(-6, 6),
-            x_scale=1.0,
-            max_nfev=STEPS,
-        )
-        return float(2 * fit.cost), fit.x
-
-    def _safe(self, term: Term | None, off: Floats) -> Floats:
-        try:
-            return self.residual(term, off)
-        except StiffmapError:
-            return np.asarray(np.full(int(self.used.sum()), 1e3))
-
-
-def slopes_of(residual: Callable[[Floats], Floats]) -> Callable[[Floats], Floats]:
-    """Differences of a residual by a step that does not shrink where a number is zero: frequencies carry round-off."""
-
-    def slopes(t: Floats) -> Floats:
-        here = residual(t)
-        return np.stack([(residual(t + STEP * e) - here) / STEP for e in np.eye(len(t))], axis=1)
-
-    return slopes
+        low, high = (np.r_[[b] * free, np.full(k, s * WIDEST)] for b, s in zip(bounds, (-1, 1), strict=True))
+        begin = np.zeros(k) if start is None else start
+        return optimum(both, begin, (low, high), lambda x: differences(both, x, STEP), STEPS)
 
 
 def uncertain_numbers(d: MachineDescription, default_u: float) -> list[tuple[str, float, float]]:

@@ -143,11 +143,12 @@ def test_poses_to_tap_are_chosen_one_by_one(arm):
 
 
 def test_information_of_poses_is_that_of_the_inverse_covariance():
-    from stiffmap.identification.taps.plan import information
+    from stiffmap.identification.planning.information import information_of
 
     rng = np.random.default_rng(0)
     A, J, rows = rng.normal(size=(6, 2)), rng.normal(size=(6, 3)), np.array([1, 1, 0, 1, 1, 0], bool)
     both = np.hstack([A, J])[rows]
     joint = np.linalg.inv(np.eye(5) + both.T @ both)[:2, :2]
-    assert information(A, J, rows) == pytest.approx(-np.log(np.linalg.det(joint)), rel=1e-12)
-    assert information(A, J, np.ones(6, bool)) > information(A, J, rows)
+    every = np.hstack([A, J])
+    assert information_of(both.T @ both, 2, 1.0) == pytest.approx(-np.log(np.linalg.det(joint)), rel=1e-12)
+    assert information_of(every.T @ every, 2, 1.0) > information_of(both.T @ both, 2, 1.0)
