@@ -17,8 +17,9 @@ constexpr double shortest_load_step = 1.0 / 16384;
 constexpr double crossing_step = 1.0 / 1024;  // a change of stability is looked at this closely
 constexpr double trusted_bend = 0.1;          // of a load step: its chord against the tangents at its ends
 constexpr double crossing_bend = 1e-3, bend_noise = 1e-9;
-constexpr double short_of_way = 1e-2;  // a correction of so little of the step's way leads to no other branch
-constexpr int most_load_steps = 400;
+constexpr double short_of_way = 1e-2;     // a correction of so little of the step's way leads to no other branch
+constexpr double short_share = 1.0 / 64;  // of the load, across a corner
+constexpr int most_load_steps = 400, most_across = 60;  // the latter with corners
 constexpr int patient_steps = 8;
 constexpr int few_iterations = 12;  // of whole steps across corners: they end soon or go to and fro
 
@@ -72,28 +73,41 @@ class LoadPath {
  public:
   LoadPath(const Mechanism& m, Problem& p, const EquilibriumOptions& opt, EquilibriumWorkspace& ws, State& state,
            EquilibriumResult& out)
-      : m_(m), p_(p), opt_(opt), ws_(ws), state_(state), out_(out), by_sign_(p.is_nonconservative()) {}
+      : m_(m),
+        p_(p),
+        opt_(opt),
+        ws_(ws),
+        state_(state),
+        out_(out),
+        by_sign_(p.is_nonconservative()),
+        corners_(has_knots(m)) {}
 
   /// All of the load at once, where Newton's steps shrink so fast that there is no doubt.
   bool at_once() {
-    p_.factor = 1;
-    if (newton(m_, p_, opt_, true, true, ws_, state_, out_) != Outcome::converged) return false;
+    ws_.met_gap = false;
+    if (!take(1, true, true)) return false;
     out_.falling = ws_.stability.falling(ws_.saddle);
     return out_.falling == 0 && out_.contraction <= steady_contraction;
   }
 
   Outcome follow() {
     out_.flags |= flag::load_stepped;
-    p_.factor = 0;
-    if (newton(m_, p_, opt_, true, false, ws_, state_, out_) !=
-        Outcome::converged) {  // springs that pull without a load
-      state_ = ws_.start;
+    double done = corners_ ? 1 : 0, step = 0.5;
+    if (corners_) {  // what a law with corners does without a load says nothing
+      while (done *= 0.5, !take(done, true, true) || ws_.stability.falling(ws_.saddle) > 0) {
+        state_ = ws_.start;
+        if (done < shortest_load_step) return Outcome::failed;
+      }
+      step = done;
+    } else if (p_.factor = 0; newton(m_, p_, opt_, true, false, ws_, state_, out_) != Outcome::converged) {
+      state_ = ws_.start;  // springs that pull without a load
       if (!settle_downhill(m_, p_, opt_.tolerance, ws_, state_, out_)) return Outcome::failed;
       factorize_at(m_, p_, state_, ws_);
     }
     note(stable_, ws_.slope_before, wrench_slope_before_);
-    double done = 0, step = 0.5;
-    for (int k = 0; k < most_load_steps; ++k) {
+    falling_ = out_.falling;
+    ws_.pieces_before = ws_.lin.dtau;
+    for (int k = 0; k < (corners_ ? most_across : most_load_steps); ++k) {
       p_.factor = std::min(1.0, done + step);
       if (advance(p_.factor - done)) {
         if (done = p_.factor; done == 1) return Outcome::converged;
@@ -108,6 +122,28 @@ class LoadPath {
     return Outcome::failed;
   }
 
+  /// Across corners that no step is proven to pass, where a gap is open or something sticks: of each is asked only that
+  /// Newton converges and that the tip does not leap.
+  Outcome step_over_corners() {
+    state_ = ws_.start;
+    out_.sign_changes = 0;
+    double done = 0, step = 1, sign = unloaded_sign(m_, p_, ws_, state_);
+    while (done < 1) {
+      ws_.step_start = state_;
+      if (take(std::min(1.0, done + step), done == 0, false)) {
+        done = p_.factor;
+        count_sign(ws_.saddle, sign, out_);
+        step *= 2;
+        continue;
+      }
+      state_ = ws_.step_start;
+      step *= 0.5;
+      if (step < 1.0 / 1024) return Outcome::failed;
+    }
+    out_.falling = ws_.stability.falling(ws_.saddle);
+    return Outcome::converged;
+  }
+
  private:
   const Mechanism& m_;
   Problem& p_;
@@ -116,8 +152,19 @@ class LoadPath {
   State& state_;
   EquilibriumResult& out_;
   bool by_sign_;       ///< stability by the determinant's sign
+  bool corners_;       ///< of laws: where one is met, the path bends at once
   double stable_ = 0;  ///< at the start of the step: falling directions, or the determinant's sign
+  Index falling_ = 0;
   VecX wrench_slope_, wrench_slope_before_;  ///< of the loops
+
+  /// A share of the load at once: from the command, or from the last step.
+  bool take(double share, bool cold, bool trusting) {
+    linearize(m_, p_, state_, ws_.lin);
+    const Pose tip = ws_.lin.frames.at(m_.tip);
+    p_.factor = share;
+    if (newton(m_, p_, opt_, cold, trusting, ws_, state_, out_) != Outcome::converged) return false;
+    return !corners_ || !leaps(m_, tip, ws_.lin.frames.at(m_.tip));
+  }
 
   void note(double& stable, VecX& slope, VecX& wrench_slope) {
     load_slope(m_, p_, ws_, slope);
@@ -132,6 +179,7 @@ class LoadPath {
     if (!off_locks(m_, p_, state_)) return;
     factorize_at(m_, p_, state_, ws_);
     note(stable_, ws_.slope_before, wrench_slope_before_);
+    falling_ = out_.falling;
   }
 
   bool advance(double step) {
@@ -147,94 +195,63 @@ class LoadPath {
       return false;
     double stable = 0;
     note(stable, ws_.slope, wrench_slope_);
+    const bool bends = corners_ && at_other_pieces(m_, ws_.lin, ws_.pieces_before);
     // The chord against the mean of the tangents at both ends: on another branch they disagree.
     ws_.dz = state_.z - ws_.step_start.z;
     const double chord = ws_.saddle.step_norm(m_, ws_.dz);
     ws_.dz -= 0.5 * step * (ws_.slope + ws_.slope_before);
     const double bend = ws_.saddle.step_norm(m_, ws_.dz);
-    const bool crossed = stable != stable_;
+    const bool near = bends && step <= short_share;
+    // Two that fall at once, as in a symmetric machine, leave the determinant's sign.
+    const bool turned = stable != stable_, crossed = (turned || out_.falling != falling_) && !near;
     if (crossed && step > crossing_step) return false;
-    if (!(bend <= bend_noise + (crossed ? crossing_bend : trusted_bend) * chord)) return false;
-    out_.sign_changes += by_sign_ && crossed;
+    if (!near && !(bend <= bend_noise + (crossed ? crossing_bend : trusted_bend) * chord)) return false;
+    out_.sign_changes += by_sign_ && turned && !near;
     stable_ = stable;
+    falling_ = out_.falling;
     ws_.slope_before = ws_.slope;
     wrench_slope_before_ = wrench_slope_;
+    ws_.pieces_before = ws_.lin.dtau;
     return true;
   }
 };
 
-/// Laws with corners: the path has corners too, so that of a step only convergence is asked, and that the tip does not
-/// leap to another assembly.
-Outcome steps_with_corners(const Mechanism& m, Problem& p, const EquilibriumOptions& opt, EquilibriumWorkspace& ws,
-                           State& state, EquilibriumResult& out) {
-  double done = 0, step = 1, sign = unloaded_sign(m, p, ws, state);
-  linearize(m, p, state, ws.lin);
-  Pose tip = ws.lin.frames.at(m.tip);
-  while (done < 1) {
-    p.factor = std::min(1.0, done + step);
-    ws.step_start = state;
-    const bool found = newton(m, p, opt, done == 0, true, ws, state, out) == Outcome::converged;
-    const Pose moved = ws.lin.frames.at(m.tip);
-    if (found && !leaps(m, tip, moved)) {
-      done = p.factor;
-      tip = moved;
-      count_sign(ws.saddle, sign, out);
-      step *= 2;
-      continue;
-    }
-    out.flags |= flag::load_stepped;
-    state = ws.step_start;
-    step *= 0.5;
-    if (step < 1.0 / 1024) return Outcome::failed;
-  }
-  out.falling = ws.stability.falling(ws.saddle);
-  return Outcome::converged;
-}
-
-/// Laws with corners of which none sticks: the whole load at once, where that needs it by way of least energy. Where
-/// the tip leaps it is not taken, or flagged if there is no other way.
-bool at_once_with_corners(const Mechanism& m, Problem& p, const EquilibriumOptions& opt, EquilibriumWorkspace& ws,
-                          State& state, EquilibriumResult& out, bool only_way) {
+/// Where the path has corners that no step is proven to pass: the whole load at once, where that needs it by way of
+/// least energy. Where the tip leaps it is not taken, or flagged if there is no other way.
+bool across_corners(const Mechanism& m, Problem& p, const EquilibriumOptions& opt, EquilibriumWorkspace& ws,
+                    State& state, EquilibriumResult& out, bool only_way) {
+  state = ws.start;
+  out.sign_changes = 0;
   p.factor = 1;
-  EquilibriumOptions few = opt;
-  few.max_iterations = std::min(opt.max_iterations, few_iterations);
   linearize(m, p, state, ws.lin);
   const Pose tip = ws.lin.frames.at(m.tip);
-  const auto found = [&] {
+  EquilibriumOptions few = opt;
+  few.max_iterations = std::min(opt.max_iterations, few_iterations);
+  const bool found = newton(m, p, few, true, false, ws, state, out) == Outcome::converged;
+  out.falling = found ? ws.stability.falling(ws.saddle) : 1;
+  if (out.falling > 0) {
+    state = ws.start;
+    if (!settle_downhill(m, p, opt.tolerance, ws, state, out)) return false;
+    factorize_at(m, p, state, ws);
     out.falling = ws.stability.falling(ws.saddle);
-    const bool far = leaps(m, tip, ws.lin.frames.at(m.tip));
-    if (far && only_way) out.flags |= flag::branch_unverified;
-    return out.falling == 0 && (only_way || !far);
-  };
-  if (newton(m, p, few, true, true, ws, state, out) == Outcome::converged && found()) return true;
-  state = ws.start;
-  if (!settle_downhill(m, p, opt.tolerance, ws, state, out)) return false;
-  factorize_at(m, p, state, ws);
-  return found();
+  }
+  const bool far = leaps(m, tip, ws.lin.frames.at(m.tip));
+  if (far && only_way) out.flags |= flag::branch_unverified;
+  return out.falling == 0 && (only_way || !far);
 }
 
 Outcome adaptive_steps(const Mechanism& m, Problem& p, const EquilibriumOptions& opt, EquilibriumWorkspace& ws,
                        State& state, EquilibriumResult& out) {
-  const auto at_once = [&](bool only_way) {
-    state = ws.start;
-    out.sign_changes = 0;
-    return at_once_with_corners(m, p, opt, ws, state, out, only_way) ? Outcome::converged : Outcome::failed;
-  };
-  if (has_knots(m)) {
-    const bool slides = !rubs_or_sticks(m);
-    if (slides && at_once(false) == Outcome::converged) return Outcome::converged;
-    state = ws.start;
-    const Outcome stepped = steps_with_corners(m, p, opt, ws, state, out);
-    return slides && stepped != Outcome::converged ? at_once(true) : stepped;
-  }
   LoadPath path(m, p, opt, ws, state, out);
   if (path.at_once()) return Outcome::converged;
   state = ws.start;
-  const Outcome followed = path.follow();
+  if (!ws.met_gap && path.follow() == Outcome::converged) return Outcome::converged;
   const auto slackens = [](const NodeSpring& s) { return s.tension_only; };
-  if (followed == Outcome::converged || std::none_of(m.external_springs.begin(), m.external_springs.end(), slackens))
-    return followed;
-  return at_once(true);  // the path has a corner where one of them goes slack
+  const bool knots = has_knots(m), slides = knots && !rubs_or_sticks(m);
+  if (slides && across_corners(m, p, opt, ws, state, out, false)) return Outcome::converged;
+  if (knots && path.step_over_corners() == Outcome::converged) return Outcome::converged;
+  const bool only_way = slides || std::any_of(m.external_springs.begin(), m.external_springs.end(), slackens);
+  return only_way && across_corners(m, p, opt, ws, state, out, true) ? Outcome::converged : Outcome::failed;
 }
 
 /// A platform in cables alone: the minimum of the energy that lies downhill, then Newton's last steps.

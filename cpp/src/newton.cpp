@@ -67,18 +67,21 @@ void line_search(const Mechanism& m, const Problem& p, EquilibriumWorkspace& ws,
 Outcome iterate(const Mechanism& m, Problem& p, const EquilibriumOptions& opt, bool cold, bool trusting, double noise,
                 double harmless, EquilibriumWorkspace& ws, State& state, EquilibriumResult& out) {
   const bool knots = has_knots(m);
+  bool same_pieces = true;  ///< as before the last step, which went all of its way
   double first = 0, previous = 0, least = std::numeric_limits<double>::infinity();
   int idle = 0;
   out.contraction = 0;
   p.secant_laws = p.first_order = cold && knots;
   if (p.secant_laws) p.friction_sign.setZero();  // not those of an attempt at more of the load
   linearize(m, p, state, ws.lin);
+  ws.pieces = ws.lin.dtau;
   for (int k = 0; k < opt.max_iterations; ++k) {
     if ((knots || !trusting) && off_locks(m, p, state)) linearize(m, p, state, ws.lin);
     ws.saddle.assemble(m, ws.lin);
     ws.saddle.factorize();
     force_balance(m, ws.lin, ws.saddle, ws.force);
     ws.saddle.solve(ws.force, ws.lin.e, ws.dz, ws.dlambda);
+    ws.met_gap |= knots && !ws.saddle.regular();
     ++out.iterations;
     const double norm = ws.saddle.step_norm(m, ws.dz);
     if (!std::isfinite(norm)) return Outcome::failed;
@@ -88,9 +91,10 @@ Outcome iterate(const Mechanism& m, Problem& p, const EquilibriumOptions& opt, b
       start_laws(m, p, state);
       p.secant_laws = p.first_order = false;
       linearize(m, p, state, ws.lin);
+      ws.pieces = ws.lin.dtau;
       continue;
     }
-    if (first > 0 && out.contraction == 0) out.contraction = norm / first;
+    if (first > 0 && out.contraction == 0 && same_pieces) out.contraction = norm / first;
     // A short step may still cross a corner, after which the force is another: two in a row do not.
     const bool settled =
         norm < opt.tolerance && (!knots || norm < nothing || (previous > 0 && previous < opt.tolerance));
@@ -104,10 +108,11 @@ Outcome iterate(const Mechanism& m, Problem& p, const EquilibriumOptions& opt, b
       state.lambda += ws.dlambda;
       return Outcome::converged;
     }
-    if (trusting && !knots) {
+    if (trusting) {
       if (first == 0) first = norm;
-      if (norm > largest_step) return Outcome::distrusted;
-      if (previous > 0 && norm > trusted_contraction * previous && norm > harmless) return Outcome::distrusted;
+      if (norm > largest_step && !knots) return Outcome::distrusted;
+      const bool shrinks = norm <= trusted_contraction * previous || norm <= harmless;
+      if (previous > 0 && same_pieces && !shrinks && (!knots || ws.saddle.regular())) return Outcome::distrusted;
     }
     previous = norm;
     const double merit = ws.saddle.merit(ws.lin);
@@ -119,11 +124,14 @@ Outcome iterate(const Mechanism& m, Problem& p, const EquilibriumOptions& opt, b
     state.z += ws.dz;
     state.lambda += ws.dlambda;
     linearize(m, p, state, ws.lin);
+    same_pieces = !knots || !at_other_pieces(m, ws.lin, ws.pieces);
+    ws.pieces = ws.lin.dtau;
     // The merit mixes closure and force: far steps may raise it harmlessly once, so only guard
     // against growth when the steps have stopped shrinking.
     if ((knots || !trusting) && k > 2 && !(ws.saddle.merit(ws.lin) < 2 * merit)) {
       state = ws.before;
       line_search(m, p, ws, state, merit);
+      same_pieces = false;
     }
   }
   return Outcome::failed;
@@ -139,6 +147,14 @@ bool rubs_or_sticks(const Mechanism& m) {
 bool has_knots(const Mechanism& m) {
   if (rubs_or_sticks(m)) return true;
   return std::any_of(m.laws.begin(), m.laws.end(), [](const Law& law) { return law.has_knots(); });
+}
+
+bool at_other_pieces(const Mechanism& m, const Linearization& lin, const VecX& slopes) {
+  for (Index j = 0; j < m.size(); ++j) {
+    const Coordinate& c = m.coordinates[at(j)];
+    if (c.law >= 0 && !c.locked && m.laws[at(c.law)].has_knots() && slopes[j] != lin.dtau[j]) return true;
+  }
+  return false;
 }
 
 bool off_locks(const Mechanism& m, const Problem& p, State& state) {
@@ -179,7 +195,7 @@ Outcome newton(const Mechanism& m, Problem& p, const EquilibriumOptions& opt, bo
   if (outcome != Outcome::converged || !has_knots(m) || ws.saddle.regular()) return outcome;
   ws.settled = state;
   if (!leave_gaps(m, p, ws.lin, gap_noise, state)) return outcome;
-  if (iterate(m, p, opt, false, trusting, gap_noise, harmless, ws, state, out) == Outcome::converged) return outcome;
+  if (iterate(m, p, opt, false, false, gap_noise, harmless, ws, state, out) == Outcome::converged) return outcome;
   state = ws.settled;
   factorize_at(m, p, state, ws);
   return outcome;

@@ -17,6 +17,9 @@ enum class Outcome { converged, failed, distrusted };
 Outcome newton(const Mechanism& m, Problem& p, const EquilibriumOptions& opt, bool cold, bool trusting,
                EquilibriumWorkspace& ws, State& state, EquilibriumResult& out, double harmless = 1e-7);
 
+/// Whether a law with corners is at another of its pieces than where the slopes of all laws were `slopes`.
+bool at_other_pieces(const Mechanism& m, const Linearization& lin, const VecX& slopes);
+
 /// Forces balance and loops are closed: a vanishing step alone says nothing where the tangent is singular.
 bool in_balance(const Mechanism& m, const EquilibriumWorkspace& ws);
 

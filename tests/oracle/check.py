@@ -44,7 +44,7 @@ class Check:
 
 
 def checks(task: Task, machine: sm.Machine | None = None) -> tuple[Answer, list[Check]]:
-    """Every way to ask. What disagrees is asked again of bodies that close in finer steps."""
+    """Every way to ask. What disagrees is asked again of bodies that close, and take the load, in finer steps."""
     machine = machine or sm.Machine(task.description)
     truth, found = checked(task, machine, Machine(task.description))
     if any(c.wrong for c in found):
@@ -148,7 +148,7 @@ def against(
             return Check(how, status.name, told, f"{truth.kind}, balanced", gaps, "")
         if not away < OFF:
             wrong = f"not an equilibrium, {away:.0e} off"
-        elif (falling == 0) != (status == sm.Status.CONVERGED):
+        elif falling >= 0 and (falling == 0) != (status == sm.Status.CONVERGED):
             wrong = "status against the eigenvalues where it stands"
     return Check(how, status.name, told, truth.kind, gaps, wrong)
 

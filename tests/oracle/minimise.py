@@ -15,9 +15,9 @@ from stiffmap.model.description import MachineDescription
 from .energy import Frame, Loads, gap, whole
 
 ITERATIONS = 40
-SHORTEST = 1 / 8192  # step of the load
+SHORTEST = 2.0**-20  # step of the load: where a path is steep, a thousandth of it still moves far
 CROSSING = 1 / 1024  # step across a change of stability
-MOST = 80  # load steps tried; beyond, the path is given up as too crooked
+MOST = 200  # load steps tried; beyond, the path is given up as too crooked
 SINGULAR = 1e-9  # smallest singular value of the scaled system; that of a sound machine is near 0.1
 STILL = 1e-9  # motion of the tip beside that of the joints
 LONGEST = 0.3  # rad, of a free turn downhill

@@ -29,7 +29,8 @@ struct EquilibriumWorkspace {
   SaddleSystem saddle;
   Stability stability;
   State start, step_start, before, settled;
-  VecX dz, dlambda, force, slope, slope_before, no_closure;
+  bool met_gap = false;  ///< a law without stiffness left something loose
+  VecX dz, dlambda, force, slope, slope_before, no_closure, pieces, pieces_before;
 };
 
 /// Free balls whose axes have come near their lock are numbered anew, the configuration stays: near a lock the balance

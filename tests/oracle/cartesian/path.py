@@ -43,6 +43,8 @@ class Path:
     near: Array
     holds: Array = field(default_factory=lambda: np.zeros((0, 0)))
     """Motions (k, 6 n) that nothing holds and that leave the TCP where it is: kept."""
+    longest: float = 1.0
+    """Share of the load in one step: longer ones may pass an imperfect fork."""
     crossed: bool = False
     goal: tuple[Array, Array] | None = None
     """Position and rotation to which motions that are kept lead the TCP."""
@@ -142,11 +144,11 @@ class Path:
             start = self.held()
         if start is None:
             return None, "no start"
-        at, done, share = self.point(start), 0.0, 1.0
+        at, done, share = self.point(start), 0.0, self.longest
         i = 6 * self.system.s.tip
         far = float(np.abs(at.state.minus(self.start)[i : i + 6]).max())
         self.released = far if self.pull is None else np.inf
-        for _ in range(MOST):
+        for _ in range(MOST + 2 * int(1 / self.longest)):
             if done == 1:
                 return at, "found"
             share = min(share, 1 - done)
@@ -157,7 +159,7 @@ class Path:
                     return None, "locked" if self.locked(at) else "ends"
             else:
                 self.crossed |= to.falling != at.falling
-                at, done, share = to, min(1.0, done + share), 2 * share
+                at, done, share = to, min(1.0, done + share), min(2 * share, self.longest)
         return None, "given up"
 
     def held(self) -> tuple[State, Array, Array, Tangent] | None:
@@ -188,7 +190,8 @@ class Path:
 
     def judged(self, p: Array, r: Array) -> tuple[float, int]:
         """How far (m, rad) the equilibrium is where the TCP is put at p, r and all else is in balance under the whole
-        load; and what falls there. NaN where Newton does not find how the rest is in balance."""
+        load; and what falls there, -1 where a determinant does not say whether two directions do. NaN where Newton does
+        not find how the rest is in balance."""
         i = self.system.s.tip
         p0, turn = self.start.p[i], Rotation.from_matrix(r @ self.start.r[i].T).as_rotvec()
         at: tuple[State, Array, Array] = (self.start, np.zeros(self.system.closures), self.near)
@@ -209,7 +212,11 @@ class Path:
             return np.nan, 0
         t = found[3]
         step, _ = self.solve(t, -(t.slope + t.load), t.gap)
-        return float(np.abs(step[6 * i : 6 * i + 6]).max()), self.falling(t)
+        falling = self.falling(t)
+        if not self.conservative and not falling:
+            a, _ = self.matrix(t)
+            falling = -1 if negative(a) - (len(a) - len(t.slope)) > 1 else 0
+        return float(np.abs(step[6 * i : 6 * i + 6]).max()), falling
 
     def step(self, at: Point, done: float, share: float) -> Point | None:
         guess = at.state.moved(share * at.slope)

@@ -108,7 +108,7 @@ class Machine:
         system.winches = [
             Winch(e, at, leg, name, drawn[name]) for name, leg, at, e in real.cables if name in drawn
         ]
-        return Path(system, state, measured)
+        return Path(system, state, measured, longest=1 / (8 * self.closure.finer - 7))
 
     def judge(
         self, displacement: Array, loads: Loads, pose: Pose | None, drives: dict[str, float] | None, kind: str

@@ -70,6 +70,15 @@ def test_a_wrong_answer_is_noticed() -> None:
 
 #: Left a branch near a singular pose, forces on points, poses behind a singular one, round-off.
 OF_THE_ORACLE = (400823, 401088, 401555, 402154, 402785, 403122, 403145, 405250)
+PAST_A_FORK = (
+    101878,
+    102321,
+    404424,
+    404630,
+    404662,
+    407503,
+    407649,
+)  # of steps that are too long, or of loads in steps
 
 
 @pytest.mark.parametrize(
@@ -81,6 +90,7 @@ OF_THE_ORACLE = (400823, 401088, 401555, 402154, 402785, 403122, 403145, 405250)
         30121,  # slopes beside friction of a cable's guide
         20025,  # rigid
         *OF_THE_ORACLE,
+        *PAST_A_FORK,
     ],
 )
 def test_seeds_that_once_disagreed(seed: int) -> None:
