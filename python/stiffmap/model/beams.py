@@ -120,9 +120,11 @@ def changed(beam: BeamNumbers, key: str, value: float) -> BeamNumbers:
 def compliance(beam: BeamNumbers) -> Matrix6:
     """(6, 6) at the far end, local axes; StiffmapError where the numbers make no beam."""
     n = dict(beam.numbers)
-    wrong = [k for k, v in beam.numbers if not v > 0.0 and k != "material.nu"]
+    least = {"material.nu": -1.0}
+    wrong = [k for k, v in beam.numbers if not v > least.get(k, 0.0)]
     if wrong:
-        raise StiffmapError(f"beam.{wrong[0]}: must be positive; found {n[wrong[0]]:g}")
+        key = wrong[0]
+        raise StiffmapError(f"beam.{key}: must be above {least.get(key, 0):g}; found {n[key]:g}")
     if "EA" in n:
         values = [n[key] for key in products(beam.along)]
     else:

@@ -52,6 +52,8 @@ SAME_EVIDENCE = 2.0
 """Evidence, ln, within which the coarsest part has the name."""
 AT_MOST, FAR = 25, 1e6
 """Steps to the optimum of effects that bend; the misfit of a machine that fails."""
+Bound = tuple[float, Place, Fit]
+"""Evidence with a place, from below, and the amplitudes that give it."""
 Predict = Callable[[Sequence["Chosen"]], Floats]
 """(m,) what effects of given strengths add to the readings, by the machine itself; NaN where it fails."""
 
@@ -190,6 +192,8 @@ class _World:
         self.columns, self.name, self.numbers, self.predict = columns, name, numbers, predict
         self.over, self.optima = over, optima
         self.known: dict[frozenset[tuple[int, int]], Model] = {}
+        self.anchors: dict[int, tuple[Model, list[Fit]]] = {}
+        self.bounds: dict[int, tuple[Model, list[Bound]]] = {}
         self.gaps = parts.gaps
 
     def search(self) -> Search:
@@ -226,15 +230,21 @@ class _World:
         best = max(refits, key=lambda m: m.score)
         return (best, np.array(list(scores.values())) - model.score) if np.isfinite(best.score) else None
 
-    def _bounds(self, model: Model, more: tuple[Fit, ...] = ()) -> list[tuple[float, Place, Fit]]:
+    def _bounds(self, model: Model, more: tuple[Fit, ...] = ()) -> list[Bound]:
         """Per place a lower bound of the evidence with it, and the anchor that gives it; `more` anchors than its own."""
+        if id(model) not in self.bounds:
+            self.bounds[id(model)] = model, self._bounded(model, self._anchors(model))
+        own = self.bounds[id(model)][1]
+        also = self._bounded(model, more) if more else own
+        return [max(both, key=lambda b: b[0]) for both in zip(own, also, strict=True)]
+
+    def _bounded(self, model: Model, anchors: Sequence[Fit]) -> list[Bound]:
         taken = {id(c.place) for c in model.chosen}
         others = [c.place.candidate for c in model.chosen]
         free = tuple(p for p in self.columns.places if id(p) not in taken and not clash(p.candidate, others))
         if not free:
             return []
         extra = model.score - model.fit.score
-        anchors = [*self._anchors(model), *more]
         found = [[log_mean(g) + a.score + extra for g in evidence(a, free)] for a in anchors]
         out = []
         for k, place in enumerate(free):
@@ -245,10 +255,14 @@ class _World:
     def _anchors(self, model: Model) -> list[Fit]:
         """Amplitudes at which candidates are judged: as fitted; without gaps; the same at the declared noise."""
         fit = model.fit
+        if id(model) in self.anchors:
+            return self.anchors[id(model)][1]
         effects = tuple(c.part for c in model.chosen)
         bare = fitted(fit.columns, (*self.numbers, *effects), amplitudes(fit), fit.weights)
         at_rest = np.array([0.0, *bare.t[1:]])
-        return [fit, bare, evaluated(fit.columns, bare.parts, at_rest, bare.weights)]
+        found = [fit, bare, evaluated(fit.columns, bare.parts, at_rest, bare.weights)]
+        self.anchors[id(model)] = model, found
+        return found
 
     def _with(self, model: Model, places: Sequence[Place], anchor: Fit) -> Model:
         """The model with further effects, fitted from the anchor."""
@@ -385,7 +399,10 @@ class _World:
             for anchor in self._anchors(fewer):
                 shapes = [p.shapes[_best_shape(anchor, p)] for _, p, _ in bounds]
                 gain = np.tril(of_pairs(anchor, shapes), -1)
+                enough = model.score - SHORT - (anchor.score + fewer.score - fewer.fit.score)
                 for k in np.argsort(gain, axis=None)[::-1][:REFITS]:
+                    if gain.flat[k] < enough:
+                        break
                     places = [bounds[int(i)][1] for i in np.unravel_index(int(k), gain.shape)]
                     if clash(places[0].candidate, [places[1].candidate]):
                         continue

@@ -97,6 +97,7 @@ class Joint:
         "Viscous damping of its motion about the equilibrium.",
         coordinate=-1,
         effort=1,
+        time=1,
         lower=0.0,
         passive=True,
     )

@@ -39,6 +39,12 @@ def test_the_table_has_uncertainty_unit_and_note() -> None:
     assert row.u == pytest.approx(2.5e5)
     assert list(t.columns) == ["value", "unit", "u", "source", "note"]
     assert t.loc["a.carriage/friction.viscous"].unit == "N·s/m"
+    text = (
+        find("five-bar")
+        .read_text(encoding="utf-8")
+        .replace("- actuator: motor", "- actuator: motor\n        damping: 2", 1)
+    )
+    assert sm.load_machine(text).numbers().filter(like="/damping", axis=0).unit.item() == "N·m·s/rad"
 
 
 def crank_angle(base: float, tip: tuple[float, float], arm: float, forearm: float, bend: int) -> float:
@@ -70,6 +76,8 @@ def test_a_beam_alone_changes_its_compliance() -> None:
     assert "gantry.ram/compliance.k11" not in machine.numbers().index  # it follows from the beam
     with pytest.raises(StiffmapError, match="inner diameter must be smaller"):
         machine.with_number("ram/beam.tube.outer", 0.05)
+    with pytest.raises(StiffmapError, match="above -1; found -1"):
+        machine.with_number("ram/beam.material.nu", -1.0)
 
 
 def test_a_leg_a_name_or_a_branch() -> None:
