@@ -16,8 +16,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from stiffmap.common.broadcasting import Floats, wrench_array
 from stiffmap.solve.machine import Machine, takes_machine
-from stiffmap.workspace.cables.distribution import limits, nearest, scaled
-from stiffmap.workspace.cables.structure import Hanging, hanging, lines, matrix, poses, weight
+from stiffmap.workspace.cables.structure import (
+    Hanging,
+    hanging,
+    limits,
+    lines,
+    matrix,
+    nearest,
+    poses,
+    scaled,
+    weight,
+)
 from stiffmap.workspace.performance.poses import read_box
 
 ROOMY = 1e4  # N: room above the lowest tension where no highest is declared

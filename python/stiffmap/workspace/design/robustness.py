@@ -4,20 +4,16 @@ from __future__ import annotations
 
 from copy import deepcopy
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from stiffmap.common.broadcasting import Floats, random_numbers
 from stiffmap.common.yaml_text import Document
-from stiffmap.model.description import MachineDescription
-from stiffmap.model.files.load import describe_document
 from stiffmap.model.files.templates import expanded
 from stiffmap.solve.machine import Machine
 from stiffmap.workspace.design.editing import Editor
 from stiffmap.workspace.design.judging import values_of, violation
-from stiffmap.workspace.design.places import put
 from stiffmap.workspace.design.problem import Design
 
 SHARE = 0.1
@@ -60,16 +56,7 @@ def robustness(design: Design, x: Floats, *, draws: int = DRAWS, seed: int = 0) 
 
     def at(numbers: Floats) -> dict[str, float]:
         given = dict(zip(places, map(float, numbers), strict=True))
-        return values_of(design, Machine(editor.description(given) if editor.can else whole(given)), names)
-
-    def whole(given: dict[str, float]) -> MachineDescription:
-        """Where elements are tied together, the whole file is built."""
-        data = deepcopy(document.data)
-        for place, value in given.items():
-            put(data, place, value)
-        return describe_document(
-            Document(data, document.lines), design.machine_file, Path(design.machine_file).parent
-        )
+        return values_of(design, Machine(editor.description(given)), names)
 
     slopes = {n: np.zeros(len(u)) for n in names}
     for i in range(len(u)):

@@ -10,18 +10,19 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.solve.kinematics import inverse_kinematics
 from stiffmap.solve.solution import Solution
 from stiffmap.solve.validity import Validity
-from stiffmap.workspace.maps.direction_sweep import (
+from stiffmap.workspace.maps.extremes import (
     DirectionSweep,
+    Extreme,
     direction,
-    even_directions,
+    even_angles,
+    find_extreme,
     solve_directions,
+    value_growth,
 )
-from stiffmap.workspace.maps.extremes import Extreme, find_extreme, value_growth
 from stiffmap.workspace.maps.fixed_order_sums import norm
 from stiffmap.workspace.maps.loading import Loading, without_failed
-from stiffmap.workspace.maps.plan import MapPlan
+from stiffmap.workspace.maps.plan import BEYOND, MapPlan
 from stiffmap.workspace.maps.uncertainty import Uncertain
-from stiffmap.workspace.maps.variables import BEYOND
 
 ALL = (0, 1, 2)
 
@@ -35,7 +36,8 @@ def solve_block(plan: MapPlan, rows: slice) -> dict[str, Any]:
     if plan.uncertain is not None:
         out |= load_deviations(plan, plan.uncertain, position)
     if plan.turning:
-        directions = even_directions(plan.loading, position, plan.force, plan.axes, plan.directions)
+        angle = np.broadcast_to(even_angles(plan.directions), (len(position), plan.directions))
+        directions = solve_directions(plan.loading, position, angle, plan.force, plan.axes)
         out["direction_status"] = directions.status.max(axis=1)
         extremes: dict[str, Floats] = {}
         for suffix, parts in (("", ALL), (f"_{plan.shown_plane}", plan.axes)):
@@ -137,10 +139,11 @@ def load_deviations(plan: MapPlan, uncertain: Uncertain, position: Floats) -> di
     s, j = sensitivities(plan.loading, uncertain, position[:, None], plan.wrenches)
     d = without_failed(s.displacement, s.status)
     std, parts = deviation(j, d, ALL, uncertain.covariance)
+    variance = np.einsum("...pk,pq,...qk->...k", j, uncertain.covariance, j)
     with np.errstate(invalid="ignore", divide="ignore"):
         share = parts / (std**2)[..., None]
     return {
-        "displacement_std": np.sqrt(_variance(j, uncertain.covariance)),
+        "displacement_std": np.sqrt(np.maximum(variance, 0.0)),
         "deflection_std": std,
         f"deflection_{plan.shown_plane}_std": deviation(j, d, plan.axes, uncertain.covariance)[0],
         "variance_share": share,
@@ -188,7 +191,3 @@ def deviation(j: Floats, d: Floats, parts: tuple[int, ...], covariance: Floats) 
     slope = np.where(still[..., None], 0.0, slope)
     shares = slope * np.einsum("pq,...q->...p", covariance, slope)
     return np.sqrt(np.maximum(shares.sum(axis=-1), 0.0)), shares
-
-
-def _variance(j: Floats, covariance: Floats) -> Floats:
-    return np.asarray(np.maximum(np.einsum("...pk,pq,...qk->...k", j, covariance, j), 0.0))

@@ -12,8 +12,7 @@ import numpy as np
 from stiffmap.solve.machine import Machine, as_machine
 from stiffmap.solve.options import keywords_of
 from stiffmap.workspace.maps.block import solve_block
-from stiffmap.workspace.maps.plan import MapPlan
-from stiffmap.workspace.maps.request import map_plan
+from stiffmap.workspace.maps.plan import MapPlan, map_plan
 from stiffmap.workspace.maps.tiles import POSES_AT_ONCE, blocks_of, tiles_of
 
 SAMPLES = 8

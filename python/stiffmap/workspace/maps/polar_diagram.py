@@ -10,15 +10,18 @@ from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import Floats, whole_number
 from stiffmap.common.errors import StiffmapError
-from stiffmap.solve.labels import COMPONENTS, TWIST_UNITS, flag_attrs, meaning, status_attrs
+from stiffmap.solve.labels import COMPONENTS, meaning
 from stiffmap.solve.machine import Machine, takes_machine
 from stiffmap.solve.options import LoadingKeywords, spelled_out
-from stiffmap.workspace.maps.direction_sweep import DirectionSweep, direction, direction_sweep_of, even_angles
-from stiffmap.workspace.maps.extremes import find_extreme
-from stiffmap.workspace.maps.fixed_order_sums import norm
+from stiffmap.workspace.maps.extremes import (
+    DirectionSweep,
+    direction,
+    direction_sweep_of,
+    even_angles,
+    find_extreme,
+)
 from stiffmap.workspace.maps.inputs import magnitude, place, plane_axes
-from stiffmap.workspace.maps.loading import Loading, without_failed
-from stiffmap.workspace.maps.provenance import describe
+from stiffmap.workspace.maps.loading import Loading, describe, displaced, without_failed
 
 
 @takes_machine
@@ -51,18 +54,10 @@ def polar(
     wrench = np.concatenate([force * direction(angle, axes), np.zeros((directions, 3))], axis=1)
     s = loading.solve(p[None, None], wrench[None])
     swept = direction_sweep_of(s, angle[None], np.full((1, directions), force), axes)
-    d, status = without_failed(s.displacement, s.status)[0], s.status[0]
-    data = {
-        "displacement": (
-            ("angle", "component"),
-            d,
-            meaning(TWIST_UNITS, "displacement of the reference point"),
-        ),
-        "deflection": ("angle", norm(d[:, :3]), meaning("m", "norm of the translation")),
-        f"deflection_{plane}": ("angle", norm(d[:, axes]), meaning("m", f"norm in the {plane} plane")),
-        "status": ("angle", status, status_attrs("the equilibrium")),
-        "flags": ("angle", s.flags[0], flag_attrs()),
-    } | _extremes(loading, p[None], force, plane, swept)
+    d = without_failed(s.displacement, s.status)[0]
+    data = displaced("angle", d, s.status[0], s.flags[0], plane) | _extremes(
+        loading, p[None], force, plane, swept
+    )
     coords = {
         "angle": (
             "angle",

@@ -12,11 +12,9 @@ from numpy.typing import NDArray
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.solve.compiled import Role
-from stiffmap.solve.labels import COMPONENTS, TWIST_UNITS, flag_attrs, meaning, status_attrs
+from stiffmap.solve.labels import COMPONENTS, meaning
 from stiffmap.solve.machine import Machine
-from stiffmap.workspace.maps.fixed_order_sums import norm
-from stiffmap.workspace.maps.loading import Loading
-from stiffmap.workspace.maps.provenance import describe
+from stiffmap.workspace.maps.loading import Loading, describe, displaced
 
 BRANCH = meaning("1", "0: from the unloaded machine; 1: the branch that crosses it")
 
@@ -41,16 +39,7 @@ class Equilibria:
 
     def variables(self) -> dict[str, Any]:
         """Variables over ``step``."""
-        d = self.displacement
-        twist = meaning(TWIST_UNITS, "displacement of the reference point")
-        return {
-            "displacement": (("step", "component"), d, twist),
-            "deflection": ("step", norm(d[:, :3]), meaning("m", "norm of the translation")),
-            "deflection_xy": (
-                "step",
-                norm(d[:, :2]),
-                meaning("m", "norm of the translation in the xy plane"),
-            ),
+        return displaced("step", self.displacement, self.status, self.flags, "xy") | {
             "deflection_along": ("step", self.along, meaning("m", "translation along the force")),
             "compliance_along": (
                 "step",
@@ -62,8 +51,6 @@ class Equilibria:
                 self.unstable_modes,
                 meaning("1", "directions in which the energy falls; NaN for single forces"),
             ),
-            "status": ("step", self.status, status_attrs("the equilibrium")),
-            "flags": ("step", self.flags, flag_attrs()),
             "branch": ("step", self.branch, BRANCH),
         }
 

@@ -8,13 +8,13 @@ from stiffmap.workspace.performance.motion.closing import DriveKinematics, drive
 from stiffmap.workspace.performance.motion.efforts import (
     PeakAcceleration,
     drive_efforts,
-    fastest,
     peak_acceleration,
 )
 from stiffmap.workspace.performance.motion.force import ForceTransmission, force_transmission
 from stiffmap.workspace.performance.motion.frequencies import NaturalFrequencies, natural_frequencies
 from stiffmap.workspace.performance.motion.inertia import body_masses, moving_mass, total_mass
 from stiffmap.workspace.performance.motion.motion_files import Motion, load_motion
+from stiffmap.workspace.performance.motion.timing import fastest
 from stiffmap.workspace.performance.motion.trajectory import (
     Path,
     Trajectory,

@@ -12,17 +12,13 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.common.short import short_repr
 from stiffmap.solve.machine import Machine, takes_machine
 from stiffmap.solve.results import OverPoses
-from stiffmap.workspace.cables.structure import Hanging
 from stiffmap.workspace.maps.inputs import plane_axes
 from stiffmap.workspace.performance.motion.closing import DriveKinematics, drive_kinematics
 from stiffmap.workspace.performance.motion.inertia import rest_efforts
-from stiffmap.workspace.performance.motion.polygons import Polygon, section_polygon
-from stiffmap.workspace.performance.motion.scaling import characteristic_length, drive_values, weighted
+from stiffmap.workspace.performance.motion.scaling import characteristic_length, drive_limits, weighted
 from stiffmap.workspace.performance.motion.tensions import as_tensions, held, in_cables, pushes, radius
 from stiffmap.workspace.performance.motion.velocity import of_motions, singular_values
-
-NOTHING = 1e-12
-"""Effort of a drive per unit force below which the drive does not feel the force."""
+from stiffmap.workspace.performance.motion.zonotopes import Polygon, section_polygon
 
 
 @short_repr
@@ -75,48 +71,23 @@ def force_transmission(
     Raises StiffmapError for bad input, never for a pose.
     """
     k = drive_kinematics(machine, position, rotation, sharing=sharing, threads=threads)
-    return force_of(
-        machine,
-        k,
-        plane=plane,
-        limits=limits,
-        gravity=gravity,
-        velocity=velocity,
-        length=length,
-        sharing=sharing,
-    )
-
-
-def force_of(
-    machine: Machine,
-    k: DriveKinematics,
-    *,
-    plane: str = "xy",
-    limits: ArrayLike | str = "declared",
-    gravity: ArrayLike | None = None,
-    velocity: ArrayLike | None = None,
-    length: float | None = None,
-    sharing: str = "least_norm",
-) -> ForceTransmission:
-    """The same from kinematics that are at hand."""
-    text = limits if isinstance(limits, str) else ""
-    given = np.ones(()) if text == "unit" else None if text == "declared" else limits
-    most = drive_values(machine, "force", given, "N or N·m")
-    if (h := in_cables(machine, "the force that is held")) is not None:
-        return _of_cables(machine, h, k, most, plane, gravity, velocity, length, sharing)
-    bias = rest_efforts(machine, k, gravity=gravity, velocity=velocity, sharing=sharing)
-    needed = -np.swapaxes(k.jacobian[..., :3, :], -1, -2)  # effort of the drives per force on the tool
-    free = most - np.abs(bias)
-    norms = np.linalg.norm(needed, axis=-1)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        room = np.where(norms > NOTHING, free / norms, np.where(free >= 0, np.inf, 0.0))
+    most = drive_limits(machine, "force", limits, "N or N·m")
+    if (h := in_cables(machine, "the force that is held")) is None:
+        bias = rest_efforts(machine, k, gravity=gravity, velocity=velocity, sharing=sharing)
+        found = -np.swapaxes(k.jacobian[..., :3, :], -1, -2), most, bias  # effort per force on the tool
+    else:
+        if velocity is not None:
+            raise StiffmapError(f"{machine.name}: velocity: for cables the force is known at rest alone")
+        found = held(machine, h, k, pushes(h), most, gravity)
+        still = rest_efforts(machine, k, gravity=gravity, velocity=None)
+        bias = as_tensions(machine, h, k, still, most, sharing)
+    rows, room, offset = found
     least, largest = _spheres(machine, k, length)
-    bad = ~np.isfinite(needed).all(axis=(-2, -1))
     return ForceTransmission(
         sphere_min=least,
         sphere_max=largest,
-        force_min=np.where(bad, np.nan, np.maximum(room.min(axis=-1), 0.0)),
-        plane=section_polygon(needed[..., list(plane_axes(plane))], most, k.status, bias),
+        force_min=radius(found),
+        plane=section_polygon(rows[..., list(plane_axes(plane))], room, k.status, offset),
         bias=bias,
         limits=most,
         status=k.status,
@@ -129,24 +100,3 @@ def _spheres(machine: Machine, k: DriveKinematics, length: float | None) -> tupl
         j = weighted(machine, k.jacobian, characteristic_length(machine, length), "all")
         s, last = of_motions(machine, k, singular_values(j))
         return 1 / s[..., 0], 1 / last
-
-
-def _of_cables(
-    machine: Machine, h: Hanging, k: DriveKinematics, most: Floats, plane: str, gravity: ArrayLike | None,
-    velocity: ArrayLike | None, length: float | None, sharing: str,
-) -> ForceTransmission:  # fmt: skip
-    """Tensions between 0 and the limits, whichever they are, moments balanced."""
-    if velocity is not None:
-        raise StiffmapError(f"{machine.name}: velocity: for cables the force is known at rest alone")
-    rows, limits, offset = found = held(machine, h, k, pushes(h), most, gravity)
-    bias = as_tensions(machine, h, k, rest_efforts(machine, k, gravity=gravity, velocity=None), most, sharing)
-    least, largest = _spheres(machine, k, length)
-    return ForceTransmission(
-        sphere_min=least,
-        sphere_max=largest,
-        force_min=radius(found),
-        plane=section_polygon(rows[..., list(plane_axes(plane))], limits, k.status, offset),
-        bias=bias,
-        limits=most,
-        status=k.status,
-    )

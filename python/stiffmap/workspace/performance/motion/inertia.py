@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from stiffmap.common.broadcasting import Floats, real_array, thread_count
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.description import Body
-from stiffmap.model.description.tree import all_elements, joints
+from stiffmap.model.description.tree import all_elements, core_name, joints
 from stiffmap.solve.compiled.names import Role
 from stiffmap.solve.machine import Machine
 from stiffmap.workspace.performance.motion.closing import DriveKinematics
@@ -56,12 +56,9 @@ def moving_mass(machine: Machine) -> float:
 
 def inertias(machine: Machine) -> Floats:
     """(bodies, 3, 3) kg·m² about the centres of mass, in the bodies' axes and the core's order."""
-    found = {n: e for n, e in all_elements(machine.description) if isinstance(e, Body)}
-    names = [name for name, _, _ in machine.compiled.bodies]
-    bodies = [found.get(n) or found[f"base.{n}"] if f"base.{n}" in found else found.get(n) for n in names]
-    if any(b is None for b in bodies):  # names of base and platform elements carry no prefix in the core
-        bodies = [e for _, e in all_elements(machine.description) if isinstance(e, Body)]
-    return np.array([b.inertia for b in bodies if b is not None], dtype=float).reshape(-1, 3, 3)
+    found = {core_name(n): e for n, e in all_elements(machine.description) if isinstance(e, Body)}
+    bodies = [found[name].inertia for name, _, _ in machine.compiled.bodies]
+    return np.array(bodies, dtype=float).reshape(-1, 3, 3)
 
 
 def need_masses(machine: Machine, what: str) -> None:
