@@ -1,4 +1,4 @@
-"""What unit tensions do to the platform, from the declared geometry."""
+"""What unit tensions do to the platform, from the declared geometry, and the tensions that hold it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""Machines whose numbers change, made quickly: only the elements that hold such a number are built again."""
+"""Places in a machine file (``templates.leg.spring[foot].beam.EIz``, ``workspace.x[0]``), and machines whose numbers there change, made
+quickly: only the elements that hold such a number are built again."""
 
 from __future__ import annotations
 
@@ -101,6 +102,11 @@ Address = tuple[str | int, ...]
 _MODEL: TypeAdapter[Any] = TypeAdapter(ElementModel)
 
 
+def described(data: Any, document: Document, file: str) -> MachineDescription:
+    """The machine of a file's data, with the lines of its document."""
+    return describe_document(Document(data, document.lines), file, Path(file).parent)
+
+
 class Editor:
     """Descriptions of one machine file with other numbers at given places.
 
@@ -124,7 +130,7 @@ class Editor:
         if data.get("effects") or "stroke" in text or "link:" in text or "'of':" in text:
             raise LookupError("tied together")
         model = validate(self.document, self.file)
-        self.base: MachineDescription = describe_document(self.document, self.file, Path(self.file).parent)
+        self.base: MachineDescription = described(data, self.document, self.file)
         self.context = Context(
             self.file, self.document, Path(self.file).parent, self.base.units, model.materials, Gathered()
         )
@@ -156,7 +162,7 @@ class Editor:
             data = unshared(self.document.data)
             for place, value in values.items():
                 put(data, place, value)
-            return describe_document(Document(data, self.document.lines), self.file, Path(self.file).parent)
+            return described(data, self.document, self.file)
         built: dict[Address, dict[Address, Element]] = {}
         known: dict[str, Element] = {}
         for (sequence, address), places in self.elements.items():

@@ -16,13 +16,12 @@ from stiffmap.common.broadcasting import Floats, given_path
 from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.yaml_text import Document, read
 from stiffmap.model.description import MachineDescription
-from stiffmap.model.files.load import describe_document
 from stiffmap.model.files.report import validated
 from stiffmap.model.files.schema.base import FileModel, Name
 from stiffmap.model.files.shipped import find
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.redesign import on_branch_of, settled
-from stiffmap.workspace.design.editing import Editor, put, unshared
+from stiffmap.workspace.design.editing import Editor, described, put, unshared
 from stiffmap.workspace.performance.motion.motion_files import (
     Motion,
     given_or_shipped,
@@ -147,11 +146,7 @@ class Design:
 
     def machine(self, x: Floats) -> Machine:
         """The machine of a vector of variables; StiffmapError where it cannot be."""
-        return Machine(self._on_branch(self._described(self.data(x))))
-
-    def _described(self, data: Any) -> MachineDescription:
-        document = Document(data, self.document.lines)
-        return describe_document(document, self.machine_file, Path(self.machine_file).parent)
+        return Machine(self._on_branch(described(self.data(x), self.document, self.machine_file)))
 
     def _on_branch(self, description: MachineDescription) -> MachineDescription:
         """On the assembly branch of the machine file, where a home is searched for."""
@@ -160,7 +155,7 @@ class Design:
     @cached_property
     def _base(self) -> MachineDescription:
         """As the machine file has it, its home found once for all designs."""
-        base = self._described(unshared(self.document.data))
+        base = described(unshared(self.document.data), self.document, self.machine_file)
         return settled(base.declared or base)
 
 

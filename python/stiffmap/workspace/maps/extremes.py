@@ -53,16 +53,6 @@ def direction(angle: Floats, axes: tuple[int, int]) -> Floats:
     return out
 
 
-def solve_directions(
-    loading: Loading, position: Floats, angle: Floats, force: float | Floats, axes: tuple[int, int]
-) -> DirectionSweep:
-    """Equilibria at positions (p, 3) under pure forces (N; one, or one per pose) at angles (p, k)."""
-    size = np.broadcast_to(np.reshape(force, (-1, 1)), angle.shape)
-    along = direction(angle, axes)
-    wrench = np.concatenate([size[..., None] * along, np.zeros_like(along)], axis=-1)
-    return direction_sweep_of(loading.solve(position[:, None], wrench), angle, size, axes)
-
-
 def direction_sweep_of(s: Solution, angle: Floats, size: Floats, axes: tuple[int, int]) -> DirectionSweep:
     """Equilibria (p, k) that have been solved for forces of those sizes (N) and angles."""
     along, across = direction(angle, axes), direction(angle + np.pi / 2, axes)
@@ -100,27 +90,72 @@ class Extreme:
     """Highest status among all directions solved."""
 
 
-def find_extreme(
-    loading: Loading,
-    position: Floats,
-    force: float,
-    axes: tuple[int, int],
-    directions: DirectionSweep,
-    parts: tuple[int, ...],
-    sign: int,
-) -> Extreme:
-    """Largest (sign 1) or smallest (-1) norm of the components `parts` of the translation."""
-    d, rate = directions.translation[..., parts], directions.turning[..., parts]
-    angle = peak_angle(sign * dot(d, d), sign * 2 * dot(d, rate))
-    directions = directions.join(solve_directions(loading, position, angle[:, None], force, axes))
-    value = norm(directions.translation[..., parts])
-    best = directions.pick(np.argmax(np.where(np.isnan(value), -np.inf, sign * value), axis=1))
-    failed = np.isnan(value).any(axis=1)
-    size = norm(best.translation[..., parts])[:, 0]
-    growth = value_growth(best.translation[..., parts], best.growing[..., parts])[:, 0]
-    angle = np.mod(best.angle[:, 0] + np.pi, 2 * np.pi) - np.pi
-    angle, size, growth = (np.where(failed, np.nan, a) for a in (angle, size, growth))
-    return Extreme(angle, size, growth, directions.status.max(axis=1))
+STEPS = 8
+CLOSE = 1e-3
+"""Relative distance to the tolerance from which one more Newton step is exact to about its square."""
+
+
+@dataclass(frozen=True)
+class TurningForce:
+    """A pure force that turns in a plane, at poses (p)."""
+
+    loading: Loading
+    position: Floats
+    """(p, 3) m."""
+    size: float
+    """N."""
+    axes: tuple[int, int]
+    """Base axes of the plane."""
+
+    def solve(
+        self, angle: Floats, size: Floats | None = None, rows: NDArray[np.intp] | None = None
+    ) -> DirectionSweep:
+        """Equilibria at angles (p, k); with a size (p,) N of its own for each pose, at some rows of the poses."""
+        position = self.position if rows is None else self.position[rows]
+        sizes = np.broadcast_to(np.reshape(self.size if size is None else size, (-1, 1)), angle.shape)
+        along = direction(angle, self.axes)
+        wrench = np.concatenate([sizes[..., None] * along, np.zeros_like(along)], axis=-1)
+        return direction_sweep_of(self.loading.solve(position[:, None], wrench), angle, sizes, self.axes)
+
+    def extreme(self, directions: DirectionSweep, parts: tuple[int, ...], sign: int) -> Extreme:
+        """Largest (sign 1) or smallest (-1) norm of the components `parts` of the translation."""
+        d, rate = directions.translation[..., parts], directions.turning[..., parts]
+        angle = peak_angle(sign * dot(d, d), sign * 2 * dot(d, rate))
+        directions = directions.join(self.solve(angle[:, None]))
+        value = norm(directions.translation[..., parts])
+        best = directions.pick(np.argmax(np.where(np.isnan(value), -np.inf, sign * value), axis=1))
+        failed = np.isnan(value).any(axis=1)
+        size = norm(best.translation[..., parts])[:, 0]
+        growth = value_growth(best.translation[..., parts], best.growing[..., parts])[:, 0]
+        angle = np.mod(best.angle[:, 0] + np.pi, 2 * np.pi) - np.pi
+        angle, size, growth = (np.where(failed, np.nan, a) for a in (angle, size, growth))
+        return Extreme(angle, size, growth, directions.status.max(axis=1))
+
+    def limit(self, worst: Extreme, parts: tuple[int, ...], tolerance: float) -> Floats:
+        """Force (p,) in N along the worst direction at which the deflection reaches the tolerance (m).
+
+        Newton's method on loaded equilibria, started at the worst direction's own. 0 where the tolerance
+        is exceeded without any force; NaN where an equilibrium on the way fails.
+        """
+        limit = newton_step(np.full(len(self.position), self.size), worst.value, worst.growth, tolerance)
+        open_ = np.abs(worst.value - tolerance) > CLOSE * tolerance
+        for _ in range(STEPS):
+            rows = np.flatnonzero(open_ & (limit > 0))
+            if rows.size == 0:
+                return limit
+            f = self.solve(worst.angle[rows, None], limit[rows], rows)
+            value = norm(f.translation[..., parts])[:, 0]
+            growth = value_growth(f.translation[..., parts], f.growing[..., parts])[:, 0]
+            limit[rows] = newton_step(limit[rows], value, growth, tolerance)
+            open_[rows] = np.abs(value - tolerance) > CLOSE * tolerance
+        return np.where(open_ & (limit > 0), np.nan, limit)
+
+
+def newton_step(force: Floats, value: Floats, growth: Floats, tolerance: float) -> Floats:
+    """Next force, not below zero; NaN where the deflection does not grow."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        step = np.where(growth > 0, (tolerance - value) / growth, np.nan)
+    return np.asarray(np.maximum(force + step, 0.0))
 
 
 def value_growth(d: Floats, growing: Floats) -> Floats:

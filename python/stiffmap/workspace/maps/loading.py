@@ -81,7 +81,7 @@ def describe(loading: Loading, title: str, call: dict[str, Any]) -> dict[str, An
         "machine_digest": machine_digest(machine),
         "effects": json.dumps([plain_effect(e) for e in machine.description.effects]),
         "stiffmap_version": __version__,
-        "call": json.dumps(plain(call) | loading.options.as_plain(), ensure_ascii=False),
+        "call": json.dumps(call | loading.options.as_plain(), ensure_ascii=False, default=np.ndarray.tolist),
         "units": "SI: m, rad, N, N m",
         "axes": "base axes of the machine, right-handed; positions are those of the commanded tcp",
         "reference_point": loading.options.point,
@@ -96,11 +96,6 @@ def describe(loading: Loading, title: str, call: dict[str, Any]) -> dict[str, An
 def machine_digest(machine: Machine) -> str:
     """Fingerprint of everything that a machine is made of, link files and users' kinds of effects among it."""
     return digest(machine.description, code()[1:] if machine.description.effects else [])[:16]
-
-
-def plain(call: dict[str, Any]) -> dict[str, Any]:
-    """Arguments as plain data."""
-    return {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in call.items()}
 
 
 def plain_effect(effect: Any) -> dict[str, Any]:

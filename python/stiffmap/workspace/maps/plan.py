@@ -59,12 +59,6 @@ def load_variables(case: tuple[str, ...], plane: str, compliance: bool) -> list[
     return out
 
 
-def beyond_variable(case: tuple[str, ...], covered: str) -> Variable:
-    """Where nothing vouches for the numbers of a calibrated machine."""
-    text = "1: joints or load are beyond the readings that the machine was calibrated by"
-    return Variable(BEYOND, case, meaning("1", text, calibrated_by=covered), "u1")
-
-
 def deviation_variables(case: tuple[str, ...], plane: str, turning: bool) -> list[Variable]:
     """Standard deviations of the load cases and of the worst direction."""
     what = "standard deviation of "
@@ -157,7 +151,9 @@ class MapPlan:
         case = () if self.cases is None else ("case",)
         out = load_variables(case, self.shown_plane, self.compliance)
         if self.validity is not None:
-            out.append(beyond_variable(case, str(self.validity)))
+            text = "1: joints or load are beyond the readings that the machine was calibrated by"
+            attrs = meaning("1", text, calibrated_by=str(self.validity))
+            out.append(Variable(BEYOND, case, attrs, "u1"))
         if self.uncertain is not None:
             out += deviation_variables(case, self.shown_plane, self.turning)
         return out + (extreme_variables(self.shown_plane, self.tolerance) if self.turning else [])

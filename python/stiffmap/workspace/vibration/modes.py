@@ -1,4 +1,5 @@
-"""What vibrates at the tool at many poses: modes of unit stiffness, and the flexibility of all others (docs/theory.md V1)."""
+"""What vibrates at the tool at many poses: modes of unit stiffness, and the flexibility of all others (docs/theory.md V1); their
+damping, declared or assumed (V2)."""
 
 from __future__ import annotations
 

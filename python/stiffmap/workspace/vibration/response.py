@@ -1,4 +1,4 @@
-"""Frequency response of a machine at its tool (docs/vibration.md)."""
+"""Frequency response of a machine at its tool (docs/vibration.md): real modes in closed form, others by their poles (docs/theory.md V3)."""
 
 from __future__ import annotations
 

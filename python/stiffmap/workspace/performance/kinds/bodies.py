@@ -8,8 +8,12 @@ from numpy.typing import NDArray
 from stiffmap.common.broadcasting import Floats
 from stiffmap.solve.status import Status
 from stiffmap.workspace.performance.motion.closing import drive_kinematics
-from stiffmap.workspace.performance.motion.frequencies import natural_frequencies
-from stiffmap.workspace.performance.motion.inertia import moving_mass, need_masses, total_mass
+from stiffmap.workspace.performance.motion.inertia import (
+    moving_mass,
+    natural_frequencies,
+    need_masses,
+    total_mass,
+)
 from stiffmap.workspace.performance.poses import box_nodes
 from stiffmap.workspace.performance.registry import Case, Found, Measure, over_poses
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from stiffmap.workspace.maps.inputs import plane_axes
-from stiffmap.workspace.performance.motion.accuracy import accuracy_of
 from stiffmap.workspace.performance.motion.efforts import acceleration_of
+from stiffmap.workspace.performance.motion.force import accuracy_of
 from stiffmap.workspace.performance.motion.inertia import need_masses, rest_efforts
 from stiffmap.workspace.performance.motion.scaling import drive_values
 from stiffmap.workspace.performance.motion.tensions import held, in_cables, pushes

@@ -1,4 +1,5 @@
-"""Drive Jacobian and joint coordinates over arrays of poses, springs at rest (docs/theory.md D1-D3)."""
+"""Drive Jacobian and joint coordinates over arrays of poses, springs at rest (docs/theory.md D1-D3); motions that cannot be are
+refused with place and time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""Images of a box of drive values under a Jacobian: a zonotope, its vertices, its inscribed sphere."""
+"""Images of a box of drive values under a Jacobian: a zonotope, its vertices, its inscribed sphere; its section in a plane: the hexagon
+of Figure 1c, for any number of drives."""
 
 from __future__ import annotations
 
