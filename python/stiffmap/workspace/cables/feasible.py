@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from stiffmap.common.broadcasting import Floats, wrench_array
+from stiffmap.solve.closing import commanded
 from stiffmap.solve.machine import Machine, takes_machine
 from stiffmap.workspace.cables.structure import (
     Hanging,
@@ -23,7 +24,6 @@ from stiffmap.workspace.cables.structure import (
     lines,
     matrix,
     nearest,
-    poses,
     scaled,
     weight,
 )
@@ -80,7 +80,7 @@ def wrench_feasible(
     """
     h = hanging(machine)
     low, high = read_box(machine, box)
-    r = poses(machine, low, rotation)[1]
+    r = commanded(machine.compiled, low, rotation)[1]
     w = np.atleast_2d(wrench_array(wrenches)) + weight(h, r, machine.compiled.gravity(gravity))
     ask = _Ask(h, r, w, *limits(h, lowest, highest))
     least = gap * float((high - low).max())

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from stiffmap.common.broadcasting import Floats, trailing, wrench_array
+from stiffmap.common.broadcasting import Floats, wrench_array
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.rotations import as_rotations
 from stiffmap.model.description import Body, Cable, MachineDescription, Offset, Pose
 from stiffmap.model.description.machine import TASK
+from stiffmap.solve.closing import commanded
 from stiffmap.solve.machine import Machine, takes_machine
 
 
@@ -102,16 +102,8 @@ def structure_matrix(machine: Machine, position: ArrayLike, rotation: ArrayLike 
     position (..., 3) m; rotation (..., 3, 3), None: as at home. The transpose, with the opposite sign, gives the rates
     of the free lengths of cables that do not yield. StiffmapError for a machine with legs.
     """
-    p, r = poses(machine, position, rotation)
+    p, r = commanded(machine.compiled, position, rotation)
     return matrix(*lines(hanging(machine), p, r))
-
-
-def poses(machine: Machine, position: ArrayLike, rotation: ArrayLike | None) -> tuple[Floats, Floats]:
-    """Arrays of poses, checked."""
-    p = trailing(position, (3,), "position", "positions (m)")
-    if rotation is None:
-        return p, machine.description.home.r
-    return p, as_rotations(trailing(rotation, (3, 3), "rotation", "rotation matrices"))
 
 
 def matrix(unit: Floats, straight: Floats, arm: Floats) -> Floats:
@@ -162,7 +154,7 @@ def tension_distribution(
     What lengths are commanded instead, `Machine.solve` says which tensions follow from compliance.
     """
     h = hanging(machine)
-    p, r = poses(machine, position, rotation)
+    p, r = commanded(machine.compiled, position, rotation)
     low, high = limits(h, lowest, highest)
     aim = low if near is None else _per_cable(h, near, "near")
     w = wrench_array(wrench) + weight(h, r, machine.compiled.gravity(gravity))

@@ -46,11 +46,8 @@ def robustness(design: Design, x: Floats, *, draws: int = DRAWS, seed: int = 0) 
     found = [f for f in _tolerances(document.data, "") if f[2] > 0]
     if not found:
         return None
-    places, values, u = (
-        tuple(f[0] for f in found),
-        np.array([f[1] for f in found]),
-        np.array([f[2] for f in found]),
-    )
+    places = tuple(f[0] for f in found)
+    values, u = (np.array(column) for column in list(zip(*found, strict=True))[1:])
     editor = Editor(document, design.machine_file, list(places))
     names = list(dict.fromkeys([*design.model.objectives, *(n for n, _ in design.constraints)]))
 

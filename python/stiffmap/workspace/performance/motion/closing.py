@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from stiffmap.common.broadcasting import Floats, batch, rows, thread_count, trailing
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.rotations import as_rotations
+from stiffmap.solve.closing import commanded
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.status import Status
 from stiffmap.workspace.performance.motion.sharing import FLAT, drive_weights, motions
@@ -65,15 +65,7 @@ def drive_kinematics(
     second attempt. `only_start`: coordinates of a neighbouring pose, which each pose continues; one that
     they do not lead to is UNREACHABLE. `sharing`: see `drive_weights`. Raises StiffmapError for bad input, never for a pose.
     """
-    p = trailing(position, (3,), "position", "positions (m)")
-    r = trailing(
-        machine.description.home.r if rotation is None else rotation,
-        (3, 3),
-        "rotation",
-        "rotation matrices",
-    )
-    if rotation is not None:
-        r = as_rotations(r)
+    p, r = commanded(machine.compiled, position, rotation)
     if not machine.actuators:
         raise StiffmapError(f"{machine.name}: no actuator, so there are no drive rates")
     shape = batch(p.shape[:-1], r.shape[:-2])
