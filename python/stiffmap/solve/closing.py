@@ -35,6 +35,16 @@ class Kinematics(OverPoses):
         return np.asarray(self.actuators, dtype=dtype)  # type: ignore[call-overload, no-any-return]
 
 
+def commanded(
+    machine: CompiledMachine, position: ArrayLike, rotation: ArrayLike | None
+) -> tuple[Floats, Floats]:
+    """Positions (..., 3) m and rotations (..., 3, 3) of commanded poses, checked; None: as at home."""
+    p = trailing(position, (3,), "position", "positions (m)")
+    if rotation is None:
+        return p, machine.home_rotation
+    return p, as_rotations(trailing(rotation, (3, 3), "rotation", "rotation matrices"))
+
+
 def close_poses(
     machine: CompiledMachine,
     position: ArrayLike,
@@ -43,9 +53,7 @@ def close_poses(
     threads: int | None,
 ) -> Kinematics:
     """See `stiffmap.inverse_kinematics`."""
-    p = trailing(position, (3,), "position", "positions (m)")
-    r = machine.home_rotation if rotation is None else rotation
-    r = as_rotations(trailing(r, (3, 3), "rotation", "rotation matrices"))
+    p, r = commanded(machine, position, rotation)
     x = None if start is None else start_coordinates(machine, start)
     shape = batch(p.shape[:-1], r.shape[:-2], *(() if x is None else (x.shape[:-1],)))
     from_x = None if x is None else rows(x, shape, x.shape[-1:])

@@ -24,7 +24,7 @@ from stiffmap.model.files.load import Source
 from stiffmap.solve.compiled import CompiledMachine, Status
 from stiffmap.solve.derivatives import Prepared, Request, differentiate, prepare, read_requests
 from stiffmap.solve.holding_wrench import HoldingWrench, holding_wrench
-from stiffmap.solve.options import SolveKeywords, options_of, spelled_out
+from stiffmap.solve.options import SolveKeywords, SolveOptions, options_of, spelled_out
 from stiffmap.solve.redesign import redesigned
 from stiffmap.solve.solution import Solution
 from stiffmap.solve.solving import Call, solve_call, solve_joints
@@ -173,14 +173,11 @@ class Machine:
                 if not sum(map(abs, position)) <= METRES_TOO_FAR * self._compiled.length:  # type: ignore[arg-type]  # plain numbers; nan too
                     hint_metres(self, position, bool(s.status == Status.UNREACHABLE))
                 return s
-        call = Call(position, wrench, options_of(given))
         if not derivatives:
-            s = solve_call(self._compiled, call)[0]
-            hint_metres(self, position, bool((s.status == Status.UNREACHABLE).all()))
-            return s
+            return solve_with(self, position, wrench, options_of(given))
         requests = read_requests(derivatives, derivatives_of)
         ready = self._derivable.get(requests.key, lambda: prepare(self._compiled, requests))
-        return differentiate(ready, call, requests)
+        return differentiate(ready, Call(position, wrench, options_of(given)), requests)
 
     @spelled_out(SolveKeywords)
     def solve_joints(
@@ -364,6 +361,15 @@ def takes_machine(
 
 
 METRES_TOO_FAR = 100.0
+
+
+def solve_with(
+    machine: Machine, position: ArrayLike, wrench: ArrayLike | None, options: SolveOptions
+) -> Solution:
+    """`Machine.solve` with options that are at hand."""
+    s = solve_call(machine.compiled, Call(position, wrench, options))[0]
+    hint_metres(machine, position, bool((s.status == Status.UNREACHABLE).all()))
+    return s
 
 
 def hint_metres(machine: Machine, position: ArrayLike, failed: bool) -> None:

@@ -40,10 +40,6 @@ class SolveOptions:
     threads: int | None = None
     """None: all cores that this process may use."""
 
-    def keywords(self) -> dict[str, Any]:
-        """All fields, as keywords of `Machine.solve`."""
-        return {name: getattr(self, name) for name in self.__dataclass_fields__}
-
     def as_plain(self) -> dict[str, Any]:
         """What of the shared options changes numbers, as JSON data; threads do not."""
         plain = {k: getattr(self, k) for k in ("point", "load_type", "method", "load_steps")}

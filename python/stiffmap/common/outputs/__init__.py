@@ -3,7 +3,7 @@
 from stiffmap.common.outputs.alone import only_job, reserved
 from stiffmap.common.outputs.keeping import asked_to_replace, check_replaceable, new_file, one_command
 from stiffmap.common.outputs.pictures import write_picture
-from stiffmap.common.outputs.space import mapped_array, needs_space
+from stiffmap.common.outputs.space import bytes_text, mapped_array, needs_space
 from stiffmap.common.outputs.tables import guarded, unguarded, write_rows
 from stiffmap.common.outputs.writing import (
     add_lines,
@@ -18,6 +18,7 @@ from stiffmap.common.outputs.writing import (
 __all__ = [
     "add_lines",
     "asked_to_replace",
+    "bytes_text",
     "check_replaceable",
     "guarded",
     "make_folder",

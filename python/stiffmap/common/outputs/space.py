@@ -25,7 +25,7 @@ def needs_space(path: Path, size: float, what: str) -> None:
         return  # not known: the write itself will say
     if free < size:
         raise FileError(
-            f"cannot be written: {what} needs {_bytes(size)}, {_bytes(free)} are free", file=str(path)
+            f"cannot be written: {what} needs {bytes_text(size)}, {bytes_text(free)} are free", file=str(path)
         )
 
 
@@ -43,7 +43,8 @@ def mapped_array(path: Path, dtype: DTypeLike, shape: tuple[int, ...]) -> Any:
     return array
 
 
-def _bytes(size: float) -> str:
+def bytes_text(size: float) -> str:
+    """A number of bytes in the unit that suits it."""
     for unit in ("bytes", "kB", "MB", "GB"):
         if size < 1000:
             return f"{size:.3g} {unit}"

@@ -17,9 +17,10 @@ from stiffmap.experiment.prediction.metrology_loop import carrier, rigged, targe
 from stiffmap.experiment.prediction.unloaded_state import lagging, lags, signs
 from stiffmap.experiment.readings import Seen, kind_of
 from stiffmap.model.description.strain import rests_at_command
-from stiffmap.solve.machine import Machine
+from stiffmap.solve.machine import Machine, solve_with
 from stiffmap.solve.options import SolveOptions
 from stiffmap.solve.solution import Solution
+from stiffmap.solve.solving import Call, solve_joints
 from stiffmap.solve.status import Flag, Status
 
 ACROSS = 1e-3
@@ -194,10 +195,11 @@ def solved(machine: Machine, plan: Experiment, options: SolveOptions) -> Solutio
         known = plan.near is not None and tuple(machine.compiled.names.coordinates) == plan.near_names
         start = plan.near if known else None
         options = replace(options, rotation=plan.rotation, start=start)
-        return machine.solve(plan.position, plan.wrench, **options.keywords())
+        return solve_with(machine, plan.position, plan.wrench, options)
     start = coordinates_of(machine, plan)
     drives = [machine.compiled.names.joints[a] for a in machine.actuators]
-    return machine.solve_joints(start[:, drives], plan.wrench, **replace(options, start=start).keywords())
+    call = Call(machine.description.home.p, plan.wrench, replace(options, start=start))
+    return solve_joints(machine.compiled, start[:, drives], call)
 
 
 def _in_play(solution: Solution, plan: Experiment) -> Mask:

@@ -19,7 +19,7 @@ from stiffmap.model.addresses import moved, number
 from stiffmap.model.description import Body, MachineDescription
 from stiffmap.model.description.tree import all_elements
 from stiffmap.solve.machine import Machine
-from stiffmap.workspace.vibration.damping import ASSUMED, damping_of
+from stiffmap.workspace.vibration.modes import ASSUMED, damping_of
 
 FELT = 0.05
 """Numbers whose uncertainty shifts no reading by more than this share of its noise are not fitted."""

@@ -17,8 +17,7 @@ from stiffmap.machining.process import Process
 from stiffmap.solve.machine import Machine, as_machine
 from stiffmap.solve.options import keywords_of
 from stiffmap.workspace.vibration.modes import TipModes, tip_modes
-from stiffmap.workspace.vibration.poles import receptance
-from stiffmap.workspace.vibration.response import frequency_axis
+from stiffmap.workspace.vibration.response import frequency_axis, receptance
 
 POINTS, BLOCK = 300, 256
 LOW, HIGH, LOOKED = 0.3, 2.0, 6

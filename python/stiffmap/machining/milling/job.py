@@ -27,7 +27,7 @@ from stiffmap.machining.process import Process, cutting_force, load_process
 from stiffmap.machining.toolpath import Box, Toolpath, load_path, sampled
 from stiffmap.solve.machine import Machine, as_machine
 from stiffmap.solve.options import keywords_of
-from stiffmap.workspace.performance.motion.frequencies import natural_frequencies
+from stiffmap.workspace.performance.motion.inertia import natural_frequencies
 
 BAND = 0.2
 """Share of the force within which a result with a band holds."""

@@ -37,8 +37,7 @@ from stiffmap.ui.cli.map_uncertainty import uncertainty_data, uncertainty_told
 from stiffmap.ui.cli.map_worst import in_words, worst_pose
 from stiffmap.ui.cli.output import JsonOption, show
 from stiffmap.ui.cli.statuses import failed_in_words
-from stiffmap.workspace.maps.inputs import magnitude, plane_axes
-from stiffmap.workspace.maps.workspace_grid import grid_of
+from stiffmap.workspace.maps.inputs import grid_of, magnitude, plane_axes
 
 
 def command(

@@ -10,7 +10,7 @@ from rich.table import Table
 
 from stiffmap.ui.cli.statuses import failed
 from stiffmap.ui.cli.table_text import table
-from stiffmap.workspace.maps.variables import BEYOND
+from stiffmap.workspace.maps.plan import BEYOND
 
 
 def across(ds: xr.Dataset) -> str:

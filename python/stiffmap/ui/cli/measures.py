@@ -188,7 +188,7 @@ def write_report(table: MeasuresTable, path: Path, figures: dict[str, Figure | b
     """The table as one page with its pictures."""
     from stiffmap.ui.plot.measures import caption
     from stiffmap.ui.report.sheet import Sheet, write_sheet
-    from stiffmap.workspace.maps.provenance import machine_digest
+    from stiffmap.workspace.maps.loading import machine_digest
 
     text = as_table(table)
     head, rows = as_text(text)

@@ -11,8 +11,8 @@ from stiffmap.solve.machine import Machine
 from stiffmap.ui.plot.style import BLACK, BLUE, MM, paper
 from stiffmap.ui.plot.workspace import edges, name_axes, paint, planes_of, section
 from stiffmap.workspace.performance.box.box import LargestBox
-from stiffmap.workspace.performance.box.cell import BOX
 from stiffmap.workspace.performance.box.inside import REACH
+from stiffmap.workspace.performance.box.proof import BOX
 
 NODES = 80
 AROUND = 0.85

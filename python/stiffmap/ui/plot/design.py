@@ -12,9 +12,8 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.ui.plot.style import BLUE, COLOURS, CYCLE, MM, SKY, VERMILLION, headline, paper
 from stiffmap.workspace.design.search import ParetoSet
-from stiffmap.workspace.performance.box.box_map import BoxMap, box_map, levels
 from stiffmap.workspace.performance.registry import get_measure
-from stiffmap.workspace.performance.table import MeasuresTable
+from stiffmap.workspace.performance.table import BoxMap, MeasuresTable, box_map, levels
 
 MAPPED = ("deflection", "frequency", "transmission_max")
 

@@ -20,10 +20,9 @@ from stiffmap.ui.plot.modes import mode_figure, mode_frames
 from stiffmap.ui.plot.style import BLUE, COLOURS, MM, SKY, VERMILLION, headline, paper
 from stiffmap.ui.plot.workspace import workspace_figure
 from stiffmap.workspace.performance.box.box import LargestBox
-from stiffmap.workspace.performance.box.box_map import box_map, levels
 from stiffmap.workspace.performance.box.workspace import Workspace
 from stiffmap.workspace.performance.registry import Measure
-from stiffmap.workspace.performance.table import MeasuresTable, Row
+from stiffmap.workspace.performance.table import MeasuresTable, Row, box_map, levels
 
 
 def transmission_figure(machine: Machine, position: ArrayLike, plane: str = "xy") -> Figure:

@@ -15,7 +15,7 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.machine import Machine
 from stiffmap.ui.plot.skeleton import skeleton
 from stiffmap.ui.plot.style import BLUE, MM, VERMILLION, new_figure, paper_style
-from stiffmap.workspace.performance.motion.frequencies import NaturalFrequencies, natural_frequencies
+from stiffmap.workspace.performance.motion.inertia import NaturalFrequencies, natural_frequencies
 
 FRAMES = 9
 """From one end of a swing to the other."""

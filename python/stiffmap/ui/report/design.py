@@ -11,9 +11,8 @@ import yaml
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.outputs import write_text
 from stiffmap.solve.machine import load_machine
-from stiffmap.workspace.design.judging import Judged
+from stiffmap.workspace.design.judging import Judged, refine
 from stiffmap.workspace.design.problem import Design
-from stiffmap.workspace.design.refining import refine
 from stiffmap.workspace.design.robustness import DRAWS, Robustness, robustness
 from stiffmap.workspace.design.search import ParetoSet
 from stiffmap.workspace.performance.table import MeasuresTable, measures

@@ -14,7 +14,7 @@ from stiffmap.ui.plot.skeleton import skeleton
 from stiffmap.ui.view.dynamics import modes_at
 from stiffmap.ui.view.moment import Moment
 from stiffmap.ui.view.scene import GHOST
-from stiffmap.workspace.performance.motion.frequencies import NaturalFrequencies
+from stiffmap.workspace.performance.motion.inertia import NaturalFrequencies
 
 MODES, RATE, PERIOD, SWING = 6, 20.0, 1.5, 0.05
 """Modes shown, pictures per second, seconds of a swing on the screen, its size as part of the extent."""

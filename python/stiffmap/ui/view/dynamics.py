@@ -8,7 +8,7 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.solve.machine import Machine
 from stiffmap.ui.view.place import orientation
 from stiffmap.ui.view.state import State
-from stiffmap.workspace.performance.motion.frequencies import NaturalFrequencies, natural_frequencies
+from stiffmap.workspace.performance.motion.inertia import NaturalFrequencies, natural_frequencies
 
 MODES = 40
 """As parallel machines have dozens of modes of their bars below those that move the tool."""

@@ -1,8 +1,7 @@
 """Tensions of cable machines: structure matrices, distributions within limits, wrench-feasible boxes (docs/cables.md)."""
 
-from stiffmap.workspace.cables.distribution import TensionDistribution, tension_distribution
 from stiffmap.workspace.cables.feasible import WrenchFeasible, wrench_feasible
-from stiffmap.workspace.cables.structure import structure_matrix
+from stiffmap.workspace.cables.structure import TensionDistribution, structure_matrix, tension_distribution
 
 __all__ = [
     "TensionDistribution",

@@ -15,9 +15,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from stiffmap.common.broadcasting import Floats, wrench_array
+from stiffmap.solve.closing import commanded
 from stiffmap.solve.machine import Machine, takes_machine
-from stiffmap.workspace.cables.distribution import limits, nearest, scaled
-from stiffmap.workspace.cables.structure import Hanging, hanging, lines, matrix, poses, weight
+from stiffmap.workspace.cables.structure import (
+    Hanging,
+    hanging,
+    limits,
+    lines,
+    matrix,
+    nearest,
+    scaled,
+    weight,
+)
 from stiffmap.workspace.performance.poses import read_box
 
 ROOMY = 1e4  # N: room above the lowest tension where no highest is declared
@@ -71,7 +80,7 @@ def wrench_feasible(
     """
     h = hanging(machine)
     low, high = read_box(machine, box)
-    r = poses(machine, low, rotation)[1]
+    r = commanded(machine.compiled, low, rotation)[1]
     w = np.atleast_2d(wrench_array(wrenches)) + weight(h, r, machine.compiled.gravity(gravity))
     ask = _Ask(h, r, w, *limits(h, lowest, highest))
     least = gap * float((high - low).max())

@@ -1,8 +1,12 @@
-"""Machines whose numbers change, made quickly: only the elements that hold such a number are built again."""
+"""Places in a machine file (``templates.leg.spring[foot].beam.EIz``, ``workspace.x[0]``), and machines whose numbers there change, made
+quickly: only the elements that hold such a number are built again."""
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
+from functools import reduce
+from operator import getitem
 from pathlib import Path
 from typing import Any
 
@@ -17,10 +21,90 @@ from stiffmap.model.files.build_elements import build_element
 from stiffmap.model.files.context import Context, Gathered
 from stiffmap.model.files.load import describe_document, validate
 from stiffmap.model.files.schema.elements import ElementModel
-from stiffmap.workspace.design.places import indices, unshared
+
+_STEP = re.compile(r"^([^\[\]]+)?((?:\[[^\[\]]+\])*)$")
+
+
+def steps(place: str) -> list[str | int | tuple[str, str]]:
+    """Keys, indices, and (sort, name) for an element of a chain."""
+    out: list[str | int | tuple[str, str]] = []
+    for part in place.split("."):
+        match = _STEP.match(part)
+        if not match or not part:
+            raise StiffmapError(f"cannot read the place '{place}'")
+        brackets = re.findall(r"\[([^\[\]]+)\]", match[2])
+        if match[1] and len(brackets) == 1 and not brackets[0].isdigit():
+            out.append((match[1], brackets[0]))
+            continue
+        if match[1]:
+            out.append(match[1])
+        out.extend(int(b) if b.isdigit() else b for b in brackets)
+    return out
+
+
+def put(data: Any, place: str, value: float) -> None:
+    """Set a number of a machine file's data, in place; StiffmapError names the step that is not there."""
+    _set(data, indices(data, place), value)
+
+
+def indices(data: Any, place: str) -> tuple[str | int, ...]:
+    """The place as keys and numbers alone; StiffmapError names the step that is not there."""
+    at, out = data, list[str | int]()
+    for step in steps(place):
+        out.append(_key(at, step, place))
+        at = at[out[-1]]
+    return tuple(out)
+
+
+def _key(at: Any, step: str | int | tuple[str, str], place: str) -> Any:
+    if isinstance(step, tuple):
+        sort, name = step
+        if isinstance(at, dict) and sort in at and isinstance(at[sort], dict | list):
+            raise StiffmapError(f"'{place}': write {sort}.{name}, not {sort}[{name}]")
+        found = (
+            [i for i, e in enumerate(at) if isinstance(e, dict) and str(e.get(sort)) == name]
+            if isinstance(at, list)
+            else []
+        )
+        if len(found) != 1:
+            known = ", ".join(_elements(at)) or "none"
+            raise StiffmapError(
+                f"'{place}': expected one {sort} named '{name}', found {len(found)}; here are: {known}"
+            )
+        return found[0]
+    if isinstance(step, int):
+        if not isinstance(at, list) or step >= len(at):
+            raise StiffmapError(f"'{place}': no entry [{step}] there")
+        return step
+    if not isinstance(at, dict) or step not in at:
+        known = ", ".join(map(str, at)) if isinstance(at, dict) else ", ".join(_elements(at)) or "a number"
+        raise StiffmapError(f"'{place}': no '{step}' there; here are: {known}")
+    return step
+
+
+def _elements(at: Any) -> list[str]:
+    sorts = ("actuator", "joint", "spring", "body", "offset", "block", "point")
+    if not isinstance(at, list):
+        return []
+    return [f"{s}[{e[s]}]" for e in at if isinstance(e, dict) for s in sorts if s in e]
+
+
+def unshared(data: Any) -> Any:
+    """Anchors of YAML are one object in several places: each place gets its own."""
+    if isinstance(data, dict):
+        return {k: unshared(v) for k, v in data.items()}
+    if isinstance(data, list):
+        return [unshared(v) for v in data]
+    return data
+
 
 Address = tuple[str | int, ...]
 _MODEL: TypeAdapter[Any] = TypeAdapter(ElementModel)
+
+
+def described(data: Any, document: Document, file: str) -> MachineDescription:
+    """The machine of a file's data, with the lines of its document."""
+    return describe_document(Document(data, document.lines), file, Path(file).parent)
 
 
 class Editor:
@@ -46,11 +130,11 @@ class Editor:
         if data.get("effects") or "stroke" in text or "link:" in text or "'of':" in text:
             raise LookupError("tied together")
         model = validate(self.document, self.file)
-        self.base: MachineDescription = describe_document(self.document, self.file, Path(self.file).parent)
+        self.base: MachineDescription = described(data, self.document, self.file)
         self.context = Context(
             self.file, self.document, Path(self.file).parent, self.base.units, model.materials, Gathered()
         )
-        self.elements: dict[tuple[str, Address], list[tuple[str, Any]]] = {}
+        self.elements: dict[tuple[Address, Address], list[tuple[str, Any]]] = {}
         self.space: list[tuple[str, Any]] = []
         for place in self.places:
             path = indices(data, place)
@@ -60,49 +144,45 @@ class Editor:
             sequence, inner = self._split(path)
             self.elements.setdefault((sequence, inner[: _depth(inner)]), []).append((place, inner))
 
-    def _split(self, path: Address) -> tuple[str, Address]:
-        """Which sequence (``templates.leg``) a path of keys is in, and the way inside it."""
+    def _split(self, path: Address) -> tuple[Address, Address]:
+        """Which sequence (``templates``, ``leg``) a path of keys is in, and the way inside it."""
         kind, name = path[0], str(path[1])
         if kind == "templates" and isinstance(path[2], int):
             legs = [leg for leg in self.document.data["legs"].values() if leg.get("template") == name]
             if any("home" in leg for leg in legs):
                 raise LookupError("homes per leg")
-            return f"templates.{name}", path[2:]
+            return ("templates", name), path[2:]
         if kind == "legs" and path[2] == "elements" and "home" not in self.document.data["legs"][name]:
-            return f"legs.{name}", path[3:]
+            return ("legs", name, "elements"), path[3:]
         raise LookupError("a place outside elements and workspace")
 
     def description(self, values: dict[str, float]) -> MachineDescription:
         """The machine with these numbers (place: value in the file's units); StiffmapError where it cannot be."""
-        built: dict[str, dict[Address, Element]] = {}
+        if not self.can:
+            data = unshared(self.document.data)
+            for place, value in values.items():
+                put(data, place, value)
+            return described(data, self.document, self.file)
+        built: dict[Address, dict[Address, Element]] = {}
         known: dict[str, Element] = {}
         for (sequence, address), places in self.elements.items():
-            raw = unshared(self._raw(sequence, address))
+            raw = unshared(reduce(getitem, (*sequence, *address), self.document.data))
             for place, inner in places:
                 _set(raw, inner[len(address) :], values[place])
             key = repr(raw)
             if key not in known:
-                known[key] = self._element(raw, sequence, address)
+                known[key] = self._element(raw, (*sequence, *address))
             built.setdefault(sequence, {})[address] = known[key]
         legs = []
         for leg, model in zip(self.base.legs, self.document.data["legs"].values(), strict=True):
-            name = f"templates.{model['template']}" if "template" in model else f"legs.{leg.name}"
+            own = ("templates", model["template"]) if "template" in model else ("legs", leg.name, "elements")
             first = 1 if "frame" in model else 0
-            edits = built.get(name)
+            edits = built.get(own)
             legs.append(leg if edits is None else replace(leg, elements=_put(leg.elements, edits, first)))
         return replace(self.base, legs=tuple(legs), workspace=self._workspace(values))
 
-    def _raw(self, sequence: str, address: Address) -> Any:
-        kind, _, name = sequence.partition(".")
-        at = self.document.data[kind][name]
-        at = at["elements"] if kind == "legs" else at
-        for key in address:
-            at = at[key]
-        return at
-
-    def _element(self, raw: Any, sequence: str, address: Address) -> Element:
-        kind, _, name = sequence.partition(".")
-        here = self.context.at(kind, name, *(("elements",) if kind == "legs" else ()), *address)
+    def _element(self, raw: Any, address: Address) -> Element:
+        here = self.context.at(*address)
         try:
             return build_element(_MODEL.validate_python(raw), here)
         except ValidationError as error:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from os import PathLike
@@ -17,18 +16,26 @@ from stiffmap.common.broadcasting import Floats, given_path
 from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.yaml_text import Document, read
 from stiffmap.model.description import MachineDescription
-from stiffmap.model.files.load import describe_document
 from stiffmap.model.files.report import validated
 from stiffmap.model.files.schema.base import FileModel, Name
 from stiffmap.model.files.shipped import find
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.redesign import on_branch_of, settled
-from stiffmap.workspace.design.editing import Editor
-from stiffmap.workspace.design.places import put, unshared
-from stiffmap.workspace.performance.motion.motion_files import Motion, load_motion, near_or_shipped
-from stiffmap.workspace.performance.quantities import quantity
-from stiffmap.workspace.performance.registry import all_measures, get_measure
-from stiffmap.workspace.performance.requirements import Bound, Requirements, load_requirements
+from stiffmap.workspace.design.editing import Editor, described, put, unshared
+from stiffmap.workspace.performance.motion.motion_files import (
+    Motion,
+    given_or_shipped,
+    load_motion,
+    near_or_shipped,
+)
+from stiffmap.workspace.performance.registry import all_measures
+from stiffmap.workspace.performance.requirements import (
+    Bound,
+    BoundModel,
+    Requirements,
+    bound_in,
+    load_requirements,
+)
 
 START_NODES = 3
 """Of a machine that is asked for a few hundred poses once."""
@@ -50,13 +57,6 @@ class SearchModel(FileModel):
     generations: int = Field(default=30, ge=1)
     seed: int = 1
     nodes: int = Field(default=7, ge=2)
-
-
-class BoundModel(FileModel):
-    """One or both bounds of a measure, with units."""
-
-    at_least: str | float | int | None = None
-    at_most: str | float | int | None = None
 
 
 class DesignFile(FileModel):
@@ -118,18 +118,21 @@ class Design:
     def data(self, x: Floats) -> Any:
         """The machine file's data with the design's numbers."""
         data = unshared(self.document.data)
-        names = self.names(x)
-        for place, text in self.model.numbers.items():
-            put(data, place, evaluate(text, names))
+        for place, value in self._numbers(x).items():
+            put(data, place, value)
         return data
+
+    def _numbers(self, x: Floats) -> dict[str, float]:
+        """Place -> value in the file's units."""
+        names = self.names(x)
+        return {place: evaluate(text, names) for place, text in self.model.numbers.items()}
 
     def quick_machine(self, x: Floats) -> Machine:
         """As `machine`, several times as quick; uncertainties and notes are those of the machine file."""
         if not self._editor.can:
             return self.machine(x)
-        names = self.names(x)
-        values = {place: evaluate(text, names) for place, text in self.model.numbers.items()}
-        return Machine(self._on_branch(self._editor.description(values)), start_nodes=START_NODES)
+        description = self._editor.description(self._numbers(x))
+        return Machine(self._on_branch(description), start_nodes=START_NODES)
 
     @cached_property
     def toolpath(self) -> Motion | None:
@@ -143,11 +146,7 @@ class Design:
 
     def machine(self, x: Floats) -> Machine:
         """The machine of a vector of variables; StiffmapError where it cannot be."""
-        return Machine(self._on_branch(self._described(self.data(x))))
-
-    def _described(self, data: Any) -> MachineDescription:
-        document = Document(data, self.document.lines)
-        return describe_document(document, self.machine_file, Path(self.machine_file).parent)
+        return Machine(self._on_branch(described(self.data(x), self.document, self.machine_file)))
 
     def _on_branch(self, description: MachineDescription) -> MachineDescription:
         """On the assembly branch of the machine file, where a home is searched for."""
@@ -156,7 +155,7 @@ class Design:
     @cached_property
     def _base(self) -> MachineDescription:
         """As the machine file has it, its home found once for all designs."""
-        base = self._described(unshared(self.document.data))
+        base = described(unshared(self.document.data), self.document, self.machine_file)
         return settled(base.declared or base)
 
 
@@ -166,11 +165,9 @@ def load_design(path: str | PathLike[str]) -> Design:
     Raises FileError naming file, line, key, what was expected and what was found.
     """
     given = given_path(path, "design", "a file or a shipped name")
+    given = given_or_shipped(given, Path(__file__).parent)
     if not given.is_file():
-        shipped = Path(__file__).with_name(given.name if given.suffix else f"{given.name}.yaml")
-        if len(given.parts) > 1 or not shipped.is_file():
-            raise FileError("no such design file", file=str(given))
-        given = shipped
+        raise FileError("no such design file", file=str(given))
     document, file = read(given), str(given)
     expected = "a design file is a mapping with name, machine, variables, numbers, objectives"
     model = validated(DesignFile, document, file, expected)
@@ -208,23 +205,13 @@ def load_design(path: str | PathLike[str]) -> Design:
         task = replace(task, toolpath=near_or_shipped(model.toolpath, given.parent))
     if task.toolpath is not None:
         load_motion(task.toolpath)  # a mistake in it is reported before the search
-    try:
-        own = tuple((n, _bound(n, b, known)) for n, b in model.constraints.items())
-    except StiffmapError as error:
-        raise fail(str(error), "constraints") from None
+    own = (
+        (name, bound_in(document, file, bound, "constraints", name))
+        for name, bound in model.constraints.items()
+    )
     design = Design(file, model, read(machine), str(machine), task, (*task.bounds, *own))
     _try(design, fail)
     return design
-
-
-def _bound(name: str, model: BoundModel, known: Sequence[str] | set[str]) -> Bound:
-    if name not in known:
-        raise StiffmapError(f"unknown measure '{name}'; known: {', '.join(sorted(known))}")
-    unit = get_measure(name).unit
-    least, most = (None if v is None else quantity(v, unit) for v in (model.at_least, model.at_most))
-    if least is not None and most is not None and least > most:
-        raise StiffmapError(f"{name}: at_least ({model.at_least}) is above at_most ({model.at_most})")
-    return Bound(least, most)
 
 
 def _try(design: Design, fail: Any) -> None:

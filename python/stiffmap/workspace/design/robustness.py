@@ -4,20 +4,16 @@ from __future__ import annotations
 
 from copy import deepcopy
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from stiffmap.common.broadcasting import Floats, random_numbers
 from stiffmap.common.yaml_text import Document
-from stiffmap.model.description import MachineDescription
-from stiffmap.model.files.load import describe_document
 from stiffmap.model.files.templates import expanded
 from stiffmap.solve.machine import Machine
 from stiffmap.workspace.design.editing import Editor
 from stiffmap.workspace.design.judging import values_of, violation
-from stiffmap.workspace.design.places import put
 from stiffmap.workspace.design.problem import Design
 
 SHARE = 0.1
@@ -50,26 +46,14 @@ def robustness(design: Design, x: Floats, *, draws: int = DRAWS, seed: int = 0) 
     found = [f for f in _tolerances(document.data, "") if f[2] > 0]
     if not found:
         return None
-    places, values, u = (
-        tuple(f[0] for f in found),
-        np.array([f[1] for f in found]),
-        np.array([f[2] for f in found]),
-    )
+    places = tuple(f[0] for f in found)
+    values, u = (np.array(column) for column in list(zip(*found, strict=True))[1:])
     editor = Editor(document, design.machine_file, list(places))
     names = list(dict.fromkeys([*design.model.objectives, *(n for n, _ in design.constraints)]))
 
     def at(numbers: Floats) -> dict[str, float]:
         given = dict(zip(places, map(float, numbers), strict=True))
-        return values_of(design, Machine(editor.description(given) if editor.can else whole(given)), names)
-
-    def whole(given: dict[str, float]) -> MachineDescription:
-        """Where elements are tied together, the whole file is built."""
-        data = deepcopy(document.data)
-        for place, value in given.items():
-            put(data, place, value)
-        return describe_document(
-            Document(data, document.lines), design.machine_file, Path(design.machine_file).parent
-        )
+        return values_of(design, Machine(editor.description(given)), names)
 
     slopes = {n: np.zeros(len(u)) for n in names}
     for i in range(len(u)):

@@ -3,10 +3,10 @@
 from stiffmap.workspace.maps.estimate import MapEstimate, map_estimate
 from stiffmap.workspace.maps.grid_map import error_map
 from stiffmap.workspace.maps.polar_diagram import polar
-from stiffmap.workspace.maps.ranking import uncertainty_ranking
 from stiffmap.workspace.maps.statistics import map_statistics
 from stiffmap.workspace.maps.sweep_line import sweep
 from stiffmap.workspace.maps.sweep_of_numbers import design_sweep
+from stiffmap.workspace.maps.uncertainty import uncertainty_ranking
 
 __all__ = [
     "MapEstimate",

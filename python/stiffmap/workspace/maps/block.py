@@ -10,18 +10,11 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.solve.kinematics import inverse_kinematics
 from stiffmap.solve.solution import Solution
 from stiffmap.solve.validity import Validity
-from stiffmap.workspace.maps.direction_sweep import (
-    DirectionSweep,
-    direction,
-    even_directions,
-    solve_directions,
-)
-from stiffmap.workspace.maps.extremes import Extreme, find_extreme, value_growth
+from stiffmap.workspace.maps.extremes import DirectionSweep, TurningForce, direction, even_angles
 from stiffmap.workspace.maps.fixed_order_sums import norm
 from stiffmap.workspace.maps.loading import Loading, without_failed
-from stiffmap.workspace.maps.plan import MapPlan
+from stiffmap.workspace.maps.plan import BEYOND, MapPlan
 from stiffmap.workspace.maps.uncertainty import Uncertain
-from stiffmap.workspace.maps.variables import BEYOND
 
 ALL = (0, 1, 2)
 
@@ -35,11 +28,13 @@ def solve_block(plan: MapPlan, rows: slice) -> dict[str, Any]:
     if plan.uncertain is not None:
         out |= load_deviations(plan, plan.uncertain, position)
     if plan.turning:
-        directions = even_directions(plan.loading, position, plan.force, plan.axes, plan.directions)
+        angle = np.broadcast_to(even_angles(plan.directions), (len(position), plan.directions))
+        force = TurningForce(plan.loading, position, plan.force, plan.axes)
+        directions = force.solve(angle)
         out["direction_status"] = directions.status.max(axis=1)
         extremes: dict[str, Floats] = {}
         for suffix, parts in (("", ALL), (f"_{plan.shown_plane}", plan.axes)):
-            values, status = _extremes(plan, position, directions, parts, suffix)
+            values, status = _extremes(force, directions, parts, suffix, plan.tolerance)
             extremes |= values
             out["direction_status"] = np.maximum(out["direction_status"], status)
         # one status for all of them: where the worst is not known, the best is not either
@@ -75,13 +70,10 @@ def _beyond(plan: MapPlan, covered: Validity, position: Floats) -> Any:
 
 
 def _extremes(
-    plan: MapPlan, position: Floats, directions: DirectionSweep, parts: tuple[int, ...], suffix: str
+    force: TurningForce, directions: DirectionSweep, parts: tuple[int, ...], suffix: str, tolerance: float
 ) -> tuple[dict[str, Floats], Any]:
-    worst, best = (
-        find_extreme(plan.loading, position, plan.force, plan.axes, directions, parts, sign)
-        for sign in (1, -1)
-    )
-    limit = force_limit(plan.loading, position, plan.force, plan.axes, worst, parts, plan.tolerance)
+    worst, best = (force.extreme(directions, parts, sign) for sign in (1, -1))
+    limit = force.limit(worst, parts, tolerance)
     values = {
         f"worst_deflection{suffix}": worst.value,
         f"worst_direction{suffix}": worst.angle,
@@ -92,55 +84,16 @@ def _extremes(
     return values, np.maximum(worst.status, best.status)
 
 
-STEPS = 8
-CLOSE = 1e-3
-"""Relative distance to the tolerance from which one more Newton step is exact to about its square."""
-
-
-def force_limit(
-    loading: Loading,
-    position: Floats,
-    force: float,
-    axes: tuple[int, int],
-    worst: Extreme,
-    parts: tuple[int, ...],
-    tolerance: float,
-) -> Floats:
-    """Force (p,) in N along the worst direction at which the deflection reaches the tolerance (m).
-
-    Newton's method on loaded equilibria, started at the worst direction's own. 0 where the tolerance
-    is exceeded without any force; NaN where an equilibrium on the way fails.
-    """
-    limit = newton_step(np.full(len(position), force), worst.value, worst.growth, tolerance)
-    open_ = np.abs(worst.value - tolerance) > CLOSE * tolerance
-    for _ in range(STEPS):
-        rows = np.flatnonzero(open_ & (limit > 0))
-        if rows.size == 0:
-            return limit
-        f = solve_directions(loading, position[rows], worst.angle[rows, None], limit[rows], axes)
-        value = norm(f.translation[..., parts])[:, 0]
-        growth = value_growth(f.translation[..., parts], f.growing[..., parts])[:, 0]
-        limit[rows] = newton_step(limit[rows], value, growth, tolerance)
-        open_[rows] = np.abs(value - tolerance) > CLOSE * tolerance
-    return np.where(open_ & (limit > 0), np.nan, limit)
-
-
-def newton_step(force: Floats, value: Floats, growth: Floats, tolerance: float) -> Floats:
-    """Next force, not below zero; NaN where the deflection does not grow."""
-    with np.errstate(invalid="ignore", divide="ignore"):
-        step = np.where(growth > 0, (tolerance - value) / growth, np.nan)
-    return np.asarray(np.maximum(force + step, 0.0))
-
-
 def load_deviations(plan: MapPlan, uncertain: Uncertain, position: Floats) -> dict[str, Any]:
     """Standard deviations under the load cases, at positions (poses, 3)."""
     s, j = sensitivities(plan.loading, uncertain, position[:, None], plan.wrenches)
     d = without_failed(s.displacement, s.status)
     std, parts = deviation(j, d, ALL, uncertain.covariance)
+    variance = np.einsum("...pk,pq,...qk->...k", j, uncertain.covariance, j)
     with np.errstate(invalid="ignore", divide="ignore"):
         share = parts / (std**2)[..., None]
     return {
-        "displacement_std": np.sqrt(_variance(j, uncertain.covariance)),
+        "displacement_std": np.sqrt(np.maximum(variance, 0.0)),
         "deflection_std": std,
         f"deflection_{plan.shown_plane}_std": deviation(j, d, plan.axes, uncertain.covariance)[0],
         "variance_share": share,
@@ -188,7 +141,3 @@ def deviation(j: Floats, d: Floats, parts: tuple[int, ...], covariance: Floats) 
     slope = np.where(still[..., None], 0.0, slope)
     shares = slope * np.einsum("pq,...q->...p", covariance, slope)
     return np.sqrt(np.maximum(shares.sum(axis=-1), 0.0)), shares
-
-
-def _variance(j: Floats, covariance: Floats) -> Floats:
-    return np.asarray(np.maximum(np.einsum("...pk,pq,...qk->...k", j, covariance, j), 0.0))

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from stiffmap.common.outputs import bytes_text
 from stiffmap.solve.machine import Machine, as_machine
 from stiffmap.solve.options import keywords_of
 from stiffmap.workspace.maps.block import solve_block
-from stiffmap.workspace.maps.plan import MapPlan
-from stiffmap.workspace.maps.request import map_plan
+from stiffmap.workspace.maps.plan import MapPlan, map_plan
 from stiffmap.workspace.maps.tiles import POSES_AT_ONCE, blocks_of, tiles_of
 
 SAMPLES = 8
@@ -38,7 +38,7 @@ class MapEstimate:
     def __str__(self) -> str:
         return (
             f"{self.poses:,} poses: about {duration(self.seconds)} (at most {duration(self.slowest)}); "
-            f"{size(self.result_bytes)} on the disk before compression, {size(self.working_bytes)} of memory "
+            f"{bytes_text(self.result_bytes)} on the disk before compression, {bytes_text(self.working_bytes)} of memory "
             "while Zarr is written"
         )
 
@@ -82,13 +82,3 @@ def duration(seconds: float) -> str:
         if seconds >= 2 * length:
             return f"{seconds / length:.3g} {unit}"
     return f"{seconds:.2g} s"
-
-
-def size(count: int) -> str:
-    """A number of bytes in the unit that suits it."""
-    value = float(count)
-    for unit in ("B", "kB", "MB", "GB", "TB"):
-        if value < 1000 or unit == "TB":
-            break
-        value /= 1000
-    return f"{value:.3g} {unit}"

@@ -1,4 +1,4 @@
-"""Weakest and strongest direction of a force that turns in a plane.
+"""Equilibria under a force that turns in a plane, and its weakest and strongest direction.
 
 The squared deflection over the force's angle is a trigonometric polynomial of degree 2 for a linear
 machine, whatever its deflection without the force. Values and slopes at the sampled directions fix
@@ -15,9 +15,61 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiffmap.common.broadcasting import Floats
-from stiffmap.workspace.maps.direction_sweep import DirectionSweep, even_angles, solve_directions
-from stiffmap.workspace.maps.fixed_order_sums import dot, norm
-from stiffmap.workspace.maps.loading import Loading
+from stiffmap.solve.solution import Solution
+from stiffmap.workspace.maps.fixed_order_sums import apply, dot, norm
+from stiffmap.workspace.maps.loading import Loading, without_failed
+
+
+@dataclass(frozen=True)
+class DirectionSweep:
+    """Equilibria of poses (p) under force directions (k)."""
+
+    angle: Floats
+    """(p, k) rad, from the plane's first axis to its second."""
+    translation: Floats
+    """(p, k, 3) m; NaN where the status is not CONVERGED."""
+    turning: Floats
+    """(p, k, 3) m/rad: change of the translation with the angle, by the loaded compliance."""
+    growing: Floats
+    """(p, k, 3) m/N: change of the translation with the force's magnitude."""
+    status: NDArray[np.uint8]
+    """(p, k)."""
+
+    def join(self, other: DirectionSweep) -> DirectionSweep:
+        """Directions of both."""
+        pairs = ((getattr(self, n), getattr(other, n)) for n in self.__dataclass_fields__)
+        return DirectionSweep(*(np.concatenate(pair, axis=1) for pair in pairs))
+
+    def pick(self, column: NDArray[np.intp]) -> DirectionSweep:
+        """One direction per pose, column (p,)."""
+        row = np.arange(len(column))
+        return DirectionSweep(*(getattr(self, n)[row, column][:, None] for n in self.__dataclass_fields__))
+
+
+def direction(angle: Floats, axes: tuple[int, int]) -> Floats:
+    """Unit vectors (..., 3)."""
+    out = np.zeros((*angle.shape, 3))
+    out[..., axes[0]], out[..., axes[1]] = np.cos(angle), np.sin(angle)
+    return out
+
+
+def direction_sweep_of(s: Solution, angle: Floats, size: Floats, axes: tuple[int, int]) -> DirectionSweep:
+    """Equilibria (p, k) that have been solved for forces of those sizes (N) and angles."""
+    along, across = direction(angle, axes), direction(angle + np.pi / 2, axes)
+    c = s.compliance[..., :3, :3]
+    return DirectionSweep(
+        angle=angle,
+        translation=without_failed(s.displacement[..., :3], s.status),
+        turning=size[..., None] * apply(c, across),
+        growing=apply(c, along),
+        status=s.status,
+    )
+
+
+def even_angles(count: int) -> Floats:
+    """Equally spaced angles (rad) from 0."""
+    return np.asarray(2 * np.pi / count * np.arange(count), dtype=float)
+
 
 SCAN = 72
 MAX_DEGREE = 11
@@ -38,32 +90,72 @@ class Extreme:
     """Highest status among all directions solved."""
 
 
-def find_extreme(
-    loading: Loading,
-    position: Floats,
-    force: float,
-    axes: tuple[int, int],
-    directions: DirectionSweep,
-    parts: tuple[int, ...],
-    sign: int,
-) -> Extreme:
-    """Largest (sign 1) or smallest (-1) norm of the components `parts` of the translation."""
-    d, rate = directions.translation[..., parts], directions.turning[..., parts]
-    angle = peak_angle(sign * dot(d, d), sign * 2 * dot(d, rate))
-    both = directions.join(solve_directions(loading, position, angle[:, None], force, axes))
-    return most_extreme(both, parts, sign)
+STEPS = 8
+CLOSE = 1e-3
+"""Relative distance to the tolerance from which one more Newton step is exact to about its square."""
 
 
-def most_extreme(directions: DirectionSweep, parts: tuple[int, ...], sign: int) -> Extreme:
-    """The direction whose components `parts` are largest or smallest."""
-    value = norm(directions.translation[..., parts])
-    best = directions.pick(np.argmax(np.where(np.isnan(value), -np.inf, sign * value), axis=1))
-    failed = np.isnan(value).any(axis=1)
-    size = norm(best.translation[..., parts])[:, 0]
-    growth = value_growth(best.translation[..., parts], best.growing[..., parts])[:, 0]
-    angle = np.mod(best.angle[:, 0] + np.pi, 2 * np.pi) - np.pi
-    angle, size, growth = (np.where(failed, np.nan, a) for a in (angle, size, growth))
-    return Extreme(angle, size, growth, directions.status.max(axis=1))
+@dataclass(frozen=True)
+class TurningForce:
+    """A pure force that turns in a plane, at poses (p)."""
+
+    loading: Loading
+    position: Floats
+    """(p, 3) m."""
+    size: float
+    """N."""
+    axes: tuple[int, int]
+    """Base axes of the plane."""
+
+    def solve(
+        self, angle: Floats, size: Floats | None = None, rows: NDArray[np.intp] | None = None
+    ) -> DirectionSweep:
+        """Equilibria at angles (p, k); with a size (p,) N of its own for each pose, at some rows of the poses."""
+        position = self.position if rows is None else self.position[rows]
+        sizes = np.broadcast_to(np.reshape(self.size if size is None else size, (-1, 1)), angle.shape)
+        along = direction(angle, self.axes)
+        wrench = np.concatenate([sizes[..., None] * along, np.zeros_like(along)], axis=-1)
+        return direction_sweep_of(self.loading.solve(position[:, None], wrench), angle, sizes, self.axes)
+
+    def extreme(self, directions: DirectionSweep, parts: tuple[int, ...], sign: int) -> Extreme:
+        """Largest (sign 1) or smallest (-1) norm of the components `parts` of the translation."""
+        d, rate = directions.translation[..., parts], directions.turning[..., parts]
+        angle = peak_angle(sign * dot(d, d), sign * 2 * dot(d, rate))
+        directions = directions.join(self.solve(angle[:, None]))
+        value = norm(directions.translation[..., parts])
+        best = directions.pick(np.argmax(np.where(np.isnan(value), -np.inf, sign * value), axis=1))
+        failed = np.isnan(value).any(axis=1)
+        size = norm(best.translation[..., parts])[:, 0]
+        growth = value_growth(best.translation[..., parts], best.growing[..., parts])[:, 0]
+        angle = np.mod(best.angle[:, 0] + np.pi, 2 * np.pi) - np.pi
+        angle, size, growth = (np.where(failed, np.nan, a) for a in (angle, size, growth))
+        return Extreme(angle, size, growth, directions.status.max(axis=1))
+
+    def limit(self, worst: Extreme, parts: tuple[int, ...], tolerance: float) -> Floats:
+        """Force (p,) in N along the worst direction at which the deflection reaches the tolerance (m).
+
+        Newton's method on loaded equilibria, started at the worst direction's own. 0 where the tolerance
+        is exceeded without any force; NaN where an equilibrium on the way fails.
+        """
+        limit = newton_step(np.full(len(self.position), self.size), worst.value, worst.growth, tolerance)
+        open_ = np.abs(worst.value - tolerance) > CLOSE * tolerance
+        for _ in range(STEPS):
+            rows = np.flatnonzero(open_ & (limit > 0))
+            if rows.size == 0:
+                return limit
+            f = self.solve(worst.angle[rows, None], limit[rows], rows)
+            value = norm(f.translation[..., parts])[:, 0]
+            growth = value_growth(f.translation[..., parts], f.growing[..., parts])[:, 0]
+            limit[rows] = newton_step(limit[rows], value, growth, tolerance)
+            open_[rows] = np.abs(value - tolerance) > CLOSE * tolerance
+        return np.where(open_ & (limit > 0), np.nan, limit)
+
+
+def newton_step(force: Floats, value: Floats, growth: Floats, tolerance: float) -> Floats:
+    """Next force, not below zero; NaN where the deflection does not grow."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        step = np.where(growth > 0, (tolerance - value) / growth, np.nan)
+    return np.asarray(np.maximum(force + step, 0.0))
 
 
 def value_growth(d: Floats, growing: Floats) -> Floats:

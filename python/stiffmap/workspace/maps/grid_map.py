@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import partial
+from collections.abc import Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -13,19 +12,15 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from stiffmap.common.broadcasting import whole_number
 from stiffmap.common.errors import FileError
 from stiffmap.common.outputs import needs_space, only_job
 from stiffmap.solve.compiled import Status
 from stiffmap.solve.machine import Machine, hint_metres, takes_machine
-from stiffmap.workspace.maps.block import solve_block
-from stiffmap.workspace.maps.cluster import on_cluster
 from stiffmap.workspace.maps.files import is_zarr, partial_folder, read_dataset, write_dataset
-from stiffmap.workspace.maps.plan import MapPlan
+from stiffmap.workspace.maps.plan import MapPlan, map_plan
 from stiffmap.workspace.maps.progress import track
-from stiffmap.workspace.maps.request import map_plan
 from stiffmap.workspace.maps.store import Store, folder_store, memory_store
-from stiffmap.workspace.maps.tiles import POSES_AT_ONCE, Tiles, blocks_of, solve_rows, tiles_of
+from stiffmap.workspace.maps.tiles import Work, work_of
 from stiffmap.workspace.maps.zarr_map import open_zarr_map
 
 
@@ -123,60 +118,31 @@ def error_map(
         tolerance=tolerance, compliance=compliance, uncertainty=uncertainty, point=point, rotation=rotation,
         gravity=gravity, load_type=load_type, method=method, load_steps=load_steps, threads=threads,
     )  # fmt: skip
-    solver = (
-        partial(solve_here, poses=at_once(chunk))
-        if scheduler is None
-        else partial(on_cluster, scheduler=scheduler)
-    )
+    work = work_of(chunk, scheduler)
     if out is None:
         store = memory_store(plan)
-        fill(plan, store, chunk, progress) if scheduler is None else _fill(plan, store, solver, progress)
+        _fill(plan, store, work, progress)
         ds = plan.dataset(store.arrays)
         hint_metres(machine, np.r_[plan.x, plan.y, plan.z], bool((ds.status == Status.UNREACHABLE).all()))
         return ds
     target = Path(out)
+    write = _to_zarr if is_zarr(target) else _to_netcdf
     with only_job(target):
-        if is_zarr(target):
-            _to_zarr(plan, target, resume, solver, progress)
-        else:
-            _to_netcdf(plan, target, resume, chunk, progress, None if scheduler is None else solver)
+        write(plan, target, resume, work, progress)
     return read_dataset(target)
 
 
-Solver = Callable[[MapPlan, Tiles, Sequence[int]], Iterator[tuple[int, dict[str, Any]]]]
-"""From tiles that are missing to tiles that are solved, in any order."""
-
-
-def fill(plan: MapPlan, store: Store, chunk: int | None, progress: bool | None) -> None:
-    """Solve the rows that are not done, block by block."""
-    blocks = blocks_of(slice(0, plan.rows), plan.x.size, at_once(chunk))
+def _fill(plan: MapPlan, store: Store, work: Work, progress: bool | None) -> None:
+    """Solve the rows that are not done."""
+    missing = [rows for rows in work.parts(plan) if not store.done[rows].all()]
     try:
-        for rows in track(blocks, len(blocks), "map", progress):
-            if not store.done[rows].all():
-                store.put(rows, solve_block(plan, rows))
+        for number, values in track(work.solved(plan, missing), len(missing), "map", progress):
+            store.put(missing[number], values)
     finally:
         store.flush()
 
 
-def at_once(chunk: int | None) -> int:
-    """Poses solved at once."""
-    return POSES_AT_ONCE if chunk is None else whole_number(chunk, "chunk", 1)
-
-
-def _fill(plan: MapPlan, store: Store, solver: Solver, progress: bool | None) -> None:
-    """Solve the tiles that are not done."""
-    tiles = tiles_of(plan)
-    missing = [i for i in range(tiles.count) if not store.done[tiles.rows_of(i)].all()]
-    try:
-        for index, values in track(solver(plan, tiles, missing), len(missing), "map", progress):
-            store.put(tiles.rows_of(index), values)
-    finally:
-        store.flush()
-
-
-def _to_netcdf(
-    plan: MapPlan, out: Path, resume: bool, chunk: int | None, progress: bool | None, solver: Solver | None
-) -> None:
+def _to_netcdf(plan: MapPlan, out: Path, resume: bool, work: Work, progress: bool | None) -> None:
     folder = partial_folder(out)
     try:
         store = folder_store(plan, folder, resume)
@@ -186,22 +152,15 @@ def _to_netcdf(
             file=str(out),
         ) from error
     needs_space(out, sum(a.nbytes for a in store.arrays.values()), "the finished map")
-    fill(plan, store, chunk, progress) if solver is None else _fill(plan, store, solver, progress)
+    _fill(plan, store, work, progress)
     write_dataset(plan.dataset(store.arrays), out)
     shutil.rmtree(folder)
 
 
-def _to_zarr(plan: MapPlan, out: Path, resume: bool, solver: Solver, progress: bool | None) -> None:
-    with open_zarr_map(plan, partial_folder(out), resume) as store:
-        missing = [i for i in range(store.tiles.count) if not store.done[i]]
-        for index, values in track(solver(plan, store.tiles, missing), len(missing), "map", progress):
-            store.put(index, values)
-        store.finish(out)
-
-
-def solve_here(
-    plan: MapPlan, tiles: Tiles, indices: Sequence[int], poses: int
-) -> Iterator[tuple[int, dict[str, Any]]]:
-    """Solved tiles, in order."""
-    for i in indices:
-        yield i, solve_rows(plan, tiles.rows_of(i), poses)
+def _to_zarr(plan: MapPlan, out: Path, resume: bool, work: Work, progress: bool | None) -> None:
+    store = open_zarr_map(plan, partial_folder(out), resume)
+    missing = np.flatnonzero(~store.done).tolist()
+    parts = [store.tiles.rows_of(i) for i in missing]
+    for number, values in track(work.solved(plan, parts), len(parts), "map", progress):
+        store.put(missing[number], values)
+    store.finish(out)

@@ -1,20 +1,26 @@
-"""How every pose of a map is solved."""
+"""How every pose of a map is solved, and what a result says of that."""
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
-from typing import Unpack
+from typing import Any, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stiffmap.common.broadcasting import Floats
-from stiffmap.solve.machine import Machine
+from stiffmap.common.fingerprints import code, digest
+from stiffmap.common.version import __version__
+from stiffmap.solve.labels import TWIST_UNITS, flag_attrs, meaning, status_attrs
+from stiffmap.solve.machine import Machine, solve_with
 from stiffmap.solve.options import LoadingKeywords, options_of
 from stiffmap.solve.solution import Solution
 from stiffmap.solve.solving import Call
 from stiffmap.solve.status import Status
 from stiffmap.solve.variants import solve_varied
+from stiffmap.workspace.maps.fixed_order_sums import norm
+from stiffmap.workspace.maps.inputs import plane_axes
 
 
 class Loading:
@@ -26,7 +32,7 @@ class Loading:
 
     def solve(self, position: Floats, wrench: Floats, *, stiffness: bool = True) -> Solution:
         """Equilibria at positions (..., 3) under wrenches (..., 6), broadcast together; without the 6x6 if not asked."""
-        return self.machine.solve(position, wrench, **replace(self.options, stiffness=stiffness).keywords())
+        return solve_with(self.machine, position, wrench, replace(self.options, stiffness=stiffness))
 
     def solve_varied(
         self, position: Floats, wrench: Floats, variants: tuple[Machine, ...]
@@ -48,3 +54,56 @@ def without_failed(values: Floats, status: NDArray[np.uint8], keep_unstable: boo
         kept |= status == Status.UNSTABLE
     tail = (1,) * (values.ndim - status.ndim)
     return np.where(kept.reshape(status.shape + tail), values, np.nan)
+
+
+def displaced(dim: str, d: Floats, status: Any, flags: Any, plane: str) -> dict[str, Any]:
+    """Variables of equilibria along one dimension, displaced by d (n, 6)."""
+    within = meaning("m", f"norm of the translation in the {plane} plane")
+    return {
+        "displacement": ((dim, "component"), d, meaning(TWIST_UNITS, "displacement of the reference point")),
+        "deflection": (dim, norm(d[:, :3]), meaning("m", "norm of the translation")),
+        f"deflection_{plane}": (dim, norm(d[:, plane_axes(plane)]), within),
+        "status": (dim, status, status_attrs("the equilibrium")),
+        "flags": (dim, flags, flag_attrs()),
+    }
+
+
+def describe(loading: Loading, title: str, call: dict[str, Any]) -> dict[str, Any]:
+    """Attributes of a Dataset: conventions, machine, version and the call that made it.
+
+    The call leaves out what cannot change the numbers: threads, chunks, output path, time of day.
+    """
+    machine = loading.machine
+    return {
+        "title": f"{title}: {machine.name}",
+        "machine": machine.name,
+        "machine_title": machine.description.title,
+        "machine_digest": machine_digest(machine),
+        "effects": json.dumps([plain_effect(e) for e in machine.description.effects]),
+        "stiffmap_version": __version__,
+        "call": json.dumps(call | loading.options.as_plain(), ensure_ascii=False, default=np.ndarray.tolist),
+        "units": "SI: m, rad, N, N m",
+        "axes": "base axes of the machine, right-handed; positions are those of the commanded tcp",
+        "reference_point": loading.options.point,
+        "wrench_order": "fx fy fz mx my mz, acting on the machine at the reference point",
+        "displacement_order": "dx dy dz rx ry rz, against the commanded pose; rotation vector, base axes",
+        "load_type": loading.options.load_type,
+        "gravity": json.dumps(loading.acting_gravity()),
+        "failed_poses": "NaN, with their status",
+    }
+
+
+def machine_digest(machine: Machine) -> str:
+    """Fingerprint of everything that a machine is made of, link files and users' kinds of effects among it."""
+    return digest(machine.description, code()[1:] if machine.description.effects else [])[:16]
+
+
+def plain_effect(effect: Any) -> dict[str, Any]:
+    """An applied effect as plain data."""
+    return {
+        "kind": effect.kind,
+        "element": effect.element,
+        "legs": list(effect.legs),
+        "parameters": dict(effect.parameters),
+        "options": dict(effect.options),
+    }

@@ -1,28 +1,93 @@
-"""What a map consists of, before anything is solved."""
+"""From the arguments of a map to its plan: what it consists of, before anything is solved."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 import xarray as xr
+from numpy.typing import ArrayLike
 
-from stiffmap.common.broadcasting import Floats
-from stiffmap.solve.labels import COMPONENTS, WRENCH, meaning
-from stiffmap.solve.validity import Validity
-from stiffmap.workspace.maps.inputs import plane_axes
-from stiffmap.workspace.maps.loading import Loading
-from stiffmap.workspace.maps.provenance import describe
-from stiffmap.workspace.maps.uncertainty import METHOD, Uncertain
-from stiffmap.workspace.maps.variables import (
-    Variable,
-    beyond_variable,
-    deviation_variables,
-    extreme_variables,
-    load_variables,
+from stiffmap.common.broadcasting import Floats, instance_of, whole_number
+from stiffmap.common.errors import StiffmapError
+from stiffmap.solve.labels import (
+    COMPLIANCE_UNITS,
+    COMPONENTS,
+    TWIST_UNITS,
+    WRENCH,
+    flag_attrs,
+    meaning,
+    status_attrs,
 )
+from stiffmap.solve.machine import Machine
+from stiffmap.solve.options import LoadingKeywords, spelled_out
+from stiffmap.solve.validity import Validity
+from stiffmap.workspace.maps.inputs import axis, grid_of, magnitude, plane_axes, plane_force, wrench_cases
+from stiffmap.workspace.maps.loading import Loading, describe
+from stiffmap.workspace.maps.uncertainty import METHOD, Uncertain, uncertain_numbers
+
+BEYOND = "beyond_calibration"
+
+
+@dataclass(frozen=True)
+class Variable:
+    """Name, dimensions after those of the grid, type and attributes of one variable."""
+
+    name: str
+    dims: tuple[str, ...]
+    attrs: dict[str, Any]
+    dtype: str = "f8"
+
+
+def load_variables(case: tuple[str, ...], plane: str, compliance: bool) -> list[Variable]:
+    """Variables that each load case has."""
+    out = [
+        Variable(
+            "displacement", (*case, "component"), meaning(TWIST_UNITS, "displacement of the reference point")
+        ),
+        Variable("deflection", case, meaning("m", "norm of the translation")),
+        Variable(f"deflection_{plane}", case, meaning("m", f"norm of the translation in the {plane} plane")),
+        Variable("status", case, status_attrs("the pose under its load"), "u1"),
+        Variable("flags", case, flag_attrs(), "u4"),
+    ]
+    if compliance:
+        dims = (*case, "component", "wrench_component")
+        out.append(Variable("compliance", dims, meaning(COMPLIANCE_UNITS, "loaded compliance")))
+    return out
+
+
+def deviation_variables(case: tuple[str, ...], plane: str, turning: bool) -> list[Variable]:
+    """Standard deviations of the load cases and of the worst direction."""
+    what = "standard deviation of "
+    loads = ("deflection", f"deflection_{plane}")
+    out = [
+        Variable("displacement_std", (*case, "component"), meaning(TWIST_UNITS, f"{what}displacement")),
+        *(Variable(f"{n}_std", case, meaning("m", f"{what}{n}")) for n in loads),
+        Variable(
+            "variance_share",
+            (*case, "parameter"),
+            meaning("1", "share of a number in the variance of the deflection"),
+        ),
+    ]
+    return out + [Variable(f"worst_{n}_std", (), meaning("m", f"{what}worst_{n}")) for n in loads if turning]
+
+
+def extreme_variables(plane: str, tolerance: float) -> list[Variable]:
+    """Variables over the force directions of a plane; the suffix says which components count."""
+    out = [Variable("direction_status", (), status_attrs("the worst of all force directions solved"), "u1")]
+    angle = f"direction of that force, from {plane[0]} towards {plane[1]}"
+    for suffix, what in (("", "translation"), (f"_{plane}", f"translation in the {plane} plane")):
+        for word, size in (("worst", "largest"), ("best", "smallest")):
+            text = f"{size} norm of the {what} over the force directions of the {plane} plane"
+            out.append(Variable(f"{word}_deflection{suffix}", (), meaning("m", text)))
+            out.append(Variable(f"{word}_direction{suffix}", (), meaning("rad", angle, plane=plane)))
+        text = f"force in the worst direction at which the norm of the {what} reaches the tolerance"
+        out.append(Variable(f"force_limit{suffix}", (), meaning("N", text, tolerance_m=tolerance)))
+    return out
+
 
 EXTREMES = (
     "loaded equilibria in {} directions and at the extremum of the trigonometric polynomial through "
@@ -86,7 +151,9 @@ class MapPlan:
         case = () if self.cases is None else ("case",)
         out = load_variables(case, self.shown_plane, self.compliance)
         if self.validity is not None:
-            out.append(beyond_variable(case, str(self.validity)))
+            text = "1: joints or load are beyond the readings that the machine was calibrated by"
+            attrs = meaning("1", text, calibrated_by=str(self.validity))
+            out.append(Variable(BEYOND, case, attrs, "u1"))
         if self.uncertain is not None:
             out += deviation_variables(case, self.shown_plane, self.turning)
         return out + (extreme_variables(self.shown_plane, self.tolerance) if self.turning else [])
@@ -114,24 +181,20 @@ class MapPlan:
         call = {n: getattr(self, n) for n in ("x", "y", "z", "compliance")}
         call |= {"function": "error_map", "wrench": self.wrenches, "cases": self.cases}
         call |= {"plane": self.shown_plane if self.turning else None, "tolerance": self.tolerance}
-        if self.uncertain is not None:
-            return self._turning_attrs(call | {"uncertainty": True}) | {
-                "uncertainty_method": METHOD,
-                "uncertainty_left_out": ", ".join(self.uncertain.left_out),
-            }
-        return self._turning_attrs(call)
-
-    def _turning_attrs(self, call: dict[str, Any]) -> dict[str, Any]:
-        if not self.turning:
-            return describe(self.loading, "error map", call)
-        call |= {"force": self.force, "directions": self.directions}
+        call |= {"uncertainty": True} if self.uncertain is not None else {}
+        call |= {"force": self.force, "directions": self.directions} if self.turning else {}
         out = describe(self.loading, "error map", call)
-        return out | {
-            "turning_force_N": self.force,
-            "turning_force": f"pure forces in the {self.shown_plane} plane at the reference point",
-            "extremes_method": EXTREMES.format(self.directions),
-            "force_limit_method": "Newton's method on loaded equilibria in the worst direction",
-        }
+        if self.turning:
+            out |= {
+                "turning_force_N": self.force,
+                "turning_force": f"pure forces in the {self.shown_plane} plane at the reference point",
+                "extremes_method": EXTREMES.format(self.directions),
+                "force_limit_method": "Newton's method on loaded equilibria in the worst direction",
+            }
+        if self.uncertain is not None:
+            out["uncertainty_method"] = METHOD
+            out["uncertainty_left_out"] = ", ".join(self.uncertain.left_out)
+        return out
 
     def dims(self, v: Variable) -> tuple[str, ...]:
         """All dimensions of a variable."""
@@ -148,3 +211,47 @@ class MapPlan:
             for v in self.variables
         }
         return xr.Dataset(data, self.coords, self.attrs)
+
+
+@spelled_out(LoadingKeywords)
+def map_plan(
+    machine: Machine,
+    *,
+    x: ArrayLike | None = None,
+    y: ArrayLike | None = None,
+    z: ArrayLike | None = None,
+    wrench: ArrayLike | Mapping[str, ArrayLike] | None = None,
+    cases: Sequence[str] | None = None,
+    plane: str | None = "xy",
+    force: float | None = None,
+    directions: int = 4,
+    tolerance: float = 0.25e-3,
+    compliance: bool = False,
+    uncertainty: bool = False,
+    **how: Any,
+) -> MapPlan:
+    """The plan of `stiffmap.error_map` with these arguments; `how`: the fields of `Loading`.
+
+    Raises StiffmapError for bad input.
+    """
+    loading = Loading(machine, **how)
+    grid = grid_of(machine, {"x": x, "y": y, "z": z})
+    instance_of(compliance, (bool, np.bool_), "compliance", "True or False")
+    wrenches, names = wrench_cases(wrench, None if cases is None else tuple(cases))
+    if (directions := whole_number(directions, "directions", 1)) < 3:
+        raise StiffmapError(f"directions: expected 3 or more, got {directions}")
+    return MapPlan(
+        loading=loading,
+        x=axis(grid["x"], "x"),
+        y=axis(grid["y"], "y"),
+        z=axis(grid["z"], "z"),
+        wrenches=wrenches,
+        cases=names,
+        shown_plane="xy" if plane is None else "".join("xyz"[i] for i in plane_axes(plane)),
+        turning=plane is not None,
+        force=0.0 if plane is None else plane_force(wrenches, force),
+        directions=directions,
+        tolerance=magnitude(tolerance, "tolerance", "m"),
+        compliance=compliance,
+        uncertain=uncertain_numbers(machine) if uncertainty else None,
+    )

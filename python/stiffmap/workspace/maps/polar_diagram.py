@@ -8,17 +8,20 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from stiffmap.common.broadcasting import Floats, whole_number
+from stiffmap.common.broadcasting import whole_number
 from stiffmap.common.errors import StiffmapError
-from stiffmap.solve.labels import COMPONENTS, TWIST_UNITS, flag_attrs, meaning, status_attrs
+from stiffmap.solve.labels import COMPONENTS, meaning
 from stiffmap.solve.machine import Machine, takes_machine
 from stiffmap.solve.options import LoadingKeywords, spelled_out
-from stiffmap.workspace.maps.direction_sweep import DirectionSweep, direction, direction_sweep_of, even_angles
-from stiffmap.workspace.maps.extremes import find_extreme
-from stiffmap.workspace.maps.fixed_order_sums import norm
+from stiffmap.workspace.maps.extremes import (
+    DirectionSweep,
+    TurningForce,
+    direction,
+    direction_sweep_of,
+    even_angles,
+)
 from stiffmap.workspace.maps.inputs import magnitude, place, plane_axes
-from stiffmap.workspace.maps.loading import Loading, without_failed
-from stiffmap.workspace.maps.provenance import describe
+from stiffmap.workspace.maps.loading import Loading, describe, displaced, without_failed
 
 
 @takes_machine
@@ -51,18 +54,9 @@ def polar(
     wrench = np.concatenate([force * direction(angle, axes), np.zeros((directions, 3))], axis=1)
     s = loading.solve(p[None, None], wrench[None])
     swept = direction_sweep_of(s, angle[None], np.full((1, directions), force), axes)
-    d, status = without_failed(s.displacement, s.status)[0], s.status[0]
-    data = {
-        "displacement": (
-            ("angle", "component"),
-            d,
-            meaning(TWIST_UNITS, "displacement of the reference point"),
-        ),
-        "deflection": ("angle", norm(d[:, :3]), meaning("m", "norm of the translation")),
-        f"deflection_{plane}": ("angle", norm(d[:, axes]), meaning("m", f"norm in the {plane} plane")),
-        "status": ("angle", status, status_attrs("the equilibrium")),
-        "flags": ("angle", s.flags[0], flag_attrs()),
-    } | _extremes(loading, p[None], force, plane, swept)
+    turning = TurningForce(loading, p[None], force, axes)
+    d = without_failed(s.displacement, s.status)[0]
+    data = displaced("angle", d, s.status[0], s.flags[0], plane) | _extremes(turning, plane, swept)
     coords = {
         "angle": (
             "angle",
@@ -78,13 +72,11 @@ def polar(
     return xr.Dataset(data, coords, describe(loading, "polar diagram", call))
 
 
-def _extremes(
-    loading: Loading, position: Floats, force: float, plane: str, swept: DirectionSweep
-) -> dict[str, Any]:
-    axes, out = plane_axes(plane), {}
-    for suffix, parts in (("", (0, 1, 2)), (f"_{plane}", axes)):
+def _extremes(force: TurningForce, plane: str, swept: DirectionSweep) -> dict[str, Any]:
+    out = {}
+    for suffix, parts in (("", (0, 1, 2)), (f"_{plane}", force.axes)):
         for word, size, sign in (("worst", "largest", 1), ("best", "smallest", -1)):
-            e = find_extreme(loading, position, force, axes, swept, parts, sign)
+            e = force.extreme(swept, parts, sign)
             what = f"{size} deflection over the force directions of the {plane} plane"
             out[f"{word}_deflection{suffix}"] = ((), e.value[0], meaning("m", what))
             out[f"{word}_direction{suffix}"] = ((), e.angle[0], meaning("rad", "direction of that force"))

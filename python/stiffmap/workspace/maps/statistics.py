@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterable, Sequence
-from functools import partial
 from os import PathLike
 from typing import Any
 
@@ -18,13 +18,9 @@ from stiffmap.solve.labels import meaning, status_attrs
 from stiffmap.solve.machine import Machine, as_machine
 from stiffmap.solve.options import keywords_of
 from stiffmap.solve.status import Status
-from stiffmap.workspace.maps.cluster import on_cluster
-from stiffmap.workspace.maps.grid_map import at_once, solve_here
-from stiffmap.workspace.maps.plan import MapPlan
+from stiffmap.workspace.maps.plan import MapPlan, Variable, map_plan
 from stiffmap.workspace.maps.progress import track
-from stiffmap.workspace.maps.request import map_plan
-from stiffmap.workspace.maps.tiles import Tiles, tiles_of
-from stiffmap.workspace.maps.variables import Variable
+from stiffmap.workspace.maps.tiles import Tiles, tiles_of, work_of
 
 NODE = ("x", "y", "z")
 DEFLECTION = re.compile(r"(worst_|best_)?deflection(_xy|_xz|_yz)?")
@@ -68,16 +64,10 @@ def map_statistics(
     if wanted.ndim != 1 or wanted.size == 0 or not ((wanted >= 0) & (wanted <= 100)).all():
         raise StiffmapError(f"percentiles: expected numbers from 0 to 100, got {list(percentiles)}")
     plan = map_plan(as_machine(machine), **call)
-    tiles = tiles_of(plan)
-    solver = (
-        partial(solve_here, poses=at_once(chunk))
-        if scheduler is None
-        else partial(on_cluster, scheduler=scheduler)
-    )
-    every = range(tiles.count)
+    tiles, work = tiles_of(plan), work_of(chunk, scheduler)
     found = {v.name: _Deflection(plan, tiles, v) for v in plan.variables if DEFLECTION.fullmatch(v.name)}
     counts = np.zeros((plan.z.size, len(plan.wrenches), len(Status)), dtype=np.int64)
-    for index, values in track(solver(plan, tiles, every), tiles.count, "map", progress):
+    for index, values in track(work.solved(plan, tiles.parts), tiles.count, "map", progress):
         for name, one in found.items():
             one.add(index, values[name])
         plane, _ = tiles.place(index)
@@ -135,11 +125,6 @@ class _Deflection:
     def variables(self, name: str, percentiles: Floats) -> dict[str, Any]:
         """Variables of the Dataset."""
         p = self.plan
-        case = self.case
-
-        def cut(values: Any) -> Any:
-            return values if case else values[..., 0]
-
         iy, ix = np.divmod(self.place, p.x.size)
         nodes = np.stack([p.x[ix], p.y[iy], np.broadcast_to(p.z[:, None], ix.shape)], axis=-1)
         nodes = np.where(np.isnan(self.most)[..., None], np.nan, nodes)
@@ -151,34 +136,21 @@ class _Deflection:
         total = [Histogram.joined([row[c] for row in self.histograms]) for c in range(self.cases)]
         both = np.fmin([h.percentiles(percentiles) for h in total], np.fmax.reduce(self.most)[:, None])
         of = f"of {name}"
-        return {
-            f"{name}_max": (("z", *case), cut(self.most), meaning("m", f"largest value {of}")),
-            f"{name}_max_position": (
-                ("z", *case, "node"),
-                nodes if case else nodes[:, 0],
-                meaning("m", f"pose of the largest value {of}"),
-            ),
-            f"{name}_within": (
-                ("z", *case),
-                cut(share),
-                meaning("1", f"share of the area {of} within tolerance_m"),
-            ),
-            f"{name}_percentile": (
-                ("percentile", "z", *case),
-                cut(np.moveaxis(each, -1, 0)),
-                meaning("m", f"percentiles {of}"),
-            ),
-            f"{name}_percentile_map": (
-                ("percentile", *case),
-                cut(np.moveaxis(both, -1, 0)),
-                meaning("m", f"percentiles {of} over the whole map"),
-            ),
-            f"{name}_column_max": (
-                ("y", "x", *case),
-                cut(self.column),
-                meaning("m", f"largest value {of} over z"),
-            ),
+        table = {
+            "max": (("z", "case"), self.most, "m", f"largest value {of}"),
+            "max_position": (("z", "case", "node"), nodes, "m", f"pose of the largest value {of}"),
+            "within": (("z", "case"), share, "1", f"share of the area {of} within tolerance_m"),
+            "percentile": (("percentile", "z", "case"), np.moveaxis(each, -1, 0), "m", f"percentiles {of}"),
+            "percentile_map": (("percentile", "case"), both.T, "m", f"percentiles {of} over the whole map"),
+            "column_max": (("y", "x", "case"), self.column, "m", f"largest value {of} over z"),
         }
+        return {f"{name}_{n}": (*self._own(dims, v), meaning(*what)) for n, (dims, v, *what) in table.items()}
+
+    def _own(self, dims: tuple[str, ...], values: Floats) -> tuple[tuple[str, ...], Floats]:
+        """Without the dimension of the cases where the deflection has none."""
+        if self.case:
+            return dims, values
+        return tuple(d for d in dims if d != "case"), np.squeeze(values, axis=dims.index("case"))
 
 
 def cells(axis: Floats) -> Floats:
@@ -202,22 +174,20 @@ class Histogram:
     """Counts over bins that share a floating-point number's sign, exponent and leading bits."""
 
     def __init__(self) -> None:
-        self.count: dict[int, int] = {}
+        self.count: Counter[int] = Counter()
 
     def add(self, values: Floats) -> None:
         """Count the values (n,), not negative; NaN are left out."""
         kept = np.ascontiguousarray(values[~np.isnan(values)], dtype=np.float64) + 0.0
         bins, counts = np.unique(kept.view(np.int64) >> _SHIFT, return_counts=True)
-        for b, n in zip(bins.tolist(), counts.tolist(), strict=True):
-            self.count[b] = self.count.get(b, 0) + n
+        self.count.update(dict(zip(bins.tolist(), counts.tolist(), strict=True)))
 
     @classmethod
     def joined(cls, parts: Iterable[Histogram]) -> Histogram:
         """The counts of all."""
         out = cls()
         for part in parts:
-            for b, n in part.count.items():
-                out.count[b] = out.count.get(b, 0) + n
+            out.count.update(part.count)
         return out
 
     def percentiles(self, percent: Floats) -> Floats:

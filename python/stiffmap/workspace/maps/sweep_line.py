@@ -1,7 +1,9 @@
-"""`stiffmap.sweep`."""
+"""`stiffmap.sweep`: single forces, and paths with their critical points."""
 
 from __future__ import annotations
 
+import json
+from collections.abc import Sequence
 from typing import Any, Unpack
 
 import numpy as np
@@ -10,14 +12,15 @@ from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import Floats, real_number, whole_number
 from stiffmap.common.errors import StiffmapError
+from stiffmap.solve.compiled import Role
 from stiffmap.solve.compiled.machine import PATH_CONTROLS as CONTROLS
+from stiffmap.solve.labels import COMPONENTS, meaning
 from stiffmap.solve.machine import Machine, hint_metres, takes_machine
 from stiffmap.solve.options import LoadingKeywords, spelled_out
 from stiffmap.solve.status import Status
 from stiffmap.workspace.maps.fixed_order_sums import dot
 from stiffmap.workspace.maps.inputs import force_list, place, unit
-from stiffmap.workspace.maps.loading import Loading, without_failed
-from stiffmap.workspace.maps.sweep_dataset import Equilibria, Followed, sweep_dataset
+from stiffmap.workspace.maps.loading import Loading, describe, displaced, without_failed
 
 
 @takes_machine
@@ -71,9 +74,8 @@ def sweep(
     s = loading.solve(p, wrench)
     d = without_failed(s.displacement, s.status, keep_unstable=True)
     c = without_failed(s.compliance, s.status, keep_unstable=True)
-    found = Equilibria(
-        force=f,
-        displacement=d,
+    variables = _variables(
+        d,
         along=dot(d[:, :3], u),
         compliance_along=dot(dot(c[:, :3, :3], u), u),
         unstable_modes=np.full(f.size, np.nan),
@@ -81,8 +83,7 @@ def sweep(
         flags=s.flags,
         branch=np.zeros(f.size, dtype=np.intp),
     )
-    call = {"position": p, "direction": u, "forces": f}
-    return sweep_dataset(loading, "force sweep", call, found, Followed())
+    return _dataset(loading, "force sweep", {"position": p, "direction": u, "forces": f}, f, variables)
 
 
 UNITS = {"force": "N", "displacement": "m", "arc": "m"}
@@ -119,17 +120,29 @@ def load_path(
     )
     (end, points, critical), (crossing_end, crossing, crossing_critical) = branches
     hint_metres(machine, position, not points)
-    _check_cross(cross, critical, str(ENDS[end]))
+    forks = sum(not c["limit"] for c in critical)
+    if abs(cross) > forks:
+        raise StiffmapError(
+            f"cross: the path has {forks} bifurcations, got {cross} (end of the path: {ENDS[end]})"
+        )
     call = {"position": position, "direction": direction, "control": control,
             "limit": limit, "steps": steps, "cross": cross}  # fmt: skip
-    followed = Followed(
-        ENDS[end],
-        _crossing_end(cross, critical, crossing, ENDS[crossing_end]),
-        tuple(critical),
-        tuple(crossing_critical),
+    both = points + crossing
+    d = np.array([p["displacement"] for p in both], dtype=float).reshape(-1, 6)
+    unstable = np.array([p["unstable"] for p in both], dtype=float)
+    variables = _variables(
+        d,
+        along=np.array([p["along"] for p in both], dtype=float),
+        compliance_along=np.full(len(both), np.nan),
+        unstable_modes=unstable,
+        status=np.where(unstable > 0, Status.UNSTABLE, Status.CONVERGED).astype(np.uint8),
+        flags=np.full(len(both), flags, dtype=np.uint32),  # those of the whole path
+        branch=np.repeat([0, 1], [len(points), len(crossing)]),
     )
-    found = _equilibria(points, crossing, int(flags))
-    return sweep_dataset(loading, f"load path by {control}", call, found, followed)
+    force = np.array([p["load"] for p in both], dtype=float)
+    ends = ENDS[end], _crossing_end(cross, critical, crossing, ENDS[crossing_end])
+    title = f"load path by {control}"
+    return _dataset(loading, title, call, force, variables, ends, (critical, crossing_critical))
 
 
 def _crossing_end(cross: int, critical: list[dict[str, Any]], points: list[Any], end: str) -> str:
@@ -139,12 +152,6 @@ def _crossing_end(cross: int, critical: list[dict[str, Any]], points: list[Any],
         if abs(fork["after"] - fork["before"]) > 1:
             return f"not followed: {abs(fork['after'] - fork['before'])} modes at once, no single branch"
     return end
-
-
-def _check_cross(cross: int, critical: list[dict[str, Any]], end: str) -> None:
-    forks = sum(not c["limit"] for c in critical)
-    if abs(cross) > forks:
-        raise StiffmapError(f"cross: the path has {forks} bifurcations, got {cross} (end of the path: {end})")
 
 
 def check_control(control: str, limit: float | None, steps: int, load_type: object, cross: int) -> float:
@@ -163,17 +170,110 @@ def check_control(control: str, limit: float | None, steps: int, load_type: obje
     return float(limit)
 
 
-def _equilibria(points: list[dict[str, Any]], crossing: list[dict[str, Any]], flags: int) -> Equilibria:
-    """Both branches, one after the other; the flags are those of the whole path."""
-    both = points + crossing
-    unstable = np.array([p["unstable"] for p in both], dtype=float)
-    return Equilibria(
-        force=np.array([p["load"] for p in both], dtype=float),
-        displacement=np.array([p["displacement"] for p in both], dtype=float).reshape(-1, 6),
-        along=np.array([p["along"] for p in both], dtype=float),
-        compliance_along=np.full(len(both), np.nan),
-        unstable_modes=unstable,
-        status=np.where(unstable > 0, Status.UNSTABLE, Status.CONVERGED).astype(np.uint8),
-        flags=np.full(len(both), flags, dtype=np.uint32),
-        branch=np.repeat([0, 1], [len(points), len(crossing)]),
-    )
+BRANCH = meaning("1", "0: from the unloaded machine; 1: the branch that crosses it")
+
+
+def _variables(
+    d: Floats, *, along: Floats, compliance_along: Floats, unstable_modes: Floats, status: Any, flags: Any, branch: Any
+) -> dict[str, Any]:  # fmt: skip
+    """Variables over ``step`` of equilibria that are displaced by d (n, 6); NaN for what was not computed."""
+    return displaced("step", d, status, flags, "xy") | {
+        "deflection_along": ("step", along, meaning("m", "translation along the force")),
+        "compliance_along": (
+            "step",
+            compliance_along,
+            meaning("m/N", "loaded compliance along the force; NaN on a path"),
+        ),
+        "unstable_modes": (
+            "step",
+            unstable_modes,
+            meaning("1", "directions in which the energy falls; NaN for single forces"),
+        ),
+        "branch": ("step", branch, BRANCH),
+    }
+
+
+def _dataset(
+    loading: Loading, title: str, call: dict[str, Any], force: Floats, variables: dict[str, Any],
+    ends: tuple[str, str] = ("", ""), critical: tuple[Sequence[Any], Sequence[Any]] = ((), ()),
+) -> xr.Dataset:  # fmt: skip
+    """What `sweep` describes; `call` holds position and direction. A path and the branch that crosses it have ends and
+    critical points."""
+    modes, coordinate = critical_variables(loading.machine, [*critical[0], *critical[1]])
+    modes["critical_branch"] = ("critical", np.repeat([0, 1], [len(c) for c in critical]), BRANCH)
+    coords = coordinate | {
+        "force": ("step", force, meaning("N", "force along the direction")),
+        "component": ("component", np.array(COMPONENTS)),
+        "axis": ("axis", np.array(["x", "y", "z"])),
+        "position": ("axis", call["position"], meaning("m", "commanded tcp")),
+        "direction": ("axis", call["direction"], meaning("1", "direction of the force, base axes")),
+    }
+    attrs = describe(loading, title, {"function": "sweep", **call}) | {
+        "failed_poses": "NaN, with their status; unstable ones kept",
+        "end": ends[0],
+        "crossing_end": ends[1],
+        "critical_points": json.dumps([_summary(c) for c in critical[0]]),
+    }
+    return xr.Dataset(variables | modes, coords, attrs)
+
+
+def _summary(c: dict[str, Any]) -> dict[str, Any]:
+    kind = "limit" if c["limit"] else "bifurcation"
+    return {"kind": kind, "force": c["load"], "deflection_along": c["along"]}
+
+
+def critical_variables(
+    machine: Machine, critical: list[dict[str, Any]]
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Variables and coordinates over the dimensions ``critical`` and ``coordinate``."""
+    names = list(machine.compiled.names.coordinates)
+    modes = np.array([c["mode"] for c in critical]).reshape(len(critical), len(names))
+    sizes = np.abs(modes) * _units(machine)
+    over = {
+        "critical_force": _floats(critical, "load", "N", "force at the critical point"),
+        "critical_deflection": _floats(critical, "along", "m", "translation along the force there"),
+        "critical_kind": (
+            "critical",
+            np.array(["limit" if c["limit"] else "bifurcation" for c in critical], dtype=object).astype(str),
+            meaning("", "limit: the force has an extremum; bifurcation: branches cross"),
+        ),
+        "unstable_before": ("critical", np.array([c["before"] for c in critical], dtype=int)),
+        "unstable_after": ("critical", np.array([c["after"] for c in critical], dtype=int)),
+        "mode_leg": ("critical", np.array([_leg(machine, names, s) for s in sizes]).astype(str)),
+        "mode_joint": ("critical", np.array([_joint(machine, names, s) for s in sizes]).astype(str)),
+        "mode": (
+            ("critical", "coordinate"),
+            modes,
+            meaning("m or rad", "buckling mode; the largest motion, angles as arcs, is 1"),
+        ),
+        "critical_coordinates": (
+            ("critical", "coordinate"),
+            np.array([c["coordinates"] for c in critical]).reshape(len(critical), len(names)),
+            meaning("m or rad", "coordinates at the critical point"),
+        ),
+    }
+    return over, {"coordinate": ("coordinate", np.array(names))}
+
+
+def _floats(critical: list[dict[str, Any]], key: str, units: str, what: str) -> tuple[Any, ...]:
+    return ("critical", np.array([c[key] for c in critical], dtype=float), meaning(units, what))
+
+
+def _units(machine: Machine) -> Floats:
+    """Length that a unit of each coordinate stands for."""
+    prismatic = np.array(machine.compiled.names.prismatic)
+    return np.where(prismatic, 1.0, machine.compiled.length)
+
+
+def _leg(machine: Machine, names: list[str], sizes: Floats) -> str:
+    """Leg of the joint that moves most; '' where that belongs to the base or the platform."""
+    leg = _joint(machine, names, sizes).split(".")[0]
+    return leg if leg in machine.legs else ""
+
+
+def _joint(machine: Machine, names: list[str], sizes: Floats) -> str:
+    """Joint, drive or spring coordinate that moves most; joints go before springs."""
+    roles = np.array(machine.compiled.names.roles)
+    joints = np.where(roles != Role.SPRING, sizes, 0.0)
+    pick = joints if joints.max(initial=0.0) > 0.1 * sizes.max() else sizes
+    return names[int(np.argmax(pick))]

@@ -79,11 +79,7 @@ def design_sweep(
     for address in axes:
         known_values(machine.description.declared or machine.description, address)
     dims = {address: address.replace("/", ".") for address in axes}
-    given = (
-        machine.description.home.p
-        if position is None
-        else trailing(position, (3,), "position", "positions (m)")
-    )
+    given = None if position is None else trailing(position, (3,), "position", "positions (m)")
     options = {"rotation": rotation, "point": point, "gravity": gravity, "method": method, "threads": threads}
     cells: dict[tuple[int, ...], dict[str, Any]] = {}
     problems: dict[tuple[int, ...], str] = {}
@@ -95,15 +91,15 @@ def design_sweep(
         except StiffmapError as problem:
             problems[index] = str(problem)
             continue
-        here = made.description.home.p if position is None else given
+        here = made.description.home.p if given is None else given
         s = made.solve(here, wrench, **options)  # type: ignore[arg-type]
-        answer: dict[str, Any] = {
+        cells[index] = {
             "displacement": s.displacement,
             "compliance": s.compliance,
             "status": s.status,
+            "deflection": np.linalg.norm(s.displacement[..., :3], axis=-1),
+            **_evaluated(evaluate, made),
         }
-        answer["deflection"] = np.linalg.norm(answer["displacement"][..., :3], axis=-1)
-        cells[index] = {**answer, **_evaluated(evaluate, made)}
     if not cells:
         raise StiffmapError(
             f"numbers: no machine can be made of them; the first: {next(iter(problems.values()))}"

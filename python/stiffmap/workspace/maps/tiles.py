@@ -1,12 +1,15 @@
-"""A map in tiles: parts of one z-plane that are solved, written and done again on their own."""
+"""A map in tiles: parts of one z-plane that are solved, written and done again on their own, here or on a cluster."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from stiffmap.common.broadcasting import whole_number
+from stiffmap.common.tasks import workers
 from stiffmap.workspace.maps.block import solve_block
 from stiffmap.workspace.maps.plan import MapPlan
 
@@ -44,6 +47,11 @@ class Tiles:
         plane, y = self.place(index)
         return slice(plane * self.rows + y.start, plane * self.rows + y.stop)
 
+    @property
+    def parts(self) -> list[slice]:
+        """Rows of every tile."""
+        return [self.rows_of(i) for i in range(self.count)]
+
 
 def tiles_of(plan: MapPlan) -> Tiles:
     """The tiles of a map."""
@@ -65,3 +73,35 @@ def solve_rows(plan: MapPlan, rows: slice, poses: int = POSES_AT_ONCE) -> dict[s
         v.name: np.concatenate([p[v.name] for p in parts]).reshape(shape + plan.tail(v))
         for v in plan.variables
     }
+
+
+@dataclass(frozen=True)
+class Work:
+    """Who solves a map: this process, about so many poses at once, or the workers of a cluster."""
+
+    poses: int
+    scheduler: Any = None
+    """Address of a dask scheduler, or a `distributed.Client`."""
+
+    def parts(self, plan: MapPlan) -> list[slice]:
+        """All rows, in parts that are kept as soon as they are solved."""
+        if self.scheduler is None:
+            return blocks_of(slice(0, plan.rows), plan.x.size, self.poses)
+        return tiles_of(plan).parts
+
+    def solved(self, plan: MapPlan, parts: Sequence[slice]) -> Iterator[tuple[int, dict[str, Any]]]:
+        """Number and values of each part: in order here, as they come from a cluster."""
+        if self.scheduler is None:
+            yield from ((i, solve_rows(plan, rows, self.poses)) for i, rows in enumerate(parts))
+            return
+        with workers(_solve, plan, scheduler=self.scheduler) as cluster:
+            yield from cluster.as_done((rows.start, rows.stop) for rows in parts)
+
+
+def work_of(chunk: int | None, scheduler: Any) -> Work:
+    """By the arguments `chunk` and `scheduler` of `stiffmap.error_map`."""
+    return Work(POSES_AT_ONCE if chunk is None else whole_number(chunk, "chunk", 1), scheduler)
+
+
+def _solve(plan: MapPlan, rows: tuple[int, int]) -> dict[str, Any]:
+    return solve_rows(plan, slice(*rows))

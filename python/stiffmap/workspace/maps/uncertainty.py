@@ -10,8 +10,9 @@ from dataclasses import dataclass
 from itertools import chain
 
 import numpy as np
+import xarray as xr
 
-from stiffmap.common.broadcasting import Floats
+from stiffmap.common.broadcasting import Floats, instance_of
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.addresses import moved, number
 from stiffmap.model.description import MachineDescription
@@ -73,10 +74,12 @@ def uncertain_numbers(machine: Machine) -> Uncertain:
             f"uncertainty: the numbers of machine '{machine.name}' have none: give some as "
             "{value: ..., u: ...} or springs as {link: file} (docs/machine_files.md)"
         )
+    from scipy.linalg import block_diag
+
     blocks = [v for _, v in links] + [np.array([[n.deviation**2]]) for n in kept]
     return Uncertain(
         names=tuple(n.name for n in numbers),
-        covariance=_block_diagonal(blocks),
+        covariance=np.asarray(block_diag(*blocks)),
         steps=np.array([n.step for n in numbers]),
         machines=tuple(Machine(_at(d, n, s * n.step), like=machine) for n in numbers for s in (-1, 1)),
         left_out=tuple(n.name for n in plain if n not in kept),
@@ -113,7 +116,19 @@ def _at(d: MachineDescription, n: _Number, delta: float) -> MachineDescription:
     return d
 
 
-def _block_diagonal(blocks: list[Floats]) -> Floats:
-    from scipy.linalg import block_diag
+def uncertainty_ranking(ds: xr.Dataset) -> xr.DataArray:
+    """Which numbers the uncertainty of an error map comes from, the largest first.
 
-    return np.asarray(block_diag(*blocks))
+    Returns (parameter,): share of each in the variance of the deflection, summed over all poses and load
+    cases of the map. They sum to 1; correlated numbers divide what they share, so one may be negative.
+
+    Raises StiffmapError for a map made without ``uncertainty=True``.
+    """
+    if "variance_share" not in instance_of(ds, xr.Dataset, "ds", "an error map"):
+        raise StiffmapError("ranking: the map has none; it needs error_map(..., uncertainty=True)")
+    weight = ds.deflection_std**2
+    over = list(weight.dims)
+    share: xr.DataArray = (ds.variance_share * weight).sum(over) / weight.sum(over)
+    share.attrs = {"units": "1", "long_name": "share of the variance of the deflection over the map"}
+    ranked: xr.DataArray = share.sortby(-share).rename("variance_share")
+    return ranked

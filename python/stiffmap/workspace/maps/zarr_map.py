@@ -12,7 +12,6 @@ import shutil
 import tempfile
 import zlib
 from collections.abc import Iterator
-from contextlib import contextmanager
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -24,10 +23,9 @@ from numpy.typing import NDArray
 from stiffmap.common.errors import FileError, MissingPartError
 from stiffmap.common.json_text import parse_json
 from stiffmap.common.outputs import add_lines, put_folder, write_text
-from stiffmap.workspace.maps.differences import kept_attributes, refuse_another_map
 from stiffmap.workspace.maps.files import zarr_strings
 from stiffmap.workspace.maps.plan import MapPlan
-from stiffmap.workspace.maps.store import FILL
+from stiffmap.workspace.maps.store import FILL, kept_attributes, refuse_another_map
 from stiffmap.workspace.maps.tiles import Tiles, tiles_of
 
 JOURNAL = "journal.jsonl"
@@ -183,8 +181,7 @@ def damaged_line(journal: Path, line: int) -> FileError:
     )
 
 
-@contextmanager
-def open_zarr_map(plan: MapPlan, folder: Path, resume: bool) -> Iterator[ZarrMap]:
+def open_zarr_map(plan: MapPlan, folder: Path, resume: bool) -> ZarrMap:
     """The unfinished map in `folder`, new or taken up."""
     zarr_package()
     out = ZarrMap(plan, folder, tiles_of(plan))
@@ -195,4 +192,4 @@ def open_zarr_map(plan: MapPlan, folder: Path, resume: bool) -> Iterator[ZarrMap
             out.begin()
     except OSError as error:
         raise FileError(f"cannot be written: {error.strerror or error}", file=str(folder)) from error
-    yield out
+    return out

@@ -3,18 +3,27 @@
 from stiffmap.workspace.performance.box.box import LargestBox, largest_box
 from stiffmap.workspace.performance.box.workspace import Workspace, workspace_volume
 from stiffmap.workspace.performance.limits.deflection import WorstDeflection, worst_deflection
-from stiffmap.workspace.performance.motion.accuracy import AccuracyTransmission, accuracy_transmission
 from stiffmap.workspace.performance.motion.closing import DriveKinematics, drive_kinematics
 from stiffmap.workspace.performance.motion.efforts import (
     PeakAcceleration,
     drive_efforts,
-    fastest,
     peak_acceleration,
 )
-from stiffmap.workspace.performance.motion.force import ForceTransmission, force_transmission
-from stiffmap.workspace.performance.motion.frequencies import NaturalFrequencies, natural_frequencies
-from stiffmap.workspace.performance.motion.inertia import body_masses, moving_mass, total_mass
+from stiffmap.workspace.performance.motion.force import (
+    AccuracyTransmission,
+    ForceTransmission,
+    accuracy_transmission,
+    force_transmission,
+)
+from stiffmap.workspace.performance.motion.inertia import (
+    NaturalFrequencies,
+    body_masses,
+    moving_mass,
+    natural_frequencies,
+    total_mass,
+)
 from stiffmap.workspace.performance.motion.motion_files import Motion, load_motion
+from stiffmap.workspace.performance.motion.timing import fastest
 from stiffmap.workspace.performance.motion.trajectory import (
     Path,
     Trajectory,

@@ -10,12 +10,11 @@ from stiffmap.common.broadcasting import (
     batch,
     real_array,
     rows,
-    trailing,
     whole_number,
     wrench_array,
 )
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.rotations import as_rotations
+from stiffmap.solve.closing import commanded
 from stiffmap.solve.machine import Machine
 
 
@@ -24,11 +23,8 @@ def loaded_poses(
 ) -> tuple[tuple[int, ...], Floats, Floats, Floats]:
     """Batch axes of commanded poses under a wrench each, and positions (n, 3) m, rotations (n, 3, 3), wrenches (n, 6) N, N·m of all of
     them; None: as at home, no wrench. StiffmapError for bad input."""
-    p = trailing(position, (3,), "position", "positions (m)")
+    p, r = commanded(machine.compiled, position, rotation)
     w = wrench_array(wrench)
-    r = machine.compiled.home_rotation
-    if rotation is not None:
-        r = as_rotations(trailing(rotation, (3, 3), "rotation", "rotation matrices"))
     shape = batch(p.shape[:-1], w.shape[:-1], r.shape[:-2])
     return shape, rows(p, shape, (3,)), rows(r, shape, (3, 3)), rows(w, shape, (6,))
 

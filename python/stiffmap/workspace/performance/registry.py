@@ -1,4 +1,4 @@
-"""The measures that exist: each is one file in `stiffmap.workspace.performance.kinds`, found by being there."""
+"""The measures that exist: those of the files in `stiffmap.workspace.performance.kinds`, found by being there."""
 
 from __future__ import annotations
 
@@ -175,7 +175,8 @@ def over_poses(positions: Floats, values: Floats, better: str, note: str = "", *
 @lru_cache
 def all_measures() -> tuple[Measure, ...]:
     """Every measure, in the order of the table."""
-    return tuple(sorted((m.MEASURE for m in modules_of(kinds)), key=lambda m: (m.order, m.name)))
+    found = (m for kind in modules_of(kinds) for m in getattr(kind, "MEASURES", None) or (kind.MEASURE,))
+    return tuple(sorted(found, key=lambda m: (m.order, m.name)))
 
 
 def get_measure(name: str) -> Measure:

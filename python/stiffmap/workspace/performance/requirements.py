@@ -11,14 +11,14 @@ from typing import Literal
 from pydantic import Field
 
 from stiffmap.common.broadcasting import given_path
-from stiffmap.common.errors import FileError
+from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.short import short_repr
 from stiffmap.common.yaml_text import Document, read
 from stiffmap.model.files.report import validated
 from stiffmap.model.files.schema.base import FileModel, Name
-from stiffmap.workspace.performance.motion.motion_files import near_or_shipped
+from stiffmap.workspace.performance.motion.motion_files import given_or_shipped, near_or_shipped
 from stiffmap.workspace.performance.quantities import quantity_in
-from stiffmap.workspace.performance.registry import all_measures, get_measure
+from stiffmap.workspace.performance.registry import get_measure
 
 Written = str | float | int
 
@@ -100,64 +100,57 @@ class Requirements:
         return dict(self.bounds).get(measure)
 
 
+def bound_in(document: Document, file: str, given: BoundModel, *keys: str) -> Bound:
+    """The bound of the measure that is the last of the keys under which it stands.
+
+    FileError for a measure that does not exist and for bounds that are no interval.
+    """
+    sides = (("at_least", given.at_least), ("at_most", given.at_most))
+    try:
+        unit = get_measure(keys[-1]).unit
+        least, most = (
+            None if value is None else quantity_in(document, file, value, unit, *keys, side)
+            for side, value in sides
+        )
+        if least is None and most is None:
+            raise StiffmapError("give at_least or at_most")
+        if least is not None and most is not None and least > most:
+            raise StiffmapError(f"at_least ({given.at_least}) is above at_most ({given.at_most})")
+    except FileError:
+        raise
+    except StiffmapError as error:
+        raise FileError(str(error), file=file, line=document.line(keys), key=".".join(keys)) from None
+    return Bound(least, most)
+
+
 def load_requirements(source: str | PathLike[str]) -> Requirements:
     """Requirements from a file, or the shipped ones by name (``trimming``).
 
     Raises FileError naming file, line, key, what was expected and what was found.
     """
     path = given_path(source, "source", "a file or a shipped name")
-    shipped = Path(__file__).with_name(path.name if path.suffix else f"{path.name}.yaml")
+    folder = Path(__file__).parent
+    path = given_or_shipped(path, folder)
     if not path.is_file():
-        if not shipped.is_file() or len(path.parts) > 1:
-            known = ", ".join(sorted(p.stem for p in Path(__file__).parent.glob("*.yaml")))
-            raise FileError(
-                f"no such requirements file, and none of that name is shipped (these are: {known})",
-                file=str(path),
-            )
-        path = shipped
-    document = read(path)
-    return requirements_of(document, str(path))
-
-
-def requirements_of(document: Document, file: str) -> Requirements:
-    """Schema, then units."""
+        known = ", ".join(sorted(p.stem for p in folder.glob("*.yaml")))
+        raise FileError(
+            f"no such requirements file, and none of that name is shipped (these are: {known})",
+            file=str(path),
+        )
+    document, file = read(path), str(path)
     expected = "a requirements file is a mapping with name, box, force and requirements"
     model = validated(RequirementsFile, document, file, expected)
     si = partial(quantity_in, document, file)
-    bounds = []
-    known = {m.name for m in all_measures()}
-    for name, given in model.requirements.items():
-        path = ("requirements", name)
-        if name not in known:
-            raise FileError(
-                f"unknown measure '{name}'; known: {', '.join(sorted(known))}",
-                file=file, line=document.line(path), key=".".join(path),
-            )  # fmt: skip
-        unit = get_measure(name).unit
-        sides = {
-            side: None if value is None else si(value, unit, *path, side)
-            for side, value in (("at_least", given.at_least), ("at_most", given.at_most))
-        }
-        bound = Bound(**sides)
-        if bound.at_least is None and bound.at_most is None:
-            raise FileError(
-                "give at_least or at_most", file=file, line=document.line(path), key=".".join(path)
-            )
-        if bound.at_least is not None and bound.at_most is not None and bound.at_least > bound.at_most:
-            raise FileError(
-                f"at_least ({given.at_least}) is above at_most ({given.at_most})",
-                file=file, line=document.line(path), key=".".join(path),
-            )  # fmt: skip
-        bounds.append((name, bound))
+    bounds = tuple(
+        (name, bound_in(document, file, given, "requirements", name))
+        for name, given in model.requirements.items()
+    )
     box = None
     if model.box is not None:
-        box = (
-            si(model.box.x, "m", "box", "x"),
-            si(model.box.y, "m", "box", "y"),
-            si(model.box.z, "m", "box", "z"),
-        )
+        x, y, z = (si(getattr(model.box, axis), "m", "box", axis) for axis in "xyz")
+        box = x, y, z
     force = None if model.force is None else si(model.force, "N", "force")
-    toolpath = None if model.toolpath is None else near_or_shipped(model.toolpath, Path(file).parent)
+    toolpath = None if model.toolpath is None else near_or_shipped(model.toolpath, path.parent)
     limits: dict[str, float | None] = {}
     for name, value in (("clearance", model.limits.clearance), ("deflection", model.limits.deflection)):
         length = None if value is None else si(value, "m", "limits", name)
@@ -168,5 +161,5 @@ def requirements_of(document: Document, file: str) -> Requirements:
                 file=file, line=document.line(("limits", name)), key=f"limits.{name}",
             )  # fmt: skip
     return Requirements(
-        model.name, model.title, model.source, box, model.plane, force, tuple(bounds), toolpath, **limits
+        model.name, model.title, model.source, box, model.plane, force, bounds, toolpath, **limits
     )

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from os import PathLike
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,6 +17,7 @@ from stiffmap.common.short import short_repr
 from stiffmap.solve.machine import Machine, takes_machine
 from stiffmap.solve.status import Status
 from stiffmap.workspace.maps.inputs import magnitude
+from stiffmap.workspace.performance.motion.closing import drive_kinematics
 from stiffmap.workspace.performance.motion.motion_files import Motion, load_motion
 from stiffmap.workspace.performance.poses import box_nodes, read_box
 from stiffmap.workspace.performance.registry import Case, Found, Measure, all_measures, get_measure
@@ -216,44 +217,54 @@ def _row(measure: Measure, case: Case, bound: Bound | None) -> Row:
 def _box(
     machine: Machine, box: ArrayLike | None, task: Requirements
 ) -> tuple[Floats, Floats, tuple[str, ...]]:
+    low, high = read_box(machine, box)
     if box is not None or task.box is None:
-        low, high = read_box(machine, box)
-        outside = _reach(machine, low, high, "the box")
-        if outside and not outside.some:
-            raise StiffmapError(f"{outside.told}: the workspace of {machine.name} is elsewhere")
-        return low, high, outside.notes
-    low, high = read_box(machine, None)
+        notes, some = _outside(machine, low, high, "the box")
+        if not some:
+            raise StiffmapError(f"{notes[0]}: the workspace of {machine.name} is elsewhere")
+        return low, high, notes
     half = np.array(task.box) / 2
     wanted = ((low + high) / 2 - half, (low + high) / 2 + half)
-    outside = _reach(machine, *wanted, "the required box about the centre of the workspace")
-    if not outside:
+    notes, _ = _outside(machine, *wanted, "the required box about the centre of the workspace")
+    if not notes:
         return (*wanted, ())
-    return low, high, (*outside.notes, "measures are over the machine's own workspace instead")
+    return low, high, (*notes, "measures are over the machine's own workspace instead")
 
 
-@dataclass(frozen=True)
-class _Outside:
-    """Nodes of a box out of reach: what is said of them, and whether some are within it."""
-
-    told: str = ""
-    some: bool = True
-
-    def __bool__(self) -> bool:
-        return bool(self.told)
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        return (self.told,) if self.told else ()
-
-
-def _reach(machine: Machine, low: Floats, high: Floats, what: str) -> _Outside:
-    from stiffmap.workspace.performance.motion.closing import drive_kinematics
-
+def _outside(machine: Machine, low: Floats, high: Floats, what: str) -> tuple[tuple[str, ...], bool]:
+    """What is said of nodes of a box that are out of reach, and whether some are within it."""
     p = box_nodes(low, high, 5)
-    status = drive_kinematics(machine, p, patient=False).status
-    bad = status != Status.CONVERGED
+    bad = drive_kinematics(machine, p, patient=False).status != Status.CONVERGED
     if not bad.any():
-        return _Outside()
+        return (), True
     first = "({:.1f}, {:.1f}, {:.1f}) mm".format(*(1e3 * p[int(np.argmax(bad))]))
-    told = f"{what} is not within reach: {int(bad.sum())} of {len(p)} nodes, for example {first}"
-    return _Outside(told, not bad.all())
+    lost = f"{what} is not within reach: {int(bad.sum())} of {len(p)} nodes, for example {first}"
+    return (lost,), not bad.all()
+
+
+class BoxMap(NamedTuple):
+    """Nodes along each axis, m, and values (x, y, z) in the measure's shown unit."""
+
+    x: Floats
+    y: Floats
+    z: Floats
+    values: Floats
+
+
+def box_map(row: Row) -> BoxMap | None:
+    """Of a row of a table of measures; None where its poses are no grid."""
+    if row.found.positions is None or row.found.values is None:
+        return None
+    x, y, z = (np.unique(row.found.positions[:, i]) for i in range(3))
+    if len(x) * len(y) * len(z) != len(row.found.values):
+        return None
+    values = row.found.values.reshape(len(x), len(y), len(z))
+    return BoxMap(x, y, z, np.asarray(row.measure.factor * values))
+
+
+def levels(*values: Floats) -> Floats:
+    """Thirteen that increase, from the least to the largest finite value."""
+    every = np.concatenate([v.ravel() for v in values])
+    finite = every[np.isfinite(every)]
+    low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 1.0)
+    return np.linspace(low, high if high - low > 1e-9 * abs(high) else low + max(abs(low), 1.0), 13)

@@ -14,7 +14,7 @@ from scipy.optimize import least_squares
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.workspace.vibration.files import MeasuredResponse
-from stiffmap.workspace.vibration.poles import Complex
+from stiffmap.workspace.vibration.response import Complex
 
 MOST = 12
 """Modes in a band."""

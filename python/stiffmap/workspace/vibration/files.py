@@ -13,7 +13,7 @@ import numpy as np
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError, MissingPartError, StiffmapError
 from stiffmap.common.tables.named import Known, read_named
-from stiffmap.workspace.vibration.poles import Complex
+from stiffmap.workspace.vibration.response import Complex
 from stiffmap.workspace.vibration.response_units import FREQUENCIES, ResponseUnit, response_unit
 
 COLUMNS = Known(

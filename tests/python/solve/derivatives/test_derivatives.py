@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -94,6 +95,7 @@ def test_gravity_of_a_variant_counts() -> None:
 @pytest.mark.parametrize("name", ["position", "rotation"])
 def test_inputs(name: str) -> None:
     from stiffmap.solve.derivatives.differentiate import _moved, _step
+    from stiffmap.solve.machine import solve_with
     from stiffmap.solve.solving import Call
 
     machine = sm.load_machine("hexapod") if name == "rotation" else MACHINE  # the Orthoglide never turns
@@ -104,9 +106,7 @@ def test_inputs(name: str) -> None:
 
         def solved(h: float, i: int = i) -> sm.Solution:
             call = _moved(machine.compiled, Call(poses, FORCE), name, i, h)
-            return machine.solve(
-                call.position, call.wrench, **call.options.keywords() | {"method": "reference"}
-            )
+            return solve_with(machine, call.position, call.wrench, replace(call.options, method="reference"))
 
         for q in QUANTITIES:
             true = richardson(

@@ -109,6 +109,6 @@ def test_evaluations_of_a_changed_problem_are_not_taken_up(
 
 def test_a_map_is_not_taken_up_with_another_link_file(folder: Path) -> None:
     first, _ = (sm.load_machine(folder / "machine.yaml"), other_link(folder, None))  # type: ignore[arg-type]
-    from stiffmap.workspace.maps.provenance import machine_digest
+    from stiffmap.workspace.maps.loading import machine_digest
 
     assert machine_digest(first) != machine_digest(sm.load_machine(folder / "machine.yaml"))

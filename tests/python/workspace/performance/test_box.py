@@ -15,8 +15,7 @@ from stiffmap.workspace.performance.box.box_search import BoxSearch
 from stiffmap.workspace.performance.box.cells import shrink
 from stiffmap.workspace.performance.box.proof import enclose, judge_cells
 from stiffmap.workspace.performance.limits.bars import segment_distance
-from stiffmap.workspace.performance.limits.limit import Limit
-from stiffmap.workspace.performance.limits.limits import Bounds
+from stiffmap.workspace.performance.limits.limits import Bounds, Limit
 
 EDGE = 1 / np.sqrt(18) + 1 / np.sqrt(6)  # of the cube within 0.5…2, times L
 

@@ -119,7 +119,7 @@ def test_each_measure_is_one_file_with_a_unit_and_a_side():
 
 
 def test_a_picture_of_nothing_and_of_one_value():
-    from stiffmap.workspace.performance.box.box_map import levels
+    from stiffmap.workspace.performance.table import levels
 
     for grid in ([np.nan, np.inf], [3.0, 3.0], [1.0, 1.0 + 1e-16], [-2.0, np.nan, 5.0], [0.0, 0.0]):
         assert (np.diff(levels(np.array(grid))) > 0).all()

@@ -12,7 +12,7 @@ import stiffmap as sm
 from stiffmap.model.description import Joint, Spring
 from stiffmap.model.description.tree import edit_sequences
 from stiffmap.workspace.vibration import tip_modes
-from stiffmap.workspace.vibration.poles import direct, receptance
+from stiffmap.workspace.vibration.response import direct, receptance
 
 ARM = Path(__file__).parents[4] / "examples/taps/kr210.yaml"
 MASSIVE = [n for n in sm.machine_names() if n != "tripteron"]

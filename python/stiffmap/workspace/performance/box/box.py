@@ -153,13 +153,14 @@ def largest_box(
         axes = np.eye(3) if orientation is None else as_rotations(real_array(orientation, "orientation"))
     space = space if region is not None and not isinstance(orientation, str) else turned(space, axes)
     with judge_on(bounds, scheduler) as judge:
-        found = BoxSearch(bounds, shape, axes, space, tolerance, max_evaluations, judge).run()
+        search = BoxSearch(bounds, shape, axes, space, tolerance, max_evaluations, judge)
+        upper = search.run()
     why = bounds.unproven
     return LargestBox(
-        edge=found.edge, edge_upper=found.upper, edges=found.edge * shape,
-        centre=np.asarray((found.centre * shape) @ axes.T), orientation=axes, limited_by=found.names, region=space,
-        guarantee="none" if found.edge == 0 else f"sampled: {why}" if why else "proven",
-        exhausted=found.exhausted, poses=found.poses, bounds=bounds,
+        edge=search.best, edge_upper=upper, edges=search.best * shape,
+        centre=np.asarray((search.centre * shape) @ axes.T), orientation=axes, limited_by=search.names, region=space,
+        guarantee="none" if search.best == 0 else f"sampled: {why}" if why else "proven",
+        exhausted=search.exhausted, poses=bounds.counter[0], bounds=bounds,
     )  # fmt: skip
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -11,9 +10,8 @@ from scipy.optimize import linprog
 from scipy.spatial import cKDTree
 
 from stiffmap.common.broadcasting import Floats
-from stiffmap.workspace.performance.box.cell import BOX
 from stiffmap.workspace.performance.box.cells import shrink
-from stiffmap.workspace.performance.box.proof import Judge, judge_cells
+from stiffmap.workspace.performance.box.proof import BOX, Judge, judge_cells
 from stiffmap.workspace.performance.limits.limits import Bounds
 
 SAMPLES = 9
@@ -34,19 +32,6 @@ NEAR = 0.05
 SURFACE = np.array([v for v in product(np.linspace(-1, 1, 25), repeat=3) if np.abs(v).max() == 1])
 MOST_CELLS = 8000
 TRIED = 24
-
-
-@dataclass(frozen=True, eq=False)
-class Found:
-    """Bounds on the edge of the cube."""
-
-    edge: float
-    upper: float
-    centre: Floats
-    names: tuple[str, ...]
-    poses: int
-    exhausted: bool
-    """Whether the work allowed was used up."""
 
 
 class BoxSearch:
@@ -72,19 +57,17 @@ class BoxSearch:
         self.touched = BOX
         """Points of the cube, -1 to 1, at which limits are watched while it climbs."""
         self.exhausted = False
+        """Whether the work allowed was used up."""
         self.climbing = 0
         """Poses closed while climbing, which are bounded of themselves and do not count as work."""
 
-    def run(self) -> Found:
-        """Lower bound, then upper bound."""
+    def run(self) -> float:
+        """Lower bound (`best`, about `centre`), then the upper bound, which is returned."""
         climbed = [self.climb(start, edge) for start, edge in self.starts(3)]
         for centre, edge in sorted(climbed, key=lambda c: -c[1]):
             if edge > self.best + 0.5 * self.gap:
                 self._prove(*self.settle(centre, edge))
-        upper = self._cover()
-        return Found(
-            self.best, max(upper, self.best), self.centre, self.names, self.bounds.counter[0], self.exhausted
-        )
+        return max(self._cover(), self.best)
 
     def estimate(self) -> tuple[Floats, float]:
         """Centre and edge of a good cube by points of its surface: nothing is proven."""

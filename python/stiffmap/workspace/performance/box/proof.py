@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import product
 from typing import Any
@@ -14,12 +14,31 @@ from numpy.typing import NDArray
 
 from stiffmap.common.broadcasting import Floats, thread_count
 from stiffmap.common.tasks import workers
-from stiffmap.workspace.performance.box.cell import BOX, Cells
-from stiffmap.workspace.performance.limits.limit import UNLIMITED
-from stiffmap.workspace.performance.limits.limits import Bounds
+from stiffmap.workspace.performance.limits.limits import UNLIMITED, Bounds
 from stiffmap.workspace.performance.motion.closing import kernel_starts
 from stiffmap.workspace.performance.motion.scaling import revolute_drives
 from stiffmap.workspace.performance.motion.zonotopes import corners
+
+BOX = np.array(list(product((-1.0, 1.0), repeat=3)))
+"""(8, 3) corners of a cell, in half lengths."""
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """What was proven of cells of positions (n)."""
+
+    inside: NDArray[np.bool_]
+    """Every pose of the cell closes and keeps all limits."""
+    broken: NDArray[np.bool_]
+    """Some pose of it does not."""
+    where: Floats
+    """(n, 3) that pose, from the centre, along the cell's axes."""
+    limit: NDArray[np.int64]
+    """Index into `names` of the limit nearest to its bound, or beyond."""
+    names: tuple[str, ...]
+    bend: Floats
+    """(n, 3) share of each axis in the curvature; NaN: unknown."""
+
 
 Judge = Callable[[Floats, Floats, Floats], Cells]
 """Of cells with centres (n, 3) m, half lengths (n, 3) m along the columns of axes (3, 3)."""

@@ -1,1 +1,1 @@
-"""One measure per file: each has a `MEASURE`; a new file here is a new measure."""
+"""A file has a `MEASURE`, or the `MEASURES` of one topic; a new file here is a new measure."""

@@ -16,10 +16,26 @@ from stiffmap.solve.machine import Machine
 from stiffmap.solve.status import Status
 from stiffmap.workspace.maps.inputs import magnitude
 from stiffmap.workspace.performance.limits.bars import Bars
-from stiffmap.workspace.performance.limits.limit import UNLIMITED, Limit
 from stiffmap.workspace.performance.motion.closing import DriveKinematics, drive_kinematics, kernel_starts
 from stiffmap.workspace.performance.motion.scaling import characteristic_length, weighted
 from stiffmap.workspace.performance.motion.zonotopes import corners, inverse_rows
+
+UNLIMITED = 1e299
+
+
+@dataclass(frozen=True, eq=False)
+class Limit:
+    """One bound ``value <= most`` at poses (n,), of a smooth array."""
+
+    name: str
+    value: Floats
+    """(n,)"""
+    most: float
+    array: Floats
+    """(n, a) the smooth array, in the unit of `value`: |change of value| <= |change of array|."""
+    left: Floats
+    """(n, a): a lower estimate of the value at a neighbour is left·(array there), the value being convex."""
+
 
 KNOWN = 4000
 """Closed poses that are kept as starts, about."""

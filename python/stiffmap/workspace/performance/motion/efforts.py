@@ -9,18 +9,22 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from stiffmap.common.broadcasting import Floats, instance_of, real_array
+from stiffmap.common.broadcasting import Floats, instance_of
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.description.elements import Drive
 from stiffmap.solve.machine import Machine, takes_machine
-from stiffmap.workspace.performance.motion.closing import DriveKinematics, drive_kinematics
+from stiffmap.workspace.performance.motion.closing import (
+    DriveKinematics,
+    drive_kinematics,
+    place_text,
+    refuse_failed,
+)
 from stiffmap.workspace.performance.motion.inertia import (
     motion_friction,
     need_masses,
     rest_efforts,
     rigid_dynamics,
 )
-from stiffmap.workspace.performance.motion.refusal import place_text, refuse_failed
 from stiffmap.workspace.performance.motion.scaling import drive_table, drive_values, revolute_drives
 from stiffmap.workspace.performance.motion.tensions import (
     as_tensions,
@@ -30,8 +34,7 @@ from stiffmap.workspace.performance.motion.tensions import (
     inertia_columns,
     radius,
 )
-from stiffmap.workspace.performance.motion.timing import quickest
-from stiffmap.workspace.performance.motion.trajectory import Path, Trajectory
+from stiffmap.workspace.performance.motion.trajectory import Trajectory
 from stiffmap.workspace.performance.motion.zonotopes import inverse_rows
 
 IMPOSSIBLE = 1e-6
@@ -183,10 +186,7 @@ def acceleration_of(
     zero = np.zeros((len(flat), 6))
     mass = rigid_dynamics(machine, flat, zero, zero, zero, np.zeros(3))["mass"].reshape((*shape, n, n))
     needed = mass @ inverse_rows(k.jacobian)[..., :3]  # effort per acceleration of the TCP
-    free = most - np.abs(bias)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        least = np.maximum((free / np.linalg.norm(needed, axis=-1)).min(axis=-1), 0.0)
-    return PeakAcceleration(least, _farthest(needed, most, bias))
+    return PeakAcceleration(radius((needed, most, bias)), _farthest(needed, most, bias))
 
 
 def _farthest(needed: Floats, most: Floats, bias: Floats) -> Floats:
@@ -202,24 +202,3 @@ def _farthest(needed: Floats, most: Floats, bias: Floats) -> Floats:
             held = np.abs((needed @ a[..., None])[..., 0] + bias) <= most * (1 + 1e-9)
             best = np.where(held.all(axis=-1), np.maximum(best, np.linalg.norm(a, axis=-1)), best)
     return np.where(np.isfinite(needed).all(axis=(-2, -1)), best, np.nan)
-
-
-def fastest(
-    machine: Machine,
-    path: Path,
-    *,
-    rotation: ArrayLike | None = None,
-    gravity: ArrayLike | None = None,
-    speed: float = np.inf,
-    force: ArrayLike = (0.0, 0.0, 0.0),
-    threads: int | None = None,
-) -> Trajectory:
-    """The quickest run along a path, from rest to rest, within the drives' speeds and efforts.
-
-    Efforts are affine in the path's acceleration and squared speed; the largest squared speed at each
-    sample follows from one pass backward and one forward (time-optimal path parametrisation by
-    reachability). Friction is charged at the sense of the motion, its viscous part at the drive's
-    highest speed so that the limits hold. `speed`: m/s along the path; `force` (3,) N on the tool.
-    """
-    need_masses(machine, "a time-optimal trajectory")
-    return quickest(machine, path, rotation, gravity, speed, real_array(force, "force"), threads)

@@ -1,4 +1,5 @@
-"""Force transmission, equation (2) of the paper: what the drives can hold at the tool (docs/measures.md)."""
+"""Accuracy and force transmission, equations (1) and (2) of the paper: encoder errors to tool error, and what the drives can
+hold at the tool (docs/measures.md)."""
 
 from __future__ import annotations
 
@@ -10,19 +11,105 @@ from numpy.typing import ArrayLike, NDArray
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.short import short_repr
+from stiffmap.solve.kinematics import forward_kinematics
 from stiffmap.solve.machine import Machine, takes_machine
 from stiffmap.solve.results import OverPoses
-from stiffmap.workspace.cables.structure import Hanging
 from stiffmap.workspace.maps.inputs import plane_axes
 from stiffmap.workspace.performance.motion.closing import DriveKinematics, drive_kinematics
 from stiffmap.workspace.performance.motion.inertia import rest_efforts
-from stiffmap.workspace.performance.motion.polygons import Polygon, section_polygon
-from stiffmap.workspace.performance.motion.scaling import characteristic_length, drive_values, weighted
+from stiffmap.workspace.performance.motion.scaling import (
+    characteristic_length,
+    drive_limits,
+    drive_values,
+    weighted,
+)
 from stiffmap.workspace.performance.motion.tensions import as_tensions, held, in_cables, pushes, radius
 from stiffmap.workspace.performance.motion.velocity import of_motions, singular_values
+from stiffmap.workspace.performance.motion.zonotopes import (
+    Polygon,
+    corners,
+    farthest_vertex,
+    section_polygon,
+    worst_corner,
+)
 
-NOTHING = 1e-12
-"""Effort of a drive per unit force below which the drive does not feel the force."""
+
+@short_repr
+@dataclass(frozen=True, eq=False)
+class AccuracyTransmission(OverPoses):
+    """Largest tool error over the box of encoder errors, at poses (...); NaN where the pose failed."""
+
+    translation: Floats
+    """(...) m, largest distance of the TCP from its command, first order, exact over the box."""
+    rotation: Floats
+    """(...) rad, largest rotation of the platform."""
+    plane: Floats
+    """(...) m, largest distance in the plane asked for."""
+    components: Floats
+    """(..., 6) m, rad: largest error of each component of the twist."""
+    corner: Floats
+    """(..., drives) signs of the encoder errors with the largest translation."""
+    nonlinear: Floats | None
+    """(...) m, the largest translation over all corners by forward kinematics; None: not asked for."""
+    errors: Floats
+    """(drives,) m or rad, half-width of each encoder's error."""
+    status: NDArray[np.uint8]
+
+
+@takes_machine
+def accuracy_transmission(
+    machine: Machine,
+    position: ArrayLike,
+    rotation: ArrayLike | None = None,
+    *,
+    errors: ArrayLike | None = None,
+    plane: str = "xy",
+    nonlinear: bool = False,
+    sharing: str = "least_norm",
+    threads: int | None = None,
+) -> AccuracyTransmission:
+    """Worst tool error when every encoder may be wrong by up to ± its error, at poses (..., 3) m.
+
+    The norm being convex, its largest value over the box of errors lies at a corner, so all corners
+    are the exact worst case of the first-order model. `errors`: one or one each, m or rad; None: the
+    machine file's ``encoder_error``. `nonlinear` also closes the machine at every corner, without
+    linearising. `sharing`: what errors of drives that outnumber the freedoms do to the tool, ``least_norm`` or
+    ``stiffness`` (docs/measures.md). Raises StiffmapError for bad input, never for a pose.
+    """
+    k = drive_kinematics(machine, position, rotation, sharing=sharing, threads=threads)
+    out = accuracy_of(machine, k, errors=errors, plane=plane)
+    if not nonlinear:
+        return out
+    moved = _by_closing(machine, k, out.errors, threads)
+    return AccuracyTransmission(**{**out.__dict__, "nonlinear": moved})
+
+
+def accuracy_of(
+    machine: Machine, k: DriveKinematics, *, errors: ArrayLike | None = None, plane: str = "xy"
+) -> AccuracyTransmission:
+    """The same from kinematics that are at hand, first order."""
+    e = drive_values(machine, "encoder_error", errors, "m or rad")
+    j = k.jacobian * e
+    return AccuracyTransmission(
+        translation=farthest_vertex(j[..., :3, :]),
+        rotation=farthest_vertex(j[..., 3:, :]),
+        plane=farthest_vertex(j[..., list(plane_axes(plane)), :]),
+        components=np.abs(j).sum(axis=-1),
+        corner=worst_corner(j[..., :3, :]),
+        nonlinear=None,
+        errors=e,
+        status=k.status,
+    )
+
+
+def _by_closing(machine: Machine, k: DriveKinematics, errors: Floats, threads: int | None) -> Floats:
+    worst = np.zeros(k.status.shape)
+    signs = corners(len(errors))
+    for s in (*signs, *-signs):
+        moved = (k.sharing @ (s * errors)[:, None])[..., 0]  # drives that go together move together
+        there = forward_kinematics(machine, k.actuators + moved, threads=threads)
+        worst = np.maximum(worst, np.linalg.norm(there.position - k.position, axis=-1))
+    return worst
 
 
 @short_repr
@@ -75,48 +162,23 @@ def force_transmission(
     Raises StiffmapError for bad input, never for a pose.
     """
     k = drive_kinematics(machine, position, rotation, sharing=sharing, threads=threads)
-    return force_of(
-        machine,
-        k,
-        plane=plane,
-        limits=limits,
-        gravity=gravity,
-        velocity=velocity,
-        length=length,
-        sharing=sharing,
-    )
-
-
-def force_of(
-    machine: Machine,
-    k: DriveKinematics,
-    *,
-    plane: str = "xy",
-    limits: ArrayLike | str = "declared",
-    gravity: ArrayLike | None = None,
-    velocity: ArrayLike | None = None,
-    length: float | None = None,
-    sharing: str = "least_norm",
-) -> ForceTransmission:
-    """The same from kinematics that are at hand."""
-    text = limits if isinstance(limits, str) else ""
-    given = np.ones(()) if text == "unit" else None if text == "declared" else limits
-    most = drive_values(machine, "force", given, "N or N·m")
-    if (h := in_cables(machine, "the force that is held")) is not None:
-        return _of_cables(machine, h, k, most, plane, gravity, velocity, length, sharing)
-    bias = rest_efforts(machine, k, gravity=gravity, velocity=velocity, sharing=sharing)
-    needed = -np.swapaxes(k.jacobian[..., :3, :], -1, -2)  # effort of the drives per force on the tool
-    free = most - np.abs(bias)
-    norms = np.linalg.norm(needed, axis=-1)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        room = np.where(norms > NOTHING, free / norms, np.where(free >= 0, np.inf, 0.0))
+    most = drive_limits(machine, "force", limits, "N or N·m")
+    if (h := in_cables(machine, "the force that is held")) is None:
+        bias = rest_efforts(machine, k, gravity=gravity, velocity=velocity, sharing=sharing)
+        found = -np.swapaxes(k.jacobian[..., :3, :], -1, -2), most, bias  # effort per force on the tool
+    else:
+        if velocity is not None:
+            raise StiffmapError(f"{machine.name}: velocity: for cables the force is known at rest alone")
+        found = held(machine, h, k, pushes(h), most, gravity)
+        still = rest_efforts(machine, k, gravity=gravity, velocity=None)
+        bias = as_tensions(machine, h, k, still, most, sharing)
+    rows, room, offset = found
     least, largest = _spheres(machine, k, length)
-    bad = ~np.isfinite(needed).all(axis=(-2, -1))
     return ForceTransmission(
         sphere_min=least,
         sphere_max=largest,
-        force_min=np.where(bad, np.nan, np.maximum(room.min(axis=-1), 0.0)),
-        plane=section_polygon(needed[..., list(plane_axes(plane))], most, k.status, bias),
+        force_min=radius(found),
+        plane=section_polygon(rows[..., list(plane_axes(plane))], room, k.status, offset),
         bias=bias,
         limits=most,
         status=k.status,
@@ -129,24 +191,3 @@ def _spheres(machine: Machine, k: DriveKinematics, length: float | None) -> tupl
         j = weighted(machine, k.jacobian, characteristic_length(machine, length), "all")
         s, last = of_motions(machine, k, singular_values(j))
         return 1 / s[..., 0], 1 / last
-
-
-def _of_cables(
-    machine: Machine, h: Hanging, k: DriveKinematics, most: Floats, plane: str, gravity: ArrayLike | None,
-    velocity: ArrayLike | None, length: float | None, sharing: str,
-) -> ForceTransmission:  # fmt: skip
-    """Tensions between 0 and the limits, whichever they are, moments balanced."""
-    if velocity is not None:
-        raise StiffmapError(f"{machine.name}: velocity: for cables the force is known at rest alone")
-    rows, limits, offset = found = held(machine, h, k, pushes(h), most, gravity)
-    bias = as_tensions(machine, h, k, rest_efforts(machine, k, gravity=gravity, velocity=None), most, sharing)
-    least, largest = _spheres(machine, k, length)
-    return ForceTransmission(
-        sphere_min=least,
-        sphere_max=largest,
-        force_min=radius(found),
-        plane=section_polygon(rows[..., list(plane_axes(plane))], limits, k.status, offset),
-        bias=bias,
-        limits=most,
-        status=k.status,
-    )

@@ -1,21 +1,29 @@
-"""Masses of a machine, and the efforts that they ask of the drives (docs/theory.md D4-D6)."""
+"""Masses of a machine, the efforts that they ask of the drives, and its natural frequencies (docs/theory.md D4-D7)."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from stiffmap.common.broadcasting import Floats, real_array, thread_count
+from stiffmap.common.broadcasting import (
+    Floats,
+    real_array,
+    thread_count,
+    whole_number,
+)
 from stiffmap.common.errors import StiffmapError
+from stiffmap.common.short import short_repr
 from stiffmap.model.description import Body
-from stiffmap.model.description.tree import all_elements, joints
+from stiffmap.model.description.tree import all_elements, core_name, joints
 from stiffmap.solve.compiled.names import Role
-from stiffmap.solve.machine import Machine
+from stiffmap.solve.machine import Machine, takes_machine
+from stiffmap.solve.results import OverPoses
 from stiffmap.workspace.performance.motion.closing import DriveKinematics
 from stiffmap.workspace.performance.motion.scaling import drive_table
 from stiffmap.workspace.performance.motion.sharing import drive_weights, followed
+from stiffmap.workspace.performance.poses import loaded_poses
 
 
 @dataclass(frozen=True)
@@ -56,12 +64,9 @@ def moving_mass(machine: Machine) -> float:
 
 def inertias(machine: Machine) -> Floats:
     """(bodies, 3, 3) kg·m² about the centres of mass, in the bodies' axes and the core's order."""
-    found = {n: e for n, e in all_elements(machine.description) if isinstance(e, Body)}
-    names = [name for name, _, _ in machine.compiled.bodies]
-    bodies = [found.get(n) or found[f"base.{n}"] if f"base.{n}" in found else found.get(n) for n in names]
-    if any(b is None for b in bodies):  # names of base and platform elements carry no prefix in the core
-        bodies = [e for _, e in all_elements(machine.description) if isinstance(e, Body)]
-    return np.array([b.inertia for b in bodies if b is not None], dtype=float).reshape(-1, 3, 3)
+    found = {core_name(n): e for n, e in all_elements(machine.description) if isinstance(e, Body)}
+    bodies = [found[name].inertia for name, _, _ in machine.compiled.bodies]
+    return np.array(bodies, dtype=float).reshape(-1, 3, 3)
 
 
 def need_masses(machine: Machine, what: str) -> None:
@@ -158,3 +163,56 @@ def rest_efforts(
     if velocity is not None:
         effort = effort + friction_efforts(machine, out["rate"])
     return effort.reshape((*shape, drives))
+
+
+@short_repr
+@dataclass(frozen=True, eq=False)
+class NaturalFrequencies(OverPoses):
+    """Undamped modes at poses (...), lowest first; NaN beyond the last one and where the pose failed."""
+
+    frequency: Floats
+    """(..., modes) Hz."""
+    shape: Floats
+    """(..., modes, coordinates) m, rad: change of all coordinates, of unit modal mass (1 kg·m²)."""
+    coordinates: Floats
+    """(..., coordinates) at the equilibrium about which the machine vibrates."""
+    status: NDArray[np.uint8]
+    flags: NDArray[np.uint32]
+
+    def __array__(self, dtype: object = None, copy: bool | None = None) -> Floats:
+        return np.asarray(self.frequency, dtype=dtype)  # type: ignore[call-overload, no-any-return]
+
+
+@takes_machine
+def natural_frequencies(
+    machine: Machine,
+    position: ArrayLike,
+    wrench: ArrayLike | None = None,
+    *,
+    rotation: ArrayLike | None = None,
+    gravity: ArrayLike | None = None,
+    modes: int = 6,
+    threads: int | None = None,
+) -> NaturalFrequencies:
+    """Frequencies (Hz) and mode shapes at commanded poses (..., 3) m, drives held.
+
+    Mass matrix over all elastic coordinates, passive joints following, against the exact tangent at
+    the loaded equilibrium: `wrench` (..., 6) N, N·m dead at the TCP and `gravity` (3,) m/s² (None: what
+    the machine file says) change the stiffness. Bodies are rigid, as the machine file declares
+    them. A dead moment makes the tangent unsymmetric: complex frequencies are flutter, status UNSTABLE.
+    Raises StiffmapError for bad input (a machine without masses), never for a pose.
+    """
+    need_masses(machine, "a natural frequency")
+    whole_number(modes, "modes", 1)
+    shape, p, r, w = loaded_poses(machine, position, wrench, rotation)
+    out = machine.compiled.modes(
+        inertias(machine), p, r, w, count=modes, whole=True, gravity=machine.compiled.gravity(gravity),
+        threads=thread_count(threads),
+    )  # fmt: skip
+    w0 = 1 / np.sqrt(out["square"])
+    found = {k: out[k].reshape(shape + out[k].shape[1:]) for k in ("coordinates", "status", "flags")}
+    return NaturalFrequencies(
+        frequency=(w0 / (2 * np.pi)).reshape(*shape, -1),
+        shape=(w0[..., None] * out["shape"]).reshape(*shape, *out["shape"].shape[1:]),
+        **found,
+    )

@@ -21,6 +21,7 @@ from stiffmap.common.yaml_text import Document, read
 from stiffmap.model.files.report import validated
 from stiffmap.model.files.schema.base import FileModel, Name
 from stiffmap.solve.machine import Machine
+from stiffmap.workspace.performance.motion.timing import fastest
 from stiffmap.workspace.performance.motion.trajectory import (
     Path,
     Trajectory,
@@ -98,8 +99,6 @@ class Motion:
         feed: float | None = None,
     ) -> Trajectory:
         """The motion over time; `duration` (s) or `feed` (m/s, all the way) in place of the file's. StiffmapError where it cannot be run."""
-        from stiffmap.workspace.performance.motion.efforts import fastest
-
         if self.path is None:
             assert self.timed is not None
             if duration is not None or feed is not None:
@@ -131,7 +130,7 @@ def load_motion(file: str | PathLike[str]) -> Motion:
     motion over time, with ``feed [mm/min]`` a path at this speed, without either a path. YAML: ``line``, ``circle`` or ``points``, ``duration`` or ``speed``, ``force``.
     Raises FileError naming file, line, what was expected and what was found.
     """
-    place = _place(FilePath(file))
+    place = given_or_shipped(FilePath(file), SHIPPED)
     if place.suffix.lower() in (".yaml", ".yml"):
         document = read(place)
         return _described(document, str(place))
@@ -141,16 +140,16 @@ def load_motion(file: str | PathLike[str]) -> Motion:
 SHIPPED = FilePath(__file__).with_name("motions")
 
 
-def _place(given: FilePath) -> FilePath:
-    """The file itself, or the shipped one of that name."""
-    shipped = SHIPPED / (given.name if given.suffix else f"{given.name}.yaml")
+def given_or_shipped(given: FilePath, folder: FilePath) -> FilePath:
+    """The file itself, or the one of that name that ships in a folder."""
+    shipped = folder / (given.name if given.suffix else f"{given.name}.yaml")
     return shipped if not given.is_file() and len(given.parts) == 1 and shipped.is_file() else given
 
 
 def near_or_shipped(name: str, folder: FilePath) -> str:
     """What a file in this folder calls its motion: one next to it, else as `load_motion` finds it."""
     near = folder / name
-    return str(near) if near.is_file() or not _place(FilePath(name)).is_file() else name
+    return str(near) if near.is_file() or not given_or_shipped(FilePath(name), SHIPPED).is_file() else name
 
 
 def _described(document: Document, file: str) -> Motion:

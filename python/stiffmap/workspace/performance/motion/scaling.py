@@ -45,6 +45,12 @@ def drive_values(machine: Machine, field: str, given: ArrayLike | None, unit: st
     return np.array(values, dtype=float)
 
 
+def drive_limits(machine: Machine, field: str, limits: ArrayLike | str, unit: str) -> Floats:
+    """(drives,) limits: ``unit``, ``declared`` in the machine file, or numbers."""
+    word = limits if isinstance(limits, str) else ""
+    return drive_values(machine, field, {"unit": 1.0, "declared": None}.get(word, limits), unit)
+
+
 def revolute_drives(machine: Machine) -> np.ndarray:
     """(drives,) bool: which actuators turn."""
     compiled = machine.compiled

@@ -9,8 +9,7 @@ from scipy.spatial import HalfspaceIntersection
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.machine import Machine
-from stiffmap.workspace.cables.distribution import nearest, scaled
-from stiffmap.workspace.cables.structure import Hanging, hanging, lines, matrix, weight
+from stiffmap.workspace.cables.structure import Hanging, hanging, lines, matrix, nearest, scaled, weight
 from stiffmap.workspace.performance.motion.closing import DriveKinematics
 from stiffmap.workspace.performance.motion.sharing import drive_weights, facets
 from stiffmap.workspace.performance.motion.zonotopes import inverse_rows

@@ -9,12 +9,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from stiffmap.common.broadcasting import Floats
+from stiffmap.common.broadcasting import Floats, real_array
 from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.machine import Machine
-from stiffmap.workspace.performance.motion.closing import drive_kinematics
-from stiffmap.workspace.performance.motion.inertia import friction_efforts, rigid_dynamics
-from stiffmap.workspace.performance.motion.refusal import refuse_failed
+from stiffmap.workspace.performance.motion.closing import drive_kinematics, refuse_failed
+from stiffmap.workspace.performance.motion.inertia import friction_efforts, need_masses, rigid_dynamics
 from stiffmap.workspace.performance.motion.scaling import drive_values
 from stiffmap.workspace.performance.motion.tensions import held, in_cables, inertia_columns, pushes
 from stiffmap.workspace.performance.motion.trajectory import Path, Trajectory
@@ -23,16 +22,25 @@ BISECTIONS = 60
 FASTEST = 1e6
 
 
-def quickest(
+def fastest(
     machine: Machine,
     path: Path,
-    rotation: ArrayLike | None,
-    gravity: ArrayLike | None,
-    speed: float,
-    force: Floats,
-    threads: int | None,
+    *,
+    rotation: ArrayLike | None = None,
+    gravity: ArrayLike | None = None,
+    speed: float = np.inf,
+    force: ArrayLike = (0.0, 0.0, 0.0),
+    threads: int | None = None,
 ) -> Trajectory:
-    """See `stiffmap.workspace.performance.fastest`."""
+    """The quickest run along a path, from rest to rest, within the drives' speeds and efforts.
+
+    Efforts are affine in the path's acceleration and squared speed; the largest squared speed at each
+    sample follows from one pass backward and one forward (time-optimal path parametrisation by
+    reachability). Friction is charged at the sense of the motion, its viscous part at the drive's
+    highest speed so that the limits hold. `speed`: m/s along the path; `force` (3,) N on the tool.
+    """
+    need_masses(machine, "a time-optimal trajectory")
+    force = real_array(force, "force")
     k = drive_kinematics(machine, path.position, rotation, threads=threads)
     refuse_failed(machine, k, None, path.position)
     limits = drive_values(machine, "force", None, "N or N·m")

@@ -13,19 +13,20 @@ from stiffmap.solve.machine import Machine, takes_machine
 from stiffmap.solve.results import OverPoses
 from stiffmap.workspace.maps.inputs import plane_axes
 from stiffmap.workspace.performance.motion.closing import DriveKinematics, drive_kinematics
-from stiffmap.workspace.performance.motion.polygons import Polygon, section_polygon
 from stiffmap.workspace.performance.motion.scaling import (
     characteristic_length,
-    drive_values,
+    drive_limits,
     mixes_units,
     weighted,
 )
 from stiffmap.workspace.performance.motion.sharing import facets, motions
 from stiffmap.workspace.performance.motion.zonotopes import (
+    Polygon,
     farthest_vertex,
     inscribed_sphere,
     inverse_rows,
     rows_limit,
+    section_polygon,
 )
 
 
@@ -104,12 +105,10 @@ def transmission_of(
     inverse: Floats | None = None,
 ) -> VelocityTransmission:
     """The same from kinematics that are at hand, and perhaps the inverse (..., drives, 6) of their Jacobian."""
-    unit = isinstance(limits, str) and limits == "unit"
-    given = np.ones(()) if unit else None if isinstance(limits, str) and limits == "declared" else limits
-    speeds = drive_values(machine, "speed", given, "m/s or rad/s")
+    speeds = drive_limits(machine, "speed", limits, "m/s or rad/s")
     size = characteristic_length(machine, length)
     j = weighted(machine, k.jacobian, size, part)
-    driven = j * (speeds if not unit else 1.0)
+    driven = j * speeds
     s, low = of_motions(machine, k, singular_values(j))
     high = s[..., 0]
     if part == "all" and machine.compiled.redundancy:
@@ -179,16 +178,7 @@ def velocity_section(
     outer radius; m/s with ``limits="declared"`` or numbers, else per unit speed of the drives.
     """
     k = drive_kinematics(machine, position, rotation, threads=threads)
-    return velocity_polygon(machine, k, plane=plane, limits=limits)
-
-
-def velocity_polygon(
-    machine: Machine, k: DriveKinematics, *, plane: str = "xy", limits: ArrayLike | str = "unit"
-) -> Polygon:
-    """The same from kinematics that are at hand."""
-    unit = isinstance(limits, str) and limits == "unit"
-    given = np.ones(()) if unit else None if isinstance(limits, str) and limits == "declared" else limits
-    speeds = drive_values(machine, "speed", given, "m/s or rad/s")
+    speeds = drive_limits(machine, "speed", limits, "m/s or rad/s")
     j = weighted(machine, k.jacobian, 1.0, "all")
     axes = list(plane_axes(plane))
     if machine.compiled.redundancy:
