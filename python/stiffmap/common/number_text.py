@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from math import floor, inf, isfinite, log10
 
 from stiffmap.common.errors import StiffmapError
@@ -31,6 +32,33 @@ def percent(share: float) -> str:
     """A share of a whole in per cent, to two digits: ``0.097 %``, ``14 %``, ``100 %``."""
     value = 100.0 * share
     return f"{value:.0f} %" if value >= 99.5 else f"{value:.2g} %"
+
+
+def percents(shares: Sequence[float]) -> list[int]:
+    """Shares in whole per cent whose sum is that of the shares, rounded: the largest remainders are rounded up."""
+    exact = [100.0 * s for s in shares]
+    whole = [floor(v) for v in exact]
+    for i in sorted(range(len(exact)), key=lambda i: whole[i] - exact[i])[: round(sum(exact)) - sum(whole)]:
+        whole[i] += 1
+    return whole
+
+
+def length_unit(largest: float, from_mm: float = 0.99995e-3) -> tuple[str, float, int]:
+    """Unit, factor from m and decimals in which a deflection of this size reads well: µm, and mm from 1 mm on."""
+    return ("µm", 1e6, 1) if abs(largest) < from_mm else ("mm", 1e3, 3)
+
+
+def length_text(size: float) -> str:
+    """A deflection (m): ``932.5 µm``, ``8.062 mm``."""
+    unit, factor, decimals = length_unit(size)
+    return f"{factor * size:.{decimals}f} {unit}"
+
+
+def vector_text(values: Iterable[float], digits: int = 6) -> str:
+    """``(0, -300, 0)``: what is only round-off of the largest component is 0."""
+    numbers = [float(v) for v in values]
+    dust = 1e-9 * max(map(abs, numbers), default=0.0)
+    return f"({', '.join(f'{v if abs(v) > dust else 0.0:.{digits}g}' for v in numbers)})"
 
 
 def with_uncertainty(value: float, u: float) -> str:

@@ -27,7 +27,7 @@ class HomeChange(NamedTuple):
         say = machine.units.say
         return (
             f"{self.name}: {say(self.declared, dimension, 10)} becomes {say(self.closed, dimension, 10)} "
-            f"({say(self.closed - self.declared, dimension, 2)})"
+            f"(a change of {say(self.closed - self.declared, dimension)})"
         )
 
 

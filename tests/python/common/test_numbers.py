@@ -11,7 +11,16 @@ import pytest
 
 from stiffmap.common import yaml_text
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.number_text import LARGEST, SMALLEST, bounded, number_in, percent
+from stiffmap.common.number_text import (
+    LARGEST,
+    SMALLEST,
+    bounded,
+    length_text,
+    number_in,
+    percent,
+    percents,
+    vector_text,
+)
 from stiffmap.common.tables.cells import Cells
 from stiffmap.common.tables.sheet import read_sheet
 from stiffmap.common.value_units import read_value
@@ -103,3 +112,20 @@ def test_warnings_of_a_command_are_one_line(
 def test_the_separator_is_what_parts_numbers(text: str, cells: tuple[str, ...], tmp_path: Path) -> None:
     (tmp_path / "t.csv").write_text(text)
     assert next(read_sheet(tmp_path / "t.csv").rows) == cells
+
+
+def test_percents_sum_to_the_whole() -> None:
+    assert percents([0.525, 0.445, 0.03]) == [53, 44, 3] and percents([1 / 3] * 3) == [34, 33, 33]
+    assert percents([]) == [] and sum(percents([0.6, 0.55, -0.15])) == 100
+
+
+@pytest.mark.parametrize(
+    ("size", "text"),
+    [(932.46e-6, "932.5 µm"), (999.96e-6, "1.000 mm"), (12.1893e-3, "12.189 mm"), (0.0, "0.0 µm")],
+)
+def test_a_deflection_is_in_mm_from_1_mm_on(size: float, text: str) -> None:
+    assert length_text(size) == text
+
+
+def test_round_off_of_a_force_is_zero() -> None:
+    assert vector_text([1.83697e-14, -300.0, -0.0]) == "(0, -300, 0)" and vector_text([]) == "()"

@@ -27,7 +27,7 @@ def test_a_residual_on_disk(tmp_path: Path, twin: Twin, capsys: pytest.CaptureFi
         "dx: rms",
         "q_x_proximal: rms",
         "mrad",
-        "noise floor",
+        "noise",
         "linearity",
         "hysteresis",
         "worst rows",

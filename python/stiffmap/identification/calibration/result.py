@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from stiffmap.common.json_text import json_text
-from stiffmap.common.number_text import percent
+from stiffmap.common.number_text import percents
 from stiffmap.common.plain import plain
 from stiffmap.common.short import short_repr
 from stiffmap.experiment.comparison.summary import Summary
@@ -97,7 +97,9 @@ class Calibration:
             for group, factor in self.wide.items()
         ]
         out.append(f"identifiable from the readings: {self.rank} directions of {len(self.rows)} unknowns")
-        parts = ", ".join(f"{p} {percent(s)}" for p, s in _largest(self.shares))
+        largest = _largest(self.shares)
+        shares = percents([s for _, s in largest])
+        parts = "; ".join(f"{p}: {share} %" for (p, _), share in zip(largest, shares, strict=True))
         out.append(f"shares of the squares: {parts}")
         noise = "" if math.isnan(self.noise) else f" (noise {in_display_units(self.noise, 'm')})"
         out.append(f"misfit: rms {size(self.before)} as declared, {size(self.after)} {self.which}{noise}")

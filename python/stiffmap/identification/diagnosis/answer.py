@@ -87,7 +87,7 @@ def answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, cross
         checks_after=checks(e, e.reading - made.prediction, sigma, ~listed),
         unexplained=rest,
         limitations=[
-            *_first(fit, v),
+            *_first(fit, v, bool((found.noise.declared > 0).any())),
             *notes,
             *(_or_number(n) for n in v.named if n.numbers),
             *limitations(e, found.noise, predictor.machine),
@@ -268,13 +268,13 @@ def _rest(columns: Columns, fit: Fit, v: Verdict, each: dict[str, float], gap: F
     return [Rest(v.rest, share, e.channels[int(axis)].name, (x, y, z), size)]
 
 
-def _first(fit: Fit, v: Verdict) -> list[str]:
+def _first(fit: Fit, v: Verdict, stated: bool) -> list[str]:
     """What must be known of the noise before anything else."""
-    out = not_as_stated(fit.noise)
+    out = [t if stated else t.replace("is stated", "repeats show") for t in not_as_stated(fit.noise)]
     if np.any(fit.weights != 1.0):
-        out.append("some readings stand out: all are weighed by heavy-tailed noise")
+        out.append("some readings lie far from the others and count less")
     if v.time:
-        out.append(f"the noise goes on from reading to reading ({v.time})")
+        out.append(f"the noise of a reading carries over to the following ones ({v.time})")
     return out
 
 

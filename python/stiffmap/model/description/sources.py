@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from fnmatch import fnmatchcase
 
+from stiffmap.common.number_text import percents
 from stiffmap.model.description.machine import MachineDescription
 
 SOURCES = ("assumed", "measured", "computed", "catalogue")
@@ -32,9 +33,8 @@ def in_words(by_source: Mapping[str, float]) -> str:
     """``83 % of it rests on assumed numbers, 17 % on computed ones``; empty where no number is marked or nothing moves."""
     if set(by_source) <= {UNMARKED}:
         return ""
-    parts = [
-        f"{100 * v:.0f} % of it rests on numbers that are {s}" for s, v in by_source.items() if v >= 0.005
-    ]
+    shares = zip(by_source, percents(list(by_source.values())), strict=True)
+    parts = [f"{share} % of it rests on numbers that are {s}" for s, share in shares if share]
     if not parts:
         return ""
     return ", ".join(

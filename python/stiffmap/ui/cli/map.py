@@ -41,6 +41,7 @@ from stiffmap.workspace.maps.inputs import grid_of, magnitude, plane_axes
 
 
 def command(
+    context: typer.Context,
     machine: MachineArgument,
     output: OutputOption = Path("stiffmap-map"),
     z: ZOption = None,
@@ -123,10 +124,11 @@ def command(
         "method": method,
         "threads": threads,
     }
+    given = assumptions(context, force, tolerance)
     if estimate:
         print_estimate(m, call, as_json)
     elif statistics:
-        print_statistics(m, call, plane, scheduler, as_json)
+        print_statistics(m, call, plane, given, scheduler, as_json)
     else:
         target = make_folder(output) / ("map.zarr" if zarr else "map.nc")
         how = {
@@ -135,7 +137,7 @@ def command(
             "out": target,
             "resume": resume,
         }
-        wanted = Wanted(output, plane, tolerance, kinds, sheets, own_scales, uncertainty)
+        wanted = Wanted(output, plane, tolerance, given, kinds, sheets, own_scales, uncertainty)
         _map(m, call, how, wanted, as_json)
 
 
@@ -151,7 +153,7 @@ def _map(machine: Machine, call: dict[str, Any], how: dict[str, Any], wanted: Wa
     band = uncertainty_data(ds, wanted.plane) if wanted.uncertainty else None
     far = beyond(ds)
     data: dict[str, Any] = {"machine": machine.name, "rows": rows, "failed": failed, "files": files}
-    told: list[Any] = [table]
+    told: list[Any] = [wanted.given, table]
     if band is not None:
         told += uncertainty_told(ds, band, wanted.plane)
     if worst is not None:
@@ -163,6 +165,27 @@ def _map(machine: Machine, call: dict[str, Any], how: dict[str, Any], wanted: Wa
     data |= {} if band is None else {"uncertainty": band}
     show(as_json, data, [*told, *failed_in_words(failed)], files)
     finish(bool(failed))
+
+
+def assumptions(context: typer.Context, force: str, tolerance: float) -> str:
+    """The force and the tolerance, and where they come from: the command line, or the default."""
+    values = {"force": f"({force}) N" if "," in force else f"{force} N", "tolerance": f"{tolerance:g} mm"}
+    taken = [n for n in values if getattr(context.get_parameter_source(n), "name", "") == "DEFAULT"]
+    own = [f"{n} {v}" for n, v in values.items() if n not in taken]
+    text = f"{_sentence(own)} as given. " if own else ""
+    if not taken:
+        return text.rstrip()
+    are, they = ("are those", "they are") if len(taken) > 1 else ("is that", "it is")
+    return (
+        f"{text}{_sentence([f'{n} {values[n]}' for n in taken])} {are} of the Orthoglide's application in the paper; {they} used "
+        f"because the machine file has none. Give your own by {' and '.join(f'--{n}' for n in taken)}."
+    )
+
+
+def _sentence(parts: Sequence[str]) -> str:
+    """``Force 300 N and tolerance 0.25 mm``."""
+    text = " and ".join(parts)
+    return text[:1].upper() + text[1:]
 
 
 def grid(machine: Machine, planes: dict[str, list[float] | None], points: int) -> dict[str, Any]:

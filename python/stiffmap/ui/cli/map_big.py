@@ -24,7 +24,7 @@ def print_estimate(machine: Machine, call: dict[str, Any], as_json: bool) -> Non
 
 
 def print_statistics(
-    machine: Machine, call: dict[str, Any], plane: str, scheduler: str | None, as_json: bool
+    machine: Machine, call: dict[str, Any], plane: str, given: str, scheduler: str | None, as_json: bool
 ) -> None:
     """Figures of a map that is not stored; exits with 1 where poses failed."""
     import stiffmap
@@ -34,7 +34,7 @@ def print_statistics(
     failed = {s.name: int(ds.status_count.sel(status=int(s)).sum()) for s in Status if s}
     failed = {name: count for name, count in failed.items() if count}
     lost = failed_in_words(failed, "solves of the load cases")
-    show(as_json, {"machine": machine.name, "rows": rows, "failed": failed}, [_table(ds, rows), *lost])
+    show(as_json, {"machine": machine.name, "rows": rows, "failed": failed}, [given, _table(ds, rows), *lost])
     finish(bool(failed))
 
 

@@ -34,6 +34,8 @@ class Wanted:
     plane: str
     tolerance: float
     """mm."""
+    given: str
+    """Force and tolerance, and where they come from."""
     kinds: Sequence[str]
     """Endings of the pictures; none: no pictures and no report."""
     tables: Sequence[str]
@@ -102,7 +104,7 @@ def write_report(
     sheet = Sheet(
         title=f"Error map of {ds.attrs['machine']}",
         answer=_answer(ds, wanted, worst),
-        lines=[*lines, f"{table.title}."],
+        lines=[wanted.given, *lines, f"{table.title}."],
         head=head,
         rows=rows,
         numbers=(1, 3, 4, 5, 6),

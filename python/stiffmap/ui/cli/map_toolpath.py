@@ -10,12 +10,13 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from stiffmap.common.broadcasting import Floats
+from stiffmap.common.number_text import length_text
 from stiffmap.common.outputs import write_rows
 from stiffmap.solve.kinematics import must_take
 from stiffmap.solve.machine import Machine
 from stiffmap.ui.cli.inputs import MM, finish, force_given
 from stiffmap.ui.cli.output import show, write_files
-from stiffmap.ui.plot.style import BLACK, CYCLE, paper
+from stiffmap.ui.plot.style import BLACK, CYCLE, length_unit, paper
 
 
 def map_toolpath(
@@ -50,7 +51,7 @@ def map_toolpath(
         worst = {"way": way[i], "position": position[i], "deflection": sizes[i]}
         place = ", ".join(f"{v / MM:.4g}" for v in position[i])
         told = (
-            f"{m.name}: largest deflection along the path {1e6 * sizes[i]:.1f} µm at ({place}) mm, "
+            f"{m.name}: largest deflection along the path {length_text(sizes[i])} at ({place}) mm, "
             f"{way[i] / MM:.4g} mm from its start"
         )
     lost = f"{failed} of {len(way)} poses failed: {s.count()}" if failed else None
@@ -86,10 +87,11 @@ def toolpath_figure(ds: xr.Dataset, name: str) -> Figure:
     with paper(6.4, 3.4, f"{name}: deflection along the toolpath") as figure:
         ax: Any = figure.subplots()
         way = ds.way.values / MM
-        ax.plot(way, 1e6 * ds.deflection.values, color=BLACK, lw=1.6, label="|d|")
+        unit, factor = length_unit(float(np.nanmax(ds.deflection.values, initial=0.0)))
+        ax.plot(way, factor * ds.deflection.values, color=BLACK, lw=1.6, label="|d|")
         for i, axis in enumerate("xyz"):
             if np.nanmax(np.abs(ds.displacement.values[:, i]), initial=0.0) > 1e-12:
-                ax.plot(way, 1e6 * ds.displacement.values[:, i], color=CYCLE[i], lw=1.0, label=f"d{axis}")
-        ax.set(xlabel="way along the path, mm", ylabel="deflection, µm")
+                ax.plot(way, factor * ds.displacement.values[:, i], color=CYCLE[i], lw=1.0, label=f"d{axis}")
+        ax.set(xlabel="way along the path, mm", ylabel=f"deflection, {unit}")
         ax.grid(color="0.9", lw=0.5)
     return figure

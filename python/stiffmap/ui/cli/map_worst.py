@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from stiffmap.common.errors import StiffmapError
+from stiffmap.common.number_text import length_text, percents, vector_text
 from stiffmap.model.description.sources import in_words as source_words
 from stiffmap.solve.budget import deflection_budget
 from stiffmap.solve.machine import Machine
@@ -56,16 +57,21 @@ def _worst(ds: Any) -> tuple[float, str, list[float], Any] | None:
     angle = float(ds.worst_direction.sel({a: there[a] for a in "xyz"}))
     wrench = np.zeros(6)
     wrench[["xyz".index(a) for a in plane]] = force * np.cos(angle), force * np.sin(angle)
-    text = ", ".join(f"{v:.0f}" for v in wrench[:3])
-    return float(there), f"({text}) N, the worst direction in the {plane} plane", p, wrench
+    return (
+        float(there),
+        f"{vector_text(wrench[:3], 3)} N, the worst direction in the {plane} plane",
+        p,
+        wrench,
+    )
 
 
 def in_words(worst: dict[str, Any]) -> str:
-    """``worst pose of the map: 932.4 µm in space at (300, 300, -200) mm under …, of which 57 % z.foot …; 83 % of it …``."""
+    """``worst pose of the map: (300, 300, -200) mm, 932.5 µm in space under …, 57 % from z.foot …; 83 % of it …``."""
     at = ", ".join(f"{v / MM:.4g}" for v in worst["position"])
-    parts = ", ".join(f"{100 * s:.0f} % {n}" for n, s in list(worst["shares"].items())[:NAMED])
+    named = zip(worst["shares"], percents(list(worst["shares"].values())), strict=True)
+    parts = ", ".join(f"{share} % from {n}" for n, share in list(named)[:NAMED])
     rests = source_words(worst["sources"])
     return (
-        f"worst pose of the map: ({at}) mm, {1e6 * worst['deflection']:.1f} µm in space under {worst['case']}, of which "
+        f"worst pose of the map: ({at}) mm, {length_text(worst['deflection'])} in space under {worst['case']}; "
         f"{parts}{'; ' + rests if rests else ''}"
     )

@@ -169,7 +169,9 @@ def _write(found: Design, path: Path) -> None:
 def _lines(d: Design) -> list[str]:
     out = [f"{len(d.experiment)} rows chosen; for comparison the median of 20 random plans of the same size"]
     if d.aim == "separate":
-        out.append(f"  the rivals differ by {d.value:.1f} standard deviations (random {d.random_value:.1f})")
+        out.append(
+            f"  the two explanations differ by {d.value:.1f} standard deviations (random {d.random_value:.1f})"
+        )
         return out
     for n, u, s, r in zip(d.names, d.units, d.sigma, d.random_sigma, strict=True):
         out.append(f"  {n}: u = {s:.3g} {u} (random {r:.3g})")

@@ -35,7 +35,7 @@ def command(
     threads: ThreadsOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Prediction for every reading: rms, per axis, worst rows, noise floor, lack of fit, model-free checks.
+    """Prediction for every reading: rms, per axis, worst rows, noise, lack of fit, model-free checks.
 
     With -o: residual.csv (mm, rad), residual.json (SI) and pictures. Exit codes: 0 the readings are as
     predicted, 1 they are not (p-value below 1e-3), 2 bad input.
@@ -84,10 +84,10 @@ def lines(r: Residual, rows: int) -> list[str]:
         out.append(f"  all angles: rms {1e3 * s.rotation_rms:.4f} mrad")
     out += [f"  found: {line}" for line in _registered(e)]
     out += [
-        f"  {a}: rms {_shown(units[a], v)}, noise floor {_shown(units[a], _floor(r, a))}"
+        f"  {a}: rms {_shown(units[a], v)}, noise {_shown(units[a], _floor(r, a))}"
         for a, v in s.per_axis.items()
     ]
-    out.append(f"  rms / noise floor {s.ratio:.2f}; p-value of this residual {_p_value(r.lack_of_fit)}")
+    out.append(f"  rms / noise {s.ratio:.2f}; p-value of this residual {_p_value(r.lack_of_fit)}")
     out += [f"  unknown frames and zeros fitted: {r.nuisances}"] if r.nuisances else []
     out.append(f"  poses beyond noise: {r.groups_off} of {int(e.groups.max()) + 1}")
     out.append(f"  outliers (rows): {', '.join(aside) or 'none'}")

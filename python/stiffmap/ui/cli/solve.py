@@ -12,6 +12,7 @@ from rich.table import Table
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
+from stiffmap.common.number_text import length_text
 from stiffmap.common.outputs import write_rows
 from stiffmap.common.outputs.option import written
 from stiffmap.common.tables.poses import PoseTable, read_pose_table
@@ -99,7 +100,7 @@ def command(
     load = np.r_[acting, MM * numbers(moment, "moment", 3)]
     s = m.solve(place, load, **how)
     why = reason(m, s, place, how["rotation"])
-    told: list[Any] = [position_words(place, m), *_lines(s)]
+    told: list[Any] = [position_words(place, m), *_lines(m, s)]
     if vector is None:
         furthest = ", ".join(f"{v:.1f}" for v in acting)
         told.insert(0, f"{size:g} N in the direction that pushes furthest: force ({furthest}) N")
@@ -129,18 +130,18 @@ def as_plain(name: str, s: Solution, load: Any) -> Any:
     }
 
 
-def _lines(s: Solution) -> Iterator[str | Table]:
+def _lines(m: Machine, s: Solution) -> Iterator[str | Table]:
     """For the terminal: mm, deg, N."""
     flags = ", ".join(str(f.name) for f in Flag(int(s.flags)))
     yield f"status {Status(int(s.status)).name.lower()}" + (f"; flags {flags}" if flags else "")
     d = s.displacement
     if np.isfinite(d).all():
-        shift = ", ".join(f"{v:.6f}" for v in 1e3 * d[:3])
+        shift = ", ".join(f"{v:z.6f}" for v in 1e3 * d[:3])
         yield f"displacement of {s.point}: ({shift}) mm, norm {1e3 * np.linalg.norm(d[:3]):.6f} mm"
         yield f"rotation: ({', '.join(f'{v:.6f}' for v in np.rad2deg(d[3:]))}) deg"
     for name, effort in zip(s.actuators, s.actuator_effort, strict=True):
         if np.isfinite(effort):
-            yield f"drive {name}: {effort:.4f} (N, or N m for a revolute one)"
+            yield f"drive {name}: {effort:z.4f} {'N' if m.compiled.names.is_prismatic(name) else 'N·m'}"
     if np.isfinite(s.compliance).any():
         scaled = s.compliance * np.outer(SCALE, SCALE) / 1e3
         yield _matrix("loaded compliance: mm and rad per N and N mm", scaled)
@@ -222,4 +223,4 @@ def _rows(table: PoseTable, s: Solution, words: list[str]) -> Iterator[str | Tab
         yield f"{len(table) - SHOWN} more rows (-o answers.csv writes all)"
     if np.isfinite(sizes).any():
         worst = int(np.nanargmax(sizes))
-        yield f"largest: {1e6 * sizes[worst]:.2f} µm in row {worst + 1} (line {table.lines[worst]})"
+        yield f"largest: {length_text(sizes[worst])} in row {worst + 1} (line {table.lines[worst]})"

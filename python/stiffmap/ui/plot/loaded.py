@@ -11,12 +11,13 @@ from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import Floats, real_array
 from stiffmap.common.errors import StiffmapError
+from stiffmap.common.number_text import length_text, length_unit, percents, vector_text
 from stiffmap.solve.budget import DeflectionBudget, deflection_budget
 from stiffmap.solve.compiled import Status
 from stiffmap.solve.machine import Machine, takes_machine
 from stiffmap.ui.plot.scene import draw_force, draw_skeleton, finish, on, scene_axes
 from stiffmap.ui.plot.skeleton import Skeleton, skeleton
-from stiffmap.ui.plot.style import BLUE, ORANGE, UM, headline, leg_colours, paper, place_text
+from stiffmap.ui.plot.style import BLUE, ORANGE, headline, leg_colours, paper, place_text
 
 SHOWN = 0.08
 """Of the machine's extent, how far the tool moves in the picture."""
@@ -96,9 +97,9 @@ def loaded_figure(
         ax: Any = scene_axes(figure, shape.rest, view, left)
         draw_loaded(ax, shape, machine.legs, view)
         draw_budget(figure.add_subplot(right), budget)
-        force = ", ".join(f"{v:g}" for v in budget.wrench[:3])
-        headline(figure, f"{machine.name} at {place_text(budget.position)} under ({force}) N: the tool moves "
-                         f"{1e6 * np.linalg.norm(shape.displacement[:3]):.1f} µm (drawn × {shape.factor:g})")  # fmt: skip
+        size = float(np.linalg.norm(shape.displacement[:3]))
+        headline(figure, f"{machine.name} at {place_text(budget.position)} under {vector_text(budget.wrench[:3], 4)} N: "
+                         f"the tool moves {length_text(size)} (drawn × {shape.factor:g})")  # fmt: skip
     return figure
 
 
@@ -117,9 +118,9 @@ def draw_loaded(
 
 
 def budget_rows(budget: DeflectionBudget) -> list[tuple[str, float, float]]:
-    """Element, its part (µm) of the tool's deflection along that, and its share, the largest first; what is not worth a
+    """Element, its part (m) of the tool's deflection along that, and its share, the largest first; what is not worth a
     row is one at the end."""
-    size = UM * float(np.linalg.norm(budget.displacement[:3]))
+    size = float(np.linalg.norm(budget.displacement[:3]))
     ranked = [(n, size * s, s) for n, _, s in budget.ranked()]
     shown = min(MOST_BARS, sum(abs(s) > FAINT for _, _, s in ranked))
     if len(ranked) <= shown + 1:
@@ -132,12 +133,13 @@ def draw_budget(ax: Any, budget: DeflectionBudget) -> None:
     """A bar per element, in the direction in which the tool moves."""
     ranked = budget_rows(budget)
     at = np.arange(len(ranked))
-    values = [v for _, v, _ in ranked]
+    unit, factor, decimals = length_unit(float(np.linalg.norm(budget.displacement[:3])))
+    values = [factor * v for _, v, _ in ranked]
     ax.barh(at, values, color=[BLUE if v >= 0 else ORANGE for v in values])
-    for i, (_, v, s) in enumerate(ranked):
-        ax.text(max(v, 0), i, f" {v:z.1f} µm, {100 * s:z.0f} %", va="center", fontsize=7)
+    for i, (v, share) in enumerate(zip(values, percents([s for _, _, s in ranked]), strict=True)):
+        ax.text(max(v, 0), i, f" {v:z.{decimals}f} {unit}, {share} %", va="center", fontsize=7)
     ax.set_yticks(at, [n for n, _, _ in ranked])
     ax.invert_yaxis()
     ax.set_xlim(min(0.0, 1.15 * min(values, default=0)), 1.45 * max(max(values, default=1), 1e-9))
     ax.axvline(0, color="0.3", lw=0.6)
-    ax.set(xlabel="part of the tool's deflection, µm", title="where the deflection comes from")
+    ax.set(xlabel=f"part of the tool's deflection, {unit}", title="where the deflection comes from")

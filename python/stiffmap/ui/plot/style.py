@@ -11,9 +11,11 @@ from textwrap import fill
 from typing import Any
 
 import matplotlib
+import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from stiffmap.common import number_text
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.outputs import write_picture
 
@@ -110,8 +112,8 @@ def paper(width: float, height: float, title: str = "", *, most: int = 7) -> Ite
 
 
 def length_unit(largest: float) -> tuple[str, float]:
-    """Unit and factor in which a deflection of this size (m) reads well: no 0.0xx mm."""
-    return ("µm", 1e6) if largest < 0.0995e-3 else ("mm", 1e3)
+    """Unit and factor of an axis for deflections up to this size (m): no 0.0xx mm."""
+    return number_text.length_unit(largest, 0.0995e-3)[:2]
 
 
 def place_text(position: Floats) -> str:
@@ -121,7 +123,12 @@ def place_text(position: Floats) -> str:
 
 def wrench_text(wrench: Floats) -> str:
     """What of a wrench (6,) is not zero, for example ``fx = 100 N``."""
-    parts = [f"{n} = {v:g} {'N' if n[0] == 'f' else 'N·m'}" for n, v in zip(WRENCH, wrench, strict=True) if v]
+    dust = 1e-9 * float(np.abs(wrench).max(initial=0.0))
+    parts = [
+        f"{n} = {v:g} {'N' if n[0] == 'f' else 'N·m'}"
+        for n, v in zip(WRENCH, wrench, strict=True)
+        if abs(v) > dust
+    ]
     return ", ".join(parts) or "no wrench"
 
 

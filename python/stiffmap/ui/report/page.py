@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from stiffmap.common.number_text import length_text, length_unit, vector_text
 from stiffmap.common.outputs import write_text
 from stiffmap.solve.budget import deflection_budget
 from stiffmap.solve.machine import Machine
@@ -31,15 +32,17 @@ def write_page(
     from stiffmap.ui.report.templates import render
 
     size = sum(v * v for v in shape.displacement[:3]) ** 0.5
+    unit, scale, decimals = length_unit(size)
     text = render(
         "machine.html",
         name=machine.name,
         title=machine.description.title,
-        position=[1e3 * v for v in budget.position],
-        force=list(budget.wrench[:3]),
-        size=1e6 * size,
+        position=vector_text(1e3 * budget.position),
+        force=vector_text(budget.wrench[:3]),
+        size=length_text(size),
+        unit=unit,
         factor=shape.factor,
-        budget=[(n, 1e6 * size * s, 100 * s) for n, _, s in budget.ranked()],
+        budget=[(n, f"{scale * size * s:.{decimals}f}", 100 * s) for n, _, s in budget.ranked()],
         data=json.dumps(scene(shape, machine.legs)),
     )
     return write_text(path, text)

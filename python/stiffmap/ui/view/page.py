@@ -6,9 +6,8 @@ from html import escape
 from os import PathLike
 from pathlib import Path
 
-import numpy as np
-
 from stiffmap.common.errors import StiffmapError
+from stiffmap.common.number_text import vector_text
 from stiffmap.common.outputs import write_text
 from stiffmap.ui.view.data import Data
 from stiffmap.ui.view.moment import Moment
@@ -68,10 +67,7 @@ def draw(server: object, moment: Moment, data: Data | None = None) -> str:
         shares = shares_panel(moment.shares())
     except StiffmapError:
         shares = ""
-    force = np.array(moment.state.force)
-    words = (
-        f"force ({', '.join(f'{v:g}' for v in force)}) N; deflected machine (orange) magnified × {factor:g}"
-    )
+    words = f"force {vector_text(moment.state.force)} N; deflected machine (orange) magnified × {factor:g}"
     return (
         f"{status_line(moment, solution, '', '')}<div>{escape(words)}</div>"
         f"{colour_bar(found, found.range, moment.state.tolerance)}"

@@ -7,6 +7,7 @@ from html import escape
 
 import numpy as np
 
+from stiffmap.common.number_text import length_text, length_unit, percents
 from stiffmap.solve.budget import DeflectionBudget
 from stiffmap.solve.solution import Solution
 from stiffmap.solve.status import Status
@@ -32,8 +33,10 @@ def status_line(moment: Moment, solution: Solution, message: str, error: str) ->
     s = moment.state
     at = ", ".join(f"{1e3 * v:.1f}" for v in s.position)
     if bool(solution.ok):
-        d = 1e6 * solution.displacement[:3]
-        said = f"the tool moves <b>{np.linalg.norm(d):.2f} µm</b> ({', '.join(f'{v:.2f}' for v in d)})"
+        size = float(np.linalg.norm(solution.displacement[:3]))
+        unit, factor, decimals = length_unit(size)
+        parts = ", ".join(f"{factor * v:z.{decimals}f}" for v in solution.displacement[:3])
+        said = f"the tool moves <b>{length_text(size)}</b> ({parts}) {unit}"
     else:
         said = f"<b>{escape(Status(int(solution.status)).name.lower())}</b>: no equilibrium"
     lines = [f"{escape(moment.machine.name)} at ({at}) mm: {said}"]
@@ -101,17 +104,18 @@ def shares_panel(budget: DeflectionBudget, lit: str = "") -> str:
     """Where the deflection comes from."""
     found = budget_rows(budget)
     biggest = max((abs(s) for _, _, s in found), default=1.0) or 1.0
-    size = 1e6 * float(np.linalg.norm(budget.displacement[:3]))
+    size = float(np.linalg.norm(budget.displacement[:3]))
+    unit, factor, decimals = length_unit(size)
     rows: list[Row] = [
         (
             f"▶ {n}" if n == lit else n,
             s / biggest,
             BLUE if s >= 0 else ORANGE,
-            f"{part:z.2f} µm, {100 * s:z.0f} %",
+            f"{factor * part:z.{decimals}f} {unit}, {share} %",
         )
-        for n, part, s in found
+        for (n, part, s), share in zip(found, percents([s for _, _, s in found]), strict=True)
     ]
-    return bars(f"where the {size:.2f} µm come from", rows)
+    return bars(f"where the {length_text(size)} come from", rows)
 
 
 def compliance_panel(solution: Solution) -> str:

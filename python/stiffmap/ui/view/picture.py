@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
 from stiffmap.common.errors import StiffmapError
+from stiffmap.common.number_text import length_text, vector_text
 from stiffmap.ui.plot import save
 from stiffmap.ui.plot.loaded import draw_budget
 from stiffmap.ui.plot.scene import draw_box, draw_force, draw_skeleton, finish
@@ -53,9 +54,8 @@ def view_figure(moment: Moment) -> Figure:
             figure.colorbar(bar, ax=ax, label=f"{q.title}, {q.unit}", shrink=0.6, location="bottom", pad=0.08)
         _shares(figure.add_subplot(1, 2, 2), moment)
         at = ", ".join(f"{MM * v:.4g}" for v in s.position)
-        force = ", ".join(f"{v:.4g}" for v in s.force)
-        d = 1e6 * float(np.linalg.norm(solution.displacement[:3]))
-        headline(figure, f"{moment.machine.name} at ({at}) mm under ({force}) N: the tool moves {d:.1f} µm "
+        moved = length_text(float(np.linalg.norm(solution.displacement[:3])))
+        headline(figure, f"{moment.machine.name} at ({at}) mm under {vector_text(s.force, 4)} N: the tool moves {moved} "
                          f"(orange: × {factor:g})")  # fmt: skip
     return figure
 

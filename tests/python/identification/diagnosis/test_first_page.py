@@ -86,7 +86,7 @@ def test_trends_are_shown_where_residuals_follow_a_driver() -> None:
     assert {name for name, _ in shown} == {"fx, N", "fy, N"}
     assert len(shown) + len(others) == len(drivers_of(d.experiment))
     page = words_of(d)
-    assert page.index("Residual of every reading against what drives it") < page.index(
+    assert page.index("Residual of every reading against the conditions on which it depends") < page.index(
         "<details><summary>Residuals"
     )
 
@@ -107,7 +107,7 @@ def test_the_first_page_carries_the_record() -> None:
         "readings.xlsx, sha256 0123456789abcdef",
     ):
         assert text in first
-    for text in ("measured by", "checked by", "Red: what is named"):
+    for text in ("measured by", "checked by", "names are red"):
         assert text in first
 
 

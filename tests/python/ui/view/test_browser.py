@@ -92,7 +92,7 @@ def test_drag_probe_and_colours_equal_solve(browser: Any) -> None:
         assert view._viewer.worker.idle(60)
         # what the page says is what is solved
         d = 1e6 * np.linalg.norm(machine.solve((x, y, z), view.state.wrench).displacement[:3])
-        page.get_by_text(f"{d:.2f} µm").first.wait_for()
+        page.get_by_text(f"{d:.1f} µm").first.wait_for()
         # the probe: a click on the plane
         spot = (-0.13, -0.13, z)  # clear of the gizmo
         page.mouse.click(*on_screen(view, page, spot))
@@ -128,7 +128,7 @@ def test_typed_numbers_undo_and_what_is_refused(browser: Any) -> None:
         box.press("Enter")
         assert until(lambda: view.state.force == (0.0, 0.0, -450.0)), view.state.force
         d = 1e6 * np.linalg.norm(machine.solve(view.state.position, view.state.wrench).displacement[:3])
-        page.get_by_text(f"{d:.2f} µm").first.wait_for()
+        page.get_by_text(f"{d:.1f} µm").first.wait_for()
         tool = page.get_by_role("textbox", name="Tool, mm, x")
         tool.fill("9000")
         tool.press("Enter")
@@ -214,7 +214,7 @@ def test_several_pages_show_the_same_and_a_closed_one_costs_nothing(browser: Any
                 two.close()
         assert view._viewer.worker.idle(60)
         d = 1e6 * np.linalg.norm(machine.solve(view.state.position, view.state.wrench).displacement[:3])
-        one.get_by_text(f"{d:.2f} µm").first.wait_for()
+        one.get_by_text(f"{d:.1f} µm").first.wait_for()
         assert until(lambda: len(view._server.get_clients()) == 1)
 
 
@@ -228,7 +228,7 @@ def test_the_page_holds_everything_and_asks_for_nothing(tmp_path: Path) -> None:
     for tag in ('<script src="http', '<link rel="stylesheet" href="http', "@import url(http"):
         assert tag not in text
     d = 1e6 * np.linalg.norm(machine.solve((0.1, 0, 0.05), (0, 0, -300.0, 0, 0, 0)).displacement[:3])
-    assert f"{d:.2f} µm" in text
+    assert f"{d:.1f} µm" in text
 
 
 def test_the_page_opens_without_a_network(browser: Any, tmp_path: Path) -> None:

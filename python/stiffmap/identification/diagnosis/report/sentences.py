@@ -178,8 +178,8 @@ def next_step(d: Any) -> str:
         return "Inspect this place, and read more poses or other loads: numbers within tolerance explain these nearly as well."
     if any(e.aliases for e in d.effects):
         return (
-            "Inspect this place and those which these readings cannot distinguish from it (the report names them); the corrected "
-            "machine file predicts the tool equally well whichever it is."
+            "Inspect this place and the others that fit the readings as well (the report lists them). The corrected machine file "
+            "predicts the tool equally well, whichever of them it is."
         )
     if d.which == "declared":
         return "Inspect this place, and read more poses: no corrected machine predicts unseen readings better than the declared one yet."

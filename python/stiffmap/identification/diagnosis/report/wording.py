@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from stiffmap.common.number_text import percent, with_uncertainty, within
+from stiffmap.common.number_text import percent, percents, with_uncertainty, within
 from stiffmap.identification.diagnosis.report.findings import Effect, Findings, Number, Rest
 from stiffmap.identification.diagnosis.report.separation import Separation
 from stiffmap.identification.diagnosis.slips.slip import Slip
@@ -33,7 +33,7 @@ def five_lines(d: Findings) -> list[str]:
         "effects: " + ("; ".join(effect_text(e) for e in d.effects) or "none") + _others(d),
         *(f"number: {number_text(n)}" for n in (d.calibration.beyond if d.calibration else ())[:LISTED]),
         f"held-out readings: rms {_thousandth(*d.before.size)} before, {_thousandth(*d.after.size)} after "
-        f"(noise floor {_thousandth(noise_size(d), d.before.size[1])}, ratio {d.after.size[0] / noise_size(d):.3f}, n = {d.after.n}){_promise(d)}",
+        f"(noise {_thousandth(noise_size(d), d.before.size[1])}, ratio {d.after.size[0] / noise_size(d):.3f}, n = {d.after.n}){_promise(d)}",
         _left(d),
         _limits(d),
         *_more(d),
@@ -66,7 +66,11 @@ def _more(d: Findings) -> list[str]:
     out = []
     largest = [(name, s) for name, s in sorted(d.shares.items(), key=lambda s: -s[1]) if s > 0.005]
     if d.verdict != "none" and len(largest) > 1:
-        out.append("shares of the squares: " + ", ".join(f"{name} {percent(s)}" for name, s in largest))
+        names, sizes = zip(*largest, strict=True)
+        out.append(
+            "shares of the squares: "
+            + "; ".join(f"{name}: {s} %" for name, s in zip(names, percents(sizes), strict=True))
+        )
     if d.which == "declared" and d.effects:
         out.append(
             "machine.yaml is the declared machine: none that was corrected predicts unseen readings better"

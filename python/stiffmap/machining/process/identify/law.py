@@ -147,7 +147,7 @@ class IdentifiedLaw:
                     f"(probability {self.chance(e):.2g} by chance)."
                 )
         if len(self.explanations) < 2:
-            out.append("Rivals of the straight law need forces at four feeds or more.")
+            out.append("Laws other than the straight one need forces at four feeds or more.")
         if self.runout is not None:
             low, high = (1e6 * v for v in self.runout.interval)
             what = "explains the line at the spindle's frequency" if low > 0 else "none is shown"

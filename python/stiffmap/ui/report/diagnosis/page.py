@@ -11,6 +11,7 @@ import numpy as np
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.fingerprints import digest
+from stiffmap.common.number_text import length_text, length_unit, vector_text
 from stiffmap.common.outputs import write_text
 from stiffmap.experiment.noise.checks import Check
 from stiffmap.identification.diagnosis.report.findings import Detectability, Effect, Findings, Number, Rest
@@ -155,12 +156,16 @@ def _budget(d: Findings) -> dict[str, Any] | None:
         found = deflection_budget(d.machine, p, force)
     except StiffmapError:  # a machine in play has no stiffness to share out
         return None
-    whole = 1e6 * float(np.linalg.norm(found.displacement[:3]))
+    whole = float(np.linalg.norm(found.displacement[:3]))
+    unit, factor, decimals = length_unit(whole)
     return {
-        "at": ", ".join(f"{1e3 * v:.0f}" for v in p),
-        "force": ", ".join(f"{v:.0f}" for v in force[:3]),
-        "size": whole,
-        "rows": [(in_shop_words(n), part, 100 * s) for n, part, s in budget_rows(found)],
+        "at": vector_text(1e3 * p, 4),
+        "force": vector_text(force[:3], 4),
+        "size": length_text(whole),
+        "unit": unit,
+        "rows": [
+            (in_shop_words(n), f"{factor * part:.{decimals}f}", 100 * s) for n, part, s in budget_rows(found)
+        ],
     }
 
 

@@ -23,19 +23,19 @@ from stiffmap.ui.report.diagnosis.vectors import vectors
 CAPTIONS = {
     "residual_vectors": "Mean residual (reading less prediction) of each pose as arrows, with the machine of your file and "
     "with the corrected one; both enlarged alike.",
-    "place": "The machine at home. Red: what is named; where nothing of the machine is, the tool is marked.",
+    "place": "The machine at home. The parts that the diagnosis names are red; where it names none that can be drawn, the tool is marked.",
     "before_after": "What the machine of your file and the corrected one leave of the readings, rms: of those that no fit saw, unless "
     "the title says otherwise.",
-    "residual_trends": "Residual of every reading against what drives it.",
-    "residual_others": "Residual of every reading against what drives nothing here.",
-    "residual_histogram": "Residuals over the noise floor. With the right machine they follow the dashed line.",
+    "residual_trends": "Residual of every reading against the conditions on which it depends.",
+    "residual_others": "Residual of every reading against conditions on which it does not depend.",
+    "residual_histogram": "Residuals over the noise. With the right machine they follow the dashed line.",
     "loops": "Reading over load in the order of time, each set-up from its own zero: what was measured, and what the machine of your file "
     "and the corrected one show.",
     "maps": "Error of the tool over a plane of the workspace: the machine of your file, the corrected one, and what the finding changes.",
     "loaded": "The corrected machine where it deflects most in that plane: without load (dashed), under it (enlarged), and the part "
     "of each spring and drive.",
     "shares": "How the squares of the difference from your file are shared out among noise, declared numbers, effects, and what "
-    "nobody can name.",
+    "has no known cause.",
     "unexplained": "What no effect explains, over the workspace.",
 }
 LEAST_SHARE = 1e-5
@@ -190,7 +190,7 @@ def histogram(d: Findings) -> Figure:
             lw=1.5,
         )
     ax.plot(bins, np.exp(-(bins**2) / 2) / np.sqrt(2 * np.pi), color="0.4", ls="--", label="noise alone")
-    ax.set(xlabel="residual / noise floor (standard deviations)", ylabel="density")
+    ax.set(xlabel="residual / noise (standard deviations)", ylabel="density")
     ax.legend()
     return figure
 
