@@ -131,7 +131,7 @@ def test_a_map_says_where_its_worst_pose_gives_way(
     assert main([*call, "--no-pictures", "-o", str(tmp_path)]) == 0
     told = capsys.readouterr().out
     assert "worst pose of the map: (0, 1310, 1590) mm, 38.5 µm in space" in told
-    assert "of which 48 % machine.ram" in told
+    assert "48 % from machine.ram" in told
     assert main([*call, "--no-pictures", "-o", str(tmp_path), "--json"]) == 0
     worst = json.loads(capsys.readouterr().out)["worst_pose"]
     assert sum(worst["shares"].values()) == pytest.approx(1, abs=1e-3)
