@@ -23,6 +23,7 @@ from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.noise.outliers import MANY
 from stiffmap.identification.candidates.candidates import Candidate
 from stiffmap.identification.inference.constants import DEGREES, STANDS_OUT
+from stiffmap.identification.inference.optimum import covariance
 from stiffmap.identification.inference.places import possible
 from stiffmap.identification.inference.readings import Readings
 from stiffmap.identification.inference.travel import Profile, profiles
@@ -87,7 +88,8 @@ class Corrected:
     numbers: Floats
     """(p,) declared numbers, in standard uncertainties."""
     covariance: Floats
-    """(k, k) of all values of the terms, in scales, one term after the other; numbers integrated out."""
+    """(k, k) of all values of the terms, in scales, one term after the other; numbers integrated out. Infinite variances of what the
+    readings do not determine."""
     prediction: Floats
     """(n, c) m, rad."""
     given: Readings
@@ -211,7 +213,7 @@ def _optimum(given: Readings, terms: Sequence[Term], start: Corrected | None, st
         if np.linalg.norm(before @ (before.T @ left) - q @ (q.T @ left)) < SETTLED:
             break
     j = jacobian(x, q)
-    spread: Floats = np.asarray(np.linalg.pinv(j.T @ j, rcond=1e-12, hermitian=True))
+    spread = covariance(j)[0]
     numbers, travel = x[k : k + p] * given.spread, x[k + p :]
     found = profiles(given.drives, travel, spread[k + p :, k + p :])
     shows = given.predicted(numbers, effects(x), given.knots(found)) if found else shown(x)
