@@ -399,10 +399,7 @@ class _World:
             for anchor in self._anchors(fewer):
                 shapes = [p.shapes[_best_shape(anchor, p)] for _, p, _ in bounds]
                 gain = np.tril(of_pairs(anchor, shapes), -1)
-                enough = model.score - SHORT - (anchor.score + fewer.score - fewer.fit.score)
                 for k in np.argsort(gain, axis=None)[::-1][:REFITS]:
-                    if gain.flat[k] < enough:
-                        break
                     places = [bounds[int(i)][1] for i in np.unravel_index(int(k), gain.shape)]
                     if clash(places[0].candidate, [places[1].candidate]):
                         continue

@@ -11,12 +11,14 @@ import pytest
 import stiffmap as sm
 from stiffmap.experiment import Predictor, random_plan
 from stiffmap.experiment.channels import AXIS_CHANNELS
+from stiffmap.identification.candidates.candidates import Candidate
 from stiffmap.identification.inference import machines
-from stiffmap.identification.inference.corrected import corrected
+from stiffmap.identification.inference.corrected import Term, corrected
 from stiffmap.identification.inference.covariance import Covariance
 from stiffmap.identification.inference.readings import Readings
 from stiffmap.identification.numbers import unknowns
 from stiffmap.identification.numbers.sensitivity import predicted, sensitivity
+from stiffmap.model.effects import registry
 
 
 def test_a_promise_is_what_estimates_from_other_poses_are_off_by(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -104,3 +106,18 @@ def test_a_promise_goes_from_the_model_to_what_the_poses_show() -> None:
     assert few[0] == 1.0 and many[0] == pytest.approx(2.0, rel=1e-3)
     size, u = machines.borne_out((1.0, 0.2), 2.0, machines.WORD)
     assert size == pytest.approx(np.sqrt(2.5)) and u == pytest.approx(size / np.sqrt(40.0))
+
+
+def test_a_turn_that_changes_nothing_is_not_determined() -> None:
+    """Of a joint's axis about itself: any angle would do, and none is known to 1e-10."""
+    machine = sm.load_machine("ur10")
+    p = Predictor(machine, random_plan(machine, "position", poses=12, seed=1))
+    kind = registry.get("axis_tilt")
+    term = Term(Candidate("axis_tilt", "elbow", ("arm",), kind.parameters), np.zeros(3))
+    p = Predictor(machine, p.experiment.with_readings(predicted(p, [], np.zeros(0))))
+    e, s = p.experiment, sensitivity(p, [])
+    rows, channel = np.nonzero(e.read)
+    n = len(rows)
+    rest = Covariance(np.ones(n), np.zeros((n, 0)))
+    found = corrected(Readings(p, e.sigma, rows, channel, 1.0, np.ones(n), rest, s, np.zeros(0)), (term,))
+    assert np.isinf(np.diag(found.covariance)).tolist().count(True) == 1
