@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from tests.oracle.alter import slopes, with_one_effect
@@ -95,6 +97,13 @@ PAST_A_FORK = (
 )
 def test_seeds_that_once_disagreed(seed: int) -> None:
     assert not judge(seed)["wrong"]
+
+
+def test_a_fork_next_to_a_corner_is_not_passed_in_one_step() -> None:
+    """A share of the load under which a leaf stage has just left its straight branch."""
+    task, _ = with_one_effect(Classes(404662).task(), np.random.default_rng((404662, 2)))
+    _, found = checks(replace(task, loads=task.loads.times(0.15)))
+    assert [c.wrong for c in found] == ["", ""]
 
 
 def test_a_seed_is_judged_and_summed_up() -> None:
