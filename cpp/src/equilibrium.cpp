@@ -136,6 +136,7 @@ class LoadPath {
         step *= 2;
         continue;
       }
+      out_.flags |= flag::load_stepped;
       state_ = ws_.step_start;
       step *= 0.5;
       if (step < 1.0 / 1024) return Outcome::failed;
@@ -222,6 +223,7 @@ bool across_corners(const Mechanism& m, Problem& p, const EquilibriumOptions& op
                     State& state, EquilibriumResult& out, bool only_way) {
   state = ws.start;
   out.sign_changes = 0;
+  out.flags &= ~flag::load_stepped;
   p.factor = 1;
   linearize(m, p, state, ws.lin);
   const Pose tip = ws.lin.frames.at(m.tip);

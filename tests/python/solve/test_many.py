@@ -58,6 +58,14 @@ def test_a_gap_may_bear_little() -> None:
         assert s.ok.all() and not verdict.bad
 
 
+def test_a_load_that_is_taken_in_steps_across_gaps_says_so() -> None:
+    machine, _ = changed("tripteron", "dead_zone")
+    assert machine is not None
+    p, load = asked(machine, np.random.default_rng([3, *b"tripteron", *b"dead_zone"]), 60)
+    flags = machine.solve(p, **load).flags  # type: ignore[arg-type]
+    assert np.sum((flags & sm.Flag.LOAD_STEPPED) > 0) > 10
+
+
 def test_what_round_off_alone_would_do_proves_nothing() -> None:
     # the ram of the travelling column drawn in to nothing: 3e18 N/m, and a preload of 10 um beside a deflection of 1e-16 m
     found = run(Batch("travelling-column", "preload", 11))
