@@ -14,7 +14,7 @@ namespace stiffmap {
 namespace {
 
 constexpr int most_terms = 18;  // of an exponential whose argument is at most one
-constexpr Index first_look = 10, looks = 3, most_together = 8, most_nodes = 12;
+constexpr Index first_look = 10, most_together = 8, most_nodes = 12;
 constexpr double settled = 1e-10;  // residual of the largest multiplier, relative
 constexpr double exact = 1e-13;    // of blocks by interpolation, whose entries are of order one
 
@@ -25,6 +25,7 @@ struct ChatterWorkspace {
   MatX basis, hessenberg;  // of the search, which begins near what the last one found
   VecX start, past, from, to;
   Eigen::VectorXcd found;
+  Index look = first_look;  // size at which the search first asks whether it has settled: that of the last one
 };
 
 /// Exact step of an interval: rows q and q' by the highest frequency, columns the same and what the last pass left.
@@ -111,11 +112,13 @@ double dominant(Index state, Index size, ChatterWorkspace& ws) {
     const double rest = z.norm();
     ws.hessenberg(j + 1, j) = rest;
     const bool last = j + 1 == most || rest <= 1e-14 * before;
-    if (last || (j + 1 >= first_look && (j + 1 - first_look) % looks == 0)) {
+    if (last || j + 1 >= ws.look) {
       const ComplexEigen e = general_eigen(MatX(ws.hessenberg.topLeftCorner(j + 1, j + 1)));
       Index best = 0;
       const double top = e.values.cwiseAbs().maxCoeff(&best);
-      if (last || rest * std::abs(e.vectors(j, best)) <= settled * std::max(top, 1e-3)) {
+      const double unsettled = rest * std::abs(e.vectors(j, best)) / (settled * std::max(top, 1e-3));
+      if (last || unsettled <= 1) {
+        ws.look = unsettled > 0.1 ? j + 1 : std::max<Index>(j, 2);
         Eigen::VectorXcd found = ws.basis.leftCols(j + 1) * e.vectors.col(best);
         const std::complex<double> turn = ws.found.size() > 0 ? ws.found.dot(found) : 0;
         const bool same = std::abs(turn) > 0.9;  // of length one both: the path of one vector goes on
@@ -146,20 +149,20 @@ VecX largest_multipliers(const ToolModes& modes, const std::vector<Chip>& chips,
   const Index state = 2 * modes.omega.size(), size = state + 2 * static_cast<Index>(chips.size());
   VecX nodes, out(depths.size());
   MatX at_nodes, at_ends;  // blocks, one depth a column
-  const auto keep = [&](MatX& kept, double depth) {
-    prepare(modes, chips, period, depth, ws);
-    kept.conservativeResize(ws.blocks.size(), kept.cols() + 1);
-    kept.rightCols<1>() = ws.blocks.reshaped();
+  const auto keep = [&](MatX& kept, const VecX& at) {
+    for (Index i = 0; i < at.size(); ++i) {
+      prepare(modes, chips, period, at[i], ws);
+      kept.resize(ws.blocks.size(), at.size());
+      kept.col(i) = ws.blocks.reshaped();
+    }
   };
   bool direct = true;  // or else polynomials in the depth through Chebyshev's nodes, judged where they are worst
   for (Index count = 4; direct && count <= most_nodes && count + 2 < depths.size(); count += 2) {
     const double low = depths.minCoeff(), high = depths.maxCoeff(), gap = std::numbers::pi / static_cast<double>(count);
     nodes = VecX::LinSpaced(count, 0.5 * gap, std::numbers::pi - 0.5 * gap).array().cos();
     nodes = (0.5 * (low + high) + 0.5 * (high - low) * nodes.array()).matrix();
-    at_nodes.resize(0, 0);
-    for (const double node : nodes) keep(at_nodes, node);
-    if (at_ends.size() == 0)
-      for (const double end : {low, high}) keep(at_ends, end);
+    keep(at_nodes, nodes);
+    if (at_ends.size() == 0) keep(at_ends, Eigen::Vector2d(low, high));
     direct = !((at_nodes * weights(nodes, low) - at_ends.col(0)).cwiseAbs().maxCoeff() <= exact &&
                (at_nodes * weights(nodes, high) - at_ends.col(1)).cwiseAbs().maxCoeff() <= exact);
   }
