@@ -11,7 +11,7 @@ from __future__ import annotations
 import argparse
 import csv
 import shutil
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -60,7 +60,7 @@ def sockets(clone: Path, out: Path) -> None:
         _write(out / f"{robot}.csv", ["position", "socket", *(f"joint_{k}_rad" for k in range(1, 8))], rows)
 
 
-def _write(file: Path, head: list[str], rows: Iterable[list[object]]) -> None:
+def _write(file: Path, head: list[str], rows: Iterable[Sequence[object]]) -> None:
     with file.open("w", encoding="utf-8", newline="") as stream:
         csv.writer(stream, lineterminator="\n").writerows([head, *rows])
 

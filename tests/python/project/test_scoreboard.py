@@ -123,10 +123,10 @@ def test_authors_tables_become_sets(tmp_path: Path) -> None:
 
     for name in ("ur5_tracker", "ipa_ur10_accuracy", "ball_in_socket"):
         assert convert(name, clone).returncode == 0
-    head, row = (
+    columns, values = (
         line.split(",") for line in (data / "ipa_ur10_accuracy/series_D.csv").read_text().splitlines()
     )
-    made = dict(zip(head, row, strict=True))
+    made = dict(zip(columns, values, strict=True))
     assert [made[k] for k in ("index", "goal_x_m", "q1_rad", "temperature_C", "meas_x_mm", "meas_std_rz_deg")] == [
         "0", "0.5", "6.5", "12.5", "13.5", "24.5"
     ]  # fmt: skip
