@@ -3,7 +3,7 @@
 
     OPENBLAS_NUM_THREADS=1 python -m bench.measured DATA [SET ...] [--draws 1] [--readings 240]
 
-DATA holds a folder for each set (licences and sources in their READMEs; none is part of stiffmap); SET: some of them by name.
+DATA holds a folder for each set (bench/board/sources.py says where they are to be had; none is part of stiffmap); SET: some of them by name.
 """
 
 from __future__ import annotations
@@ -27,7 +27,10 @@ from stiffmap.identification.inference.names import Chosen
 from stiffmap.identification.inference.places import Place
 from stiffmap.identification.inference.verdict import judged
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "examples"))
+HERE = Path(__file__).resolve().parent
+sys.path[:0] = [str(HERE), str(HERE.parent / "examples")]
+from board.sources import absent  # noqa: E402
+
 SEEN = -6.0
 """ln variance from which a part is printed."""
 PANDA = ((0, 0, 333), (-90, 0, 0), (90, 0, 316), (90, 82.5, 0), (-90, -82.5, 384), (90, 0, 0), (90, 88, 0))
@@ -228,7 +231,7 @@ def main() -> int:
     of_columns.MOST_READINGS = o.readings
     for name in o.sets or SETS:
         if not (o.data / name).is_dir():
-            print(f"{name}: skipped, no such folder in {o.data}")
+            print(f"{name}: skipped, {absent(name)}")
             continue
         with tempfile.TemporaryDirectory() as scratch:
             for case, machine, experiment in SETS[name](o.data / name, Path(scratch), o.draws):

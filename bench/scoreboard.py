@@ -27,7 +27,7 @@ sys.path.insert(0, str(HERE))
 from board.page import markdown, page  # noqa: E402
 from board.row import Row  # noqa: E402
 
-DATA = HERE.parents[1] / "shared" / "measured"
+DATA = HERE.parent / "measured"
 COMMAND = "python bench/scoreboard.py --out docs/scoreboard.md"
 
 
@@ -37,7 +37,7 @@ def main() -> int:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="page: .md or .html")
-    parser.add_argument("--data", type=Path, default=DATA, help="folder of the sets [../shared/measured]")
+    parser.add_argument("--data", type=Path, default=DATA, help="folder of the sets [measured]")
     parser.add_argument(
         "--peer", action="append", default=[], metavar="NAME=PYTHON", help="robotkinecal, figaroh"
     )
@@ -54,7 +54,7 @@ def main() -> int:
         nargs="?",
         const="",
         metavar="PROGRAM",
-        help="measure speed only, keep the rows of FILE.json; PROGRAM: pinocchio_vjm.cpp, compiled",
+        help="measure speed only, keep the rows of FILE.json; PROGRAM: bench/peers/pinocchio_vjm.cpp, compiled as it says",
     )
     a = parser.parse_args()
     if bad := [p for p in a.peer if "=" not in p]:
@@ -98,7 +98,10 @@ def measured(
         if name not in known:
             raise SystemExit(f"--only: expected one of {', '.join(known)}, got {name!r}")
     if not folder.is_dir():
-        print(f"no folder {folder}: every set is absent", file=sys.stderr)
+        print(
+            f"no folder {folder}: every set is absent; what follows says where each is to be had",
+            file=sys.stderr,
+        )
 
     def say(line: str) -> None:
         print(line, file=sys.stderr, flush=True)

@@ -3,7 +3,7 @@
 
     python examples/measured_actuator.py [DATA]
 
-DATA is the folder with tests.csv and torque_ramps.csv; default ../shared/measured/cycloidal_actuator_play. The
+DATA is the folder with tests.csv and torque_ramps.csv; default measured/cycloidal_actuator_play. The
 data (CC BY-SA 4.0, JelmerV, Anti-Backlash Cycloidal Actuator) are not part of stiffmap; without them the script
 says so and ends. docs/measured_actuator.md tells the result.
 
@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
-DATA = Path(__file__).resolve().parents[2] / "shared" / "measured" / "cycloidal_actuator_play"
+DATA = Path(__file__).resolve().parents[1] / "measured" / "cycloidal_actuator_play"
 PLAY = 2.0  # N·m: torque that closes the gap, against friction
 MEMORY = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0)  # N·m, half widths of the play operators
 LEVELS = (1.0, 2.0, 4.0, 8.0, 16.0)  # N·m, where stiffness may change

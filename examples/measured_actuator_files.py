@@ -21,7 +21,7 @@ from pathlib import Path
 import stiffmap as sm
 from stiffmap.model.description.tree import joints
 
-DATA = Path(__file__).resolve().parents[2] / "shared" / "measured" / "cycloidal_actuator_play"
+DATA = Path(__file__).resolve().parents[1] / "measured" / "cycloidal_actuator_play"
 MACHINE = """name: gear
 title: a gearbox whose output is clamped
 units: {length: mm, force: N, angle: deg}

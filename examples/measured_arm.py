@@ -4,7 +4,7 @@
     python examples/measured_arm.py [DATA] [--series C B D] [--every 4] [-o FOLDER]
 
 DATA is the folder of the series (series_B.csv, series_C.csv, series_D.csv); default
-../shared/measured/ipa_ur10_accuracy. The data (MIT licence, Landgraf et al., IEEE CASE 2021) are not part
+measured/ipa_ur10_accuracy. The data (MIT licence, Landgraf et al., IEEE CASE 2021) are not part
 of stiffmap; without them the script says so and ends. docs/measured_arm.md tells the result.
 """
 
@@ -28,7 +28,7 @@ from stiffmap.identification.inference.travel import Profile
 from stiffmap.identification.numbers import Tolerances
 from stiffmap.ui.cli.calibrate import write as write_calibration
 
-DATA = Path(__file__).resolve().parents[2] / "shared" / "measured" / "ipa_ur10_accuracy"
+DATA = Path(__file__).resolve().parents[1] / "measured" / "ipa_ur10_accuracy"
 JOINTS = ("base", "shoulder", "elbow", "wrist_1", "wrist_2", "wrist_3")
 ELASTIC = ("drive compliance", "link compliance", "masses")
 LENGTH = 1e3 * 3.0**0.5

@@ -19,7 +19,7 @@ from pathlib import Path
 
 import stiffmap
 
-DATA = Path(__file__).resolve().parents[2] / "shared" / "measured" / "flsun_v400_delta"
+DATA = Path(__file__).resolve().parents[1] / "measured" / "flsun_v400_delta"
 RADIUS, ROD, SPREAD, PLATE = 161.8, 344.0, 50.0, 30.0
 """mm: towers less the effector's radius, rods (means of the sessions); the last two are assumed."""
 TOWERS = {"a": 210, "b": 330, "c": 90}

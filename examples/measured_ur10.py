@@ -4,7 +4,7 @@
 Data: Landgraf et al., IEEE CASE 2021, github.com/christianlandgraf/ipa-robot-accuracy (MIT licence); as
 CSV files in the folder given. They are read where they are and not part of stiffmap.
 
-    python examples/measured_ur10.py ../shared/measured/ipa_ur10_accuracy -o ur10
+    python examples/measured_ur10.py measured/ipa_ur10_accuracy -o ur10
 
 makes an experiment of commanded joint angles and tracker positions, reduced to the robot's base by a
 hand-eye registration whose rest (frames of instrument and tool) stays unknown, and diagnoses it. With

@@ -3,7 +3,7 @@
 
     python examples/measured_ur5.py [DATA] [--poses 1000] [--tolerance 3] [-o FOLDER]
 
-DATA is the folder of grid.csv (to calibrate) and random.csv (20 poses that no fit sees); default ../shared/measured/ur5_tracker.
+DATA is the folder of grid.csv (to calibrate) and random.csv (20 poses that no fit sees); default measured/ur5_tracker.
 The data (MIT licence, P. Jacobi, github.com/pauljac7700/serial_robots_datasets) are not part of stiffmap; without them the script says
 so and ends. The tracker read one reflector: its place on the flange and the tracker's frame are unknown.
 """
@@ -26,7 +26,7 @@ from stiffmap.identification.numbers import Tolerances
 from stiffmap.solve.kinematics import forward_kinematics
 from stiffmap.ui.cli.calibrate import write as write_calibration
 
-DATA = Path(__file__).resolve().parents[2] / "shared" / "measured" / "ur5_tracker"
+DATA = Path(__file__).resolve().parents[1] / "measured" / "ur5_tracker"
 MACHINE = Path(__file__).with_name("ur5.yaml")
 JOINTS = ("base", "shoulder", "elbow", "wrist_1", "wrist_2", "wrist_3")
 HEAD = """machine: ur5

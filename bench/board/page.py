@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from board.row import Row
+from board.sources import SOURCES
 
 HEAD = ("set", "authors", "before", "after", "unseen rows", "cause", "s")
 SPEED = ("case", "program", "µs a pose", "times stiffmap's", "note")
@@ -21,7 +22,9 @@ REPEAT = """This page and the JSON file next to it are written by
 {command}
 ```
 
-The data are no part of stiffmap. Put a folder for each set where `--data` says; sources and licences are below."""
+The data are no part of stiffmap. Each set has a folder in `measured`, or where `--data` says. CLONE is a clone of the authors' repository
+at the commit that is named. The C++ peer of the speed is `bench/peers/pinocchio_vjm.cpp`, which says how to build it; `--speed PROGRAM` runs it."""
+FOLDERS = ("folder", "source, licence", "made by")
 
 
 def number(x: float | None) -> str:
@@ -80,7 +83,9 @@ def markdown(
     for title, head, cells in [*tables(rows), *speed_table(speed)]:
         lines += ["", f"## {title}", "", _line(head), _line(["---"] * len(head))]
         lines += [_line(c) for c in cells]
-    return "\n".join([*lines, "", "## Repeat it", "", REPEAT.format(command=command), ""])
+    folders = [_line([f"`{k}`", str(s), s.files.format(k)]) for k, s in SOURCES.items()]
+    lines += ["", "## Repeat it", "", REPEAT.format(command=command), "", _line(FOLDERS), _line(["---"] * 3)]
+    return "\n".join([*lines, *folders, ""])
 
 
 def page(

@@ -17,6 +17,7 @@ import numpy as np
 import stiffmap as sm
 from board.peers import beside_arm, plain_places
 from board.row import Row
+from board.sources import SOURCES, absent
 from stiffmap.experiment.files.load import load_experiment
 from stiffmap.identification.calibration import Calibration
 from stiffmap.identification.numbers import Tolerances
@@ -43,10 +44,14 @@ class MeasuredSet:
 
     folder: str
     name: str
-    source: str
     authors: str
     rows: Callable[[Path, Asked], Iterator[dict[str, Any]]]
     """Fields of its rows, one after the other."""
+
+    @property
+    def source(self) -> str:
+        """Where it is to be had, and its licence."""
+        return str(SOURCES[self.folder])
 
 
 def all_rows(
@@ -56,7 +61,8 @@ def all_rows(
     for one in (s for s in SETS if only is None or s.folder in only):
         known = {"source": one.source, "authors": one.authors}
         if not (data / one.folder).is_dir():
-            yield Row(one.name, **known, status="absent", note=f"no folder {one.folder} among the data")
+            say(f"{one.name}: {absent(one.folder)}")
+            yield Row(one.name, **known, status="absent", note=absent(one.folder))
             continue
         try:
             for fields in one.rows(data / one.folder, asked):
@@ -208,28 +214,24 @@ SETS = (
     MeasuredSet(
         "ur5_tracker",
         "UR5, laser tracker",
-        "github.com/pauljac7700/serial_robots_datasets, MIT",
         "0.155 mm mean (P. Jacobi's network on top of a geometric calibration; probably after compensation)",
         ur5,
     ),
     MeasuredSet(
         "ipa_ur10_accuracy",
         "UR10, laser tracker",
-        "github.com/christianlandgraf/ipa-robot-accuracy, MIT",
         "no calibrated figure is published with the data",
         ur10,
     ),
     MeasuredSet(
         "flsun_v400_delta",
         "FLSUN V400 delta printer, bed heights",
-        "github.com/fzechert/FLSun-V400, CC0 1.0",
         "at most 0.05 mm at the 7 points that the firmware's calibration was fitted to",
         delta,
     ),
     MeasuredSet(
         "cycloidal_actuator_play",
         "Cycloidal actuator, torque ramps",
-        "github.com/JelmerV/Anti-Backlash-Cycloidal-Actuator, CC BY-SA 4.0",
         "no model of the loops is published with the data",
         gearbox,
     ),

@@ -20,7 +20,7 @@ ROUNDS = 9
 def speed(program: str | None) -> list[dict[str, Any]]:
     """Rows: case, package, microseconds a pose, note. All in turn in one run, one thread, the quickest of nine rounds of each.
 
-    program: pinocchio_vjm.cpp, compiled. A peer that is not here is a row that says so.
+    program: bench/peers/pinocchio_vjm.cpp, compiled as it says. A peer that is not here is a row that says so.
     """
     sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "peers"))
     from tripteron import grid
@@ -49,7 +49,7 @@ def speed(program: str | None) -> list[dict[str, Any]]:
     best = {name: [np.inf, np.inf] for name in works}
     cpp = "Pinocchio, C++ with Eigen"
     if program is None:
-        absent[cpp] = "its program was not given"
+        absent[cpp] = "not given (compile bench/peers/pinocchio_vjm.cpp)"
     else:
         best[cpp] = [np.inf, np.inf]
     for _ in range(ROUNDS):

@@ -1,6 +1,6 @@
 """A measured UR10's kinematics by stiffmap and by other calibration packages: same poses, same folds, held-out error and time.
 
-    OPENBLAS_NUM_THREADS=1 python bench/peers/arm_calibration.py ../shared/measured/ipa_ur10_accuracy --every 8 \\
+    OPENBLAS_NUM_THREADS=1 python bench/peers/arm_calibration.py measured/ipa_ur10_accuracy --every 8 \\
         --peer robotkinecal=/path/to/venv/bin/python --peer figaroh=/path/to/venv/bin/python
 
 Each peer runs in a Python of its own (their requirements exclude each other), `arm_NAME.py` beside this file, and gets commanded

@@ -60,7 +60,9 @@ def test_absent_and_damaged_sets_are_rows(tmp_path: Path) -> None:
     said = {r["set"]: (r["status"], r["note"]) for r in rows}
     assert said["UR5, laser tracker"][0] == "failed"
     assert "grid.csv" in said["UR5, laser tracker"][1]
-    assert said["UR10, laser tracker"] == ("absent", "no folder ipa_ur10_accuracy among the data")
+    status, note = said["UR10, laser tracker"]
+    assert status == "absent" and "ipa_ur10_accuracy" in note and "bench/convert_set.py" in note
+    assert "github.com/christianlandgraf/ipa-robot-accuracy@507fba6, MIT" in note and note in done.stderr
     assert said["a_new_set"] == ("absent", "no reader for this set yet")
     page = (tmp_path / "board.html").read_text()
     assert all(r["set"] in page and r["note"].split(":")[0] in page for r in rows)
@@ -98,3 +100,45 @@ def test_plain_least_squares_finds_a_known_arm() -> None:
     x = plain.fitted(q[:90], seen[:90], *model)
     assert np.abs(plain.places(x, q[90:], *model) - seen[90:]).max() < 1e-12
     assert np.abs(plain.places(0 * x, q, *model) - seen).max() > 1e-2
+
+
+def test_authors_tables_become_sets(tmp_path: Path) -> None:
+    """Small tables of the authors' form; what cannot be found is one line."""
+    clone, data = tmp_path / "clone", tmp_path / "data"
+    for series, name in (("B", "joint_configurations"), ("C", "random_poses"), ("D", "iso_cubes")):
+        (clone / f"Series_{series}").mkdir(parents=True)
+        cells = ";".join(["2,02103E+13", *(f"{k},5" for k in range(25))])
+        head = ";".join(["Timestamp", *"abcdefghijklmnopqrstuvwxy"])
+        (clone / f"Series_{series}/measurements_{name}.csv").write_text(f"{head}\n{cells}\n")
+    for socket in "01":
+        for robot in ("panda_2", "panda_6", "panda_7"):
+            (clone / f"data/{robot}/front").mkdir(parents=True, exist_ok=True)
+            (clone / f"data/{robot}/front/hole_{socket}.csv").write_text("1,2,3,4,5,6,7\n")
+    for name in ("grid", "random"):
+        (clone / f"3D_UR5_uncalibrated_{name}_cleaned.csv").write_text(f"{name}\n")
+
+    def convert(name: str, folder: Path) -> subprocess.CompletedProcess[str]:
+        command = [sys.executable, str(ROOT / "bench/convert_set.py"), name, str(folder), "--data", str(data)]
+        return subprocess.run(command, capture_output=True, text=True)
+
+    for name in ("ur5_tracker", "ipa_ur10_accuracy", "ball_in_socket"):
+        assert convert(name, clone).returncode == 0
+    columns, values = (
+        line.split(",") for line in (data / "ipa_ur10_accuracy/series_D.csv").read_text().splitlines()
+    )
+    made = dict(zip(columns, values, strict=True))
+    assert [made[k] for k in ("index", "goal_x_m", "q1_rad", "temperature_C", "meas_x_mm", "meas_std_rz_deg")] == [
+        "0", "0.5", "6.5", "12.5", "13.5", "24.5"
+    ]  # fmt: skip
+    assert (data / "ball_in_socket/panda_6.csv").read_text().splitlines()[2] == "front,1,1,2,3,4,5,6,7"
+    assert (data / "ur5_tracker/random.csv").read_text() == "random\n"
+    done = convert("ipa_ur10_accuracy", tmp_path)
+    assert done.returncode == 2 and "measurements_joint_configurations.csv" in done.stderr
+
+
+def test_pages_of_measured_machines_name_public_places_only() -> None:
+    for page in (ROOT / "docs").glob("measured_*.md"):
+        text = page.read_text(encoding="utf-8")
+        assert "../" not in text.replace("](../examples/", "") and "scoreboard.md#repeat-it" in text, (
+            page.name
+        )

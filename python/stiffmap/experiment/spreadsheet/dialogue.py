@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.fingerprints import digest
@@ -22,6 +22,7 @@ from stiffmap.experiment.spreadsheet.joints import Commanded
 from stiffmap.experiment.spreadsheet.together import together
 
 Ask = Callable[[str], str]
+Made = TypeVar("Made")
 MOST = 30
 """Questions about one sheet."""
 
@@ -48,7 +49,7 @@ class Answers:
         """These without columns that were made, which the next sheet of this form has not got, but as `given`."""
         there = {*sheet.header, *(f"{sign}{h}" for h in sheet.header for sign in "+-")}
         own = {k: v for k, v in self.chosen.items() if set(v) <= there}
-        return Answers(own | given.chosen, self.units, self.constants, self.noise)
+        return Answers(own | given.chosen, self.units, given.constants | self.constants, self.noise)
 
 
 class Unanswered(StiffmapError):
@@ -103,11 +104,28 @@ def ask_all(
     """The sheet, with columns of the other sign where an answer wants them, understood with the answers to every question that it leaves; raises StiffmapError."""
     commands, further = (joints.columns, joints.head) if joints else ({}, {})
     further = further | dict(head or {})
+
+    def signed(a: Answers) -> tuple[Sheet, Answers, Imported]:
+        meant = together(sheet, a.chosen, a.units, False)
+        a = replace(a, chosen=meant.chosen)
+        found = understand(meant.sheet, a.chosen, a.units, a.constants, commands, further, loaded)
+        return meant.sheet, a, found
+
+    (table, a, found), _ = asked(sheet, a, ask, signed)
+    read = dict.fromkeys(f"d{m[1]}" if m in SEEN else m for m in READINGS if m in found.units)
+    lost = [m for m in read if m not in a.noise]
+    if ask is not None and lost and found.repeats < 2:
+        a = _noise(lost, a, ask)
+    return table, found, a
+
+
+def asked(
+    sheet: Sheet, a: Answers, ask: Ask | None, understood: Callable[[Answers], Made]
+) -> tuple[Made, Answers]:
+    """What is understood with the answers to every question that this leaves, and those; raises StiffmapError."""
     for _ in range(MOST):
         try:
-            signed = together(sheet, a.chosen, a.units, False)
-            sheet, a = signed.sheet, replace(a, chosen=signed.chosen)
-            found = understand(sheet, a.chosen, a.units, a.constants, commands, further, loaded)
+            return understood(a), a
         except Question as question:
             if ask is None:
                 raise
@@ -117,12 +135,6 @@ def ask_all(
                 left = Unanswered(str(nobody))
                 left.answers = a
                 raise left from None
-            continue
-        read = dict.fromkeys(f"d{m[1]}" if m in SEEN else m for m in READINGS if m in found.units)
-        lost = [m for m in read if m not in a.noise]
-        if ask is not None and lost and found.repeats < 2:
-            a = _noise(lost, a, ask)
-        return sheet, found, a
     raise StiffmapError(f"{sheet.file}: the sheet is not understood after {MOST} answers")
 
 
@@ -162,10 +174,13 @@ def _answered(sheet: Sheet, question: Question, a: Answers, ask: Ask) -> Answers
         except ValueError:
             return a
         return Answers(a.chosen, a.units, a.constants | {meaning: value}, a.noise)
+    apart = question.meaning == "socket"
     said = ask(
-        f"{columns}\nWhich column is the position {question.meaning}? A letter, or a number in mm that holds in all rows"
+        "How far is it from one socket to the next, in mm?"
+        if apart
+        else f"{columns}\nWhich column is the position {question.meaning}? A letter, or a number in mm that holds in all rows"
     ).strip()
-    column = _column(sheet, said)
+    column = None if apart else _column(sheet, said)
     if column is not None:
         return Answers(a.chosen | {question.meaning: [column]}, a.units, a.constants, a.noise)
     try:

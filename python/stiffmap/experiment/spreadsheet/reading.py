@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 
 from stiffmap.common.errors import StiffmapError
@@ -16,6 +17,7 @@ from stiffmap.experiment.spreadsheet.dialogue import (
     Ask,
     Unanswered,
     ask_all,
+    asked,
     profile_file,
     remember,
     remembered,
@@ -57,9 +59,10 @@ def read_and_ask(
         table, told = meant.sheet, told + meant.said
         answers = replace(answers, chosen=meant.chosen, units=meant.units)
         joints = commanded(table, how.drives, answers.chosen, answers.units)
+        before = whole = answers
         if joints is not None:
-            joints, answers = seated(joints, answers)
-            joints = as_seen(joints, answers.units, how.difference)
+            (placed, answers), whole = asked(table, whole, ask, partial(seated, joints))
+            joints = as_seen(placed, answers.units, how.difference)
             table, answers = joints.sheet, replace(answers, chosen=joints.chosen)
             told += joints.told
         elif how.wrote is not None:
@@ -80,14 +83,14 @@ def read_and_ask(
         try:
             table, found, final = ask_all(table, answers, ask, joints, beside.head, loaded)
         except Unanswered as left:
-            said = left.answers.of(form, given)
+            said = left.answers.of(form, replace(given, constants=whole.constants))
             if said != given:
                 raise StiffmapError(
                     f"{left}; the answers so far are remembered: {remember(form, said)}"
                 ) from None
             raise
-        if ask is not None and final != answers:
-            said = final.of(form, given)
+        if ask is not None and (final != answers or whole is not before):
+            said = final.of(form, replace(given, constants=whole.constants))
             told.append(f"the answers are remembered for sheets of this form: {remember(form, said)}")
         return table, found, final, [*told, *beside.said, *found.said], joints
 

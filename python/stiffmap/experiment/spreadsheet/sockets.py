@@ -33,9 +33,10 @@ def seated(c: Commanded, a: Answers) -> tuple[Commanded, Answers]:
     if any(k.meaning in READINGS for k in columns) or not (fixed or socket):
         return c, a
     where = [np.full(len(sheet.lines), constants.pop(s)) for s in SEEN] if fixed else []
-    told = "nothing was measured: the point stood in one place of an unknown frame"
+    number, names = _sockets(sheet, socket) if socket and not fixed else (np.zeros(0, np.intp), [""])
+    places = "one place" if len(names) == 1 else f"{len(names)} places"
+    told = f"nothing was measured: the point stood in {places} of an unknown frame"
     if socket and not fixed:
-        number, names = _sockets(sheet, socket)
         apart = constants.pop("socket", 0.0)
         if len(names) > 1 and not apart:
             raise Question(

@@ -86,3 +86,23 @@ def test_a_row_without_a_socket_is_named(
         "balls.csv, line 3: column 'socket': expected the name or number of a socket"
         in capsys.readouterr().err
     )
+
+
+def test_a_dialogue_asks_how_far_sockets_are_apart_and_remembers(
+    rows: list[list[str]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
+    asked, answers = [], iter(["far", "50"])
+
+    def reply(text: str = "") -> str:
+        asked.append(capsys.readouterr().out + text)
+        return next(answers)
+
+    monkeypatch.setattr("builtins.input", reply)
+    code, out = make(tmp_path, "position socket", rows, "--dialogue")
+    assert code == 0 and len(asked) == 2 and "How far is it from one socket to the next, in mm?" in asked[0]
+    seen = load_experiment(out).seen
+    assert seen is not None and seen[1] == pytest.approx([0.05, 0, 0])
+    code, out = make(tmp_path, "position socket", rows, "--overwrite")
+    again = load_experiment(out).seen
+    assert code == 0 and again is not None and again == pytest.approx(seen)
