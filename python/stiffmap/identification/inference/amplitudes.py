@@ -18,7 +18,6 @@ from functools import cached_property
 import numpy as np
 from numpy.linalg import LinAlgError
 from scipy.linalg import cho_solve, cholesky, solve_triangular
-from scipy.linalg.blas import dsymm
 from scipy.linalg.lapack import dpotri
 from scipy.special import gammaln
 
@@ -96,6 +95,8 @@ class Fit:
     """ln N(r | 0, V), with the bound of heavy tails."""
     score: float
     """Evidence: likelihood, priors, and the price of the amplitudes (Laplace)."""
+    gain: dict[int, Floats] = field(default_factory=dict)
+    """What places would add to the evidence, as far as it was asked for: by the place's `id`, (shapes,)."""
 
     @property
     def noise(self) -> float:
@@ -214,8 +215,8 @@ def _heavy(fit: Fit, mean: Floats, sd: Floats) -> Floats:
 
 def evaluated(columns: Columns, parts: Sequence[Part], t: Floats, weights: Floats) -> Fit:
     """The evidence at given amplitudes."""
-    fit, _, information = _evaluate(columns, tuple(parts), t, weights, _noise_matrix(columns, weights))
-    return _priced(fit, information)
+    fit, along = _evaluate(columns, tuple(parts), t, weights, _noise_matrix(columns, weights))
+    return _priced(fit, _information(fit, along))
 
 
 def noise_prior(columns: Columns) -> tuple[float, float]:
@@ -238,38 +239,53 @@ def noise_part(f: Fit) -> tuple[Floats, Floats]:
 def _noise_matrix(columns: Columns, weights: Floats) -> Floats:
     if np.all(weights == 1.0):
         return np.eye(len(columns))
-    return np.asarray(columns.free.T @ (columns.free / weights[:, None]))
+    scaled = columns.free / np.sqrt(weights)[:, None]
+    return np.asarray(scaled.T @ scaled)
 
 
 def _evaluate(
     columns: Columns, parts: tuple[Part, ...], t: Floats, weights: Floats, noise: Floats
-) -> tuple[Fit, Floats, Floats]:
-    """The fit at these amplitudes without their price, the gradient of its objective and the average information; parts that are off
-    have none."""
-    matrices = [noise, *(p.matrix for p in parts)]
-    on = [k for k, x in enumerate(t) if k == 0 or x > OFF]
+) -> tuple[Fit, Floats]:
+    """The fit at these amplitudes without their price, and (m, 1 + k) what each part adds to the readings; parts that are off add
+    nothing."""
     v = columns.zero.copy()
-    for k in on:
-        v += np.exp(t[k]) * matrices[k]
+    for x, matrix in _on(parts, t, noise).values():
+        v += x * matrix
     root = _root(v)
     r = columns.residual
     solved = cho_solve((root, True), r, check_finite=False)
     m = len(r)
     likelihood = -0.5 * float(r @ solved) - float(np.log(np.diag(root)).sum()) - 0.5 * m * np.log(2 * np.pi)
     likelihood += _bound(weights)
-    inverse = dpotri(root, lower=1)[0]  # below the diagonal; above it zero, as the root is
-    along, trace = np.zeros((m, len(t)), order="F"), np.zeros(len(t))
-    for k in on:
-        along[:, k] = np.exp(t[k]) * (matrices[k] @ solved)
-        both = 2.0 * np.vdot(inverse.T, matrices[k]) - np.vdot(np.diag(inverse), np.diag(matrices[k]))
-        trace[k] = np.exp(t[k]) * float(both)
-    gradient = 0.5 * (along.T @ solved - trace)
-    of_data = 0.5 * along.T @ dsymm(1.0, inverse, along, lower=1)
+    along = np.zeros((m, len(t)), order="F")
+    for k, (x, matrix) in _on(parts, t, noise).items():
+        along[:, k] = x * (matrix @ solved)
     centre, sd = _prior(columns, parts)
-    off = t - centre
-    score = likelihood - 0.5 * float(np.sum((off / sd) ** 2))
-    fit = Fit(columns, parts, t, weights, root, solved, likelihood, score)
-    return fit, gradient - off / sd**2, of_data + np.diag(1.0 / sd**2)
+    score = likelihood - 0.5 * float(np.sum(((t - centre) / sd) ** 2))
+    return Fit(columns, parts, t, weights, root, solved, likelihood, score), along
+
+
+def _on(parts: tuple[Part, ...], t: Floats, noise: Floats) -> dict[int, tuple[float, Floats]]:
+    """Variances and matrices (m, m) of the noise and of the parts that are not off, by their places in t."""
+    matrices = {0: noise} | {k: p.matrix for k, p in enumerate(parts, 1) if t[k] > OFF}
+    return {k: (float(np.exp(t[k])), matrix) for k, matrix in matrices.items()}
+
+
+def _gradient(fit: Fit, along: Floats, noise: Floats) -> Floats:
+    """(1 + k,) slope of the score, priced without."""
+    inverse = dpotri(fit.root, lower=1)[0]  # below the diagonal; above it zero, as the root is
+    trace = np.zeros(len(fit.t))
+    for k, (x, matrix) in _on(fit.parts, fit.t, noise).items():
+        trace[k] = x * float(2.0 * np.vdot(inverse.T, matrix) - np.diag(inverse) @ np.diag(matrix))
+    centre, sd = _prior(fit.columns, fit.parts)
+    return np.asarray(0.5 * (along.T @ fit.solved - trace) - (fit.t - centre) / sd**2)
+
+
+def _information(fit: Fit, along: Floats) -> Floats:
+    """(1 + k, 1 + k) average information, priors included."""
+    _, sd = _prior(fit.columns, fit.parts)
+    white = fit.white(along)
+    return np.asarray(0.5 * white.T @ white + np.diag(1.0 / sd**2))
 
 
 def _prior(columns: Columns, parts: Sequence[Part]) -> tuple[Floats, Floats]:
@@ -297,9 +313,10 @@ def _root(v: Floats) -> Floats:
     more = 0.0
     while True:
         try:
-            return np.asarray(cholesky(v + more * np.eye(len(v)), lower=True, check_finite=False))
+            return np.asarray(cholesky(v, lower=True, check_finite=False))
         except LinAlgError:
-            more = max(10.0 * more, ROUND_OFF * float(np.diag(v).max()))
+            more = max(9.0 * more, ROUND_OFF * float(np.diag(v).max()))
+            v = v + more * np.eye(len(v))
 
 
 def _of_size(part: Part, root: Floats, solved: Floats, t: float) -> float:
@@ -352,20 +369,24 @@ def _optimum(
 ) -> Fit:
     """Damped Newton steps on ln variances."""
     damping, noise = SHRINK, _noise_matrix(columns, weights)
-    fit, gradient, information = _evaluate(columns, parts, t, weights, noise)
+    fit, along = _evaluate(columns, parts, t, weights, noise)
+    gradient, information = None, _information(fit, along)
     for _ in range(steps):
+        if gradient is None:
+            gradient = _gradient(fit, along, noise)
         scale = np.maximum(np.diag(information), 1e-2)
         step = np.linalg.solve(information + damping * np.diag(scale), gradient)
         step = np.clip(step, -LARGEST_STEP, LARGEST_STEP)
         sinks = (fit.t + step < SINKS) & (step < 0.0)
-        moved = _evaluate(columns, parts, np.where(sinks, OFF, fit.t + step), weights, noise)
-        gain = moved[0].score - fit.score
+        moved, along_there = _evaluate(columns, parts, np.where(sinks, OFF, fit.t + step), weights, noise)
+        gain = moved.score - fit.score
         if gain < -1e-9:
             damping *= 8.0
             if damping > 1e6:
                 break
             continue
-        fit, gradient, information = moved
+        fit, along, gradient = moved, along_there, None
+        information = _information(fit, along)
         damping = max(damping / 4.0, 1e-3)
         if gain < ENOUGH:
             break

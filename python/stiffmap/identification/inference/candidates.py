@@ -19,26 +19,28 @@ AT_ONCE = 512
 
 
 def evidence(fit: Fit, places: tuple[Place, ...]) -> list[Floats]:
-    """Per place, (shapes,) mean over sizes of the gain of evidence of an effect there, ln."""
-    shapes = [s for p in places for s in p.shapes]
-    out = np.empty(len(shapes))
-    by_rank: dict[int, list[int]] = {}
-    for k, s in enumerate(shapes):
-        by_rank.setdefault(s.directions.shape[1], []).append(k)
+    """Per place, (shapes,) mean over sizes of the gain of evidence of an effect there, ln; worked out once for each fit."""
+    by_rank: dict[int, list[tuple[Floats, int, Shape]]] = {}
+    for p in places:
+        if id(p) not in fit.gain:
+            fit.gain[id(p)] = np.empty(len(p.shapes))
+            for k, s in enumerate(p.shapes):
+                by_rank.setdefault(s.directions.shape[1], []).append((fit.gain[id(p)], k, s))
     for rank, members in by_rank.items():
         for begin in range(0, len(members), max(1, AT_ONCE // rank)):
             some = members[begin : begin + max(1, AT_ONCE // rank)]
-            out[some] = _of_rank(fit, [shapes[k] for k in some], rank)
-    ends = np.cumsum([len(p.shapes) for p in places])
-    return [out[end - len(p.shapes) : end] for p, end in zip(places, ends, strict=True)]
+            for (to, k, _), gain in zip(some, _of_rank(fit, [s for _, _, s in some], rank), strict=True):
+                to[k] = gain
+    return [fit.gain[id(p)] for p in places]
 
 
 def _of_rank(fit: Fit, shapes: list[Shape], rank: int) -> Floats:
-    m = len(fit.columns)
-    factor = np.hstack([s.factor for s in shapes])
-    white = fit.white(factor).reshape(m, len(shapes), rank)
-    inside, vectors = np.linalg.eigh(np.einsum("mia,mib->iab", white, white))
-    z = np.einsum("iab,ia->ib", vectors, (factor.T @ fit.solved).reshape(len(shapes), rank))
+    directions = np.concatenate([s.directions for s in shapes], axis=1)
+    scale = len(fit.columns) / rank  # of a factor's square over that of the directions
+    white = fit.white(directions).T.reshape(len(shapes), rank, -1)
+    inside, vectors = np.linalg.eigh(scale * (white @ white.transpose(0, 2, 1)))
+    along = np.sqrt(scale) * (directions.T @ fit.solved).reshape(len(shapes), rank)
+    z = np.einsum("iab,ia->ib", vectors, along)
     gain = gains(inside, z)
     if rank == 1:
         sign = np.array([s.sign for s in shapes])[:, None]
@@ -56,20 +58,16 @@ def of_pairs(fit: Fit, shapes: Sequence[Shape]) -> Floats:
     for k, v in enumerate(shapes):
         factor[:, k, : v.directions.shape[1]] = v.factor
     white = fit.white(factor.reshape(m, -1))
-    gram = (white.T @ white).reshape(s, rank, s, rank)
+    gram = (white.T @ white).reshape(s, rank, s, rank).swapaxes(1, 2)
     z = (factor.reshape(m, -1).T @ fit.solved).reshape(s, rank)
     b2 = SIZES[::PAIR_STRIDE] ** 2
-    squares = np.stack(np.meshgrid(b2, b2, indexing="ij"), axis=-1).reshape(-1, 2).repeat(rank, axis=1)
+    root = np.sqrt(np.stack(np.meshgrid(b2, b2, indexing="ij"), axis=-1).reshape(-1, 2).repeat(rank, axis=1))
+    first, second = np.tril_indices(s, -1)
+    both = np.stack([first, second], axis=1)
+    of_two = gram[both[:, :, None], both[:, None, :]].swapaxes(2, 3).reshape(-1, 1, 2 * rank, 2 * rank)
+    inner = np.eye(2 * rank) + root[:, :, None] * of_two * root[:, None, :]
+    scaled = root * z[both].reshape(-1, 1, 2 * rank)
+    solved = np.linalg.solve(inner, scaled[..., None])[..., 0]
     out = np.full((s, s), -np.inf)
-    for i in range(s):
-        for j in range(i):
-            both = [i, j]
-            g = gram[both][:, :, both].reshape(2 * rank, 2 * rank)
-            zz = z[both].reshape(-1)
-            root = np.sqrt(squares)
-            inner = np.eye(2 * rank) + root[:, :, None] * g * root[:, None, :]
-            scaled = root * zz
-            solved = np.linalg.solve(inner, scaled[..., None])[..., 0]
-            gain = 0.5 * np.sum(scaled * solved, axis=1) - 0.5 * np.linalg.slogdet(inner)[1]
-            out[i, j] = out[j, i] = log_mean(gain)
-    return out
+    out[first, second] = log_mean(0.5 * np.sum(scaled * solved, axis=-1) - 0.5 * np.linalg.slogdet(inner)[1])
+    return np.asarray(np.maximum(out, out.T))

@@ -99,7 +99,7 @@ def _directions(white: Floats, v: Variant) -> Shape | None:
     sign = 0
     if kept.shape[1] == 1 and seen.sum() == 1 and v.sign[seen][0]:
         sign = int(np.sign(v.sign[seen][0]) * np.sign(float(kept[:, 0] @ white[:, seen][:, 0])))
-    return Shape(v, np.ascontiguousarray(kept), sign)
+    return Shape(v, np.asfortranarray(kept), sign)
 
 
 def _reach(v: Variant, k: int) -> float:

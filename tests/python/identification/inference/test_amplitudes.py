@@ -32,7 +32,8 @@ def test_the_likelihood_is_that_of_the_covariance_and_its_gradient_that_of_diffe
     def objective(x):
         return amplitudes._evaluate(c, some, x, w, noise)
 
-    fit, gradient, information = objective(at)
+    fit, along = objective(at)
+    gradient, information = amplitudes._gradient(fit, along, noise), amplitudes._information(fit, along)
     expected = multivariate_normal(cov=dense(c, some, at, w)).logpdf(c.residual)
     bound = sum(float(ln_bound(0.0, x)) - norm.logpdf(0.0, scale=x**-0.5) for x in w) if heavy else 0.0
     assert fit.likelihood == pytest.approx(expected + bound, abs=1e-8)
@@ -84,7 +85,7 @@ def test_the_price_of_an_effect_is_the_mean_over_its_sizes():
     c, some = columns(rng), parts(rng)
     at, w = np.array([0.1, -1.0, -0.5, 1.2]), np.ones(READINGS)
     fit = amplitudes.evaluated(c, some[2:], at[[0, 3]], w)
-    bare = amplitudes._evaluate(c, some[2:], at[[0, 3]], w, np.eye(len(c)))[2]
+    bare = amplitudes._information(*amplitudes._evaluate(c, some[2:], at[[0, 3]], w, np.eye(len(c))))
     sizes = [np.array([at[0], 2 * np.log(b)]) for b in amplitudes.SIZES]
     each = [multivariate_normal(cov=dense(c, some[2:], x, w)).logpdf(c.residual) for x in sizes]
     price = np.logaddexp.reduce(each) - np.log(len(each)) - fit.likelihood
