@@ -98,16 +98,6 @@ SHOWN = {
 }
 
 
-def quantity_of(meaning: str) -> str:
-    """Length, force, angle, moment or temperature of a column of an experiment."""
-    plain = meaning.removeprefix("u_")
-    if plain == "temperature":
-        return "temperature"
-    if plain.startswith(("euler", "rot", "pr")):
-        return "angle"
-    return {"f": "force", "m": "moment", "r": "angle"}.get(plain[0], "length")
-
-
 def unit_of(text: str, quantity: str | None = None) -> Unit | None:
     """A unit as a sheet writes it, of one quantity or of any; None for what is none."""
     if text.strip() in ("MN", "mN"):  # a factor of 1e9 between the two: here the case decides

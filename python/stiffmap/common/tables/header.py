@@ -40,7 +40,7 @@ def header_of(
     if len(lines) > 1 and _needs_group(names, lines[-2][1], first):
         names = _grouped(lines[-2][1], names, known)
     if units:
-        names = [_with_unit(n, units[i] if i < len(units) else "") for i, n in enumerate(names)]
+        names = [_with_own_unit(n, units[i] if i < len(units) else "") for i, n in enumerate(names)]
     return number, names
 
 
@@ -98,9 +98,14 @@ def _units(cells: Sequence[str]) -> bool:
     return bool(named) and len(named) >= 0.6 * len(filled)
 
 
-def _with_unit(name: str, unit: str) -> str:
+def with_unit(name: str, unit: str) -> str:
+    """``x [mm]``, or the bare name where there is no unit."""
+    return f"{name} [{unit}]" if unit else name
+
+
+def _with_own_unit(name: str, unit: str) -> str:
     bare = _bare(unit)
-    return f"{name} [{bare}]" if bare and unit_of(bare) is not None and not split_unit(name)[1] else name
+    return name if unit_of(bare) is None or split_unit(name)[1] else with_unit(name, bare)
 
 
 def _needs_group(names: Sequence[str], group: Sequence[str], first: Sequence[str]) -> bool:
@@ -126,7 +131,7 @@ def _grouped(group: Sequence[str], names: Sequence[str], known: Callable[[str], 
         text = " ".join(p for p in (title, plain) if p)
         if once[plain.lower()] == 1 and known(plain) and not known(text):
             text = plain  # Force over Fx
-        out.append(f"{text} [{own or unit}]" if own or unit else text)
+        out.append(with_unit(text, own or unit))
     return out
 
 

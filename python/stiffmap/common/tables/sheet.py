@@ -6,10 +6,14 @@ import math
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import chain
 from pathlib import Path
 from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError, StiffmapError
@@ -62,6 +66,24 @@ class Sheet:
         """The rows, one by one."""
         return zip(*self.columns, strict=True)
 
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """The header without units."""
+        return tuple(split_unit(h)[0] for h in self.header)
+
+    def unit(self, column: int) -> str:
+        """The unit that stands in a column's header, or nothing."""
+        return split_unit(self.header[column])[1]
+
+    def with_cells(self, name: str, cells: Iterable[str]) -> Sheet:
+        """The sheet and one column more."""
+        return replace(self, header=(*self.header, name), columns=(*self.columns, Cells.of(cells)))
+
+    def with_column(self, name: str, values: ArrayLike) -> Sheet:
+        """The sheet and one column of numbers (rows,) more, empty where they are NaN."""
+        cells = ["" if v != v else repr(v) for v in np.asarray(values, dtype=float).tolist()]
+        return self.with_cells(name, (c.replace(".", ",") for c in cells) if self.decimal_comma else cells)
+
     def numbers(self, column: int) -> Floats:
         """A column; NaN where nothing was read. FileError names the line of what is no number."""
         if column not in self._read:
@@ -71,13 +93,12 @@ class Sheet:
 
     def size(self, column: int, meaning: str, quantity: str, said: str = "") -> float:
         """SI size of a column's unit: `said`, else that of its header. StiffmapError names the column and the way to say it."""
-        name, own = split_unit(self.header[column])
-        unit = unit_of(said or own, quantity)
+        unit = unit_of(said or self.unit(column), quantity)
         if unit is None:
             usual = "mm" if quantity == "length" else "deg"
             raise StiffmapError(
                 f"{self.file}: column '{self.header[column]}' ({meaning}) has no unit of {quantity}s ({known(quantity)}): write it in "
-                f"the header, as in '{name} [{usual}]', or say --unit {meaning}={usual} (--unit {quantity}={usual}: of all {quantity}s)"
+                f"the header, as in '{self.names[column]} [{usual}]', or say --unit {meaning}={usual} (--unit {quantity}={usual}: of all {quantity}s)"
             )
         return unit.size
 
