@@ -114,7 +114,7 @@ def known(quantity: str | None = None) -> str:
 
 def name_and_unit(header: str) -> tuple[str, str]:
     """``x [mm]`` is x in mm; an empty unit where none stands in brackets."""
-    match = re.fullmatch(r"\s*(.*?)\s*(?:[\[(]\s*([^\])]*?)\s*[\])])?\s*", header)
+    match = re.fullmatch(r"\s*(.*?)\s*(?:[\[(]\s*([^\])]*?)\s*[\])])?\s*", header, re.DOTALL)
     assert match is not None  # any text is a name
     return match[1], match[2] or ""
 

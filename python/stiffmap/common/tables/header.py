@@ -7,7 +7,8 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from itertools import pairwise
 
-from stiffmap.common.units import unit_of
+from stiffmap.common.errors import FileError
+from stiffmap.common.units import name_and_unit, unit_of
 
 Line = tuple[int, list[str]]
 MOST_LINES = 4
@@ -42,6 +43,13 @@ def header_of(
     if units:
         names = [_with_own_unit(n, units[i] if i < len(units) else "") for i, n in enumerate(names)]
     return number, names
+
+
+def refuse_twice(names: Sequence[str], file: str, line: int) -> None:
+    """FileError where two columns have one name."""
+    twice = sorted(name for name, times in Counter(names).items() if times > 1)
+    if twice:
+        raise FileError(f"column '{twice[0]}' occurs twice", file=file, line=line)
 
 
 RECORD = {
@@ -138,9 +146,9 @@ def _grouped(group: Sequence[str], names: Sequence[str], known: Callable[[str], 
 def split_unit(header: str) -> tuple[str, str]:
     """``Uhr 1 [µm]`` is ``Uhr 1`` in ``µm``; also round brackets, and ``x / mm``, ``x, mm``, ``x in mm``, ``x_mm``,
     ``x 1/100 mm``."""
-    match = re.match(r"^(.*?)\s*[\[(]\s*([^\])]*)\s*[\])]\s*$", header)
-    if match:
-        return match[1].strip(), match[2].strip()
+    name, unit = name_and_unit(header)
+    if name != header.strip():
+        return name, unit
     part = re.match(
         r"^(.*?\S)(?:\s+in)?[\s,;]+((?:1/|0[.,]0*1\s?)\d*\s?(?:mm|in)?|(?:mm|in)/1\d+)\s*$", header
     )

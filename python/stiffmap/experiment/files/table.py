@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,7 +16,7 @@ from stiffmap.common.errors import FileError, MissingColumnError
 from stiffmap.common.number_text import number_in
 from stiffmap.common.outputs import unguarded
 from stiffmap.common.tables.cells import Cells, filled, packed, row_numbers
-from stiffmap.common.tables.header import Line
+from stiffmap.common.tables.header import Line, refuse_twice
 from stiffmap.common.tables.lines import decimal_comma, lines_of, with_points
 from stiffmap.model.files.schema.base import suggestion
 
@@ -119,9 +118,7 @@ def read_table(path: Path, expected: int | None = None) -> Table:
 
 def _rows(rows: Iterable[Line], header: Sequence[str], lines: Any, file: str) -> Iterator[list[str]]:
     """Rows with something in them, as long as the header; `lines` gathers their numbers."""
-    twice = sorted(c for c, times in Counter(header).items() if times > 1)
-    if twice:
-        raise FileError(f"column '{twice[0]}' occurs twice", file=file, line=1)
+    refuse_twice(header, file, 1)
     width = len(header)
     for n, row in rows:
         if len(row) != width:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stiffmap.common.errors import FileError
+from stiffmap.common.tables.header import refuse_twice
 from stiffmap.common.units import (
     FORCES,
     LENGTHS,
@@ -66,9 +67,7 @@ class Scales:
         file declares none, that of the header holds. Names in `whole` are no such columns. Raises `FileError`."""
         split = [(h, "") if h in whole else name_and_unit(h) for h in table.header]
         names = tuple(name for name, _ in split)
-        twice = next((n for n in names if names.count(n) > 1), None)
-        if twice:
-            table.fail(f"column '{twice}' occurs twice")
+        refuse_twice(names, table.file, 1)
         factors = {name: self._factor(name, unit, table) for name, unit in split if unit}
         return replace(table, header=names, factors=factors)
 

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import repeat
 from pathlib import Path
 from typing import Any, NoReturn
 
-import numpy as np
-
-from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs import make_folder, only_job, write_rows, write_text
 from stiffmap.common.tables.cells import row_numbers
@@ -168,7 +166,7 @@ def _unit(sheet: Sheet, c: Column, units: Mapping[str, str], beside: Mapping[int
 
 
 class Rows:
-    """Rows of data.csv, made block by block whenever they are asked for: text, and numbers as floats."""
+    """Rows of data.csv, made one by one whenever they are asked for: text, and numbers as floats."""
 
     def __init__(
         self, sheet: Sheet, used: list[Column], constants: Mapping[str, float], factors: Mapping[str, float]
@@ -192,7 +190,6 @@ class Rows:
         self._wanted: list[list[int | float | None]] = [
             [*always, *(at.get((m, k)) for m in meanings)] for k in range(1, self.repeats + 1)
         ]
-        self._words = [c.index for c in used if c.meaning in WORDS]
         self._name = header.index("id") if "id" in header else None
         self.lines = row_numbers()
         """Line in the sheet of each row, once they were made."""
@@ -201,19 +198,12 @@ class Rows:
     def __iter__(self) -> Iterator[Sequence[Any]]:
         self.lines = row_numbers()
         taken: set[str] = set()
-        words = {i: self._sheet.columns[i].parts() for i in self._words}
-        start = 0
-        for size in map(len, self._sheet.columns[0].parts()):
-            here = slice(start, start + size)
-            cells = {i: next(parts) for i, parts in words.items()}
-            cells |= {i: _written(values[here]) for i, values in self._numbers.items()}
-            each = [self._block(k, cells, size) for k in range(self.repeats)]
-            for n, rows in enumerate(zip(*each, strict=True), start):
-                for row in rows:
-                    if any(row[i] != "" for i in self._readings):
-                        self.lines.append(self._sheet.lines[n])
-                        yield self._once(row, taken)
-            start += size
+        sides = zip(*map(self._side, range(self.repeats)), strict=True)
+        for line, rows in zip(self._sheet.lines, sides, strict=True):
+            for row in rows:
+                if any(row[i] != "" for i in self._readings):
+                    self.lines.append(line)
+                    yield self._once(row, taken)
 
     def _once(self, row: Sequence[Any], taken: set[str]) -> Sequence[Any]:
         """A point that is read again is a repeat: its second row is called ``P1.2``."""
@@ -228,26 +218,28 @@ class Rows:
         taken.add(free)
         return row if free == row[self._name] else [*row[: self._name], free, *row[self._name + 1 :]]
 
-    def _block(self, k: int, cells: dict[int, list[Any]], size: int) -> Iterator[Sequence[Any]]:
+    def _side(self, k: int) -> Iterator[Sequence[Any]]:
         """Rows of one of the repeats that stand side by side."""
-        columns = [
-            [""] * size if w is None else [w] * size if isinstance(w, float) else cells[w]
-            for w in self._wanted[k]
-        ]
+        columns = [self._cells(wanted) for wanted in self._wanted[k]]
         if self.repeats > 1:
             if self._name is not None:
-                columns[self._name] = [f"{name}.{k + 1}" for name in columns[self._name]]
-            columns.append([k + 1] * size)
+                columns[self._name] = (f"{name}.{k + 1}" for name in columns[self._name])
+            columns.append(self._same(k + 1))
         return zip(*columns, strict=True)
+
+    def _cells(self, wanted: int | float | None) -> Iterable[Any]:
+        """Of a column of the sheet by its index, or of a number that is the same in all rows; None: empty ones."""
+        if wanted is None or isinstance(wanted, float):
+            return self._same("" if wanted is None else wanted)
+        if wanted not in self._numbers:
+            return self._sheet.columns[wanted]
+        return ("" if v != v else v for v in map(float, self._numbers[wanted]))
+
+    def _same(self, cell: Any) -> Iterable[Any]:
+        return repeat(cell, len(self._sheet.lines))
 
     def __len__(self) -> int:
         return sum(1 for _ in self)
-
-
-def _written(values: Floats) -> list[Any]:
-    """Numbers, and nothing where there are none."""
-    out: list[Any] = values.tolist()
-    return ["" if v != v else v for v in out] if np.isnan(values).any() else out
 
 
 def write_folder(
