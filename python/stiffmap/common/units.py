@@ -1,4 +1,4 @@
-"""Units of length, force, moment, mass, angle, time and acceleration: their sizes in SI, and how sheets spell them."""
+"""Units of length, force, moment, mass, angle and time: their sizes in SI, and how sheets spell them."""
 
 from __future__ import annotations
 
@@ -39,7 +39,6 @@ GRAVITY = Fraction("9.80665")
 """Standard acceleration of gravity, m/s²: the weight of a kilogram in N."""
 POUND = Fraction("4.4482216152605")
 """A pound-force, N."""
-ACCELERATIONS = {"m/s2": Fraction(1), "m/s²": Fraction(1), "g": GRAVITY}
 
 
 class Unit(NamedTuple):

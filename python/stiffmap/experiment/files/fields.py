@@ -45,7 +45,7 @@ QUANTITIES = {
 }
 SI = {"m": "length", "rad": "angle"}
 DECLARED = (*POSE, *POSE2, *AXES, *VECTOR, *WRENCH)
-"""Columns whose unit experiment.yaml may declare, beside those of kinds of readings."""
+"""Columns whose unit experiment.yaml may declare, in addition to kinds of readings."""
 
 
 def quantity_of(column: str) -> str | None:

@@ -23,6 +23,9 @@ from stiffmap.experiment.files.units import ANGLES, Scales
 from stiffmap.experiment.readings import kinds
 from stiffmap.model.files.report import validated
 
+SAME = ("point", "unloaded", "frame", "tool", "title", "reference_temperature")
+"""Keys of the file that an `Experiment` has as they are."""
+
 
 def load_experiment(path: str | PathLike[str]) -> Experiment:
     """Experiment from a folder with ``experiment.yaml`` and its CSV file, or from the YAML file.
@@ -151,19 +154,14 @@ def _setting(model: ExperimentFile, scales: Scales, file: Path) -> dict[str, Any
     return {
         "rotation_against": model.orientation.against,
         "command_of": tuple(_channel(n, c.unit, c.actuator) for n, c in model.command.items()),
-        "reference_temperature": model.reference_temperature,
         "normal": (x, y, z),
         "surface": model.surface.shape,
         "anchor": None if model.anchor is None else tuple(scales.length * v for v in model.anchor),
-        "point": model.point,
+        **{k: getattr(model, k) for k in SAME},
         "load_point": model.load_point or model.point,
         "zero_sigma": np.nan_to_num(read_columns.declared(model.zero_noise, scales, AXIS_CHANNELS)),
-        "unloaded": model.unloaded,
-        "frame": model.frame,
-        "tool": model.tool,
         "certificate": _certificate(model, scales, file),
         "loop": Loop(**model.metrology.model_dump()),
-        "title": model.title,
         "record": tuple((k, v) for k, v in {**model.record.model_dump(), "notes": model.notes}.items() if v),
         "source": str(file),
     }

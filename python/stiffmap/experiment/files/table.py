@@ -82,12 +82,12 @@ class Table:
         """The first of these columns that the table has."""
         return next((c for c in names if c in self), None)
 
-    def refuse_unknown(self, known: Sequence[str], told: str) -> None:
-        """`FileError` for the first column that is none of these, which `told` introduces."""
+    def refuse_unknown(self, known: Sequence[str], list_of: str) -> None:
+        """`FileError` for the first column that is none of these; `list_of` stands before their names."""
         for column in self.header:
             if column not in known:
                 near = suggestion(column, list(known))
-                self.fail(f"unknown column '{column}'{near}; {told} {', '.join(known)}")
+                self.fail(f"unknown column '{column}'{near}; {list_of} {', '.join(known)}")
 
     def fail(self, message: str, row: int | None = None) -> NoReturn:
         """Raise `FileError` that names a row, or the header."""

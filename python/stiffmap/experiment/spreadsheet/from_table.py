@@ -12,6 +12,7 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.common.fingerprints import file_digest
 from stiffmap.common.outputs import new_file
 from stiffmap.common.short import short_repr
+from stiffmap.common.tables.header import RECORD
 from stiffmap.common.tables.sheet import Layout, Sheet, read_sheet
 from stiffmap.experiment.experiment import Experiment
 from stiffmap.experiment.noise.level import against_the_load, contradictions
@@ -25,8 +26,6 @@ from stiffmap.experiment.spreadsheet.instrument import load_instrument
 from stiffmap.experiment.spreadsheet.joints import DIFFERENCES, drives_of
 from stiffmap.experiment.spreadsheet.reading import Reading, read_and_ask
 from stiffmap.solve.machine import Machine, load_machine
-
-RECORDED = ("certificate", "date", "instrument", "notes", "operator", "temperature")
 
 
 @short_repr
@@ -111,9 +110,9 @@ def experiment_from_table(
                 f"{name}: expected a mapping of columns to what is said of them, got {value!r}"
             )
     new_file(output / "experiment.yaml", overwrite, output)
-    wrong = sorted(set(record or ()) - {*RECORDED})
+    wrong = sorted(set(record or ()) - {*RECORD})
     if wrong:
-        raise StiffmapError(f"record: expected one of {', '.join(RECORDED)}; got '{wrong[0]}'")
+        raise StiffmapError(f"record: expected one of {', '.join(sorted(RECORD))}; got '{wrong[0]}'")
     chosen = {k: v.split("|") for k, v in (columns or {}).items()}
     given = Answers(chosen, dict(units or {}), dict(constants or {}), dict(noise or {}))
     rows = None if dh is None else read_dh(read_sheet(Path(dh)), given.units)
