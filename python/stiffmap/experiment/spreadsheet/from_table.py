@@ -43,8 +43,8 @@ class FromTable:
     """What was taken for granted, and what was left out."""
     sheet: Sheet = field(repr=False)
     understood: Imported = field(repr=False)
-    commanded: Meant = field(repr=False)
-    """Columns of joints that the table commands, with all that was said of it."""
+    commanded: Meant | None = field(repr=False)
+    """Joints that the table commands."""
 
 
 def experiment_from_table(
@@ -134,4 +134,4 @@ def experiment_from_table(
         Machine(arm(rows, dh_convention, output.name, source, m.middle())).save(declared)
     warnings = tuple(line for line in (against_the_load(made), *contradictions(made)) if line)
     remarks = (*m.said, *(f"left out: {text}" for text in own.aside))
-    return FromTable(made, output, declared, warnings, remarks, own, found, m)
+    return FromTable(made, output, declared, warnings, remarks, own, found, m if m.columns else None)

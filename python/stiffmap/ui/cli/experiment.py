@@ -144,7 +144,7 @@ def _prompt(text: str) -> str:
 def _told(table: FromTable) -> Iterator[Any]:
     """What each column was taken for, the first rows, and what to do next."""
     found, header, made = table.understood, table.sheet.header, table.experiment
-    commands = table.commanded.columns
+    commands = table.commanded.columns if table.commanded else {}
     for c in found.columns:
         if c.meaning in commands:
             yield f"'{header[c.index]}': command of {', '.join(commands[c.meaning])}"
