@@ -1,4 +1,4 @@
-"""Units of length, force, moment, mass, angle, time and acceleration: their sizes in SI, and how sheets spell them."""
+"""Units of length, force, moment, mass, angle and time: their sizes in SI, and how sheets spell them."""
 
 from __future__ import annotations
 
@@ -39,7 +39,6 @@ GRAVITY = Fraction("9.80665")
 """Standard acceleration of gravity, m/s²: the weight of a kilogram in N."""
 POUND = Fraction("4.4482216152605")
 """A pound-force, N."""
-ACCELERATIONS = {"m/s2": Fraction(1), "m/s²": Fraction(1), "g": GRAVITY}
 
 
 class Unit(NamedTuple):
@@ -98,16 +97,6 @@ SHOWN = {
 }
 
 
-def quantity_of(meaning: str) -> str:
-    """Length, force, angle, moment or temperature of a column of an experiment."""
-    plain = meaning.removeprefix("u_")
-    if plain == "temperature":
-        return "temperature"
-    if plain.startswith(("euler", "rot", "pr")):
-        return "angle"
-    return {"f": "force", "m": "moment", "r": "angle"}.get(plain[0], "length")
-
-
 def unit_of(text: str, quantity: str | None = None) -> Unit | None:
     """A unit as a sheet writes it, of one quantity or of any; None for what is none."""
     if text.strip() in ("MN", "mN"):  # a factor of 1e9 between the two: here the case decides
@@ -124,7 +113,7 @@ def known(quantity: str | None = None) -> str:
 
 def name_and_unit(header: str) -> tuple[str, str]:
     """``x [mm]`` is x in mm; an empty unit where none stands in brackets."""
-    match = re.fullmatch(r"\s*(.*?)\s*(?:[\[(]\s*([^\])]*?)\s*[\])])?\s*", header)
+    match = re.fullmatch(r"\s*(.*?)\s*(?:[\[(]\s*([^\])]*?)\s*[\])])?\s*", header, re.DOTALL)
     assert match is not None  # any text is a name
     return match[1], match[2] or ""
 

@@ -10,8 +10,7 @@ import pytest
 
 import stiffmap as sm
 from stiffmap.experiment import Predictor
-from stiffmap.experiment.files.columns import known
-from stiffmap.experiment.files.orientation import MATRIX, TURNED2
+from stiffmap.experiment.files.fields import MATRIX, TURNED2, known
 from stiffmap.experiment.files.schema import ExperimentFile
 
 PAGE = (Path(__file__).parents[3] / "docs" / "experiments.md").read_text(encoding="utf-8")

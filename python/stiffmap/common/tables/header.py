@@ -7,7 +7,8 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from itertools import pairwise
 
-from stiffmap.common.units import unit_of
+from stiffmap.common.errors import FileError
+from stiffmap.common.units import name_and_unit, unit_of
 
 Line = tuple[int, list[str]]
 MOST_LINES = 4
@@ -40,8 +41,15 @@ def header_of(
     if len(lines) > 1 and _needs_group(names, lines[-2][1], first):
         names = _grouped(lines[-2][1], names, known)
     if units:
-        names = [_with_unit(n, units[i] if i < len(units) else "") for i, n in enumerate(names)]
+        names = [_with_own_unit(n, units[i] if i < len(units) else "") for i, n in enumerate(names)]
     return number, names
+
+
+def refuse_twice(names: Sequence[str], file: str, line: int) -> None:
+    """FileError where two columns have one name."""
+    twice = sorted(name for name, times in Counter(names).items() if times > 1)
+    if twice:
+        raise FileError(f"column '{twice[0]}' occurs twice", file=file, line=line)
 
 
 RECORD = {
@@ -98,9 +106,14 @@ def _units(cells: Sequence[str]) -> bool:
     return bool(named) and len(named) >= 0.6 * len(filled)
 
 
-def _with_unit(name: str, unit: str) -> str:
+def with_unit(name: str, unit: str) -> str:
+    """``x [mm]``, or the bare name where there is no unit."""
+    return f"{name} [{unit}]" if unit else name
+
+
+def _with_own_unit(name: str, unit: str) -> str:
     bare = _bare(unit)
-    return f"{name} [{bare}]" if bare and unit_of(bare) is not None and not split_unit(name)[1] else name
+    return name if unit_of(bare) is None or split_unit(name)[1] else with_unit(name, bare)
 
 
 def _needs_group(names: Sequence[str], group: Sequence[str], first: Sequence[str]) -> bool:
@@ -126,16 +139,16 @@ def _grouped(group: Sequence[str], names: Sequence[str], known: Callable[[str], 
         text = " ".join(p for p in (title, plain) if p)
         if once[plain.lower()] == 1 and known(plain) and not known(text):
             text = plain  # Force over Fx
-        out.append(f"{text} [{own or unit}]" if own or unit else text)
+        out.append(with_unit(text, own or unit))
     return out
 
 
 def split_unit(header: str) -> tuple[str, str]:
     """``Uhr 1 [µm]`` is ``Uhr 1`` in ``µm``; also round brackets, and ``x / mm``, ``x, mm``, ``x in mm``, ``x_mm``,
     ``x 1/100 mm``."""
-    match = re.match(r"^(.*?)\s*[\[(]\s*([^\])]*)\s*[\])]\s*$", header)
-    if match:
-        return match[1].strip(), match[2].strip()
+    name, unit = name_and_unit(header)
+    if name != header.strip():
+        return name, unit
     part = re.match(
         r"^(.*?\S)(?:\s+in)?[\s,;]+((?:1/|0[.,]0*1\s?)\d*\s?(?:mm|in)?|(?:mm|in)/1\d+)\s*$", header
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
@@ -12,6 +13,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from stiffmap.common.errors import FileError
+from stiffmap.common.number_text import number_in
 from stiffmap.common.tables.cells import BETWEEN, BLOCK, Cells, filled
 from stiffmap.common.tables.workbook import workbook_lines
 
@@ -29,6 +31,13 @@ POINT = re.compile(r"^[ \t]*[+-]?\d*\.\d+[ \t]*$", re.M)
 SAMPLE = 2_000
 """Lines by which the separator is found."""
 NUMBER = re.compile(r"\s*[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?\s*")
+
+
+NOTHING = {
+    "", *["na", "n/a", "n.a.", "nan", "none", "null", "#n/a", "#nv", "n.m.", "k.a.", "ka", "?", "x", "./.", "*", "out", "off", "leer", "empty", "fehlt", "missing", "entfällt", "ausreißer"],
+    *["#div/0!", "#value!", "#wert!", "#ref!", "#bezug!", "#name?", "#num!", "#zahl!"], "k. a.", "nicht gemessen", "not read", "not measured",
+}  # fmt: skip
+DASHES = re.compile(r"[-–—_.· ]+")
 
 
 class Source(NamedTuple):
@@ -88,6 +97,32 @@ def decimal_comma(rows: Iterable[list[str]]) -> bool:
         if points:
             return False
     return commas
+
+
+def number(cell: str, decimal_comma: bool) -> float | None:
+    """The number in a cell; NaN for nothing, None for text."""
+    text = plain(cell.strip())
+    if text.lower() in NOTHING or DASHES.fullmatch(text):
+        return math.nan
+    if decimal_comma:
+        text = with_point(text)
+    try:
+        value = number_in(text)
+    except ValueError:
+        return None
+    return value if math.isfinite(value) else None
+
+
+def is_finite(cell: str, comma: bool) -> bool:
+    """Whether a cell holds a number."""
+    value = number(cell, comma)
+    return value is not None and math.isfinite(value)
+
+
+def is_data(cells: list[str], comma: bool) -> bool:
+    """Whether at least half of the cells that are filled are numbers, two of them or more."""
+    numeric = sum(is_finite(c, comma) for c in cells)
+    return numeric >= 2 and 2 * numeric >= sum(bool(c.strip()) for c in cells)
 
 
 def _text(path: Path) -> Source:

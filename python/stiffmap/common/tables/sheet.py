@@ -2,36 +2,33 @@
 
 from __future__ import annotations
 
-import math
 import re
-from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import chain
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import ArrayLike
+
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError, StiffmapError
-from stiffmap.common.number_text import number_in
 from stiffmap.common.tables.cells import Cells, filled, packed, row_numbers
-from stiffmap.common.tables.header import Line, fits, header_of, record_of, split_unit
+from stiffmap.common.tables.header import Line, fits, header_of, record_of, refuse_twice, split_unit
 from stiffmap.common.tables.lines import (
     COMMENTS,
     decimal_comma,
+    is_data,
+    is_finite,
     kept,
     lines_of,
-    plain,
-    with_point,
+    number,
     with_points,
 )
 from stiffmap.common.units import known, unit_of
 
-NOTHING = {
-    "", *["na", "n/a", "n.a.", "nan", "none", "null", "#n/a", "#nv", "n.m.", "k.a.", "ka", "?", "x", "./.", "*", "out", "off", "leer", "empty", "fehlt", "missing", "entfällt", "ausreißer"],
-    *["#div/0!", "#value!", "#wert!", "#ref!", "#bezug!", "#name?", "#num!", "#zahl!"], "k. a.", "nicht gemessen", "not read", "not measured",
-}  # fmt: skip
-DASHES = re.compile(r"[-–—_.· ]+")
 STATISTICS = re.compile(
     r"(mean|average|avg|mittel(wert)?e?|mw|ø|sum|summe|total|gesamt|std\.?( ?dev\.?)?|stdev|stabw|s|sigma|σ|min(imum)?|"
     r"max(imum)?|median|range|spannweite|rms|durchschnitt|standardabweichung|streuung)\.?:?( .*)?",
@@ -62,6 +59,24 @@ class Sheet:
         """The rows, one by one."""
         return zip(*self.columns, strict=True)
 
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """The header without units."""
+        return tuple(split_unit(h)[0] for h in self.header)
+
+    def unit(self, column: int) -> str:
+        """The unit that stands in a column's header, or nothing."""
+        return split_unit(self.header[column])[1]
+
+    def with_cells(self, name: str, cells: Iterable[str]) -> Sheet:
+        """The sheet and one column more."""
+        return replace(self, header=(*self.header, name), columns=(*self.columns, Cells.of(cells)))
+
+    def with_column(self, name: str, values: ArrayLike) -> Sheet:
+        """The sheet and one column of numbers (rows,) more, empty where they are NaN."""
+        cells = ["" if v != v else repr(v) for v in np.asarray(values, dtype=float).tolist()]
+        return self.with_cells(name, (c.replace(".", ",") for c in cells) if self.decimal_comma else cells)
+
     def numbers(self, column: int) -> Floats:
         """A column; NaN where nothing was read. FileError names the line of what is no number."""
         if column not in self._read:
@@ -71,13 +86,12 @@ class Sheet:
 
     def size(self, column: int, meaning: str, quantity: str, said: str = "") -> float:
         """SI size of a column's unit: `said`, else that of its header. StiffmapError names the column and the way to say it."""
-        name, own = split_unit(self.header[column])
-        unit = unit_of(said or own, quantity)
+        unit = unit_of(said or self.unit(column), quantity)
         if unit is None:
             usual = "mm" if quantity == "length" else "deg"
             raise StiffmapError(
                 f"{self.file}: column '{self.header[column]}' ({meaning}) has no unit of {quantity}s ({known(quantity)}): write it in "
-                f"the header, as in '{name} [{usual}]', or say --unit {meaning}={usual} (--unit {quantity}={usual}: of all {quantity}s)"
+                f"the header, as in '{self.names[column]} [{usual}]', or say --unit {meaning}={usual} (--unit {quantity}={usual}: of all {quantity}s)"
             )
         return unit.size
 
@@ -99,20 +113,6 @@ class Sheet:
         except FileError:
             return False
         return True
-
-
-def number(cell: str, decimal_comma: bool) -> float | None:
-    """The number in a cell; NaN for nothing, None for text."""
-    text = plain(cell.strip())
-    if text.lower() in NOTHING or DASHES.fullmatch(text):
-        return math.nan
-    if decimal_comma:
-        text = with_point(text)
-    try:
-        value = number_in(text)
-    except ValueError:
-        return None
-    return value if math.isfinite(value) else None
 
 
 @dataclass(frozen=True)
@@ -141,12 +141,9 @@ def read_sheet(path: Path, sheet: str | None = None, layout: Layout = PLAIN) -> 
     """
     page, lines, _ = lines_of(path, sheet)
     comma = decimal_comma(c for _, c in kept(lines()))
-    if layout.table is not None:
-        chosen = _one_table(lines(), comma, layout, str(path))
-        lines = lambda: chosen  # noqa: E731
     above: list[Line] = []
-    rows = iter(lines())
-    first = next((row for row in _above(rows, comma, above)), None)
+    rows = iter(lines() if layout.table is None else _one_table(lines(), comma, layout, str(path)))
+    first = next(_above(rows, comma, above), None)
     found = None if first is None else header_of(above, first[1], layout.known)
     if first is not None and (layout.header or (found is None and layout.numbered)):
         found = first[0], _names(first[1], layout.header, str(path), first[0])
@@ -159,25 +156,30 @@ def read_sheet(path: Path, sheet: str | None = None, layout: Layout = PLAIN) -> 
             f"no header line with rows of numbers below it was found{way if first else ''}", file=str(path)
         )
     number_, header = found
-    endless = next((c for c in header if len(c) > LONGEST_HEADER), None)
-    if endless is not None or len(header) > MOST_COLUMNS:
-        what = f"{len(header)} columns" if endless is None else f"one of {len(endless)} characters"
-        raise FileError(
-            f"expected a header of at most {MOST_COLUMNS} columns of {LONGEST_HEADER} characters each; found {what}",
-            file=str(path),
-            line=number_,
-        )
-    width = max(i for i, c in enumerate(header) if c) + 1
-    names = [h or f"column {i + 1}" for i, h in enumerate(header[:width])]
-    twice = sorted(h for h, n in Counter(names).items() if n > 1)
-    if twice:
-        raise FileError(f"column '{twice[0]}' occurs twice", file=str(path), line=number_)
+    names = _checked(header, str(path), number_)
+    width = len(names)
     said = [*header, *(c.strip() for _, cells in above for c in cells)]
     numbered, aside = row_numbers(), list[str]()
     data = _data(chain([first], kept(rows)), header, said, comma, aside, layout, str(path))
     columns = packed(_even(data, width, numbered), width)
     file = f"{path}, sheet '{page}'" if page else str(path)
     return Sheet(file, tuple(names), columns, numbered, comma, record_of(above), tuple(aside))
+
+
+def _checked(header: Sequence[str], file: str, line: int) -> list[str]:
+    """Names of columns up to the last that has one: neither endless nor twice."""
+    endless = next((c for c in header if len(c) > LONGEST_HEADER), None)
+    if endless is not None or len(header) > MOST_COLUMNS:
+        what = f"{len(header)} columns" if endless is None else f"one of {len(endless)} characters"
+        raise FileError(
+            f"expected a header of at most {MOST_COLUMNS} columns of {LONGEST_HEADER} characters each; found {what}",
+            file=file,
+            line=line,
+        )
+    width = max(i for i, c in enumerate(header) if c) + 1
+    names = [h or f"column {i + 1}" for i, h in enumerate(header[:width])]
+    refuse_twice(names, file, line)
+    return names
 
 
 def _names(first: Sequence[str], given: Sequence[str], file: str, line: int) -> list[str]:
@@ -202,7 +204,7 @@ def _begins_table(
         fits(cells, width)
         and len(known) >= 2
         and not set(known) <= set(names)
-        and not any(_finite(c, comma) for c in cells)
+        and not any(is_finite(c, comma) for c in cells)
     )
 
 
@@ -212,7 +214,7 @@ def _one_table(lines: Iterable[Line], comma: bool, layout: Layout, file: str) ->
     names: list[str] = []
     width = 0
     for n, cells in kept(lines):
-        data = _is_data(cells, comma)
+        data = is_data(cells, comma)
         if width and not data and _begins_table(cells, names, width, comma, layout):
             tables.append([])
             names, width = [], 0
@@ -234,7 +236,7 @@ def _above(rows: Iterator[Line], comma: bool, above: list[Line]) -> Iterator[Lin
     for n, cells in rows:
         if not filled(cells):
             continue
-        data = _is_data(cells, comma)
+        data = is_data(cells, comma)
         if data and not cells[0].strip().startswith(COMMENTS):
             yield n, cells
         elif not data:
@@ -259,7 +261,7 @@ def _data(
         first = next(c.strip() for c in cells if c.strip())
         if STATISTICS.fullmatch(first) and number(first, comma) is None:
             aside.append(f"row {n}, '{first}', is no reading")
-        elif not any(_finite(c, comma) for c in cells):
+        elif not any(is_finite(c, comma) for c in cells):
             if _begins_table(cells, names, len(header), comma, layout):
                 raise FileError(
                     "another table begins here: say --table 1 for the one above, --table 2 for this one",
@@ -272,30 +274,14 @@ def _data(
             yield n, cells
 
 
-def _finite(cell: str, comma: bool) -> bool:
-    value = number(cell, comma)
-    return value is not None and math.isfinite(value)
-
-
 def column_letter(index: int) -> str:
     """``A`` for 0, ``AB`` for 27, as spreadsheets name columns."""
-    name = ""
-    index += 1
-    while index:
-        index, rest = divmod(index - 1, 26)
-        name = chr(65 + rest) + name
-    return name
+    before, last = divmod(index, 26)
+    return (column_letter(before - 1) if before else "") + chr(65 + last)
 
 
-def _even(rows: Iterable[tuple[int, list[str]]], width: int, numbers: Any) -> Iterator[list[str]]:
+def _even(rows: Iterable[Line], width: int, numbers: Any) -> Iterator[list[str]]:
     """Rows as long as the header; `numbers` gathers those of their lines."""
     for n, cells in rows:
         numbers.append(n)
-        yield cells if len(cells) == width else [*cells, *[""] * width][:width]
-
-
-def _is_data(cells: list[str], comma: bool) -> bool:
-    """Whether at least half of the cells that are filled are numbers, two of them or more."""
-    filled = [c for c in cells if c.strip()]
-    numeric = [c for c in filled if (v := number(c, comma)) is not None and math.isfinite(v)]
-    return len(numeric) >= 2 and 2 * len(numeric) >= len(filled)
+        yield [*cells, *[""] * width][:width]

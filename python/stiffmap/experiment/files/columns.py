@@ -9,55 +9,28 @@ from scipy.spatial.transform import Rotation
 
 from stiffmap.common.errors import FileError
 from stiffmap.experiment.channels import Channel
-from stiffmap.experiment.experiment import ASKED, AXES, BRANCHES, WRENCH, Floats, Integers
-from stiffmap.experiment.files.orientation import TURNED, TURNED2
+from stiffmap.experiment.experiment import BRANCHES, Floats, Integers
+from stiffmap.experiment.files.fields import (
+    APPROACH,
+    POSE,
+    POSE2,
+    SEEN,
+    SEEN_QUATERNION,
+    SEEN_TURNED,
+    TURNED,
+)
 from stiffmap.experiment.files.schema import ExperimentFile, NoiseModel
 from stiffmap.experiment.files.table import Table
 from stiffmap.experiment.files.units import Scales
-from stiffmap.experiment.readings import kind_of, kinds
-
-WORDS = ("id", "branch", "setup", "point", "load_point", "instrument", "target")
-SEEN, SEEN_TURNED, SEEN_QUATERNION = ("px", "py", "pz"), ("prx", "pry", "prz"), ("pqx", "pqy", "pqz", "pqw")
-POSE, POSE2 = ("x", "y", "z"), ("x2", "y2", "z2")
-APPROACH = ("approach_x", "approach_y", "approach_z")
-COUNTED = ("repeat", "order", "hours", "temperature")
-PLAN = (*WORDS, *POSE, *TURNED, *POSE2, *TURNED2, *APPROACH, *WRENCH, *ASKED, *COUNTED)
-"""Columns of a plan: all but readings."""
-
-
-def read() -> tuple[str, ...]:
-    """Columns of readings, measured minus commanded."""
-    return (*AXES, *(k.name for k in kinds()))
-
-
-def absolute() -> tuple[str, ...]:
-    """Columns of readings in coordinates of their own."""
-    return (*SEEN, *SEEN_TURNED, *SEEN_QUATERNION, *(k.absolute for k in kinds() if k.absolute))
-
-
-def known() -> tuple[str, ...]:
-    """All columns that have a meaning."""
-    return (*PLAN, *read(), *(f"u_{a}" for a in read()), *absolute())
-
-
-def block(table: Table, names: Sequence[str], *, blank: bool, missing: float = np.nan) -> Floats:
-    """(n, names) numbers; a column that is not there is `missing`."""
-    n = len(table)
-    return np.column_stack(
-        [table.numbers(c, blank=blank) if c in table else np.full(n, missing) for c in names]
-    )
+from stiffmap.experiment.readings import kind_of
 
 
 def position(table: Table, scales: Scales, commanded: bool) -> Floats:
     """(n, 3) m; NaN where actuator coordinates are commanded instead."""
     if commanded:
-        twice = [c for c in (*POSE, *TURNED) if c in table]
+        twice = table.one_of((*POSE, *TURNED))
         if twice:
-            raise FileError(
-                f"column '{twice[0]}': actuators are commanded (command:), so the pose follows from them",
-                file=table.file,
-                line=1,
-            )
+            table.fail(f"column '{twice}': actuators are commanded (command:), so the pose follows from them")
         return np.full((len(table), 3), np.nan)
     if scales.length < 1e-5 and not set(POSE) & set(scales.own):
         raise FileError(
@@ -65,57 +38,45 @@ def position(table: Table, scales: Scales, commanded: bool) -> Floats:
             "{length: mm, dx: um, dy: um, dz: um} (or x: um, if they are)",
             file=scales.file,
         )
-    return np.asarray(scales.lengths(POSE) * np.column_stack([table.numbers(c) for c in POSE]))
+    return np.asarray(scales.lengths(POSE) * table.block(POSE, blank=False, missing=None))
 
 
-def command(model: ExperimentFile, table: Table, scales: Scales) -> Floats | None:
-    """(n, actuators) m, rad, in the order of the file."""
-    if not model.command:
+def command(model: ExperimentFile, table: Table, scales: Scales, behind: str = "") -> Floats | None:
+    """(n, actuators) m, rad, in the order of the file; None where nothing is commanded.
+
+    `behind` the names of its columns: ``2`` for the second command of a distance, of which cells may be empty.
+    """
+    names = [f"{c}{behind}" for c in model.command]
+    if not names or (behind and not table.one_of(names)):
         return None
-    return np.column_stack([scales.own[c] * table.numbers(c) for c in model.command])
-
-
-def other_command(model: ExperimentFile, table: Table, scales: Scales) -> Floats | None:
-    """(n, actuators) m, rad: the second command of a distance, in columns named as the first with a 2 behind."""
-    wanted = [f"{c}2" for c in model.command]
-    if not any(c in table for c in wanted):
-        return None
-    columns = [
-        scales.own[c] * table.numbers(w, blank=True) for c, w in zip(model.command, wanted, strict=True)
-    ]
-    return np.column_stack(columns)
+    return np.asarray([scales.own[c] for c in names] * table.block(names, blank=bool(behind), missing=None))
 
 
 def seen(table: Table, scales: Scales) -> Floats | None:
     """(n, 3) m: coordinates of the target in the instrument's frame."""
-    if not any(c in table for c in SEEN):
+    if not table.one_of(SEEN):
         return None
-    out = scales.length * np.column_stack([table.numbers(c, blank=True) for c in SEEN])
+    out = scales.length * table.block(SEEN, blank=True, missing=None)
     return np.where(np.asarray(np.isfinite(out).all(axis=1))[:, None], out, np.nan)
 
 
 def seen_rotation(model: ExperimentFile, table: Table, scales: Scales) -> Floats | None:
     """(n, 3, 3) of the target in the instrument's frame, from three angles or a quaternion; NaN where blank."""
-    names = next((g for g in (SEEN_TURNED, SEEN_QUATERNION) if any(c in table for c in g)), None)
+    names = next((g for g in (SEEN_TURNED, SEEN_QUATERNION) if table.one_of(g)), None)
     if names is None:
         return None
-    values = np.column_stack([table.numbers(c, blank=True) for c in names])
-    good = np.asarray(np.isfinite(values).all(axis=1))
+    values = table.block(names, blank=True, missing=None)
+    good = np.asarray(np.isfinite(values).all(axis=1))[:, None]
     if names is SEEN_QUATERNION:
-        filled = np.where(good[:, None], values, [0.0, 0.0, 0.0, 1.0])
-        wrong = np.flatnonzero(np.abs(np.linalg.norm(filled, axis=1) - 1.0) > 1e-2)
-        if wrong.size:
-            raise FileError(
-                "columns 'pqx' to 'pqw': expected a quaternion of length 1, x y z w",
-                file=table.file,
-                line=table.lines[int(wrong[0])],
-            )
+        filled = np.where(good, values, [0.0, 0.0, 0.0, 1.0])
+        unit = np.abs(np.linalg.norm(filled, axis=1) - 1.0) <= 1e-2
+        table.check(unit, lambda _: "columns 'pqx' to 'pqw': expected a quaternion of length 1, x y z w")
         turned = Rotation.from_quat(filled)
     else:
-        filled = scales.angle(names[0]) * np.where(good[:, None], values, 0.0)
+        filled = scales.angle(names[0]) * np.where(good, values, 0.0)
         word = model.target_orientation
         turned = Rotation.from_rotvec(filled) if word == "rotvec" else Rotation.from_euler(word, filled)
-    return np.where(good[:, None, None], turned.as_matrix(), np.nan)
+    return np.where(good[:, :, None], turned.as_matrix(), np.nan)
 
 
 def gravities(model: ExperimentFile, table: Table) -> tuple[tuple[float, float, float] | None, Floats | None]:
@@ -126,19 +87,11 @@ def gravities(model: ExperimentFile, table: Table) -> tuple[tuple[float, float, 
     if "setup" not in table:
         raise FileError("gravity: a gravity for each set-up needs the column 'setup'", file=table.file)
     labels = table.text("setup")
-    for row, label in zip(table.lines, labels, strict=True):
-        if label not in given:
-            raise FileError(
-                f"gravity: no gravity for set-up '{label}'; given for {', '.join(given)}",
-                file=table.file,
-                line=row,
-            )
+    table.check(
+        [label in given for label in labels],
+        lambda i: f"gravity: no gravity for set-up '{labels[i]}'; given for {', '.join(given)}",
+    )
     return None, np.array([given[label] for label in labels])
-
-
-def labels(table: Table, name: str) -> tuple[str, ...]:
-    """Words of a column, or nothing."""
-    return tuple(table.text(name)) if name in table else ()
 
 
 def other(
@@ -158,21 +111,20 @@ def other(
                 file=table.file,
             )
         return np.full((len(table), 3), np.nan)
-    out = scales.lengths(POSE2) * np.column_stack([table.numbers(c, blank=True) for c in POSE2])
-    lost = np.isfinite(reading[:, at]).any(axis=1) & ~np.isfinite(out).all(axis=1)
-    same = np.abs(out - scales.lengths(POSE) * block(table, POSE, blank=True)).max(axis=1) < 1e-9
-    for wrong, why in ((lost, "has no second pose (x2, y2, z2)"), (same, "is between a pose and itself")):
-        if wrong.any():
-            line = table.lines[int(np.flatnonzero(wrong)[0])]
-            raise FileError(f"column '{kind.name}': {kind.title} {why}", file=table.file, line=line)
-    return np.asarray(out)
+    out = np.asarray(scales.lengths(POSE2) * table.block(POSE2, blank=True, missing=None))
+    read = np.isfinite(reading[:, at]).any(axis=1)
+    same = np.abs(out - scales.lengths(POSE) * table.block(POSE, blank=True)).max(axis=1) < 1e-9
+    told = f"column '{kind.name}': {kind.title}"
+    table.check(~read | np.isfinite(out).all(axis=1), lambda _: f"{told} has no second pose (x2, y2, z2)")
+    table.check(~same, lambda _: f"{told} is between a pose and itself")
+    return out
 
 
 def approach(table: Table) -> Floats | None:
     """(n, 3) direction of the last travel; an empty cell is 0."""
-    if not any(c in table for c in APPROACH):
+    if not table.one_of(APPROACH):
         return None
-    return np.nan_to_num(block(table, APPROACH, blank=True, missing=0.0))
+    return np.nan_to_num(table.block(APPROACH, blank=True, missing=0.0))
 
 
 def declared(noise: NoiseModel, scales: Scales, channels: Sequence[Channel]) -> Floats:
@@ -187,10 +139,8 @@ def sigma(model: ExperimentFile, table: Table, scales: Scales, channels: tuple[C
     for i, c in enumerate(channels):
         own = model.joints[c.name].noise if c.joint else None
         common[i] = common[i] if own is None else scales.own[c.name] * own
-    each = scales.motion(channels) * block(table, [f"u_{c.name}" for c in channels], blank=True)
-    if np.any(each < 0):
-        row = int(np.flatnonzero((each < 0).any(axis=1))[0])
-        raise FileError("a standard deviation is negative", file=table.file, line=table.lines[row])
+    each = scales.motion(channels) * table.block([f"u_{c.name}" for c in channels], blank=True)
+    table.check(~(each < 0).any(axis=1), lambda _: "a standard deviation is negative")
     return np.where(np.isfinite(each), each, common)
 
 
@@ -198,14 +148,13 @@ def ids(table: Table) -> tuple[str, ...]:
     """Names of the rows, each once."""
     if "id" not in table:
         return tuple(str(i + 1) for i in range(len(table)))
-    seen: dict[str, int] = {}
-    for name, line in zip(table.text("id"), table.lines, strict=True):
-        if name in seen:
-            raise FileError(
-                f"column 'id': '{name}' occurs twice (first in line {seen[name]})", file=table.file, line=line
-            )
-        seen[name] = line
-    return tuple(seen)
+    names = table.text("id")
+    first = {name: i for i, name in reversed(list(enumerate(names)))}
+    table.check(
+        [first[name] == i for i, name in enumerate(names)],
+        lambda i: f"column 'id': '{names[i]}' occurs twice (first in line {table.lines[first[names[i]]]})",
+    )
+    return tuple(names)
 
 
 def whole(table: Table, column: str) -> Integers | None:
@@ -213,27 +162,21 @@ def whole(table: Table, column: str) -> Integers | None:
     if column not in table:
         return None
     values = table.numbers(column)
-    wrong = np.flatnonzero((values != np.round(values)) | (np.abs(values) > 2**53))
-    if wrong.size:
-        raise FileError(
-            f"column '{column}': expected whole numbers", file=table.file, line=table.lines[wrong[0]]
-        )
+    good = (values == np.round(values)) & (np.abs(values) <= 2**53)
+    table.check(good, lambda _: f"column '{column}': expected whole numbers")
     return values.astype(np.intp)
+
+
+def words(table: Table, column: str, empty: str = "") -> tuple[str, ...]:
+    """Words of a column, `empty` where a cell is; nothing where there is no column."""
+    return tuple(cell or empty for cell in table.text(column)) if column in table else ()
 
 
 def branch(table: Table) -> tuple[str, ...]:
     """``loading``, ``unloading`` or nothing."""
-    if "branch" not in table:
-        return ()
-    cells = table.text("branch")
-    for cell, line in zip(cells, table.lines, strict=True):
-        if cell not in BRANCHES:
-            raise FileError(
-                f"column 'branch': expected loading or unloading; found '{cell}'", file=table.file, line=line
-            )
-    return tuple(cells)
-
-
-def named(table: Table, column: str, common: str) -> tuple[str, ...]:
-    """Named point of each row; an empty cell is the file's."""
-    return tuple(cell or common for cell in table.text(column)) if column in table else ()
+    cells = words(table, "branch")
+    table.check(
+        [cell in BRANCHES for cell in cells],
+        lambda i: f"column 'branch': expected loading or unloading; found '{cells[i]}'",
+    )
+    return cells

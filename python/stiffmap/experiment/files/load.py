@@ -11,17 +11,20 @@ import numpy as np
 
 from stiffmap.common.errors import FileError, MissingColumnError
 from stiffmap.common.units import name_and_unit
-from stiffmap.common.yaml_text import read
+from stiffmap.common.yaml_text import read as read_yaml
 from stiffmap.experiment.channels import AXIS_CHANNELS, Channel
 from stiffmap.experiment.experiment import ASKED, AXES, WRENCH, Experiment, Floats, Loop
 from stiffmap.experiment.files import columns as read_columns
+from stiffmap.experiment.files.fields import SEEN, SEEN_QUATERNION, SEEN_TURNED, absolute, known, read
 from stiffmap.experiment.files.orientation import rotations
 from stiffmap.experiment.files.schema import ExperimentFile, file_model
 from stiffmap.experiment.files.table import Table, read_table
 from stiffmap.experiment.files.units import ANGLES, Scales
 from stiffmap.experiment.readings import kinds
 from stiffmap.model.files.report import validated
-from stiffmap.model.files.schema.base import suggestion
+
+SAME = ("point", "unloaded", "frame", "tool", "title", "reference_temperature")
+"""Keys of the file that an `Experiment` has as they are."""
 
 
 def load_experiment(path: str | PathLike[str]) -> Experiment:
@@ -35,14 +38,19 @@ def load_experiment(path: str | PathLike[str]) -> Experiment:
         raise FileError(
             "there is no such experiment (expected a folder with experiment.yaml)", file=str(place)
         )
-    document = read(file)
+    document = read_yaml(file)
     expected = "an experiment file is a mapping with machine, quantity and units"
     model = validated(file_model(), document, str(file), expected)
     scales = Scales.of(model, str(file))
     table = _rename(read_table(file.parent / model.data, model.rows), model.columns)
     table = scales.of_header(table, {*model.joints, *model.command})
     seconds = [f"{c}2" for c in model.command if f"{c}2" in table]
-    _known_columns(table, (*model.joints, *model.command, *seconds))
+    own = (*model.joints, *model.command, *seconds)
+    if taken := next((c for c in own if c in known()), None):
+        table.fail(f"joints, command: '{taken}' has a meaning of its own; give the column another name")
+    table.refuse_unknown((*known(), *own, *(f"u_{c}" for c in own)), "known:")
+    for column in own:
+        table.text(column)
     return _assemble(model, table, scales, file)
 
 
@@ -58,38 +66,17 @@ def _rename(table: Table, columns: dict[str, str]) -> Table:
     return replace(table, header=tuple(header))
 
 
-def _known_columns(table: Table, own: tuple[str, ...]) -> None:
-    for column in own:
-        if column in read_columns.known():
-            raise FileError(
-                f"joints, command: '{column}' has a meaning of its own; give the column another name",
-                file=table.file,
-                line=1,
-            )
-    known = [*read_columns.known(), *own, *(f"u_{c}" for c in own)]
-    for column in table.header:
-        if column not in known:
-            near = suggestion(column, known)
-            raise FileError(
-                f"unknown column '{column}'{near}; known: {', '.join(known)}", file=table.file, line=1
-            )
-    for column in own:
-        table.text(column)
-
-
-def extra_channels(model: ExperimentFile, table: Table) -> tuple[Channel, ...]:
-    """Kinds of readings and joints that the file reads."""
-    joints = [
-        Channel(name, "rad" if j.unit in ANGLES else "m", j.joint, j.side) for name, j in model.joints.items()
-    ]
-    given = [k.channel for k in kinds() if k.name in table or (k.absolute and k.absolute in table)]
-    return (*given, *joints)
+def _channel(name: str, unit: str, *joint: str) -> Channel:
+    """A column of a joint, which an encoder reads or which commands it."""
+    return Channel(name, "rad" if unit in ANGLES else "m", *joint)
 
 
 def _assemble(model: ExperimentFile, table: Table, scales: Scales, file: Path) -> Experiment:
-    extra = extra_channels(model, table)
+    given = [k.channel for k in kinds() if table.one_of((k.name, k.absolute))]
+    joints = [_channel(name, j.unit, j.joint, j.side) for name, j in model.joints.items()]
+    extra = (*given, *joints)
     parts = _readings(model, table, scales, extra)
-    parts |= _rows(model, table, scales) | _setting(model, scales, file)
+    parts |= rows_of(model, table, scales) | _setting(model, scales, file)
     name = file.parent.name if file.name == "experiment.yaml" else file.stem
     experiment = Experiment(name=name, machine=model.machine, quantity=model.quantity, extra=extra, **parts)
     if experiment.unloaded == "approach" and experiment.approach is None:
@@ -105,21 +92,20 @@ def _readings(
     """What the instrument read, SI, and how sure it is."""
     channels = (*AXIS_CHANNELS, *extra)
     for column in AXES[3:]:
-        for name in (column, f"u_{column}"):
-            if name in table:
-                scales.angle(column)
-    reading = scales.motion(channels) * read_columns.block(table, [c.name for c in channels], blank=True)
+        if table.one_of((column, f"u_{column}")):
+            scales.angle(column)
+    reading = scales.motion(channels) * table.block([c.name for c in channels], blank=True)
     seen, seen_rotation = read_columns.seen(table, scales), read_columns.seen_rotation(model, table, scales)
-    absolute = {
+    of_kinds = {
         k.name: float(scales.motion((k.channel,))[0]) * table.numbers(k.absolute, blank=True)
         for k in kinds()
         if k.absolute and k.absolute in table
     }
-    _above_zero(table, absolute)
-    _promise(reading, channels, table, seen, seen_rotation, absolute)
+    _above_zero(table, of_kinds)
+    _promise(reading, channels, table, seen, seen_rotation, of_kinds)
     if not np.isfinite(reading).any():
         raise MissingColumnError(
-            f"missing column: no reading ({', '.join((*read_columns.read(), *read_columns.absolute()))}, joints)",
+            f"missing column: no reading ({', '.join((*read(), *absolute()))}, joints)",
             file=table.file,
         )
     _fits(model.quantity, table)
@@ -129,16 +115,15 @@ def _readings(
         "sigma": np.where(np.isfinite(reading), sigma, np.nan),
         "seen": seen,
         "seen_rotation": seen_rotation,
-        "absolute": absolute,
+        "absolute": of_kinds,
         "other": read_columns.other(model, table, scales, reading, channels),
     }
 
 
-def _rows(model: ExperimentFile, table: Table, scales: Scales) -> dict[str, Any]:
+def rows_of(model: ExperimentFile, table: Table, scales: Scales) -> dict[str, Any]:
     """What else stands in the rows: poses, loads, commands, and how they were reached."""
     gravity, gravity_of = read_columns.gravities(model, table)
     rotation, other_rotation = rotations(table, scales, model.orientation)
-    load_point = model.load_point or model.point
     return {
         "ids": read_columns.ids(table),
         "position": read_columns.position(table, scales, bool(model.command)),
@@ -147,14 +132,14 @@ def _rows(model: ExperimentFile, table: Table, scales: Scales) -> dict[str, Any]
         "rotation": rotation,
         "other_rotation": other_rotation,
         "command": read_columns.command(model, table, scales),
-        "other_command": read_columns.other_command(model, table, scales),
+        "other_command": read_columns.command(model, table, scales, "2"),
         "approach": read_columns.approach(table),
         "repeat": read_columns.whole(table, "repeat"),
         **{c: table.numbers(c) if c in table else None for c in ("order", "hours", "temperature")},
         "branch": read_columns.branch(table),
-        **{c: read_columns.labels(table, c) for c in ("setup", "instrument", "target")},
-        "points": read_columns.named(table, "point", model.point),
-        "load_points": read_columns.named(table, "load_point", load_point),
+        **{c: read_columns.words(table, c) for c in ("setup", "instrument", "target")},
+        "points": read_columns.words(table, "point", model.point),
+        "load_points": read_columns.words(table, "load_point", model.load_point or model.point),
         "gravity": gravity,
         "gravity_of": gravity_of,
     }
@@ -168,22 +153,15 @@ def _setting(model: ExperimentFile, scales: Scales, file: Path) -> dict[str, Any
     x, y, z = (float(v) for v in normal / np.linalg.norm(normal))
     return {
         "rotation_against": model.orientation.against,
-        "command_of": tuple(
-            Channel(n, "rad" if c.unit in ANGLES else "m", c.actuator) for n, c in model.command.items()
-        ),
-        "reference_temperature": model.reference_temperature,
+        "command_of": tuple(_channel(n, c.unit, c.actuator) for n, c in model.command.items()),
         "normal": (x, y, z),
         "surface": model.surface.shape,
         "anchor": None if model.anchor is None else tuple(scales.length * v for v in model.anchor),
-        "point": model.point,
+        **{k: getattr(model, k) for k in SAME},
         "load_point": model.load_point or model.point,
         "zero_sigma": np.nan_to_num(read_columns.declared(model.zero_noise, scales, AXIS_CHANNELS)),
-        "unloaded": model.unloaded,
-        "frame": model.frame,
-        "tool": model.tool,
         "certificate": _certificate(model, scales, file),
         "loop": Loop(**model.metrology.model_dump()),
-        "title": model.title,
         "record": tuple((k, v) for k, v in {**model.record.model_dump(), "notes": model.notes}.items() if v),
         "source": str(file),
     }
@@ -211,21 +189,20 @@ def _certificate(model: ExperimentFile, scales: Scales, file: Path) -> tuple[tup
 
 def _fits(quantity: str, table: Table) -> None:
     """FileError for a column that an experiment of this quantity cannot have."""
-    wrong = [(c, "") for c in (*read_columns.SEEN, *read_columns.SEEN_TURNED, *read_columns.SEEN_QUATERNION)]
-    wrong = [] if quantity == "position" else wrong
+    of_position = (*SEEN, *SEEN_TURNED, *SEEN_QUATERNION)
+    wrong = [] if quantity == "position" else [(c, "it") for c in of_position]
     wrong += [(c, k.title) for k in kinds() if quantity not in k.quantities for c in (k.name, k.absolute)]
     for column, title in wrong:
-        if column and column in table:
-            raise FileError(f"column '{column}': {title or 'it'} is no {quantity}", file=table.file, line=1)
+        if column in table:
+            table.fail(f"column '{column}': {title} is no {quantity}")
 
 
 def _above_zero(table: Table, absolute: dict[str, Floats]) -> None:
     """FileError for a reading that has the wrong sign."""
     for kind in (k for k in kinds() if k.positive and k.name in absolute):
-        for line, value in zip(table.lines, absolute[kind.name], strict=True):
-            if value <= 0.0:
-                message = f"column '{kind.absolute}': expected {kind.title} above zero; found {value:g} m"
-                raise FileError(message, file=table.file, line=line)
+        values = absolute[kind.name]
+        expected = f"column '{kind.absolute}': expected {kind.title} above zero"
+        table.check(~(values <= 0.0), [f"{expected}; found {v:g} m" for v in values].__getitem__)
 
 
 def _promise(
@@ -243,12 +220,9 @@ def _promise(
     for values, names in parts:
         if values is None:
             continue
-        twice = [n for n in names if n in table]
-        if twice:
-            raise FileError(
-                f"column '{twice[0]}': the file has the same reading in coordinates of its own as well; give one",
-                file=table.file,
-                line=1,
+        if twice := table.one_of(names):
+            table.fail(
+                f"column '{twice}': the file has the same reading in coordinates of its own as well; give one"
             )
         good = np.isfinite(values.reshape(len(values), -1)).all(axis=1)
         for n in names:
@@ -261,7 +235,7 @@ def _wrench(model: ExperimentFile, table: Table, scales: Scales) -> Floats:
         raise MissingColumnError(
             "missing column: a deflection needs a load (fx, fy, fz, mx, my, mz)", file=table.file
         )
-    return np.asarray(scales.wrench(given) * read_columns.block(table, WRENCH, blank=False, missing=0.0))
+    return np.asarray(scales.wrench(given) * table.block(WRENCH, blank=False, missing=0.0))
 
 
 def _asked(table: Table, scales: Scales) -> Floats | None:
@@ -269,4 +243,4 @@ def _asked(table: Table, scales: Scales) -> Floats | None:
     given = [w for w, c in zip(WRENCH, ASKED, strict=True) if c in table]
     if not given:
         return None
-    return np.asarray(scales.wrench(given) * read_columns.block(table, ASKED, blank=True))
+    return np.asarray(scales.wrench(given) * table.block(ASKED, blank=True))

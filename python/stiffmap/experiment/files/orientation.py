@@ -10,19 +10,12 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from stiffmap.common.errors import FileError
 from stiffmap.experiment.experiment import Floats, Mask
+from stiffmap.experiment.files.fields import FORMS, MATRIX, QUATERNION, TURNED, TURNED2, VECTOR
 from stiffmap.experiment.files.schema import OrientationModel
 from stiffmap.experiment.files.table import Table
 from stiffmap.experiment.files.units import Scales
 
-VECTOR = ("rotx", "roty", "rotz")
-QUATERNION = ("qw", "qx", "qy", "qz")
-EULER = ("euler1", "euler2", "euler3")
-MATRIX = tuple(f"r{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3))
-FORMS = (VECTOR, QUATERNION, EULER, MATRIX)
-TURNED = tuple(c for form in FORMS for c in form)
-TURNED2 = tuple(f"{c}2" if form is not MATRIX else f"{c}_2" for form in FORMS for c in form)
 UNIT_LENGTH, ORTHONORMAL = 1e-3, 1e-4
 """How far a quaternion's length, or a matrix from a rotation, may be off: printed digits, no more."""
 
@@ -41,57 +34,44 @@ def rotations(
 
 def _orientation(table: Table, scales: Scales, model: OrientationModel, second: bool) -> Floats | None:
     names = dict(zip(TURNED, TURNED2 if second else TURNED, strict=True))
-    forms = [f for f in FORMS if any(names[c] in table for c in f)]
+    forms = [f for f in FORMS if table.one_of(names[c] for c in f)]
     if not forms:
         return None
     if len(forms) > 1:
-        one, two = names[forms[0][0]], next(names[c] for c in forms[1] if names[c] in table)
-        raise FileError(
-            f"column '{two}': orientations are given twice, as {one} … and as {two} …; keep one",
-            file=table.file,
-            line=1,
-        )
+        one, two = names[forms[0][0]], table.one_of(names[c] for c in forms[1])
+        table.fail(f"column '{two}': orientations are given twice, as {one} … and as {two} …; keep one")
     form = forms[0]
-    if form is VECTOR:
-        return _vectors(table, scales, [names[c] for c in form], second)
-    cells = np.column_stack([table.numbers(names[c], blank=second) for c in form])
+    # a turn about one axis may leave out the others
+    cells = table.block([names[c] for c in form], blank=second, missing=0.0 if form is VECTOR else None)
     empty: Mask = np.asarray(~np.isfinite(cells).all(axis=1))
-    if form is EULER:
-        angles = scales.angle(names[form[0]]) * np.nan_to_num(cells)
-        out = Rotation.from_euler(_sequence(table, model, names[form[0]]), angles).as_matrix()
-    else:
+    if form in (QUATERNION, MATRIX):
         out = (_quaternions if form is QUATERNION else _matrices)(table, cells, empty)
-    out[empty] = np.eye(3)
-    return np.ascontiguousarray(out)
-
-
-def _vectors(table: Table, scales: Scales, names: list[str], second: bool) -> Floats:
-    n = len(table)
-    cells = [table.numbers(c, blank=second) if c in table else np.zeros(n) for c in names]
-    vectors = scales.angle(names[0]) * np.nan_to_num(np.column_stack(cells))
-    return np.ascontiguousarray(Rotation.from_rotvec(vectors).as_matrix())
+        out[empty] = np.eye(3)
+        return np.ascontiguousarray(out)
+    angles = scales.angle(names[form[0]]) * np.nan_to_num(cells)
+    if form is VECTOR:
+        turned = Rotation.from_rotvec(angles)
+    else:
+        angles[empty] = 0.0
+        turned = Rotation.from_euler(_sequence(table, model, names[form[0]]), angles)
+    return np.ascontiguousarray(turned.as_matrix())
 
 
 def _sequence(table: Table, model: OrientationModel, column: str) -> str:
     if model.euler is None:
-        raise FileError(
+        table.fail(
             f"column '{column}': Euler angles need their convention: orientation: {{euler: XYZ}} for turns "
-            "about x, the turned y, the twice turned z; {euler: xyz} for turns about fixed axes",
-            file=table.file,
-            line=1,
+            "about x, the turned y, the twice turned z; {euler: xyz} for turns about fixed axes"
         )
     return model.euler
 
 
 def _quaternions(table: Table, cells: Floats, empty: Mask) -> Floats:
     length = np.linalg.norm(cells, axis=1)
-    wrong = np.flatnonzero(~empty & ~(np.abs(length - 1.0) < UNIT_LENGTH))
-    if wrong.size:
-        raise FileError(
-            f"column 'qw': expected a quaternion of length 1, found {length[wrong[0]]:.6g}",
-            file=table.file,
-            line=table.lines[wrong[0]],
-        )
+    table.check(
+        empty | (np.abs(length - 1.0) < UNIT_LENGTH),
+        lambda i: f"column 'qw': expected a quaternion of length 1, found {length[i]:.6g}",
+    )
     cells = np.where(empty[:, None], [1.0, 0.0, 0.0, 0.0], cells)
     return np.asarray(Rotation.from_quat(cells[:, [1, 2, 3, 0]]).as_matrix())
 
@@ -99,12 +79,11 @@ def _quaternions(table: Table, cells: Floats, empty: Mask) -> Floats:
 def _matrices(table: Table, cells: Floats, empty: Mask) -> Floats:
     r = np.where(empty[:, None], np.eye(3).reshape(-1), cells).reshape(-1, 3, 3)
     off = np.abs(r @ r.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2))
-    wrong = np.flatnonzero((off > ORTHONORMAL) | (np.linalg.det(r) < 0.0))
-    if wrong.size:
-        raise FileError(
-            f"column 'r11': expected a rotation matrix, found one that is off by {off[wrong[0]]:.2g} "
-            f"(determinant {np.linalg.det(r[wrong[0]]):.3g})",
-            file=table.file,
-            line=table.lines[wrong[0]],
-        )
+    table.check(
+        (off <= ORTHONORMAL) & (np.linalg.det(r) >= 0.0),
+        lambda i: (
+            f"column 'r11': expected a rotation matrix, found one that is off by {off[i]:.2g} "
+            f"(determinant {np.linalg.det(r[i]):.3g})"
+        ),
+    )
     return np.asarray(Rotation.from_matrix(r).as_matrix())

@@ -12,21 +12,21 @@ from scipy.spatial.transform import Rotation
 from stiffmap.common.outputs import make_folder, putting, write_rows, write_text
 from stiffmap.common.yaml_text import text_of
 from stiffmap.experiment.experiment import ASKED, AXES, WRENCH, Channel, Experiment, Floats, Loop
-from stiffmap.experiment.files.columns import APPROACH, POSE, POSE2, SEEN, SEEN_TURNED
-from stiffmap.experiment.files.orientation import VECTOR
+from stiffmap.experiment.files.fields import (
+    APPROACH,
+    COUNTED,
+    POSE,
+    POSE2,
+    SEEN,
+    SEEN_TURNED,
+    VECTOR,
+    WORDS,
+)
 from stiffmap.experiment.readings import kinds
 from stiffmap.experiment.setups import SEEN as SEEN_TARGET
 
 MM = 1e3
 PLAIN = {"unloaded": "centre", "frame": "known", "tool": "known"}
-WORDS = {
-    "branch": "branch",
-    "setup": "setup",
-    "instrument": "instrument",
-    "target": "target",
-    "point": "points",
-    "load_point": "load_points",
-}
 
 
 def save_experiment(experiment: Experiment, folder: str | PathLike[str], title: str = "") -> None:
@@ -121,38 +121,28 @@ def _columns(e: Experiment) -> dict[str, list[Any]]:
             columns[c.name] = _text(e.reading[:, i] * _scale(c))
             if not _alike(e, i) and np.isfinite(e.sigma[:, i]).any():
                 columns[f"u_{c.name}"] = _text(e.sigma[:, i] * _scale(c))
-    for name, values in (
-        ("repeat", e.repeat),
-        ("order", e.order),
-        ("hours", e.hours),
-        ("temperature", e.temperature),
-    ):
-        if values is not None:
-            columns[name] = _text(np.asarray(values, dtype=float))
-    words = {n: getattr(e, field) for n, field in WORDS.items()}
-    return columns | {
-        n: list(v) for n, v in words.items() if v and not (n == "point" and SEEN_TARGET in v[0])
-    }
+    for name in COUNTED:
+        if getattr(e, name) is not None:
+            columns[name] = _text(np.asarray(getattr(e, name), dtype=float))
+    return columns | {n: v for n, v in _words(e).items() if not (n == "point" and SEEN_TARGET in v[0])}
+
+
+def _words(e: Experiment) -> dict[str, list[Any]]:
+    return {n: list(getattr(e, field)) for n, field in WORDS.items() if getattr(e, field)}
 
 
 def plan_columns(e: Experiment) -> dict[str, list[Any]]:
     """Columns of a plan's rows, without readings, as `stiffmap simulate --plan` reads them (mm, N, rad)."""
     loads = {c: v for c, v in _loads(e).items() if e.quantity == "deflection" or any(float(x) for x in v)}
-    words = {n: list(getattr(e, field)) for n, field in WORDS.items() if getattr(e, field)}
-    return {"id": list(e.ids)} | _commanded(e) | loads | words
+    return {"id": list(e.ids)} | _commanded(e) | loads | _words(e)
 
 
 def _absolute(e: Experiment) -> tuple[dict[str, list[Any]], tuple[str, ...]]:
     """Columns of readings in coordinates of their own, and the channels that they stand for."""
-    columns: dict[str, list[Any]] = {}
-    told: tuple[str, ...] = ()
-    if e.seen is not None:
-        columns |= {c: _text(e.seen[:, i] * MM) for i, c in enumerate(SEEN)}
-        told += AXES[:3]
+    columns = _block(SEEN, e.seen, MM)
+    told: tuple[str, ...] = AXES[:3] if columns else ()
     if e.seen_rotation is not None:
-        good = np.asarray(np.isfinite(e.seen_rotation).all(axis=(1, 2)))
-        turns = Rotation.from_matrix(np.where(good[:, None, None], e.seen_rotation, np.eye(3))).as_rotvec()
-        columns |= {c: _text(np.where(good, turns[:, i], np.nan)) for i, c in enumerate(SEEN_TURNED)}
+        columns |= _rotvec(e.seen_rotation, SEEN_TURNED)
         told += AXES[3:]
     for kind in kinds():
         values = e.absolute.get(kind.name)
@@ -166,26 +156,26 @@ def _absolute(e: Experiment) -> tuple[dict[str, list[Any]], tuple[str, ...]]:
 
 def _commanded(e: Experiment) -> dict[str, list[Any]]:
     if e.command is not None:
-        out = {c.name: _text(e.command[:, i] * _scale(c)) for i, c in enumerate(e.command_of)}
-        if e.other_command is not None:
-            out |= {
-                f"{c.name}2": _text(e.other_command[:, i] * _scale(c)) for i, c in enumerate(e.command_of)
-            }
+        names, units = [c.name for c in e.command_of], [_scale(c) for c in e.command_of]
+        out = _block(names, e.command, units) | _block([f"{c}2" for c in names], e.other_command, units)
     else:
-        out = {c: _text(e.position[:, i] * MM) for i, c in enumerate(POSE)} | _rotvec(e.rotation, VECTOR)
+        out = _block(POSE, e.position, MM) | _rotvec(e.rotation, VECTOR)
     if e.other is not None and e.command is None:
-        out |= {c: _text(e.other[:, i] * MM) for i, c in enumerate(POSE2)}
-        out |= _rotvec(e.other_rotation, [f"{c}2" for c in VECTOR])
-    if e.approach is not None:
-        out |= {c: _text(e.approach[:, i]) for i, c in enumerate(APPROACH)}
-    return out
+        out |= _block(POSE2, e.other, MM) | _rotvec(e.other_rotation, [f"{c}2" for c in VECTOR])
+    return out | _block(APPROACH, e.approach)
+
+
+def _block(names: Sequence[str], values: Floats | None, units: Any = 1.0) -> dict[str, list[Any]]:
+    """Columns of an array (n, names), SI times `units`; none where there is no array."""
+    return {} if values is None else dict(zip(names, map(_text, (values * units).T), strict=True))
 
 
 def _rotvec(rotation: Floats | None, names: Sequence[str]) -> dict[str, list[Any]]:
     if rotation is None:
         return {}
-    vectors = Rotation.from_matrix(rotation).as_rotvec()
-    return {c: _text(vectors[:, i]) for i, c in enumerate(names)}
+    good = np.asarray(np.isfinite(rotation).all(axis=(1, 2)))[:, None]
+    turns = Rotation.from_matrix(np.where(good[:, :, None], rotation, np.eye(3))).as_rotvec()
+    return _block(names, np.where(good, turns, np.nan))
 
 
 def _loads(e: Experiment) -> dict[str, list[Any]]:

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, create_model
 
+from stiffmap.experiment.files.fields import DECLARED, quantity_of, read
 from stiffmap.experiment.readings import kinds
 from stiffmap.model.files.schema.base import FileModel
 
@@ -18,6 +19,8 @@ Length = Literal["m", "cm", "mm", "um", "µm", "in"]
 Angle = Literal["rad", "mrad", "deg"]
 Force = Literal["N", "kN", "MN"]
 Moment = Literal["N*m", "N*mm", "kN*m"]
+UNITS: dict[str | None, Any] = {"length": Length, "angle": Angle, "force": Force, "moment": Moment}
+"""Quantity of a column -> units that the file may declare for it."""
 
 
 class UnitsModel(FileModel):
@@ -31,27 +34,6 @@ class UnitsModel(FileModel):
     force: Force | None = None
     angle: Angle | None = None
     temperature: Literal["degC", "K"] | None = None
-    x: Length | None = None
-    y: Length | None = None
-    z: Length | None = None
-    x2: Length | None = None
-    y2: Length | None = None
-    z2: Length | None = None
-    dx: Length | None = None
-    dy: Length | None = None
-    dz: Length | None = None
-    rx: Angle | None = None
-    ry: Angle | None = None
-    rz: Angle | None = None
-    rotx: Angle | None = None
-    roty: Angle | None = None
-    rotz: Angle | None = None
-    fx: Force | None = None
-    fy: Force | None = None
-    fz: Force | None = None
-    mx: Moment | None = None
-    my: Moment | None = None
-    mz: Moment | None = None
 
     def own(self) -> dict[str, str]:
         """Units of single columns."""
@@ -60,17 +42,10 @@ class UnitsModel(FileModel):
 
 
 class NoiseModel(FileModel):
-    """One standard deviation per reading axis, in the units of the file."""
-
-    dx: Positive | None = None
-    dy: Positive | None = None
-    dz: Positive | None = None
-    rx: Positive | None = None
-    ry: Positive | None = None
-    rz: Positive | None = None
+    """One standard deviation per axis or kind of reading, in the units of the file."""
 
 
-LengthOrAngle = Literal["m", "cm", "mm", "um", "µm", "in", "rad", "mrad", "deg"]
+LengthOrAngle = Literal[Length, Angle]
 
 
 class JointModel(FileModel):
@@ -189,16 +164,17 @@ class ExperimentFile(FileModel):
 
 
 def file_model() -> type[ExperimentFile]:
-    """The keys of the file with the noise and the unit of every known kind of reading."""
-    return _with_kinds(tuple((k.name, k.unit) for k in kinds()))
+    """The keys of the file with the units of single columns and the noise of every known kind of reading."""
+    declared = (*DECLARED, *(k.name for k in kinds()))
+    return _with_columns(tuple((n, quantity_of(n)) for n in declared), read())
 
 
 @cache
-def _with_kinds(readings: tuple[tuple[str, str], ...]) -> type[ExperimentFile]:
-    units: dict[str, Any] = {
-        n: (Length | None if unit == "m" else Angle | None, None) for n, unit in readings
-    }
-    sizes: dict[str, Any] = {n: (Positive | None, None) for n, _ in readings}
+def _with_columns(
+    declared: tuple[tuple[str, str | None], ...], readings: tuple[str, ...]
+) -> type[ExperimentFile]:
+    units: dict[str, Any] = {n: (UNITS[quantity] | None, None) for n, quantity in declared}
+    sizes: dict[str, Any] = dict.fromkeys(readings, (Positive | None, None))
     noise = create_model("NoiseModel", __base__=NoiseModel, **sizes)
     fields: dict[str, Any] = {
         "units": (create_model("UnitsModel", __base__=UnitsModel, **units), ...),

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import math
 import os
-from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
+
+import numpy as np
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError, MissingColumnError
 from stiffmap.common.number_text import number_in
 from stiffmap.common.outputs import unguarded
 from stiffmap.common.tables.cells import Cells, filled, packed, row_numbers
-from stiffmap.common.tables.header import Line
+from stiffmap.common.tables.header import Line, refuse_twice
 from stiffmap.common.tables.lines import decimal_comma, lines_of, with_points
 from stiffmap.model.files.schema.base import suggestion
 
@@ -51,26 +52,52 @@ class Table:
 
     def numbers(self, column: str, *, blank: bool = False) -> Floats:
         """A column as floats; with `blank`, empty cells are NaN (a value that was not read)."""
-        found = self._cells(column).numbers(
-            lambda cell, row: self._number(cell, column, self.lines[row], blank)
-        )
+        found = self._cells(column).numbers(lambda cell, row: self._number(cell, column, row, blank))
         return found * self.factors[column] if self.factors.get(column, 1.0) != 1.0 else found
 
-    def _number(self, cell: str, column: str, line: int, blank: bool) -> float:
+    def _number(self, cell: str, column: str, row: int, blank: bool) -> float:
         if blank and cell.lower() in ("", "nan", "na"):
             return math.nan
         try:
             value = number_in(cell)
         except ValueError:
-            found = "an empty cell" if not cell else repr(cell)
-            raise FileError(
-                f"column '{column}': expected a number; found {found}", file=self.file, line=line
-            ) from None
-        if not math.isfinite(value):
-            raise FileError(
-                f"column '{column}': expected a finite number; found {cell}", file=self.file, line=line
+            self.fail(
+                f"column '{column}': expected a number; found {repr(cell) if cell else 'an empty cell'}", row
             )
+        if not math.isfinite(value):
+            self.fail(f"column '{column}': expected a finite number; found {cell}", row)
         return value
+
+    def block(self, names: Sequence[str], *, blank: bool, missing: float | None = np.nan) -> Floats:
+        """(n, names) numbers; a column that is not there is `missing`, or refused where that is None."""
+        n = len(self)
+        there = [c in self or missing is None for c in names]
+        columns = [
+            self.numbers(c, blank=blank) if t else np.full(n, missing)
+            for c, t in zip(names, there, strict=True)
+        ]
+        return np.column_stack(columns)
+
+    def one_of(self, names: Iterable[str]) -> str | None:
+        """The first of these columns that the table has."""
+        return next((c for c in names if c in self), None)
+
+    def refuse_unknown(self, known: Sequence[str], list_of: str) -> None:
+        """`FileError` for the first column that is none of these; `list_of` stands before their names."""
+        for column in self.header:
+            if column not in known:
+                near = suggestion(column, list(known))
+                self.fail(f"unknown column '{column}'{near}; {list_of} {', '.join(known)}")
+
+    def fail(self, message: str, row: int | None = None) -> NoReturn:
+        """Raise `FileError` that names a row, or the header."""
+        raise FileError(message, file=self.file, line=1 if row is None else self.lines[row])
+
+    def check(self, good: Any, message: Callable[[int], str]) -> None:
+        """`FileError` at the first row where a condition (n,) does not hold."""
+        wrong = np.flatnonzero(~np.asarray(good, dtype=bool))
+        if wrong.size:
+            self.fail(message(int(wrong[0])), int(wrong[0]))
 
 
 def read_table(path: Path, expected: int | None = None) -> Table:
@@ -91,9 +118,7 @@ def read_table(path: Path, expected: int | None = None) -> Table:
 
 def _rows(rows: Iterable[Line], header: Sequence[str], lines: Any, file: str) -> Iterator[list[str]]:
     """Rows with something in them, as long as the header; `lines` gathers their numbers."""
-    twice = sorted(c for c, times in Counter(header).items() if times > 1)
-    if twice:
-        raise FileError(f"column '{twice[0]}' occurs twice", file=file, line=1)
+    refuse_twice(header, file, 1)
     width = len(header)
     for n, row in rows:
         if len(row) != width:

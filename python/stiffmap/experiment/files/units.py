@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stiffmap.common.errors import FileError
+from stiffmap.common.tables.header import refuse_twice
 from stiffmap.common.units import (
     FORCES,
     LENGTHS,
@@ -16,20 +17,17 @@ from stiffmap.common.units import (
     PLANE_ANGLES,
     known,
     name_and_unit,
-    quantity_of,
     size_of,
     unit_of,
 )
 from stiffmap.experiment.experiment import WRENCH, Channel, Floats
+from stiffmap.experiment.files.fields import known as known_columns
+from stiffmap.experiment.files.fields import quantity_of
 from stiffmap.experiment.files.schema import ExperimentFile
 from stiffmap.experiment.files.table import Table
-from stiffmap.experiment.readings import kinds
 
 ANGLES = {a: float(PLANE_ANGLES[a]) for a in ("rad", "mrad", "deg")}
 
-PLAIN = ("id", "branch", "setup", "point", "load_point", "instrument", "target", "approach_", "pq", "repeat", "order",
-         "hours", "temperature")  # fmt: skip
-"""Beginnings of columns of words and plain numbers."""
 TIMES = {"hours": ("h", "hour", "hours"), "temperature": ("°c", "degc", "c")}
 
 
@@ -48,8 +46,8 @@ class Scales:
     own: dict[str, float]
     """Of columns that declare their unit themselves."""
     file: str
-    quantities: dict[str, str]
-    """Of columns whose name does not say it."""
+    commands: dict[str, str]
+    """Quantity of columns of joints, whose names the file chooses."""
 
     @staticmethod
     def of(model: ExperimentFile, file: str) -> Scales:
@@ -58,12 +56,10 @@ class Scales:
         angle = None if units.angle is None else ANGLES[units.angle]
         force = None if units.force is None else float(FORCES[units.force])
         own = {name: factor(unit) for name, unit in units.own().items()}
-        own |= {name: factor(c.unit) for name, c in model.joints.items()}
-        own |= {name: factor(c.unit) for name, c in model.command.items()}
-        turning = {n: c.unit in ANGLES for n, c in model.joints.items()}
-        turning |= {n: c.unit in ANGLES for n, c in model.command.items()}
-        turning |= {n: k.channel.unit == "rad" for k in kinds() for n in (k.name, k.absolute) if n}
-        quantities = {n: "angle" if turns else "length" for n, turns in turning.items()}
+        seconds = {f"{name}2": c.unit for name, c in model.command.items()}
+        joints = seconds | {name: c.unit for name, c in (model.joints | model.command).items()}
+        own |= {name: factor(unit) for name, unit in joints.items()}
+        quantities = {name: "angle" if unit in ANGLES else "length" for name, unit in joints.items()}
         return Scales(factor(units.length), force, angle, own, file, quantities)
 
     def of_header(self, table: Table, whole: Collection[str] = ()) -> Table:
@@ -71,24 +67,22 @@ class Scales:
         file declares none, that of the header holds. Names in `whole` are no such columns. Raises `FileError`."""
         split = [(h, "") if h in whole else name_and_unit(h) for h in table.header]
         names = tuple(name for name, _ in split)
-        twice = next((n for n in names if names.count(n) > 1), None)
-        if twice:
-            raise FileError(f"column '{twice}' occurs twice", file=table.file, line=1)
+        refuse_twice(names, table.file, 1)
         factors = {name: self._factor(name, unit, table) for name, unit in split if unit}
         return replace(table, header=names, factors=factors)
 
     def _factor(self, column: str, text: str, table: Table) -> float:
         """Unit of a column over the one that its numbers are taken to be in."""
         base = column.removeprefix("u_").removesuffix("_cmd")
-        quantity = self.quantities.get(base) or ("" if base.startswith(PLAIN) else quantity_of(base))
-        unit = unit_of(text, quantity) if quantity else None
-        if base in TIMES and text.lower() in TIMES[base]:
+        if text.lower() in TIMES.get(base, ()):
             return 1.0
-        if unit is None or unit.mass:
-            expected = known(quantity) if quantity else TIMES.get(base, ("none",))[0]
-            raise FileError(
-                f"unit of column '{column}': expected {expected}; found '{text}'", file=table.file, line=1
-            )
+        if base not in (*known_columns(), *self.commands):
+            return 1.0  # refused by its name later
+        quantity = self.commands.get(base) or quantity_of(base)
+        unit = unit_of(text, quantity) if quantity else None
+        if quantity is None or unit is None or unit.mass or base in TIMES:
+            expected = TIMES[base][0] if base in TIMES else known(quantity) if quantity else "none"
+            table.fail(f"unit of column '{column}': expected {expected}; found '{text}'")
         moment = None if self.force is None else self.force * self.length
         common = {"length": self.length, "angle": self.radian, "force": self.force, "moment": moment}
         return unit.size / self.own.setdefault(base, common[quantity] or unit.size)

@@ -2,27 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import repeat
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
-import numpy as np
-
-from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs import make_folder, only_job, write_rows, write_text
 from stiffmap.common.tables.cells import row_numbers
 from stiffmap.common.tables.sheet import Sheet, column_letter
-from stiffmap.common.units import Unit, known, quantity_of, unit_of
+from stiffmap.common.units import Unit, known, unit_of
 from stiffmap.common.yaml_text import text_of
+from stiffmap.experiment.experiment import WRENCH
+from stiffmap.experiment.files.fields import POSE, quantity_of
 from stiffmap.experiment.spreadsheet.guess import READINGS, Column, guess
 from stiffmap.experiment.spreadsheet.together import weight
 
 WORDS = ("id", "setup", "branch", "target")
-POSE = ("x", "y", "z")
-FORCE, MOMENT = ("fx", "fy", "fz"), ("mx", "my", "mz")
-POSE2 = ("x2", "y2", "z2")
+"""Columns of words that a sheet may have."""
 COUNTED = ("order", "repeat")
 ABSOLUTE = {"ll": "length"}
 """Readings that a sheet has in coordinates of their own -> their columns in data.csv."""
@@ -85,53 +83,53 @@ def understand(
     beside = _beside(sheet, columns)
     plain = (*WORDS, *COUNTED, *drives)
     found = {c.meaning: _unit(sheet, c, units, beside) for c in used if c.meaning not in plain}
-    if loaded and not known & {*FORCE, *MOMENT, "ll"}:
+    if loaded and not known & {*WRENCH, "ll"}:
         _ask_load(sheet)
     said = []
     for c in used:
-        if c.meaning in FORCE:
+        if c.meaning in WRENCH[:3]:
             sign, why = weight(sheet, c.index, c.name[:1] in ("+", "-"), c.meaning, found[c.meaning])
             found[c.meaning] = found[c.meaning]._replace(factor=sign * found[c.meaning].factor)
             said += [why] if why else []
     named = {m: u.name for m, u in found.items()}
     factors = {m: u.factor for m, u in found.items() if u.factor != 1.0}
-    repeats = max([c.repeat for c in used], default=0) or 1
-    header, rows = _rows(sheet, used, constants, repeats, factors)
+    rows = Rows(sheet, used, constants, factors)
     told = {"command": {k: {"actuator": a, "unit": u} for k, (a, u) in drives.items()}} if drives else {}
     further = told | dict(head or {})
-    return Imported(columns, named, factors, header, rows, repeats, dict(constants),
+    return Imported(columns, named, factors, rows.header, rows, rows.repeats, dict(constants),
                     [c for c in columns if c.meaning == "note"], further, tuple(said))  # fmt: skip
 
 
 def _ask(sheet: Sheet, known_: set[str]) -> None:
-    there = ", ".join(f"'{h}'" for h in sheet.header)
     lost = [a for a in POSE if a not in known_]
     if lost:
-        raise Question(
-            f"{sheet.file}: which column is the position {lost[0]}? Say --map {lost[0]}='HEADER', or "
-            f"--set {lost[0]}=NUMBER (mm) where it is the same in every row; columns: {there}",
-            "column",
+        _ask_column(
+            sheet,
+            f"which column is the position {lost[0]}? Say --map {lost[0]}='HEADER', or "
+            f"--set {lost[0]}=NUMBER (mm) where it is the same in every row",
             lost[0],
         )
     if not known_ & set(READINGS):
-        raise Question(
-            f"{sheet.file}: which column is a reading? Say --map dx='HEADER' (dy, dz, rx, ry, rz), several "
-            f"headers with | between them for repeats, or length='HEADER'; where a ball stood in one socket, --set px=0 --set py=0 "
-            f"--set pz=0; columns: {there}",
-            "column",
+        _ask_column(
+            sheet,
+            "which column is a reading? Say --map dx='HEADER' (dy, dz, rx, ry, rz), several headers with | between them for "
+            "repeats, or length='HEADER'; where a ball stood in one socket, --set px=0 --set py=0 --set pz=0",
             "reading",
         )
 
 
 def _ask_load(sheet: Sheet) -> None:
-    there = ", ".join(f"'{h}'" for h in sheet.header)
-    raise Question(
-        f"{sheet.file}: missing column: a deflection needs a load; which column is it? Say --map fx='HEADER' (fy, fz, mx, my, "
-        f"mz; --map fz='-HEADER' where it pulls against the axis), or --set fx=NUMBER (N) where it is the same in every row; "
-        f"columns: {there}",
-        "column",
+    _ask_column(
+        sheet,
+        "missing column: a deflection needs a load; which column is it? Say --map fx='HEADER' (fy, fz, mx, my, mz; "
+        "--map fz='-HEADER' where it pulls against the axis), or --set fx=NUMBER (N) where it is the same in every row",
         "load",
     )
+
+
+def _ask_column(sheet: Sheet, message: str, meaning: str) -> NoReturn:
+    there = ", ".join(f"'{h}'" for h in sheet.header)
+    raise Question(f"{sheet.file}: {message}; columns: {there}", "column", meaning)
 
 
 def _beside(sheet: Sheet, columns: Sequence[Column]) -> dict[int, str]:
@@ -152,62 +150,35 @@ def _beside(sheet: Sheet, columns: Sequence[Column]) -> dict[int, str]:
 
 
 def _unit(sheet: Sheet, c: Column, units: Mapping[str, str], beside: Mapping[int, str]) -> Unit:
-    quantity = quantity_of(c.meaning)
+    quantity = quantity_of(c.meaning) or "length"
     text = units.get(c.meaning, c.unit) or beside.get(c.index, "") or units.get(quantity, "")
-    place = f"{sheet.file}: column '{c.name}' ({c.meaning})"
+    found = unit_of(text, quantity) if text else None
+    if found is not None:
+        return found
     if not text:
-        usual = {"length": "um" if c.meaning in READINGS else "mm", "force": "N", "moment": "N*m"}
-        raise Question(
-            f"{place} has no unit: write it in the header, as in '{c.name} [mm]', or say "
-            f"--unit {c.meaning}={usual.get(quantity, 'deg' if quantity == 'angle' else 'degC')}",
-            "unit",
-            c.meaning,
-        )
-    found = unit_of(text, quantity)
-    if found is None:
-        if unit_of(text) is not None or text.strip() == "mN":
-            raise Question(
-                f"{place}: the unit '{text}' is not one of this quantity; those of {quantity} are: {known(quantity)}",
-                "unit",
-                c.meaning,
-            )
-        raise Question(
-            f"{place}: the unit '{text}' is not known; those of {quantity} are: {known(quantity)}",
-            "unit",
-            c.meaning,
-        )
-    return found
-
-
-def _rows(
-    sheet: Sheet,
-    used: list[Column],
-    constants: Mapping[str, float],
-    repeats: int,
-    factors: Mapping[str, float],
-) -> tuple[list[str], Rows]:
-    """Cells of data.csv: repeats side by side become rows one below the other."""
-    common = [c for c in used if c.repeat == 0]
-    meanings = list(dict.fromkeys(c.meaning for c in used if c.repeat))
-    header = [*(c.meaning for c in common), *constants, *meanings, *(["repeat"] if repeats > 1 else [])]
-    return header, Rows(sheet, common, constants, meanings, repeats, used, factors)
+        length = "um" if c.meaning in READINGS else "mm"
+        usual = {"length": length, "force": "N", "moment": "N*m", "angle": "deg", "temperature": "degC"}
+        why = f" has no unit: write it in the header, as in '{c.name} [mm]', or say --unit {c.meaning}={usual[quantity]}"
+    else:
+        another = unit_of(text) is not None or text.strip() == "mN"
+        why = f": the unit '{text}' is not {'one of this quantity' if another else 'known'}; those of {quantity} are: {known(quantity)}"
+    raise Question(f"{sheet.file}: column '{c.name}' ({c.meaning}){why}", "unit", c.meaning)
 
 
 class Rows:
-    """Rows of data.csv, made block by block whenever they are asked for: text, and numbers as floats."""
+    """Rows of data.csv, made one by one whenever they are asked for: text, and numbers as floats."""
 
     def __init__(
-        self,
-        sheet: Sheet,
-        common: list[Column],
-        constants: Mapping[str, float],
-        meanings: list[str],
-        repeats: int,
-        used: list[Column],
-        factors: Mapping[str, float],
+        self, sheet: Sheet, used: list[Column], constants: Mapping[str, float], factors: Mapping[str, float]
     ) -> None:
-        self._sheet, self._repeats = sheet, repeats
-        numbers = {
+        self._sheet = sheet
+        self.repeats = max([c.repeat for c in used], default=0) or 1
+        """Side by side in the sheet, which become rows one below the other."""
+        common = [c for c in used if c.repeat == 0]
+        meanings = list(dict.fromkeys(c.meaning for c in used if c.repeat))
+        header = [*(c.meaning for c in common), *constants, *meanings]
+        self.header = [*header, *(["repeat"] if self.repeats > 1 else [])]
+        self._numbers = {
             c.index: sheet.numbers(c.index) * factors.get(c.meaning, 1.0) + 0.0  # no -0
             if c.meaning in factors
             else sheet.numbers(c.index)
@@ -215,14 +186,10 @@ class Rows:
             if c.meaning not in WORDS
         }
         at = {(c.meaning, c.repeat): c.index for c in used}
-        wanted: list[list[int | float | None]] = []
-        for k in range(1, repeats + 1):
-            side = [at.get((m, k)) for m in meanings]
-            wanted.append([*(c.index for c in common), *map(float, constants.values()), *side])
-        self._numbers, self._wanted = numbers, wanted
-        self._words = [c.index for c in used if c.meaning in WORDS]
-        header = [*(c.meaning for c in common), *constants, *meanings]
-        self._id = header.index("id") if repeats > 1 and "id" in header else None
+        always = [*(c.index for c in common), *map(float, constants.values())]
+        self._wanted: list[list[int | float | None]] = [
+            [*always, *(at.get((m, k)) for m in meanings)] for k in range(1, self.repeats + 1)
+        ]
         self._name = header.index("id") if "id" in header else None
         self.lines = row_numbers()
         """Line in the sheet of each row, once they were made."""
@@ -231,19 +198,12 @@ class Rows:
     def __iter__(self) -> Iterator[Sequence[Any]]:
         self.lines = row_numbers()
         taken: set[str] = set()
-        words = {i: self._sheet.columns[i].parts() for i in self._words}
-        start = 0
-        for size in map(len, self._sheet.columns[0].parts()):
-            here = slice(start, start + size)
-            cells = {i: next(parts) for i, parts in words.items()}
-            cells |= {i: _written(values[here]) for i, values in self._numbers.items()}
-            each = [self._block(k, cells, size) for k in range(self._repeats)]
-            for n, rows in enumerate(zip(*each, strict=True), start):
-                for row in rows:
-                    if any(row[i] != "" for i in self._readings):
-                        self.lines.append(self._sheet.lines[n])
-                        yield self._once(row, taken)
-            start += size
+        sides = zip(*map(self._side, range(self.repeats)), strict=True)
+        for line, rows in zip(self._sheet.lines, sides, strict=True):
+            for row in rows:
+                if any(row[i] != "" for i in self._readings):
+                    self.lines.append(line)
+                    yield self._once(row, taken)
 
     def _once(self, row: Sequence[Any], taken: set[str]) -> Sequence[Any]:
         """A point that is read again is a repeat: its second row is called ``P1.2``."""
@@ -258,26 +218,28 @@ class Rows:
         taken.add(free)
         return row if free == row[self._name] else [*row[: self._name], free, *row[self._name + 1 :]]
 
-    def _block(self, k: int, cells: dict[int, list[Any]], size: int) -> Iterator[Sequence[Any]]:
+    def _side(self, k: int) -> Iterator[Sequence[Any]]:
         """Rows of one of the repeats that stand side by side."""
-        columns = [
-            [""] * size if w is None else [w] * size if isinstance(w, float) else cells[w]
-            for w in self._wanted[k]
-        ]
-        if self._repeats > 1:
-            if self._id is not None:
-                columns[self._id] = [f"{name}.{k + 1}" for name in columns[self._id]]
-            columns.append([k + 1] * size)
+        columns = [self._cells(wanted) for wanted in self._wanted[k]]
+        if self.repeats > 1:
+            if self._name is not None:
+                columns[self._name] = (f"{name}.{k + 1}" for name in columns[self._name])
+            columns.append(self._same(k + 1))
         return zip(*columns, strict=True)
+
+    def _cells(self, wanted: int | float | None) -> Iterable[Any]:
+        """Of a column of the sheet by its index, or of a number that is the same in all rows; None: empty ones."""
+        if wanted is None or isinstance(wanted, float):
+            return self._same("" if wanted is None else wanted)
+        if wanted not in self._numbers:
+            return self._sheet.columns[wanted]
+        return ("" if v != v else v for v in map(float, self._numbers[wanted]))
+
+    def _same(self, cell: Any) -> Iterable[Any]:
+        return repeat(cell, len(self._sheet.lines))
 
     def __len__(self) -> int:
         return sum(1 for _ in self)
-
-
-def _written(values: Floats) -> list[Any]:
-    """Numbers, and nothing where there are none."""
-    out: list[Any] = values.tolist()
-    return ["" if v != v else v for v in out] if np.isnan(values).any() else out
 
 
 def write_folder(

@@ -17,7 +17,6 @@ from scipy.spatial.transform import Rotation
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.tables.header import split_unit
 from stiffmap.common.tables.sheet import Sheet
 from stiffmap.model.description import Drive, Element, Joint, Leg, MachineDescription, Offset, Pose
 
@@ -183,10 +182,9 @@ def _pose(t: Floats) -> Pose:
 
 def _columns(sheet: Sheet) -> dict[str, int]:
     found: dict[str, int] = {}
-    for i, header in enumerate(sheet.header):
-        name = split_unit(header)[0].strip().lower()
+    for i, name in enumerate(sheet.names):
         for meaning, pattern in (NUMBERS | WORDS).items():
-            if meaning not in found and re.fullmatch(pattern, name):
+            if meaning not in found and re.fullmatch(pattern, name.lower()):
                 found[meaning] = i
                 break
     return found
@@ -194,8 +192,8 @@ def _columns(sheet: Sheet) -> dict[str, int]:
 
 def _factor(sheet: Sheet, index: int, name: str, units: Mapping[str, str]) -> float:
     quantity = "length" if name in LENGTH else "angle"
-    own = split_unit(sheet.header[index])[1]
-    return sheet.size(index, name, quantity, units.get(name, own) or units.get(quantity, ""))
+    said = units.get(name, sheet.unit(index)) or units.get(quantity, "")
+    return sheet.size(index, name, quantity, said)
 
 
 def _named(text: str, number: int) -> str:

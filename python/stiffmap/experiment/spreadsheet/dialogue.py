@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -14,48 +14,34 @@ from stiffmap.common.fingerprints import digest
 from stiffmap.common.number_text import number_in
 from stiffmap.common.outputs import make_folder, write_text
 from stiffmap.common.tables.sheet import Sheet, column_letter
-from stiffmap.common.units import known, quantity_of, unit_of
+from stiffmap.common.units import known, unit_of
 from stiffmap.common.yaml_text import read, text_of
-from stiffmap.experiment.spreadsheet.convert import FORCE, MOMENT, Imported, Question, understand
-from stiffmap.experiment.spreadsheet.guess import READINGS, SEEN
-from stiffmap.experiment.spreadsheet.joints import Commanded
+from stiffmap.experiment.experiment import WRENCH
+from stiffmap.experiment.files.fields import SEEN, quantity_of
+from stiffmap.experiment.spreadsheet.answers import Answers, Meant
+from stiffmap.experiment.spreadsheet.convert import Imported, Question, understand
+from stiffmap.experiment.spreadsheet.guess import READINGS
 from stiffmap.experiment.spreadsheet.together import together
 
 Ask = Callable[[str], str]
 Made = TypeVar("Made")
 MOST = 30
 """Questions about one sheet."""
-
-
-@dataclass
-class Answers:
-    """What --map, --unit, --set and --noise say, or would say."""
-
-    chosen: dict[str, list[str]] = field(default_factory=dict)
-    units: dict[str, str] = field(default_factory=dict)
-    constants: dict[str, float] = field(default_factory=dict)
-    noise: dict[str, float] = field(default_factory=dict)
-
-    def below(self, other: Answers) -> Answers:
-        """These, where `other` says nothing."""
-        return Answers(
-            {k: v for k, v in self.chosen.items() if k not in other.constants} | other.chosen,
-            self.units | other.units,
-            {k: v for k, v in self.constants.items() if k not in other.chosen} | other.constants,
-            self.noise | other.noise,
-        )
-
-    def of(self, sheet: Sheet, given: Answers) -> Answers:
-        """These without columns that were made, which the next sheet of this form has not got, but as `given`."""
-        there = {*sheet.header, *(f"{sign}{h}" for h in sheet.header for sign in "+-")}
-        own = {k: v for k, v in self.chosen.items() if set(v) <= there}
-        return Answers(own | given.chosen, self.units, given.constants | self.constants, self.noise)
+ASKED = {
+    "reading": (READINGS, "Which reading, and in which column? For example dx=A; repeats: dx=B,C"),
+    "load": (
+        WRENCH,
+        "Which column is the load, and along which axis? For example fx=A, fz=-A against the axis, or fx=100 N in all rows",
+    ),
+}
+"""Questions whose answer says what a column means, and what it may mean."""
+APART = "socket"
+"""What is asked as a number alone."""
+PLACE = "Which column is the position {}? A letter, or a number in mm that holds in all rows"
 
 
 class Unanswered(StiffmapError):
-    """Nobody answers a question; `answers` are those that were given before."""
-
-    answers = Answers()
+    """Nobody answers a question."""
 
 
 def profile_file(sheet: Sheet) -> Path:
@@ -93,118 +79,81 @@ def remember(sheet: Sheet, a: Answers) -> Path:
     return file
 
 
-def ask_all(
-    sheet: Sheet,
-    a: Answers,
-    ask: Ask | None,
-    joints: Commanded | None = None,
-    head: Mapping[str, Any] | None = None,
-    loaded: bool = False,
-) -> tuple[Sheet, Imported, Answers]:
-    """The sheet, with columns of the other sign where an answer wants them, understood with the answers to every question that it leaves; raises StiffmapError."""
-    commands, further = (joints.columns, joints.head) if joints else ({}, {})
-    further = further | dict(head or {})
+def ask_all(m: Meant, ask: Ask | None, loaded: bool = False) -> Imported:
+    """What is understood of the sheet with the answers to every question that it leaves, which `m` gathers, and with columns of
+    the other sign where an answer wants them; raises StiffmapError."""
 
-    def signed(a: Answers) -> tuple[Sheet, Answers, Imported]:
-        meant = together(sheet, a.chosen, a.units, False)
-        a = replace(a, chosen=meant.chosen)
-        found = understand(meant.sheet, a.chosen, a.units, a.constants, commands, further, loaded)
-        return meant.sheet, a, found
+    def understood() -> Imported:
+        signed = Meant.of_sheet(m.sheet, m)
+        together(signed, False)
+        m.sheet, m.chosen = signed.sheet, signed.chosen
+        return understand(m.sheet, m.chosen, m.units, m.constants, m.columns, m.head, loaded)
 
-    (table, a, found), _ = asked(sheet, a, ask, signed)
-    read = dict.fromkeys(f"d{m[1]}" if m in SEEN else m for m in READINGS if m in found.units)
-    lost = [m for m in read if m not in a.noise]
-    if ask is not None and lost and found.repeats < 2:
-        a = _noise(lost, a, ask)
-    return table, found, a
+    found = asked(m, ask, understood)
+    read = dict.fromkeys(f"d{r[1]}" if r in SEEN else r for r in READINGS if r in found.units)
+    if ask is not None and found.repeats < 2:
+        _noise(m, [r for r in read if r not in m.noise], ask)
+    return found
 
 
-def asked(
-    sheet: Sheet, a: Answers, ask: Ask | None, understood: Callable[[Answers], Made]
-) -> tuple[Made, Answers]:
-    """What is understood with the answers to every question that this leaves, and those; raises StiffmapError."""
+def asked(m: Meant, ask: Ask | None, step: Callable[[], Made]) -> Made:
+    """What a step gives with the answers to every question that it leaves, which `m` gathers; raises StiffmapError."""
     for _ in range(MOST):
         try:
-            return understood(a), a
+            return step()
         except Question as question:
             if ask is None:
                 raise
             try:
-                a = _answered(sheet, question, a, ask)
+                _answer(m, question, ask)
             except StiffmapError as nobody:
-                left = Unanswered(str(nobody))
-                left.answers = a
-                raise left from None
-    raise StiffmapError(f"{sheet.file}: the sheet is not understood after {MOST} answers")
+                raise Unanswered(str(nobody)) from None
+            m.answered = True
+    raise StiffmapError(f"{m.sheet.file}: the sheet is not understood after {MOST} answers")
 
 
-def _answered(sheet: Sheet, question: Question, a: Answers, ask: Ask) -> Answers:
+def _answer(m: Meant, question: Question, ask: Ask) -> None:
+    """Ask, and keep the answer; after one that is none the same question comes again."""
+    meaning = question.meaning
     if question.kind == "unit":
-        quantity = quantity_of(question.meaning)
-        header = _header_of(sheet, question.meaning, a)
+        quantity = quantity_of(meaning) or "length"
+        header = f"'{m.chosen[meaning][0]}'" if meaning in m.chosen else meaning
         unit = ask(f"Unit of {header} ({known(quantity)})?").strip()
-        if unit_of(unit, quantity) is None:
-            return a  # the same question again
-        return Answers(a.chosen, a.units | {question.meaning: unit}, a.constants, a.noise)
-    columns = "\n".join(f"  {column_letter(i)}  {h}" for i, h in enumerate(sheet.header))
-    if question.meaning == "reading":
-        said = ask(
-            f"{columns}\nWhich reading, and in which column? For example dx={column_letter(0)}; repeats: dx=B,C"
-        )
-        meaning, _, where = said.partition("=")
-        meaning = meaning.strip().lower()
-        found = [_column(sheet, w) for w in where.split(",")]
-        if meaning not in READINGS or None in found:
-            return a
-        return Answers(a.chosen | {meaning: [str(f) for f in found]}, a.units, a.constants, a.noise)
-    if question.meaning == "load":
-        said = ask(
-            f"{columns}\nWhich column is the load, and along which axis? For example fx={column_letter(0)}, fz=-{column_letter(0)} "
-            "against the axis, or fx=100 N in all rows"
-        )
-        meaning, _, where = said.partition("=")
-        meaning, sign = meaning.strip().lower(), where.strip()[:1] if where.strip()[:1] in ("+", "-") else ""
-        if meaning not in (*FORCE, *MOMENT):
-            return a
-        column = _column(sheet, where.strip().removeprefix(sign))
-        if column is not None:
-            return Answers(a.chosen | {meaning: [f"{sign}{column}"]}, a.units, a.constants, a.noise)
-        try:
-            value = number_in(where.lower().removesuffix("n").strip().replace(",", "."))
-        except ValueError:
-            return a
-        return Answers(a.chosen, a.units, a.constants | {meaning: value}, a.noise)
-    apart = question.meaning == "socket"
-    said = ask(
-        "How far is it from one socket to the next, in mm?"
-        if apart
-        else f"{columns}\nWhich column is the position {question.meaning}? A letter, or a number in mm that holds in all rows"
-    ).strip()
-    column = None if apart else _column(sheet, said)
-    if column is not None:
-        return Answers(a.chosen | {question.meaning: [column]}, a.units, a.constants, a.noise)
-    try:
-        return Answers(
-            a.chosen, a.units, a.constants | {question.meaning: number_in(said.replace(",", "."))}, a.noise
-        )
-    except ValueError:
-        return a
+        if unit_of(unit, quantity) is not None:
+            m.units[meaning] = unit
+        return
+    if meaning == APART:
+        _keep_number(m.constants, meaning, ask("How far is it from one socket to the next, in mm?"))
+        return
+    allowed, wanted = ASKED.get(meaning, ((), PLACE))
+    columns = "\n".join(f"  {column_letter(i)}  {h}" for i, h in enumerate(m.sheet.header))
+    said = ask(f"{columns}\n{wanted.format(meaning)}").strip()
+    if allowed:
+        meaning, _, said = (part.strip() for part in said.partition("="))
+        meaning = meaning.lower()
+        if meaning not in allowed:
+            return
+    load = meaning in WRENCH
+    sign = said[:1] if load and said[:1] in ("+", "-") else ""
+    wanted_columns = said.split(",") if meaning in READINGS else [said.removeprefix(sign)]
+    found = [_column(m.sheet, w) for w in wanted_columns]
+    if None not in found:
+        m.chosen[meaning] = [f"{sign}{header}" for header in found]
+    elif meaning not in READINGS:
+        _keep_number(m.constants, meaning, said.lower().removesuffix("n").strip() if load else said)
 
 
-def _header_of(sheet: Sheet, meaning: str, a: Answers) -> str:
-    return f"'{a.chosen[meaning][0]}'" if meaning in a.chosen else meaning
+def _keep_number(where: dict[str, float], name: str, said: str) -> None:
+    with suppress(ValueError):
+        where[name] = number_in(said.replace(",", "."))
 
 
-def _noise(lost: list[str], a: Answers, ask: Ask) -> Answers:
-    noise: Mapping[str, float] = {}
-    for m in lost:
-        said = ask(f"One standard deviation of a reading of {m}, in its unit? Empty: repeats show it").strip()
+def _noise(m: Meant, lost: list[str], ask: Ask) -> None:
+    for r in lost:
+        said = ask(f"One standard deviation of a reading of {r}, in its unit? Empty: repeats show it").strip()
         if said:
-            try:
-                noise = {**noise, m: number_in(said.replace(",", "."))}
-            except ValueError:
-                continue
-    return Answers(a.chosen, a.units, a.constants, {**a.noise, **noise})
+            _keep_number(m.noise, r, said)
+            m.answered = True
 
 
 def _column(sheet: Sheet, said: str) -> str | None:

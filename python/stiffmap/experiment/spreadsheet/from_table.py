@@ -12,20 +12,20 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.common.fingerprints import file_digest
 from stiffmap.common.outputs import new_file
 from stiffmap.common.short import short_repr
+from stiffmap.common.tables.header import RECORD
 from stiffmap.common.tables.sheet import Layout, Sheet, read_sheet
 from stiffmap.experiment.experiment import Experiment
 from stiffmap.experiment.noise.level import against_the_load, contradictions
+from stiffmap.experiment.spreadsheet.answers import Answers, Meant
 from stiffmap.experiment.spreadsheet.convert import Imported
 from stiffmap.experiment.spreadsheet.dh import LEG, arm, read_dh
-from stiffmap.experiment.spreadsheet.dialogue import Answers, Ask
+from stiffmap.experiment.spreadsheet.dialogue import Ask
 from stiffmap.experiment.spreadsheet.folder import make_experiment
 from stiffmap.experiment.spreadsheet.guess import has_meaning
 from stiffmap.experiment.spreadsheet.instrument import load_instrument
-from stiffmap.experiment.spreadsheet.joints import DIFFERENCES, Commanded, drives_of
+from stiffmap.experiment.spreadsheet.joints import DIFFERENCES, drives_of
 from stiffmap.experiment.spreadsheet.reading import Reading, read_and_ask
 from stiffmap.solve.machine import Machine, load_machine
-
-RECORDED = ("certificate", "date", "instrument", "notes", "operator", "temperature")
 
 
 @short_repr
@@ -43,7 +43,7 @@ class FromTable:
     """What was taken for granted, and what was left out."""
     sheet: Sheet = field(repr=False)
     understood: Imported = field(repr=False)
-    commanded: Commanded | None = field(repr=False)
+    commanded: Meant | None = field(repr=False)
     """Joints that the table commands."""
 
 
@@ -110,9 +110,9 @@ def experiment_from_table(
                 f"{name}: expected a mapping of columns to what is said of them, got {value!r}"
             )
     new_file(output / "experiment.yaml", overwrite, output)
-    wrong = sorted(set(record or ()) - {*RECORDED})
+    wrong = sorted(set(record or ()) - {*RECORD})
     if wrong:
-        raise StiffmapError(f"record: expected one of {', '.join(RECORDED)}; got '{wrong[0]}'")
+        raise StiffmapError(f"record: expected one of {', '.join(sorted(RECORD))}; got '{wrong[0]}'")
     chosen = {k: v.split("|") for k, v in (columns or {}).items()}
     given = Answers(chosen, dict(units or {}), dict(constants or {}), dict(noise or {}))
     rows = None if dh is None else read_dh(read_sheet(Path(dh)), given.units)
@@ -120,17 +120,18 @@ def experiment_from_table(
     numbered = any(h.strip("+-").isdigit() for many in chosen.values() for h in many)
     layout = Layout(has_meaning, tuple(header), numbered, which)
     read = Reading(wrote, drives, difference, quantity == "deflection", layout)
-    own, found, answers, told, joints = read_and_ask(file, sheet, read, given, ask)
-    if rows is not None and joints is None:
+    m, found = read_and_ask(file, sheet, read, given, ask)
+    own = m.sheet
+    if rows is not None and not m.columns:
         raise StiffmapError(f"{file}: no column commands a joint; the arm has {', '.join(drives)}")
-    quantity = "position" if (joints and joints.head) or "ll" in found.units else quantity
+    quantity = "position" if m.placed or "ll" in found.units else quantity
     declared = str(output / "machine.yaml") if machine is None else str(machine)
     title = f"from {own.file.replace(str(file), file.name)}"
     kept = {"source": file.name, "sha256": file_digest(file), **(record or {})}
-    made = make_experiment(found, own, output, declared, quantity, answers.noise, title, kept)
-    if rows is not None and joints is not None and dh is not None:
+    made = make_experiment(found, own, output, declared, quantity, m.noise, title, kept)
+    if rows is not None and dh is not None:
         source = f"from {Path(dh).name}"
-        Machine(arm(rows, dh_convention, output.name, source, joints.middle())).save(declared)
+        Machine(arm(rows, dh_convention, output.name, source, m.middle())).save(declared)
     warnings = tuple(line for line in (against_the_load(made), *contradictions(made)) if line)
-    remarks = (*told, *(f"left out: {text}" for text in own.aside))
-    return FromTable(made, output, declared, warnings, remarks, own, found, joints)
+    remarks = (*m.said, *(f"left out: {text}" for text in own.aside))
+    return FromTable(made, output, declared, warnings, remarks, own, found, m if m.columns else None)

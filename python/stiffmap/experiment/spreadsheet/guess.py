@@ -8,6 +8,8 @@ from dataclasses import dataclass, replace
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.tables.header import split_unit
+from stiffmap.experiment.channels import AXES
+from stiffmap.experiment.files.fields import SEEN
 
 PATTERNS: tuple[tuple[str, str], ...] = (
     ("id", r"#|id|nr\.?|no\.?|lfd\.? ?nr\.?|number|nummer|row|zeile|punkt|messpunkt|point|messpunkt nr\.?|point no\.?"),
@@ -25,8 +27,7 @@ PATTERNS: tuple[tuple[str, str], ...] = (
     *((a, rf"{a}|pos\.?[ _-]?{a}|{a}[ _-]?pos\.?|position ?_?{a}|(nominal|pose|punkt|messpunkt|tcp|ort|lage|koordinate|coordinate) ?_?{a}|soll ?_?{a}|{a} ?soll|{a}[ _-]?(t|target|cmd|nominal|command|commanded)|target[ _-]?{a}") for a in "xyz"),
 )  # fmt: skip
 REPEATED = re.compile(r"^(.*?)[ _.-]*(?:#|run|messung|wdh|rep|repeat)?[ _.-]*(\d+)$", re.IGNORECASE)
-SEEN = ("px", "py", "pz")
-READINGS = ("dx", "dy", "dz", "rx", "ry", "rz", "dd", "ll", *SEEN)
+READINGS = (*AXES, "dd", "ll", *SEEN)
 
 
 @dataclass(frozen=True)

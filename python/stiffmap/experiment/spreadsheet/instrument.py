@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-import math
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
+
+from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError, StiffmapError
-from stiffmap.common.tables.cells import Cells
-from stiffmap.common.tables.header import split_unit
 from stiffmap.common.tables.sheet import Sheet
 from stiffmap.common.yaml_text import read
-from stiffmap.experiment.spreadsheet.guess import SEEN, guess
+from stiffmap.experiment.files.fields import SEEN
+from stiffmap.experiment.spreadsheet.answers import Meant
+from stiffmap.experiment.spreadsheet.guess import guess
 
 FOLDER = Path(__file__).parent / "instruments"
 KEYS = {"title", "quantity", "columns", "measured", "circle", "units"}
@@ -65,101 +66,82 @@ def load_instrument(name_or_path: str) -> Instrument:
     return Instrument(**data)
 
 
-def as_readings(
-    sheet: Sheet, instrument: Instrument, constants: Mapping[str, float], given: Mapping[str, Sequence[str]]
-) -> tuple[Sheet, dict[str, list[str]], dict[str, str], dict[str, float]]:
-    """The sheet with columns of readings, the columns' meanings, units of those without, and constants left over.
+def as_readings(m: Meant, instrument: Instrument) -> None:
+    """Columns of readings, their meanings, and units of those without.
 
-    `given`: what a person says of columns. Where these or the headers name px, py, pz, nothing is taken off the places seen.
+    What a person says of columns stays. Where that or the headers name px, py, pz, nothing is taken off the places seen.
 
     Raises StiffmapError where the sheet lacks a column that the instrument needs.
     """
     if instrument.circle:
-        return _of_circle(sheet, instrument, constants)
+        _of_circle(m, instrument)
+        return
     chosen: dict[str, list[str]] = {}
     units: dict[str, str] = {}
     for meaning, pattern in instrument.columns.items():
-        index = _find(sheet, pattern)
+        index = _find(m.sheet, pattern)
         if index is not None:
-            chosen[meaning] = [sheet.header[index]]
-            units |= _unit(sheet, index, meaning, instrument)
-    said = guess(sheet.header, given)
+            chosen[meaning] = [m.sheet.header[index]]
+            if meaning in instrument.units and not m.sheet.unit(index):
+                units[meaning] = instrument.units[meaning]
+    said = guess(m.sheet.header, m.chosen)
     seen = any(c.meaning in SEEN for c in said)
     for c in said:
         unit = instrument.units.get(c.meaning.replace("p", "d") if c.meaning in SEEN else c.meaning)
-        if unit and not c.unit and (seen or c.meaning in given):
+        if unit and not c.unit and (seen or c.meaning in m.chosen):
             units[c.meaning] = unit
     for reading, pattern in ({} if seen else instrument.measured).items():
         axis = reading[-1]
-        own = _find(sheet, pattern)
+        own = _find(m.sheet, pattern)
         if own is None:
             continue
         if axis not in chosen:
             raise StiffmapError(
-                f"{sheet.file}: '{sheet.header[own]}' was measured; no column is its commanded {axis}"
+                f"{m.sheet.file}: '{m.sheet.header[own]}' was measured; no column is its commanded {axis}"
             )
-        command = sheet.header.index(chosen[axis][0])
-        scale = [_named(sheet, i, m, instrument) for i, m in ((own, reading), (command, axis))]
-        pairs = zip(sheet.numbers(own), sheet.numbers(command), strict=True)
-        name = f"{sheet.header[own]} less {sheet.header[command]} [mm]"
-        sheet = with_column(sheet, name, [a * scale[0] - b * scale[1] for a, b in pairs])
+        command = m.sheet.header.index(chosen[axis][0])
+        name = f"{m.sheet.header[own]} less {m.sheet.header[command]} [mm]"
+        values = _si(m.sheet, own, reading, instrument) - _si(m.sheet, command, axis, instrument)
+        m.sheet = m.sheet.with_column(name, values)
         chosen[reading] = [name]
-    return sheet, chosen, units, dict(constants)
+    m.chosen, m.units = chosen | m.chosen, units | m.units
 
 
-def _of_circle(
-    sheet: Sheet, instrument: Instrument, constants: Mapping[str, float]
-) -> tuple[Sheet, dict[str, list[str]], dict[str, str], dict[str, float]]:
+def _of_circle(m: Meant, instrument: Instrument) -> None:
     """Poses on the circle, its centre as the second pose, and the distance's deviation."""
-    lost = [c for c in CIRCLE if c not in constants]
+    lost = [c for c in CIRCLE if c not in m.constants]
     if lost:
         raise StiffmapError(f"a ball bar needs --set {lost[0]}=NUMBER (mm)")
     at: dict[str, int] = {}
     for key in ("angle", "deviation"):
-        found = _find(sheet, instrument.circle[key])
+        found = _find(m.sheet, instrument.circle[key])
         if found is None:
-            raise StiffmapError(f"{sheet.file}: no column is the {key}; there are: {', '.join(sheet.header)}")
+            raise StiffmapError(
+                f"{m.sheet.file}: no column is the {key}; there are: {', '.join(m.sheet.header)}"
+            )
         at[key] = found
-    turn = _named(sheet, at["angle"], "angle", instrument)
-    size = _named(sheet, at["deviation"], "deviation", instrument)
-    angles = [turn * a for a in sheet.numbers(at["angle"])]
-    centre = {a: constants[f"centre_{a}"] for a in "xyz"}
+    angles, deviation = (_si(m.sheet, i, key, instrument) for key, i in at.items())
+    *centre, radius = (m.constants.pop(c) for c in CIRCLE)
     plane = instrument.circle["plane"]
-    waves = {plane[0]: math.cos, plane[1]: math.sin}
-    chosen = {}
-    for a in "xyz":
-        values = [centre[a] + (constants["radius"] * waves[a](t) if a in waves else 0.0) for t in angles]
-        for name, column in ((a, values), (f"{a}2", [centre[a]] * len(angles))):
-            sheet = with_column(sheet, f"{name} of the circle [mm]", column)
-            chosen[name] = [f"{name} of the circle [mm]"]
-    sheet = with_column(sheet, "radial deviation [mm]", [size * v for v in sheet.numbers(at["deviation"])])
-    chosen["dd"] = ["radial deviation [mm]"]
-    return sheet, chosen, {}, {k: v for k, v in constants.items() if k not in CIRCLE}
-
-
-def with_column(sheet: Sheet, name: str, values: list[float]) -> Sheet:
-    """The sheet and one column more."""
-    cell = [("" if math.isnan(v) else repr(float(v))) for v in values]
-    if sheet.decimal_comma:
-        cell = [c.replace(".", ",") for c in cell]
-    return replace(sheet, header=(*sheet.header, name), columns=(*sheet.columns, Cells.of(cell)))
+    waves = {plane[0]: np.cos(angles), plane[1]: np.sin(angles)}
+    made = {}
+    for a, middle in zip("xyz", centre, strict=True):
+        made[f"{a} of the circle [mm]"] = a, middle + radius * waves.get(a, np.zeros(len(angles)))
+        made[f"{a}2 of the circle [mm]"] = f"{a}2", np.full(len(angles), middle)
+    made["radial deviation [mm]"] = "dd", deviation
+    for name, (_, values) in made.items():
+        m.sheet = m.sheet.with_column(name, values)
+    m.chosen = {meaning: [name] for name, (meaning, _) in made.items()} | m.chosen
 
 
 def _find(sheet: Sheet, pattern: str) -> int | None:
-    for i, header in enumerate(sheet.header):
-        if re.fullmatch(pattern, split_unit(header)[0], re.IGNORECASE):
-            return i
-    return None
+    found = (i for i, n in enumerate(sheet.names) if re.fullmatch(pattern, n, re.IGNORECASE))
+    return next(found, None)
 
 
-def _named(sheet: Sheet, index: int, meaning: str, instrument: Instrument) -> float:
-    """mm or rad that one of a column's unit is: its header's, else the instrument's."""
-    own = split_unit(sheet.header[index])[1]
+def _si(sheet: Sheet, index: int, meaning: str, instrument: Instrument) -> Floats:
+    """A column in mm or rad, of its header's unit, else the instrument's."""
     quantity = "angle" if meaning == "angle" else "length"
-    size = sheet.size(index, meaning, quantity, own or instrument.units.get(meaning, ""))
-    return size if quantity == "angle" else 1e3 * size
-
-
-def _unit(sheet: Sheet, index: int, meaning: str, instrument: Instrument) -> dict[str, str]:
-    given = instrument.units.get(meaning)
-    return {meaning: given} if given and not split_unit(sheet.header[index])[1] else {}
+    said = sheet.unit(index) or instrument.units.get(meaning, "")
+    size = sheet.size(index, meaning, quantity, said)
+    return (size if quantity == "angle" else 1e3 * size) * sheet.numbers(index)

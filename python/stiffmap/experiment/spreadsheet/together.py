@@ -4,18 +4,17 @@ names of targets, and headers with a sign."""
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
 from stiffmap.common.errors import FileError
-from stiffmap.common.tables.header import split_unit
+from stiffmap.common.tables.header import split_unit, with_unit
 from stiffmap.common.tables.sheet import Sheet, column_letter
 from stiffmap.common.units import Unit, unit_of
+from stiffmap.experiment.channels import AXES
+from stiffmap.experiment.files.fields import EULER, POSE, SEEN, SEEN_TURNED
+from stiffmap.experiment.spreadsheet.answers import Meant
 from stiffmap.experiment.spreadsheet.guess import READINGS, find_column, guess, guessed
-from stiffmap.experiment.spreadsheet.instrument import with_column
 
 LOAD = re.compile(
     r"(applied |test |hanging |hung )?(load|force|mass|weight|payload|last|prüflast|kraft|prüfkraft|masse|gewicht|belastung|"
@@ -48,30 +47,9 @@ NAMED = 5
 ANGLE = r"(tcp|pos|ist|soll|nominal|cmd|orientation|ori|rot)?[ _.-]?{}"
 
 
-@dataclass
-class Meant:
-    """A sheet with the columns that were made of others, and what they mean."""
-
-    sheet: Sheet
-    chosen: dict[str, list[str]]
-    units: dict[str, str]
-    said: list[str] = field(default_factory=list)
-    """What the reader must know, in words."""
-    head: dict[str, Any] = field(default_factory=dict)
-    """Further keys of experiment.yaml."""
-
-    def add(self, name: str, values: np.ndarray[Any, Any], meaning: str) -> None:
-        """A column more, the only one of its meaning."""
-        if name not in self.sheet.header:
-            self.sheet = with_column(self.sheet, name, [float(v) for v in values])
-        self.chosen[meaning] = [name]
-
-
-def together(
-    sheet: Sheet, chosen: Mapping[str, Sequence[str]], units: Mapping[str, str], deflection: bool
-) -> Meant:
-    """Signs in `chosen`, gauges before and after a load, loads with their direction. Raises StiffmapError."""
-    m = Meant(sheet, {{"length": "ll"}.get(k, k): list(v) for k, v in chosen.items()}, dict(units))
+def together(m: Meant, deflection: bool) -> None:
+    """Signs of chosen columns, gauges before and after a load, loads with their direction. Raises StiffmapError."""
+    m.chosen = {"ll" if k == "length" else k: list(v) for k, v in m.chosen.items()}
     _signs(m)
     _lengths(m)
     if deflection:
@@ -79,13 +57,14 @@ def together(
     _directions(m)
     if not any(re.fullmatch("[fm][xyz]", c.meaning) for c in guess(m.sheet.header, m.chosen)):
         _hung(m)
-    return m
 
 
-def oriented(m: Meant, commands: Sequence[str], noise: Mapping[str, float]) -> None:
-    """KUKA's A B C next to X Y Z, and names of targets; `commands`: headers of commanded joints."""
-    _abc(m, noise)
-    _targets(m, commands)
+def oriented(m: Meant) -> None:
+    """KUKA's A B C next to X Y Z, and names of targets."""
+    taken = {find_column(h, m.sheet.header) for v in m.chosen.values() for h in v}
+    _abc(m, taken)
+    if "target" not in m.chosen:
+        _targets(m, taken)
 
 
 def _signs(m: Meant) -> None:
@@ -96,9 +75,9 @@ def _signs(m: Meant) -> None:
                 continue
             index = find_column(wanted[1:].strip(), m.sheet.header)
             name = f"{wanted[0].replace('−', '-')}{m.sheet.header[index]}"
-            values = m.sheet.numbers(index)
             if name not in m.sheet.header:
-                m.sheet = with_column(m.sheet, name, [float(-v if name[0] == "-" else v) for v in values])
+                values = m.sheet.numbers(index)
+                m.sheet = m.sheet.with_column(name, -values if name[0] == "-" else values)
             headers[k] = name
             m.said.append(f"{meaning} is {name[0]}'{m.sheet.header[index]}'")
 
@@ -119,7 +98,7 @@ def _lengths(m: Meant) -> None:
             rows = ", ".join(f"line {m.sheet.lines[i]} ({values[i]:g})" for i in wrong[:NAMED])
             told = f"{rows} and {wrong.size - NAMED} more" if wrong.size > NAMED else rows
             m.said.append(f"'{c.name}': expected lengths above zero; left out: {told}")
-            name = f"{c.name} in use" + (f" [{c.unit}]" if c.unit else "")
+            name = with_unit(f"{c.name} in use", c.unit)
             m.add(name, np.where(values > 0.0, values, np.nan), "ll")
 
 
@@ -152,20 +131,12 @@ def _differences(m: Meant) -> None:
         after, before = m.sheet.header[i], m.sheet.header[j]
         if meaning not in READINGS:
             continue
-        units = [split_unit(h)[1] for h in (after, before)]
+        units = [m.sheet.unit(k) for k in (i, j)]
         unit = m.units.get(meaning) or units[0] or units[1]
-        sizes = [unit_of(u or unit) for u in units]
-        if None in sizes or not unit:
-            scale = 1.0
-        else:
-            assert sizes[0] is not None and sizes[1] is not None
-            scale = sizes[1].size / sizes[0].size
+        loaded, unloaded = (unit_of(u or unit) for u in units)
+        scale = unloaded.size / loaded.size if unit and loaded and unloaded else 1.0
         values = m.sheet.numbers(i) - scale * m.sheet.numbers(j)
-        m.add(
-            f"{split_unit(after)[0]} less {split_unit(before)[0]}" + (f" [{unit}]" if unit else ""),
-            values,
-            meaning,
-        )
+        m.add(with_unit(f"{m.sheet.names[i]} less {m.sheet.names[j]}", unit), values, meaning)
         m.said.append(f"{meaning} is '{after}' less '{before}'")
 
 
@@ -178,12 +149,12 @@ def _way(cell: str) -> tuple[str, float] | None:
 
 def _directions(m: Meant) -> None:
     """Components of a load whose size and direction stand in columns of their own."""
-    names = [split_unit(h)[0].strip() for h in m.sheet.header]
+    names = m.sheet.names
     at = [i for i, n in enumerate(names) if DIRECTION.fullmatch(n) and any(map(_way, m.sheet.columns[i]))]
     loads = [
         i
         for i, n in enumerate(names)
-        if LOAD.fullmatch(n) and i not in at and unit_of(split_unit(m.sheet.header[i])[1] or "N", "force")
+        if LOAD.fullmatch(n) and i not in at and unit_of(m.sheet.unit(i) or "N", "force")
     ]
     mapped = {find_column(v[0], m.sheet.header): k for k, v in m.chosen.items() if re.fullmatch("f[xyz]", k)}
     loads = [i for i in loads if i in mapped] or loads or [i for i in mapped if i < len(names)]
@@ -202,23 +173,22 @@ def _directions(m: Meant) -> None:
                 f"(cell {column_letter(way)}{m.sheet.lines[row]})",
                 file=m.sheet.file, line=m.sheet.lines[row],
             )  # fmt: skip
-    unit = split_unit(m.sheet.header[load])[1] or m.units.get(
-        mapped.get(load, "force"), m.units.get("force", "")
-    )
+    common = m.units.get("force", "")
+    unit = m.sheet.unit(load) or m.units.get(mapped.get(load, "force"), common)
     for axis, values in zip("xyz", parts.T, strict=True):
         m.chosen.pop(f"f{axis}", None)
         if values.any():
-            m.add(f"+{names[load]} along {axis}" + (f" [{unit}]" if unit else ""), values, f"f{axis}")
+            m.add(with_unit(f"+{names[load]} along {axis}", unit), values, f"f{axis}")
             m.units.pop(f"f{axis}", None)
     if not parts.any():
-        m.add(f"+{names[load]} along z" + (f" [{unit}]" if unit else ""), parts[:, 2], "fz")
+        m.add(with_unit(f"+{names[load]} along z", unit), parts[:, 2], "fz")
     m.said.append(f"the load is '{m.sheet.header[load]}' along '{m.sheet.header[way]}'")
 
 
 def _hung(m: Meant) -> None:
     """A mass that no column gives a direction hangs."""
-    for i, header in enumerate(m.sheet.header):
-        name, unit = split_unit(header)
+    for i, name in enumerate(m.sheet.names):
+        unit = m.sheet.unit(i)
         found = unit_of(unit, "force") if unit else None
         if (
             found is not None
@@ -226,32 +196,30 @@ def _hung(m: Meant) -> None:
             and WEIGHS.search(name)
             and m.sheet.is_numeric(i)
         ):
-            m.chosen.setdefault("fz", [header])
+            m.chosen.setdefault("fz", [m.sheet.header[i]])
             return
 
 
-def _abc(m: Meant, noise: Mapping[str, float]) -> None:
+def _abc(m: Meant, taken: set[int]) -> None:
     """Euler angles A B C (about z, the new y, the new x) where they stand with X Y Z."""
-    names = [split_unit(h)[0].strip().lower() for h in m.sheet.header]
+    names = [n.lower() for n in m.sheet.names]
     at = [next((i for i, n in enumerate(names) if re.fullmatch(ANGLE.format(a), n)), None) for a in "abc"]
-    taken = {find_column(h, m.sheet.header) for v in m.chosen.values() for h in v}
     meanings = {c.meaning for c in guess(m.sheet.header, m.chosen)}
     columns = [i for i in at if i is not None and i not in taken and m.sheet.is_numeric(i)]
-    seen = {"px", "py", "pz"} <= meanings
-    units = [split_unit(m.sheet.header[i])[1] for i in columns]
+    seen = set(SEEN) <= meanings
+    units = [m.sheet.unit(i) for i in columns]
     if any(u and unit_of(u, "angle") is None for u in units):
         return  # gauges A, B and C
-    if len(columns) < 3 or not (seen or {"x", "y", "z"} <= meanings):
+    if len(columns) < 3 or not (seen or set(POSE) <= meanings):
         return
     shown = ", ".join(f"'{m.sheet.header[i]}'" for i in columns)
-    if seen and not {"rx", "ry", "rz"} <= set(noise):
+    if seen and not set(AXES[3:]) <= set(m.noise):
         m.said.append(f"{shown} are not used; as the orientation seen they need --noise rx=… ry=… rz=…")
         return
-    for i, meaning in zip(
-        columns, ("prx", "pry", "prz") if seen else ("euler1", "euler2", "euler3"), strict=True
-    ):
+    for i, unit, meaning in zip(columns, units, SEEN_TURNED if seen else EULER, strict=True):
         m.chosen[meaning] = [m.sheet.header[i]]
-        if not split_unit(m.sheet.header[i])[1]:
+        taken.add(i)
+        if not unit:
             m.units.setdefault(meaning, m.units.get("angle", "deg"))
     m.head |= {"target_orientation": "ZYX"} if seen else {"orientation": {"against": "base", "euler": "ZYX"}}
     m.said.append(
@@ -259,15 +227,11 @@ def _abc(m: Meant, noise: Mapping[str, float]) -> None:
     )
 
 
-def _targets(m: Meant, commands: Sequence[str]) -> None:
+def _targets(m: Meant, taken: set[int]) -> None:
     """A column of names of reflectors; also one of points that are read at every pose of the joints."""
-    if "target" in m.chosen:
-        return
-    taken = {find_column(h, m.sheet.header) for v in m.chosen.values() for h in v}
-    joints = [list(m.sheet.columns[m.sheet.header.index(h)]) for h in commands]
-    poses = list(zip(*joints, strict=True)) if joints else []
-    for i, header in enumerate(m.sheet.header):
-        name = split_unit(header)[0].strip()
+    commands = [m.sheet.header.index(h) for c in m.columns for h in m.chosen[c]]
+    poses = list(zip(*(m.sheet.columns[i] for i in commands), strict=True))
+    for i, name in enumerate(m.sheet.names):
         sure = TARGET.fullmatch(name) is not None
         if i in taken or not (sure or (poses and POINT.fullmatch(name))):
             continue
@@ -279,6 +243,7 @@ def _targets(m: Meant, commands: Sequence[str]) -> None:
             each_pose = len(set(zip(poses, cells, strict=True))) == len(poses) > len(set(poses))
             sure = each_pose and all(re.search(r"[^\W\d]", w) for w in words)
         if many and plain and sure:
+            header = m.sheet.header[i]
             m.chosen["target"] = [header]
             m.said.append(
                 f"'{header}' names the target that was read: {', '.join(sorted(words)[:6])}; --map note='{header}' where it does not"
@@ -289,7 +254,7 @@ def _targets(m: Meant, commands: Sequence[str]) -> None:
 def weight(sheet: Sheet, index: int, explicit: bool, meaning: str, unit: Unit) -> tuple[float, str]:
     """Sign of a load along an axis, and what to say of it: a mass, and what is called a weight, pulls down."""
     values, header = sheet.numbers(index), sheet.header[index]
-    if not (unit.mass or HUNG.search(split_unit(header)[0])):
+    if not (unit.mass or HUNG.search(sheet.names[index])):
         return 1.0, ""
     if explicit or meaning[0] != "f" or np.nanmin(values, initial=0.0) < 0:
         return 1.0, ""

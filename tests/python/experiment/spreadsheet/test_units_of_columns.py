@@ -42,3 +42,28 @@ def test_a_wrong_unit_names_its_column(tmp_path: Path) -> None:
         load(tmp_path / "c", MIXED.replace("dx: um", "dx: N"), OTHER)
     with pytest.raises(sm.StiffmapError, match="did you mean"):
         load(tmp_path / "d", MIXED.replace("dx: um", "dxx: um"), OTHER)
+
+
+@pytest.mark.parametrize("header", [" [mm]", '"a\nb"', "zz [mm]"])
+def test_a_column_without_a_meaning_is_refused_by_its_name(header: str, tmp_path: Path) -> None:
+    with pytest.raises(sm.StiffmapError, match="unknown column"):
+        load(tmp_path / "e", PLAIN, ROWS.replace("temperature", header))
+
+
+def test_a_second_command_has_the_unit_of_its_header(tmp_path: Path) -> None:
+    head = "machine: ur10\nquantity: position\nunits: {length: mm}\ncommand:\n"
+    head += "".join(f"  q{k}: {{actuator: arm.joint_{k}, unit: deg}}\n" for k in range(1, 7))
+    names = [f"q{k}" for k in range(1, 7)]
+    said = {unit: ",".join([*names, *(f"{n}2{unit}" for n in names), "dd"]) for unit in ("", " [mrad]")}
+    first, second = "10,-80,70,20,30,40", (20.0, -70.0, 60.0, 30.0, 20.0, 10.0)
+    cells = {"": second, " [mrad]": tuple(1e3 * np.radians(second))}
+    plain, other = (
+        load(
+            tmp_path / f"f{len(u)}",
+            head,
+            f"{said[u]}\n{first},{','.join(map(repr, map(float, cells[u])))},0.1\n",
+        )
+        for u in said
+    )
+    assert plain.other_command is not None and other.other_command is not None
+    np.testing.assert_allclose(other.other_command, plain.other_command, rtol=1e-12)
