@@ -113,6 +113,11 @@ def turned(straight: Floats, reach: Floats) -> Floats:
         return np.where(straight > reach, reach / (straight - reach), np.inf)
 
 
+def changed(h: Hanging, straight: Floats, arm: Floats, reach: Floats) -> Floats:
+    """(..., n) bound of how far each column of `scaled` moves where the platform moves by `reach`; lengths, arms as by `lines`."""
+    return np.asarray(turned(straight, reach) * np.sqrt(1.0 + (arm**2).sum(-1) / h.length**2))
+
+
 @dataclass(frozen=True, eq=False)
 class _Ask:
     h: Hanging
@@ -126,9 +131,7 @@ class _Ask:
         reach = 0.5 * np.linalg.norm(cells[:, 1] - cells[:, 0], axis=1)
         unit, straight, arm = lines(self.h, centre, self.rotation)
         plain = matrix(unit, straight, arm)
-        column = turned(straight, reach[:, None]) * np.sqrt(
-            1.0 + (arm**2).sum(-1) / self.h.length**2
-        )  # of dW
+        column = changed(self.h, straight, arm, reach[:, None])
         inside, outside = np.ones(len(cells), dtype=bool), np.zeros(len(cells), dtype=bool)
         top = np.where(np.isfinite(self.high), self.high, self.low + ROOMY)
         for wrench in self.wrenches:

@@ -10,7 +10,9 @@ from tests.python.workspace.cables.made import hanging
 from stiffmap import Machine, StiffmapError, inverse_kinematics, load_machine
 from stiffmap.model.description import Drive
 from stiffmap.workspace.cables import structure_matrix, tension_distribution, wrench_feasible
-from stiffmap.workspace.cables.feasible import turned
+from stiffmap.workspace.cables.feasible import changed, turned
+from stiffmap.workspace.cables.structure import hanging as hanging_of
+from stiffmap.workspace.cables.structure import lines, scaled
 
 SIX = ("x", "y", "z", "rx", "ry", "rz")
 
@@ -121,6 +123,22 @@ def test_a_line_turns_by_no_more_than_its_bound() -> None:
         bound = float(turned(np.array(straight), np.array(reach)))
         assert most <= bound <= most * 1.01 * straight / (straight - reach)
     assert turned(np.array(1.0), np.array(1.0)) == np.inf
+
+
+@pytest.mark.parametrize("reach", [0.02, 0.3])
+def test_a_column_changes_by_no_more_than_its_bound_and_by_nearly_as_much(reach: float) -> None:
+    """The structure matrix itself, at ends of many moves of a platform on cables without pulleys."""
+    rng = np.random.default_rng(7)
+    m, p = frame(), np.array([0.4, -0.3, 1.1])
+    moves = rng.normal(size=(4000, 3))
+    moves *= reach / np.linalg.norm(moves, axis=1, keepdims=True)
+    h = hanging_of(m)
+    _, straight, arm = lines(h, p, np.eye(3))
+    here, there = (scaled(h, structure_matrix(m, q), np.zeros(6))[0] for q in (p, p + moves))
+    most = np.linalg.norm(there - here, axis=1).max(axis=0)
+    bound = changed(h, straight, arm, np.array(reach))
+    assert (most <= bound).all()
+    assert (bound <= 1.02 * most * (straight / (straight - reach)) ** 2).all()
 
 
 def test_boxes_are_proven() -> None:
