@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from tests.python.model.files.full_machine import full_machine
 
 import stiffmap as sm
 from stiffmap.common.errors import HomeError, StiffmapError
@@ -124,6 +125,20 @@ def test_bad_values_are_refused() -> None:
             machine.with_number(address, value)
     with pytest.raises(HomeError, match="of the change"):
         machine.with_number("forearm/length", 3.0)
+
+
+@pytest.mark.parametrize("name", ["linear-delta", "ur10", "every number"])
+def test_moved_as_built_moves_that_number_by_as_much(name: str) -> None:
+    """Every number that a machine as built can have otherwise; external springs among them."""
+    d = full_machine() if name == "every number" else sm.load_machine(name).description
+    changed = [r.address for r in listed(d) if number(d, r.address) is not None]
+    assert len(changed) > 5
+    for address in changed:
+        built = moved(d, address, 1e-4)
+        assert built is not None
+        before, after = number(d, address), number(built, address)
+        assert before is not None and (after is None or after == pytest.approx(before + 1e-4, abs=1e-15))
+        assert built != d
 
 
 def test_moved_as_built_leaves_the_controller() -> None:
