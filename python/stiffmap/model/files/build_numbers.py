@@ -5,14 +5,16 @@ from __future__ import annotations
 from typing import Any
 
 from stiffmap.common.units import Dimension
-from stiffmap.model.description.numbers import DeclaredNumber, numbers_of
+from stiffmap.model.description.numbers import PARTS, DeclaredNumber, numbers_of
 from stiffmap.model.files.context import Context
 from stiffmap.model.files.schema.base import FileModel, Number
 
 
 def build_range(pair: list[Number], dimension: Dimension, context: Context, name: str) -> tuple[float, float]:
     """SI interval; raises `FileError` where it is empty."""
-    low, high = (context.si(n, dimension, f"{name}.{w}") for n, w in zip(pair, ("min", "max"), strict=True))
+    low, high = (
+        context.si(n, dimension, f"{name}.{w}") for n, w in zip(pair, PARTS["interval"], strict=True)
+    )
     if low >= high:
         context.at(name).fail(f"the lower end {pair[0].value} is not below the upper end {pair[1].value}")
     return (low, high)

@@ -48,6 +48,16 @@ def test_the_table_has_uncertainty_unit_and_note() -> None:
     assert sm.load_machine(text).numbers().filter(like="/damping", axis=0).unit.item() == "N·m·s/rad"
 
 
+def test_the_uncertainty_of_an_end_of_a_range_is_at_its_address() -> None:
+    text = find("linear-delta").read_text(encoding="utf-8")
+    ends = re.search(r"range: \[(\S+), (\S+)\]", text)
+    assert ends
+    uncertain = f"range: [{{value: {ends[1]}, u: 2}}, {{value: {ends[2]}, u: 3}}]"
+    t = sm.load_machine(text.replace(ends[0], uncertain)).numbers()
+    assert t.loc["a.carriage/range.low"].u == pytest.approx(2e-3)
+    assert t.loc["a.carriage/range.high"].u == pytest.approx(3e-3)
+
+
 def crank_angle(base: float, tip: tuple[float, float], arm: float, forearm: float, bend: int) -> float:
     """Of a five-bar's motor, by the law of cosines."""
     x, y = tip[0] - base, tip[1]
