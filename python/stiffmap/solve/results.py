@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import fields, is_dataclass
+from itertools import product
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -50,7 +51,7 @@ class OverPoses:
         return xr.Dataset(variables, coords=coordinates)
 
     def to_dataframe(self) -> pd.DataFrame:
-        """One row per pose, one column per number: ``status``, ``displacement_0`` …."""
+        """One row per pose, one column per number: ``dx`` … ``rz`` of the displacement, ``status``, ``compliance_dx_fx`` …."""
         import pandas as pd
 
         table: dict[str, Any] = {}
@@ -59,9 +60,11 @@ class OverPoses:
         for name, variable in data.data_vars.items():
             shape = variable.shape[:count]
             flat = variable.to_numpy().reshape(int(np.prod(shape)), -1)
-            own = variable.shape[count:]
-            for i, index in enumerate(np.ndindex(*own)):
-                table["_".join([str(name), *map(str, index)])] = flat[:, i]
+            own = variable.dims[count:]
+            labels = [data[d].to_numpy() if d in data.coords else range(data.sizes[d]) for d in own]
+            first = [] if name == "displacement" and "component" in own else [str(name)]
+            for i, parts in enumerate(product(*labels)):
+                table["_".join([*first, *map(str, parts)])] = flat[:, i]
         return pd.DataFrame(table)
 
     def to_json(self) -> str:
