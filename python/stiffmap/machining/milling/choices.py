@@ -78,6 +78,10 @@ def choices(
             raise StiffmapError(f"tolerance: expected a length above zero (m), got {tolerance}")
         cut = replace(cut, tolerance=tolerance)
     if isinstance(path, Toolpath):
+        if size is not None or offset:
+            raise StiffmapError(
+                "size, offset: only of a built-in outline, or of a file; a toolpath has both in it"
+            )
         p = path
     else:
         shifts = {

@@ -107,3 +107,5 @@ def test_python_turns_the_tool_of_an_arm() -> None:
     assert turned.angle.shape == turned.way.shape
     fixed = sm.mill("ur10", "circle", "trimming", **where)
     assert float(abs(turned.error_normal).max()) <= float(abs(fixed.error_normal).max()) * (1 + 1e-6)
+    with pytest.raises(sm.StiffmapError, match="size, offset"):
+        sm.mill("ur10", load_path("circle"), "trimming", size=(0.06,))
