@@ -13,8 +13,8 @@ from collections.abc import Iterator
 import numpy as np
 
 import stiffmap as sm
+from stiffmap.machining.milling.command import commanded
 from stiffmap.machining.milling.equilibrium import equilibrium
-from stiffmap.machining.milling.job import commanded
 from stiffmap.machining.milling.placement import Search
 from stiffmap.machining.milling.plant import Plant
 from stiffmap.machining.milling.setting import setting

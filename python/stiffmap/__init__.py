@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.from_above import PLACES
 from stiffmap.common.version import __version__
-from stiffmap.solve.status import Flag, Status
 
 if TYPE_CHECKING:
     from stiffmap.experiment import Experiment, Residual, load_experiment
@@ -36,6 +35,7 @@ if TYPE_CHECKING:
     from stiffmap.solve.kinematics import Kinematics, forward_kinematics, inverse_kinematics
     from stiffmap.solve.machine import Machine, load_machine
     from stiffmap.solve.solution import Solution
+    from stiffmap.solve.status import Flag, Status
     from stiffmap.solve.unreachable import why_unreachable
     from stiffmap.solve.urdf_machine import import_urdf
     from stiffmap.ui import plot
@@ -89,6 +89,7 @@ _HOME = {
         "stiffmap.solve.kinematics": "Kinematics forward_kinematics inverse_kinematics",
         "stiffmap.solve.machine": "Machine load_machine",
         "stiffmap.solve.solution": "Solution",
+        "stiffmap.solve.status": "Flag Status",
         "stiffmap.solve.unreachable": "why_unreachable",
         "stiffmap.solve.urdf_machine": "import_urdf",
         "stiffmap.ui.plot": "plot",

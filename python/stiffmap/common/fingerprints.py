@@ -8,8 +8,6 @@ from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from stiffmap.common.errors import FileError
 from stiffmap.common.python_file import code_run
 from stiffmap.common.version import __version__
@@ -65,6 +63,8 @@ def _words(data: Any) -> Iterator[str]:
 
 def _pieces(value: Any) -> Iterator[bytes]:
     """Bytes that say type and value; what is nested is preceded by its size."""
+    import numpy as np
+
     if isinstance(value, np.ndarray):
         a = np.ascontiguousarray(value)
         yield f"array {a.dtype.str} {a.shape}".encode()

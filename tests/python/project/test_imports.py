@@ -62,7 +62,7 @@ BY_NAME = {
     "stiffmap.common.library",  # files of one folder
     "stiffmap.common.python_file",  # a file that a user wrote
     "stiffmap.model.link.optional",  # packages of the extra [fea]
-    "stiffmap.ui.cli.app",  # the module of a command
+    "stiffmap.ui.cli.loading",  # the module of a command, and what it imports when it runs
 }
 LOADERS = {
     "import_module",

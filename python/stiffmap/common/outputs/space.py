@@ -5,13 +5,12 @@ from __future__ import annotations
 import os
 import shutil
 from pathlib import Path
-from typing import Any
-
-import numpy as np
-from numpy.lib.format import open_memmap
-from numpy.typing import DTypeLike
+from typing import TYPE_CHECKING, Any
 
 from stiffmap.common.errors import FileError
+
+if TYPE_CHECKING:
+    from numpy.typing import DTypeLike
 
 
 def needs_space(path: Path, size: float, what: str) -> None:
@@ -31,9 +30,11 @@ def needs_space(path: Path, size: float, what: str) -> None:
 
 def mapped_array(path: Path, dtype: DTypeLike, shape: tuple[int, ...]) -> Any:
     """A new array in a file, whose whole space the disk has granted; OSError where it does not."""
+    from numpy.lib.format import open_memmap
+
     path.unlink(missing_ok=True)
     try:
-        array = open_memmap(path, "w+", np.dtype(dtype), shape)
+        array = open_memmap(path, "w+", dtype, shape)
         if hasattr(os, "posix_fallocate"):
             with path.open("r+b") as file:
                 os.posix_fallocate(file.fileno(), 0, path.stat().st_size)

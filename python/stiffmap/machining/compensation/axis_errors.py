@@ -7,6 +7,7 @@ E_ZX along Y and Z (straightness), E_AX, E_BX, E_CX its rotations about X, Y and
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from os import PathLike
 
 import numpy as np
 import xarray as xr
@@ -16,6 +17,7 @@ from stiffmap.common.broadcasting import Floats, real_array
 from stiffmap.common.errors import StiffmapError
 from stiffmap.machining.compensation.commands import compensate
 from stiffmap.solve.machine import Machine, takes_machine
+from stiffmap.workspace.maps.files import read_dataset
 
 LETTERS = "XYZABC"
 
@@ -78,13 +80,16 @@ def axis_errors(
     axis: str,
     position: ArrayLike | None = None,
     *,
+    points: int = 21,
     through: ArrayLike | None = None,
+    zero: float | None = None,
     wrench: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
 ) -> AxisErrors:
     """Errors of a corrected machine (its effects, weight and load) along one axis, in both directions of travel.
 
-    position: (n,) m commanded along `axis`, None: 21 over the workspace; through: (3,) m a point of the line, None: home;
+    position: (n,) m commanded along `axis`, None: `points` over the workspace; through: (3,) m a point of the line, None: home;
+    zero: m, position of the reference point, where the table is zero, None: none;
     wrench: (6,) N, N·m at the tool; gravity: (3,) m/s², None: the machine's. Between the positions the errors are
     solved as well, for `interpolation`. Raises StiffmapError where a position has no answer.
     """
@@ -93,7 +98,7 @@ def axis_errors(
         raise StiffmapError(f"axis: {machine.name} does not command {axis}")
     if position is None:
         low, high = machine.workspace
-        position = np.linspace(low[i], high[i], 21)
+        position = np.linspace(low[i], high[i], max(points, 2))
     nodes = real_array(position, "position")
     if nodes.ndim != 1 or nodes.size < 2 or not (np.diff(nodes) > 0).all():
         raise StiffmapError("position: expected two or more rising numbers (m)")
@@ -114,7 +119,7 @@ def axis_errors(
         errors.append(found.before)
     n = nodes.size
     half_way = [e[n:, i] - (e[: n - 1, i] + e[1:n, i]) / 2 for e in errors]
-    return AxisErrors(
+    made = AxisErrors(
         axis,
         nodes,
         errors[0][:n],
@@ -123,17 +128,25 @@ def axis_errors(
         through=(float(point[0]), float(point[1]), float(point[2])),
         machine=machine.name,
     )
+    return made if zero is None else made.zeroed(zero)
 
 
 def axis_errors_of_map(
-    ds: xr.Dataset, axis: str, *, through: ArrayLike | None = None, case: str | None = None
+    ds: xr.Dataset | str | PathLike[str],
+    axis: str,
+    *,
+    through: ArrayLike | None = None,
+    case: str | None = None,
+    zero: float | None = None,
 ) -> AxisErrors:
-    """The same from an error map: its displacement along the line of the grid nearest to `through` (3,) m.
+    """The same from an error map (dataset, .nc or .zarr): its displacement along the line of the grid nearest to `through` (3,) m.
 
     case: load case of the map; None: its only one. Both directions of travel are the same. The interpolation error
     is estimated from second differences.
     """
     i = _index(axis)
+    if not isinstance(ds, xr.Dataset):
+        ds = read_dataset(ds)
     if "case" in ds.dims:
         names = [str(c) for c in ds.case.values]
         if case is None and len(names) > 1:
@@ -156,7 +169,7 @@ def axis_errors_of_map(
         errors[:-2, i] * (nodes[2:] - nodes[1:-1]) + errors[2:, i] * (nodes[1:-1] - nodes[:-2])
     ) / (nodes[2:] - nodes[:-2])
     at = [nodes[0] if k == i else float(line[a]) for k, a in enumerate("xyz")]
-    return AxisErrors(
+    made = AxisErrors(
         axis,
         nodes,
         errors,
@@ -166,6 +179,7 @@ def axis_errors_of_map(
         through=(at[0], at[1], at[2]),
         machine=str(ds.attrs.get("machine", "")),
     )
+    return made if zero is None else made.zeroed(zero)
 
 
 def _index(axis: str) -> int:

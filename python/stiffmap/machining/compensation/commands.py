@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from os import PathLike
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,8 +20,10 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs import write_rows
 from stiffmap.common.short import short_repr
 from stiffmap.experiment.experiment import AXES, Experiment
+from stiffmap.experiment.files.plan_file import load_plan
 from stiffmap.experiment.poses.configuration import coordinates_of
 from stiffmap.experiment.poses.drive_jacobian import drive_jacobian
+from stiffmap.experiment.poses.orientation import against_base
 from stiffmap.experiment.prediction.equilibria import motions
 from stiffmap.model.description import TASK
 from stiffmap.solve.kinematics import (
@@ -66,6 +69,8 @@ class Commands:
     beyond: NDArray[np.bool_] | None
     """(n,) rows outside what the readings of a calibrated machine covered: nothing vouches for its numbers there. None: the
     machine was not calibrated."""
+    ids: tuple[str, ...] = ()
+    """Of the rows, as a file of poses names them; else 1, 2 …"""
 
     @property
     def ok(self) -> NDArray[np.bool_]:
@@ -107,7 +112,7 @@ class Commands:
 @takes_machine
 def compensate(
     machine: Machine,
-    position: ArrayLike | None = None,
+    position: ArrayLike | str | PathLike[str] | None = None,
     rotation: ArrayLike | None = None,
     *,
     actuators: ArrayLike | None = None,
@@ -126,7 +131,8 @@ def compensate(
         The corrected machine: as declared, with the effects that a diagnosis found. Its controller knows the
         declared geometry.
     position, rotation
-        (n, 3) m and (n, 3, 3) wanted tool poses; rotation None: as at home.
+        (n, 3) m and (n, 3, 3) wanted tool poses; rotation None: as at home. Or a CSV file of poses (x, y, z in mm, and
+        where wanted loads, orientation, approach), whose own loads replace `wrench`.
     actuators
         (n, actuators) instead: wanted is the pose that the declared machine takes there, and the commands stay in
         that configuration. Needed for redundant arms and other branches.
@@ -149,6 +155,11 @@ def compensate(
     StiffmapError
         For bad input.
     """
+    ids = None
+    if isinstance(position, (str, PathLike)):
+        read = against_base(load_plan(Path(position), machine, "position"), machine.description.home.r)
+        position, rotation, approach, ids = read.position, read.rotation, read.approach, read.ids
+        wrench = read.wrench if read.wrench.any() else wrench
     plan = _plan(machine, position, rotation, actuators, wrench, approach, gravity, point)
     wanted_p, wanted_r = plan.position, _turns(machine, plan)
     chosen = _components(machine, components)
@@ -181,6 +192,7 @@ def compensate(
         tuple(TASK[i] for i in chosen),
         tuple(machine.compiled.names.is_prismatic(a) for a in machine.actuators),
         None if valid is None else valid.outside(machine, start, plan.wrench),
+        ids or plan.ids,
     )
 
 

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from os import PathLike
+from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
+from stiffmap.common.outputs import write_text
 from stiffmap.model.description import Element, Joint, MachineDescription, Offset, Pose, Spring
+from stiffmap.solve.machine import Machine, takes_machine
 
 PARALLEL = 0.05
 """rad: below it two axes count as parallel and their row has Hayati's fourth parameter: the common normal of
@@ -127,6 +131,27 @@ def dh_list(description: MachineDescription) -> tuple[Frame, list[DhRow], Frame]
     rows.append(DhRow(joints[-1][0].name, 0.0, 0.0, 0.0, 0.0, None, joints[-1][0].kind == "prismatic"))
     assert first is joints[0][0]
     return base, rows, (x.T @ (tool_p - o), x.T @ tool_r)
+
+
+@takes_machine
+def write_dh(machine: Machine, path: str | PathLike[str]) -> list[str]:
+    """Write `dh_list` of a corrected serial arm as CSV, mm and deg; what geometry cannot hold, in words.
+
+    Raises StiffmapError for a machine that is no serial arm, FileError where the file cannot be written.
+    """
+    corrected, left = corrected_geometry(machine.description)
+    (p, r), rows, (q, s) = dh_list(corrected)
+    lines = ["joint,theta_deg,d_mm,a_mm,alpha_deg,beta_deg"]
+    for row in rows:
+        beta = "" if row.beta is None else f"{np.degrees(row.beta):.9g}"
+        lines.append(
+            f"{row.joint},{np.degrees(row.theta):.9g},{1e3 * row.d:.9g},{1e3 * row.a:.9g},{np.degrees(row.alpha):.9g},{beta}"
+        )
+    for name, shift, turn in (("base", p, r), ("tool", q, s)):
+        cells = ",".join(f"{v:.9g}" for v in (*(1e3 * shift), *turn.ravel()))
+        lines.append(f"# {name}: x y z in mm, rotation by rows,{cells}")
+    write_text(Path(path), "\n".join(lines) + "\n")
+    return left
 
 
 def _with_z(z: Floats) -> Floats:

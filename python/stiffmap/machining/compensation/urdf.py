@@ -9,14 +9,25 @@ from pathlib import Path
 import numpy as np
 
 from stiffmap.common.errors import FileError
+from stiffmap.common.outputs import writing
 from stiffmap.machining.compensation.geometry import corrected_geometry, serial_joints
 from stiffmap.model.description import Joint, MachineDescription, Offset, Pose
 from stiffmap.model.urdf.chains import plain_name
 from stiffmap.model.urdf.editing import SAME, with_origins
 from stiffmap.model.urdf.model import UrdfJoint, UrdfModel
 from stiffmap.model.urdf.reader import read_urdf
+from stiffmap.solve.machine import Machine, takes_machine
 
 CLOSE = 1e-9  # m, and of a rotation matrix: a machine file's digits
+
+
+@takes_machine
+def write_urdf(machine: Machine, urdf: str | PathLike[str], path: str | PathLike[str]) -> list[str]:
+    """Write the URDF of an imported arm as `corrected_urdf` makes it; what no origin can hold, in words. Raises as that does."""
+    text, left = corrected_urdf(machine.description, urdf)
+    with writing(Path(path)) as fresh:
+        fresh.write_bytes(text)
+    return left
 
 
 def corrected_urdf(description: MachineDescription, urdf: str | PathLike[str]) -> tuple[bytes, list[str]]:

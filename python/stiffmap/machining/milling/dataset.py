@@ -78,6 +78,8 @@ def dataset_of(
             "notes": list(job.path.notes),
         },
     )
+    if job.angle is not None:
+        ds["angle"] = ("point", job.angle)
     if tolerance is not None:
         ds["margin"] = ("point", tolerance - np.abs(normal))
         ds["margin_after"] = tolerance - np.abs(ds.error_normal_after)

@@ -18,9 +18,9 @@ class Entry:
 
     way: float
     """m along the cuts, from where the path enters now."""
-    step: float
-    """m: size of the error across the wall there, before compensation, which is the step that the entry leaves."""
-    given: float
+    step: float | None = None
+    """m: size of the error across the wall there, before compensation, which is the step that the entry leaves; None: not searched for."""
+    given: float | None = None
     """m: the same where the path enters now."""
 
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from os import PathLike
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
@@ -13,6 +13,8 @@ from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
+from stiffmap.machining.milling.choices import Choices, choices
+from stiffmap.machining.milling.command import commanded
 from stiffmap.machining.milling.dataset import along, dataset_of
 from stiffmap.machining.milling.equilibrium import Equilibrium, equilibrium
 from stiffmap.machining.milling.plant import Plant
@@ -21,12 +23,14 @@ from stiffmap.machining.milling.reach import must_reach
 from stiffmap.machining.milling.setting import Setting, scaled, setting
 from stiffmap.machining.milling.speed import Feeds, best_feeds
 from stiffmap.machining.milling.stability import PathStability, path_stability
+from stiffmap.machining.milling.verdict import verdict
 from stiffmap.machining.milling.verify import Run, run
 from stiffmap.machining.milling.warnings import Warned, warned
-from stiffmap.machining.process import Process, cutting_force, load_process
-from stiffmap.machining.toolpath import Box, Toolpath, load_path, sampled
+from stiffmap.machining.process import Process, cutting_force
+from stiffmap.machining.toolpath import Box, Toolpath, sampled
 from stiffmap.solve.machine import Machine, as_machine
 from stiffmap.solve.options import keywords_of
+from stiffmap.solve.status import Status
 from stiffmap.workspace.performance.motion.inertia import natural_frequencies
 
 BAND = 0.2
@@ -52,6 +56,16 @@ class Milled:
     feeds: Feeds | None = None
     warnings: tuple[Warned, ...] = ()
     """What is to be watched, and at which points."""
+    choices: Choices | None = None
+    """Placement, entry and turns of the tool that were asked for."""
+
+    @property
+    def finding(self) -> bool:
+        """Whether a point has no equilibrium, is beyond the tolerance after compensation, or breaks a limit."""
+        t = self.job.process.tolerance
+        beyond = t is not None and not (np.abs(self.dataset.error_normal_after.values) <= t).all()
+        states = self.dataset.status.values
+        return bool((states != Status.CONVERGED).any() or beyond or any(w.finding for w in self.warnings))
 
 
 def mill_job(
@@ -61,31 +75,43 @@ def mill_job(
     *,
     at: ArrayLike | None = None,
     turn: float = 0.0,
-    true_machine: Machine | None = None,
+    true_machine: Machine | str | PathLike[str] | None = None,
     step: float = 2e-3,
     within: float = WITHIN,
-    stock: Box | None = None,
+    stock: Box | ArrayLike | None = None,
     thickness: float | None = None,
     passes: int = 1,
     band: bool = False,
     angle: Floats | None = None,
     feeds: bool = False,
+    size: tuple[float, ...] | None = None,
+    offset: Mapping[str, ArrayLike] | None = None,
+    tolerance: float | None = None,
+    place: int | None = None,
+    reverse: bool = False,
+    entry: float | Literal["best"] | None = None,
+    redundancy: int | None = None,
     threads: int | None = None,
+    scheduler: Any = None,
+    progress: Callable[[int], None] | None = None,
 ) -> Milled:
     """The same with the program and all states, for reports."""
-    cut = process if isinstance(process, Process) else load_process(process)
-    p = path if isinstance(path, Toolpath) else load_path(path, feed=cut.feed, spindle=cut.spindle)
     if passes < 1:
         raise StiffmapError(f"passes: expected 1 or more, got {passes}")
-    place = p.placed(machine.description.home.p if at is None else at, turn)
+    made_of = choices(
+        machine, path, process, at=at, turn=turn, size=size, offset=offset, tolerance=tolerance, reverse=reverse, place=place,
+        entry=entry, redundancy=redundancy, angle=angle, step=step, stock=stock, thickness=thickness, threads=threads,
+        scheduler=scheduler, progress=progress,
+    )  # fmt: skip
+    p, cut, where, box, angle = made_of.path, made_of.process, made_of.place, made_of.stock, made_of.angle
     if angle is not None:
         p = replace(p, turn=None)
-    job = setting(machine, p, cut, sampled(p, step), place, stock=stock, thickness=thickness, angle=angle)
+    job = setting(machine, p, cut, sampled(p, step), where, stock=box, thickness=thickness, angle=angle)
     must_reach(job, threads)
     chosen = best_feeds(job, threads=threads) if feeds else None
     if chosen is not None:
         p = replace(p, feed=chosen.feed)
-        job = setting(machine, p, cut, sampled(p, step), place, stock=stock, thickness=thickness, angle=angle)
+        job = setting(machine, p, cut, sampled(p, step), where, stock=box, thickness=thickness, angle=angle)
     plant = Plant(job, threads=threads)
     before = equilibrium(plant, job.position)
     found = commanded(plant, before)
@@ -106,11 +132,13 @@ def mill_job(
     if isinstance(stability, PathStability):
         ds["multiplier"] = ("point", np.interp(job.points.way, stability.way, stability.multiplier))
         ds["multiplier"].attrs["said"] = stability.sentence(job.process.spindle)
+    ds.attrs |= {"program": made.text, "verdict": verdict(ds), **made_of.said}
     out = Milled(
-        job, before, found.position, made, after, ds, stability, feeds=chosen, warnings=warned(job, ds)
-    )
+        job, before, found.position, made, after, ds, stability, feeds=chosen, warnings=warned(job, ds), choices=made_of
+    )  # fmt: skip
     if true_machine is None:
         return out
+    true_machine = as_machine(true_machine)
     if true_machine.actuators != machine.actuators:
         raise StiffmapError(
             f"true_machine: expected the actuators {', '.join(machine.actuators)}, "
@@ -143,11 +171,11 @@ def mill(
     at, turn
         Where the part's origin lies (3,) m, base axes, and its turn about z, rad. None: the machine's home.
     true_machine
-        Machine that the commands are also simulated on, as an experiment would find it.
+        Machine (name, file) that the commands are also simulated on, as an experiment would find it.
     step, within
         m: distance of the points along the path; chord error of the written program.
     stock, thickness
-        Box of stock (`stiffmap.machining.toolpath.box`), or width to trim, m; None: the process's own cut.
+        Box of stock, lowest and highest corner (2, 3) m in the axes of the part, or width to trim, m; None: the process's own cut.
     passes
         Number of passes along the same commands; each further one cuts what the last left (spring-back).
     band
@@ -156,8 +184,24 @@ def mill(
         (points,) rad: turn of an arm's tool about its axis, from `redundancy`; None: that of the path (C), else as at home.
     feeds
         True: the largest feed of each move at which the error stays within the tolerance; the program has them.
+    size, offset
+        Of a built-in outline, m; work offsets of G-code by name, as {"G55": (0.01, 0, 0)}, m.
+    tolerance
+        m; None: the process's.
+    place
+        So many placements are tried first and the best is taken, refined; instead of `at` and `turn`.
+    reverse
+        True: the path the other way, conventional for climb and the other way round.
+    entry
+        Where a closed outline is entered: m along it, or 'best' (the least step).
+    redundancy
+        Arms: the turn about the tool is chosen from so many over a full turn; instead of `angle`.
     threads
         None: all cores that this process may use.
+    scheduler
+        Address or client of a dask cluster whose workers try the placements and the turns.
+    progress
+        Called with the number of lines read of a long program.
 
     Returns
     -------
@@ -166,7 +210,9 @@ def mill(
         `error` (…, 3) m before, its parts `error_normal` (positive: material stays on the part), `error_along`, `error_axial`;
         `error_normal_after` of the written program as simulated, at the same way; `mirror_left` what one mirror step leaves;
         `force` (…, 3) N, `gain` kp/k, `effort` N, N·m, `margin` m, `status`, `flags`, `ripple` m; `taper` m, how much
-        further out the wall is at the top of the cut than at the tip; `warnings`, a bit for each of its attribute `names`.
+        further out the wall is at the top of the cut than at the tip; `warnings`, a bit for each of its attribute `names`;
+        `angle` rad where the tool was turned. Attributes: `program`, the text of the compensated program, `verdict`, `at` m and
+        `turn` rad; where asked for `placement`, a sentence, and `entry` m.
 
     Raises
     ------
@@ -216,43 +262,3 @@ def ripple(job: Setting, state: Equilibrium) -> Floats:
         return np.full(len(job), np.nan)
     amplitude = np.einsum("i,mij->mj", force.amplitude[teeth - 1], np.abs(job.axes))
     return np.asarray(np.abs(np.einsum("mi,mij,mj->m", job.off, state.compliance, amplitude)))
-
-
-STEPS = 40
-DONE = 1e-11
-"""m: distance from the path below which a command stands."""
-
-
-@dataclass(frozen=True, eq=False)
-class Commanded:
-    """m points, base axes, m."""
-
-    position: Floats
-    """(m, 3) to command; NaN where the machine has no answer."""
-    left: Floats
-    """(m,) m: how far the model still is from the path there, under the force of the wanted cut."""
-    mirror: Floats
-    """(m, 3) the mirrored commands: the wanted position less the error."""
-
-
-def commanded(plant: Plant, before: Equilibrium) -> Commanded:
-    """Inverse of the loaded machine: on the path the cut is the wanted one, so that its force is known there."""
-    job = plant.job
-    force = job.force(np.zeros((len(job), 2)))
-    steered = np.array([1.0 if axis in job.machine.description.task else 0.0 for axis in "xyz"])
-    # the machine's tangent tells where the tool would stand under the wanted cut
-    further = np.einsum("mij,mj->mi", before.compliance, force - before.force)
-    u = job.position - steered * (np.nan_to_num(before.error) + np.nan_to_num(further))
-    rest = np.full((len(job), 3), np.nan)
-    active = np.arange(len(job))
-    for _ in range(STEPS):
-        s = plant.stand(u[active], force[active], rows=active)
-        rest[active] = u[active] + s.moved - job.position[active]
-        far = np.abs(steered * rest[active]).max(axis=1)
-        go = far > DONE  # a lost point compares false
-        u[active[go]] -= steered * rest[active[go]]
-        active = active[go]
-        if not active.size:
-            break
-    u[~np.isfinite(rest).all(axis=1)] = np.nan
-    return Commanded(u, np.linalg.norm(rest, axis=1), job.position - steered * before.error)

@@ -21,6 +21,7 @@ from stiffmap.solve.status import Flag
 LIMITS = int(Flag.JOINT_LIMIT | Flag.DRIVE_RANGE)
 FASTEST = 3.0
 """rad/s of the turn about the tool."""
+IDLE = "no turn changes the error, as the last joint turns about the tool's own axis; a spindle across the flange would make use of it"
 SAME = 1e-6
 """Share by which errors differ that count as one: of such turns the one nearest to home is taken."""
 ON_ANOTHER_BRANCH = 1.0

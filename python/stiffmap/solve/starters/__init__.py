@@ -11,14 +11,14 @@ from stiffmap.model.files.load import description_from_text
 from stiffmap.model.files.schema.base import suggestion
 from stiffmap.solve.kinematics import inverse_kinematics
 from stiffmap.solve.machine import Machine
-from stiffmap.solve.starters.machine_class import OPTIONS, MachineClass
+from stiffmap.solve.starters.machine_class import MachineClass
 
 NAMES = ("3-rrr", "3-prr", "five-bar", "xy-table", "hexapod", "delta", "linear-delta", "orthoglide",
          "scara", "gantry", "five-axis", "arm")  # fmt: skip
 CLASSES = {n: MachineClass(n, read(Path(__file__).with_name(f"{n}.yaml")).data) for n in NAMES}
 SHRINK, MOST_TRIES = 0.8, 16
 
-__all__ = ["CLASSES", "OPTIONS", "class_of", "machine_text"]
+__all__ = ["CLASSES", "class_of", "machine_text"]
 
 
 def class_of(name: str) -> MachineClass:

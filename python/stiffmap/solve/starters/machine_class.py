@@ -1,6 +1,6 @@
 """A class of machines: one YAML file of this folder, and the machine file that it gives for some dimensions.
 
-`dimensions` holds the defaults (mm; `drive` as in `OPTIONS`), `home` and `task` those of the machine file, `box` the half
+`dimensions` holds the defaults (mm; `drive` N/µm where it slides, kN·m/rad where it turns), `home` and `task` those of the machine file, `box` the half
 extents of the workspace about home, `let` numbers by name, and `need` what has to be positive. In `text`, ``<radius / 2>``
 stands for its value to 12 digits and ``<radius / 2:g>`` for its value in that format. A line ``<legs>`` stands for the text
 under `repeat`, `legs`, once for each entry of the lists that it goes `over`.
@@ -19,20 +19,6 @@ from typing import Any
 from stiffmap.common.arithmetic import evaluate
 from stiffmap.common.errors import StiffmapError
 
-OPTIONS = {
-    "radius": "mm, of the circle on which the legs stand on the base",
-    "platform": "mm, of the circle on which the legs hold the platform",
-    "arm": "mm, first link",
-    "forearm": "mm, second link",
-    "rod": "mm, rods or struts at home",
-    "height": "mm, of the tool above (below: of a delta) the base, or of the arm's shoulder",
-    "stroke": "mm, travel of the drives, or of each axis",
-    "reach": "mm, from the last slide or pivot to the tool",
-    "tube": "mm, outer diameter of the links",
-    "wall": "mm, wall of the links' tubes",
-    "drive": "stiffness of a drive: N/µm where it slides, kN·m/rad where it turns",
-}
-"""Every dimension that some class has."""
 _PLACE = re.compile(r"<([^<>:]+)(?::([^<>]+))?>")
 _REPEATED = re.compile(r"(?m)^( *)<(\w+)>$")
 Box = tuple[float, float, float]

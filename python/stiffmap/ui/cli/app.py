@@ -12,17 +12,17 @@ import traceback
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from importlib import import_module
 from inspect import getdoc
 from typing import Annotated, Any
 
 import typer
 from rich.markup import escape
 
-from stiffmap.common.errors import FileError, FileErrors, MissingPartError, StiffmapError
+from stiffmap.common.errors import FileError, FileErrors, StiffmapError
 from stiffmap.common.number_text import number_in
 from stiffmap.common.outputs.keeping import one_command
 from stiffmap.ui.cli.commands import COMMANDS, Command
+from stiffmap.ui.cli.loading import import_all, load
 
 BAD_INPUT = 2
 DEFECT = 70
@@ -62,6 +62,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
             raise
         print(f"stiffmap: {_defect(error)}", file=sys.stderr)
         return DEFECT
+    finally:
+        if arguments is not None:  # the program goes on, and may use what is in these modules
+            with suppress(ModuleNotFoundError):
+                import_all()
     return 0
 
 
@@ -119,20 +123,6 @@ def styled(text: str) -> str:
 def flowed(text: str) -> str:
     """Paragraphs without the source's line breaks: the terminal breaks them at its own width."""
     return "\n\n".join(" ".join(paragraph.split()) for paragraph in text.split("\n\n"))
-
-
-def load(command: Command) -> Callable[..., Any]:
-    """Import a command's function; raises `MissingPartError` for what is not installed."""
-    try:
-        function: Callable[..., Any] = getattr(import_module(command.module), command.function)
-    except ModuleNotFoundError as error:
-        missing = error.name or command.module
-        if missing.split(".")[0] == "stiffmap":
-            advice = "which this installation of stiffmap lacks"
-        else:
-            advice = "which is not installed: pip install 'stiffmap[all]'"
-        raise MissingPartError(f"'stiffmap {command.name}' needs {missing}, {advice}") from error
-    return function
 
 
 def _summary(command: Command) -> Callable[[], None]:

@@ -3,34 +3,27 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 import typer
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.outputs import write_text, writing
 from stiffmap.common.outputs.option import written
-from stiffmap.experiment.comparison.prediction_error import left_by
-from stiffmap.experiment.experiment import Experiment, Mask
-from stiffmap.experiment.files.load import load_experiment
-from stiffmap.experiment.files.plan_file import load_plan
-from stiffmap.experiment.poses.orientation import against_base
-from stiffmap.experiment.prediction.predict import Predictor
-from stiffmap.identification.validity import beyond
+from stiffmap.experiment.comparison.summary import Summary
 from stiffmap.machining.compensation import (
+    AxisErrors,
+    Commands,
     axis_errors,
     axis_errors_of_map,
+    check_compensation,
     compensate,
     compensation_table,
-    corrected_geometry,
-    corrected_urdf,
-    dh_list,
+    write_dh,
     write_table,
+    write_urdf,
 )
-from stiffmap.model.description import MachineDescription
 from stiffmap.solve.machine import Machine
-from stiffmap.solve.validity import Validity
 from stiffmap.ui.cli.inputs import (
     CorrectedArgument,
     EffectsOption,
@@ -42,7 +35,6 @@ from stiffmap.ui.cli.inputs import (
 )
 from stiffmap.ui.cli.inputs import gravity as gravity_of
 from stiffmap.ui.cli.output import JsonOption, show
-from stiffmap.workspace.maps.files import read_dataset
 
 MM = 1e3
 WORSE = "worse: these commands would enlarge the error of these readings; the file does not hold where they were taken"
@@ -121,91 +113,57 @@ def command(
         raise StiffmapError(
             "--urdf: give -o FILE, the URDF to write, and no poses, whose commands go there too"
         )
+    load = [*numbers(force, "force", 3), 0.0, 0.0, 0.0]
+    pull = gravity_of(gravity)
     if axis is not None:
-        out = _table(machine, effect, axis, form, points, through, case, zero, output, force, gravity)
+        line: dict[str, Any] = {"through": in_si(through, "through", 3), "zero": in_si(zero)}
+        if machine.endswith((".nc", ".zarr")):
+            errors = axis_errors_of_map(machine, axis, case=case, **line)
+        else:
+            m = machine_with(machine, effect)
+            errors = axis_errors(m, axis, points=points, wrench=load, gravity=pull, **line)
+        out = _table(errors, form, output)
     else:
         m = machine_with(machine, effect)
         out = {} if urdf is None and dh is None else _geometry(m, urdf, dh, output)
-        out |= {} if poses is None else _commands(m, poses, output, force, gravity)
+        out |= {} if poses is None else _commands(compensate(m, poses, wrench=load, gravity=pull), output)
         out |= {} if check is None else _checked(m, check)
     show(as_json, out, (f"{key}: {value}" for key, value in out.items()))
     finish(out.get("verdict") == WORSE)
 
 
 def _checked(m: Machine, folder: Path) -> dict[str, object]:
-    """Sizes of readings as they are, and less what the corrected machine says of them; those beyond what it was calibrated
-    by apart."""
-    e = Predictor(m, load_experiment(folder)).experiment
-    out, worse = _sizes(m, e, None)
-    far = beyond(m, e)
-    if far is not None:
-        out |= _promise(m)
-        out[BEYOND] = f"{int(far.sum())} of {len(far)}"
-        if far.any() and not far.all():
-            there, harm = _sizes(m, e, far)
-            out |= {f"there, {k}": v for k, v in there.items() if k != "readings"}
-            worse |= harm
-    out["verdict"] = WORSE if worse else BETTER
-    return out
+    """Sizes of readings as they are and as compensation would leave them; those beyond what the machine was calibrated by apart."""
+    found = check_compensation(m, folder)
+    out = _sizes(found.whole)
+    if (v := found.validity) is not None and v.error is not None:
+        out[f"promised by the file, m{v.unit}"] = f"{MM * v.error:.4g} ± {MM * v.error_u:.1g} rms ({v})"
+    if found.beyond is not None:
+        out[BEYOND] = f"{int(found.beyond.sum())} of {len(found.beyond)}"
+    if found.there is not None:
+        out |= {f"there, {k}": v for k, v in _sizes(found.there).items() if k != "readings"}
+    return out | {"verdict": WORSE if found.worse else BETTER}
 
 
-def _sizes(m: Machine, e: Experiment, rows: Mask | None) -> tuple[dict[str, object], bool]:
-    before, after = left_by(m, e, rows)
-    out: dict[str, object] = {"readings": before.n}
-    for name, s in (("as measured", before), ("left by compensation", after)):
+def _sizes(sizes: tuple[Summary, Summary]) -> dict[str, object]:
+    out: dict[str, object] = {"readings": sizes[0].n}
+    for name, s in zip(("as measured", "left by compensation"), sizes, strict=True):
         size, unit = s.size
         out[f"rms {name}, m{unit}"] = round(MM * size, 6)
         if unit == "m":
             out[f"largest {name}, mm"] = round(MM * s.max, 6)
-    return out, after.size[0] > before.size[0]
+    return out
 
 
-def _promise(m: Machine) -> dict[str, object]:
-    """What the machine file says of itself."""
-    v = Validity.of_machine(m)
-    if v is None or v.error is None:
-        return {}
-    return {f"promised by the file, m{v.unit}": f"{MM * v.error:.4g} ± {MM * v.error_u:.1g} rms ({v})"}
-
-
-def _table(
-    machine: str,
-    effect: list[str] | None,
-    axis: str,
-    form: str,
-    points: int,
-    through: str | None,
-    case: str | None,
-    zero: float | None,
-    output: Path | None,
-    force: str,
-    gravity: str | None,
-) -> dict[str, object]:
-    """Table of an axis, from a machine or from a map that has been written."""
-    point = in_si(through, "through", 3)
-    if machine.endswith((".nc", ".zarr")):
-        errors = axis_errors_of_map(read_dataset(machine), axis, through=point, case=case)
-    else:
-        m = machine_with(machine, effect)
-        low, high = (
-            (np.asarray(end)["xyz".index(axis)] for end in m.workspace) if axis in "xyz" else (0.0, 1.0)
-        )
-        errors = axis_errors(
-            m,
-            axis,
-            np.linspace(low, high, max(points, 2)),
-            through=point,
-            wrench=[*numbers(force, "force", 3), 0.0, 0.0, 0.0],
-            gravity=gravity_of(gravity),
-        )
-    errors = errors if zero is None else errors.zeroed(zero / MM)
+def _table(errors: AxisErrors, form: str, output: Path | None) -> dict[str, object]:
+    """A controller's table of an axis."""
     text = compensation_table(errors, form)
     if output is not None:
         write_table(errors, output, form)
     forward, backward = errors.positioning
     return {
         "positions": len(errors.position),
-        f"{errors.names['xyz'.index(axis)]}, um": f"{1e6 * min(forward.min(), backward.min()):.3f} "
+        f"{errors.names['xyz'.index(errors.axis)]}, um": f"{1e6 * min(forward.min(), backward.min()):.3f} "
         f"to {1e6 * max(forward.max(), backward.max()):.3f}",
         "largest reversal value, um": round(1e6 * float(np.abs(errors.reversal).max()), 3),
         "linear interpolation leaves, um": round(1e6 * errors.interpolation, 3),
@@ -213,24 +171,17 @@ def _table(
     }
 
 
-def _commands(
-    m: Machine, poses: Path, output: Path | None, force: str, gravity: str | None
-) -> dict[str, object]:
-    plan = against_base(load_plan(poses, m, "position"), m.description.home.r)
-    wrench = plan.wrench if plan.wrench.any() else np.append(numbers(force, "force", 3), np.zeros(3))
-    found = compensate(
-        m, plan.position, plan.rotation, wrench=wrench, approach=plan.approach, gravity=gravity_of(gravity)
-    )
+def _commands(found: Commands, output: Path | None) -> dict[str, object]:
     if output is not None:
         found.write(output)
-    lost = [plan.ids[i] for i in np.flatnonzero(~found.ok)]
+    lost = [found.ids[i] for i in np.flatnonzero(~found.ok)]
     told: dict[str, object] = {}
     if found.beyond is not None:
-        far = [plan.ids[i] for i in np.flatnonzero(found.beyond)]
+        far = [found.ids[i] for i in np.flatnonzero(found.beyond)]
         more = f" and {len(far) - NAMED} more" if len(far) > NAMED else ""
         told[BEYOND] = f"{', '.join(far[:NAMED])}{more}" or "none"
     return told | {
-        "rows": len(plan),
+        "rows": len(found.ids),
         "corrected components": " ".join(found.components),
         "rms error at declared commands, mm": round(MM * found.rms(found.before), 6),
         "rms error at compensated commands, mm": round(MM * found.rms(found.after), 9),
@@ -239,25 +190,9 @@ def _commands(
 
 
 def _geometry(m: Machine, urdf: Path | None, dh: Path | None, output: Path | None) -> dict[str, object]:
-    corrected, left = corrected_geometry(m.description)
-    if urdf is not None and output is not None:
-        text, left = corrected_urdf(m.description, urdf)
-        with writing(output) as fresh:
-            fresh.write_bytes(text)
+    left: list[str] = []
     if dh is not None:
-        write_text(dh, _dh_text(corrected))
+        left = write_dh(m, dh)
+    if urdf is not None and output is not None:
+        left = write_urdf(m, urdf, output)
     return {"not in the geometry": "; ".join(left) or "nothing"}
-
-
-def _dh_text(description: MachineDescription) -> str:
-    (p, r), rows, (q, s) = dh_list(description)
-    lines = ["joint,theta_deg,d_mm,a_mm,alpha_deg,beta_deg"]
-    for row in rows:
-        beta = "" if row.beta is None else f"{np.degrees(row.beta):.9g}"
-        lines.append(
-            f"{row.joint},{np.degrees(row.theta):.9g},{MM * row.d:.9g},{MM * row.a:.9g},{np.degrees(row.alpha):.9g},{beta}"
-        )
-    for name, shift, turn in (("base", p, r), ("tool", q, s)):
-        cells = ",".join(f"{v:.9g}" for v in (*(MM * shift), *turn.ravel()))
-        lines.append(f"# {name}: x y z in mm, rotation by rows,{cells}")
-    return "\n".join(lines) + "\n"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
 
     from stiffmap.machining.process import Process
 
-RPM = 60 / (2 * np.pi)
+RPM = 60 / (2 * math.pi)
 
 
 def command(

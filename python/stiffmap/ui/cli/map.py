@@ -37,7 +37,7 @@ from stiffmap.ui.cli.map_uncertainty import uncertainty_data, uncertainty_told
 from stiffmap.ui.cli.map_worst import in_words, worst_pose
 from stiffmap.ui.cli.output import JsonOption, show
 from stiffmap.ui.cli.statuses import failed_in_words
-from stiffmap.workspace.maps.inputs import grid_of, magnitude, plane_axes
+from stiffmap.workspace.maps.inputs import magnitude, plane_axes
 
 
 def command(
@@ -113,7 +113,8 @@ def command(
         map_toolpath(m, toolpath, force, how, output, kinds, as_json)
         return
     call: dict[str, Any] = {
-        **grid(m, {"x": x, "y": y, "z": z}, points),
+        **planes({"x": x, "y": y, "z": z}),
+        "points": points,
         "wrench": cases(plane, force),
         "plane": plane,
         "directions": directions,
@@ -188,12 +189,12 @@ def _sentence(parts: Sequence[str]) -> str:
     return text[:1].upper() + text[1:]
 
 
-def grid(machine: Machine, planes: dict[str, list[float] | None], points: int) -> dict[str, Any]:
-    """Axes (m) over the workspace box; a coordinate that is not commanded has one value, its home."""
-    given = {a: MM * np.array(v) for a, v in planes.items() if v}
+def planes(across: dict[str, list[float] | None]) -> dict[str, Any]:
+    """Planes (m) across one axis; none where none are given."""
+    given = {a: MM * np.array(v) for a, v in across.items() if v}
     if len(given) > 1:
         raise StiffmapError(f"--{' and --'.join(given)}: expected planes across one axis")
-    return grid_of(machine, given, points)
+    return given
 
 
 def named_formats(text: str, option: str, known: Sequence[str]) -> list[str]:

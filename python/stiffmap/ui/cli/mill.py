@@ -2,28 +2,15 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Iterator
-from dataclasses import replace
-from typing import Annotated, Any
+from typing import Annotated
 
-import numpy as np
 import typer
 
-from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.machining.milling import mill_job
-from stiffmap.machining.milling.entry import best_entry
-from stiffmap.machining.milling.placement import placements
-from stiffmap.machining.milling.redundancy import Redundancy
-from stiffmap.machining.milling.redundancy import redundancy as choose_turns
-from stiffmap.machining.milling.setting import Setting, setting
-from stiffmap.machining.milling.speed import other_side
-from stiffmap.machining.process import Process, load_process
-from stiffmap.machining.toolpath import Toolpath, box, load_path, sampled
-from stiffmap.machining.toolpath.entry import entered_at, turned_round
-from stiffmap.solve.machine import load_machine
-from stiffmap.solve.status import Status
 from stiffmap.ui.cli.inputs import (
     MM,
     CorrectedArgument,
@@ -38,9 +25,7 @@ from stiffmap.ui.cli.inputs import (
     pairs,
 )
 from stiffmap.ui.cli.output import JsonOption, show
-from stiffmap.ui.report.milling import placement_summary, summary, write_report
-
-IDLE = "no turn changes the error, as the last joint turns about the tool's own axis; a spindle across the flange would make use of it"
+from stiffmap.ui.report.milling import summary, write_report
 
 
 def command(
@@ -125,78 +110,18 @@ def command(
 
       [cyan]stiffmap mill corrected.yaml outline.ngc --process trimming --true my.yaml --band -o cut[/cyan]
     """
-    m = machine_with(machine, effect)
-    cut = _process(process, tolerance)
-    p = load_path(
-        path,
-        feed=cut.feed,
-        spindle=cut.spindle,
-        size=None if size is None else tuple(in_si(size, "size").tolist()),
-        offsets=_offsets(offset),
-        progress=None if as_json or not sys.stderr.isatty() else _read,
-    )
-    if reverse:
-        p, cut = turned_round(p), other_side(cut)
-    corners = in_si(stock, "stock", 6)
-    plate = None if corners is None else box(corners[:3], corners[3:])
-    where = in_si(at, "at", 3)
-    angle = float(np.radians(turn))
-    out: dict[str, object] = {}
-    if place is not None:
-        best = placements(m, p, cut, count=place, threads=threads, scheduler=scheduler)
-        where, angle = best.best.at, best.best.turn
-        out["placement"] = {"words": best.words(cut.tolerance), **placement_summary(best)}
-
-    def job(path: Toolpath, turns: Floats | None = None) -> Setting:
-        place = path.placed(m.description.home.p if where is None else where, angle)
-        return setting(
-            m, path, cut, sampled(path, MM * step), place, stock=plate, angle=turns,
-            thickness=in_si(thickness),
-        )  # fmt: skip
-
-    def turned(path: Toolpath) -> Redundancy | None:
-        if redundancy is None:
-            return None
-        return choose_turns(job(path), redundancy, threads=threads, scheduler=scheduler)
-
-    chosen = turned(p)
-    if entry is not None:
-        p, out["entry"] = _entered(p, entry, job(p, None if chosen is None else chosen.angle), threads)
-        chosen = turned(p)
-    if chosen is not None:
-        out["redundancy"] = {
-            "largest_mm": float(1e3 * np.abs(chosen.error).max()), "best_fixed_turn_mm": float(1e3 * chosen.fixed.min()),
-            "as_at_home_mm": float(1e3 * np.interp(0.0, chosen.turns, chosen.fixed)),
-            **({"note": IDLE} if chosen.idle else {}),
-        }  # fmt: skip
     found = mill_job(
-        m, p, cut, at=where, turn=angle, step=MM * step, within=MM * within, angle=None if chosen is None else chosen.angle, feeds=feeds, stock=plate,
-        true_machine=None if true_machine is None else load_machine(true_machine),
-        thickness=in_si(thickness), passes=passes, band=band, threads=threads,
+        machine_with(machine, effect), path, process, at=in_si(at, "at", 3), turn=math.radians(turn), size=in_si(size, "size"),
+        offset=_offsets(offset), true_machine=true_machine, step=MM * step, within=MM * within, thickness=in_si(thickness),
+        tolerance=in_si(tolerance), passes=passes, band=band, place=place, stock=in_si(stock, "stock", 6), reverse=reverse,
+        entry="best" if entry == "best" else None if entry is None else float(in_si(entry, "entry", 1)[0]), feeds=feeds,
+        redundancy=redundancy, threads=threads, scheduler=scheduler, progress=None if as_json or not sys.stderr.isatty() else _read,
     )  # fmt: skip
-    out = {**summary(found), **out}
+    out = summary(found)
     if output is not None:
         out["files"] = {k: str(output / v) for k, v in write_report(found, output).items()}
     show(as_json, out, _lines(out))
-    states: Any = found.dataset.status.values
-    t = cut.tolerance
-    after = np.abs(found.dataset.error_normal_after.values)
-    beyond = t is not None and not (after <= t).all()
-    finish(bool((states != Status.CONVERGED).any() or beyond or any(w.finding for w in found.warnings)))
-
-
-def _entered(p: Toolpath, text: str, here: Setting, threads: int | None) -> tuple[Toolpath, dict[str, float]]:
-    """The path entered elsewhere, and what the step there is."""
-    if text == "best":
-        best = best_entry(here, threads)
-        said = {
-            "way_mm": 1e3 * best.way,
-            "step_there_mm": 1e3 * best.step,
-            "step_as_given_mm": 1e3 * best.given,
-        }
-        return entered_at(p, best.way), said
-    way = float(numbers(text, "entry", 1)[0])
-    return entered_at(p, MM * way), {"way_mm": way}
+    finish(found.finding)
 
 
 def _read(count: int) -> None:
@@ -204,19 +129,10 @@ def _read(count: int) -> None:
     print(f"\r{count} lines read", end="", file=sys.stderr, flush=True)
 
 
-def _process(name: str, tolerance: float | None) -> Process:
-    p = load_process(name)
-    if tolerance is None:
-        return p
-    if not tolerance > 0:
-        raise StiffmapError(f"--tolerance: expected a number above zero, got {tolerance}")
-    return replace(p, tolerance=MM * tolerance)
-
-
 def _offsets(given: list[str] | None) -> dict[str, list[float]] | None:
     if not given:
         return None
-    out = {"G54": [0.0, 0.0, 0.0]}
+    out = {}
     for name, values in pairs(given, "offset").items():
         if name.upper() not in {f"G{n}" for n in range(54, 60)}:
             raise StiffmapError(f"--offset: expected such as G55=10,0,0; got '{name}={values}'")

@@ -12,13 +12,28 @@ from rich.text import Text
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs import new_file, write_text
 from stiffmap.model.files.starter import starter_text
-from stiffmap.solve.starters import CLASSES, OPTIONS, class_of, machine_text
+from stiffmap.solve.starters import CLASSES, class_of, machine_text
 from stiffmap.ui.cli.inputs import OverwriteOption
 from stiffmap.ui.cli.output import JsonOption, print_json, show
 
+DIMENSIONS = {
+    "radius": "mm, of the circle on which the legs stand on the base",
+    "platform": "mm, of the circle on which the legs hold the platform",
+    "arm": "mm, first link",
+    "forearm": "mm, second link",
+    "rod": "mm, rods or struts at home",
+    "height": "mm, of the tool above (below: of a delta) the base, or of the arm's shoulder",
+    "stroke": "mm, travel of the drives, or of each axis",
+    "reach": "mm, from the last slide or pivot to the tool",
+    "tube": "mm, outer diameter of the links",
+    "wall": "mm, wall of the links' tubes",
+    "drive": "stiffness of a drive: N/µm where it slides, kN·m/rad where it turns",
+}
+"""Every dimension that some class has."""
+
 
 def _dimension(key: str) -> Any:
-    return typer.Option(f"--{key}", help=f"{OPTIONS[key]}.", rich_help_panel="Dimensions (with --from)")
+    return typer.Option(f"--{key}", help=f"{DIMENSIONS[key]}.", rich_help_panel="Dimensions (with --from)")
 
 
 Length = float | None

@@ -38,7 +38,7 @@ from stiffmap.ui.cli.output import JsonOption, show
 from stiffmap.ui.cli.statuses import MEANINGS
 from stiffmap.ui.cli.table_text import table as table_of
 
-SCALE = np.array([1e3] * 3 + [1.0] * 3)
+SCALE = [1e3] * 3 + [1.0] * 3
 NAMES = ("dx", "dy", "dz", "rx", "ry", "rz")
 SHOWN = 20  # rows of a file that are printed
 """m to mm, rad stays: a compliance then is in mm/N, rad/N, mm/(N mm), rad/(N mm)."""

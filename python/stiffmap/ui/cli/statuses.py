@@ -11,11 +11,11 @@ from rich.text import Text
 from stiffmap.solve.compiled import Status, counted
 
 MEANINGS = {
-    Status.UNREACHABLE.name: "the joints cannot get there, or a limit forbids it",
-    Status.SINGULAR.name: "the machine can move freely there",
-    Status.UNSTABLE.name: "it gives way before the whole load acts; a slender rod between balls in one piece does so "
+    "UNREACHABLE": "the joints cannot get there, or a limit forbids it",
+    "SINGULAR": "the machine can move freely there",
+    "UNSTABLE": "it gives way before the whole load acts; a slender rod between balls in one piece does so "
     "early: docs/machine_files.md",
-    Status.NOT_CONVERGED.name: "no equilibrium was found under the whole load",
+    "NOT_CONVERGED": "no equilibrium was found under the whole load",
 }
 
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import webbrowser
 from pathlib import Path
 from typing import Annotated, Any
 
-import numpy as np
 import typer
 
 from stiffmap.common.errors import StiffmapError
@@ -24,11 +24,10 @@ from stiffmap.ui.cli.inputs import (
     numbers,
 )
 from stiffmap.ui.cli.output import JsonOption, show
-from stiffmap.ui.view.quantities import QUANTITIES
 
 LOCAL = "127.0.0.1"
 
-DEGREE = np.pi / 180
+DEGREE = math.pi / 180
 
 
 def command(
@@ -44,7 +43,10 @@ def command(
         typer.Option(help="Axis across which the plane lies (x, y, z), or the normal of a free one."),
     ] = None,
     quantity: Annotated[
-        str, typer.Option(help=f"What the colours show: {', '.join(QUANTITIES)}.")
+        str,
+        typer.Option(
+            help="What the colours show: deflection, worst, stiffness, margin, status, frequency, dynamic."
+        ),
     ] = "deflection",
     tolerance: Annotated[float, typer.Option(help="Tolerated deflection, mm.")] = 0.25,
     frequency: Annotated[float, typer.Option(help="Of the dynamic stiffness, Hz.")] = 0.0,

@@ -10,9 +10,11 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from stiffmap.common.outputs import make_folder, write_rows, write_text
+from stiffmap.machining.milling.choices import Choices
 from stiffmap.machining.milling.job import Milled
 from stiffmap.machining.milling.limits import outside
 from stiffmap.machining.milling.placement import Placements
+from stiffmap.machining.milling.redundancy import IDLE
 from stiffmap.machining.milling.stability import PathStability
 from stiffmap.machining.milling.verdict import sizes, verdict
 from stiffmap.machining.process import cutting_force
@@ -75,10 +77,26 @@ def summary(found: Milled) -> dict[str, object]:
     waves = ds.ripple.values
     if np.isfinite(waves).any() and waves.any():
         out["ripple_mm"] = float(1e3 * np.nanmax(waves))
+    return out | ({} if found.choices is None else _chosen(found.choices))
+
+
+def _chosen(c: Choices) -> dict[str, object]:
+    """What was asked for; mm."""
+    out: dict[str, object] = {}
+    if c.placement is not None:
+        out["placement"] = {"words": c.placement.words(c.process.tolerance), **_placement(c.placement)}
+    if (e := c.entry) is not None:
+        steps = {"step_there_mm": e.step, "step_as_given_mm": e.given}
+        out["entry"] = {"way_mm": 1e3 * e.way, **{k: 1e3 * v for k, v in steps.items() if v is not None}}
+    if (r := c.redundancy) is not None:
+        out["redundancy"] = {
+            "largest_mm": float(1e3 * np.abs(r.error).max()), "best_fixed_turn_mm": float(1e3 * r.fixed.min()),
+            "as_at_home_mm": float(1e3 * np.interp(0.0, r.turns, r.fixed)), **({"note": IDLE} if r.idle else {}),
+        }  # fmt: skip
     return out
 
 
-def placement_summary(found: Placements) -> dict[str, object]:
+def _placement(found: Placements) -> dict[str, object]:
     """Numbers of a search for the placement; mm, deg."""
     fits = found.largest[np.isfinite(found.largest)]
     with np.errstate(invalid="ignore", divide="ignore"):

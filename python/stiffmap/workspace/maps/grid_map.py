@@ -17,6 +17,7 @@ from stiffmap.common.outputs import needs_space, only_job
 from stiffmap.solve.compiled import Status
 from stiffmap.solve.machine import Machine, hint_metres, takes_machine
 from stiffmap.workspace.maps.files import is_zarr, partial_folder, read_dataset, write_dataset
+from stiffmap.workspace.maps.inputs import POINTS
 from stiffmap.workspace.maps.plan import MapPlan, map_plan
 from stiffmap.workspace.maps.progress import track
 from stiffmap.workspace.maps.store import Store, folder_store, memory_store
@@ -31,6 +32,7 @@ def error_map(
     x: ArrayLike | None = None,
     y: ArrayLike | None = None,
     z: ArrayLike | None = None,
+    points: int = POINTS,
     wrench: ArrayLike | Mapping[str, ArrayLike] | None = None,
     cases: Sequence[str] | None = None,
     plane: str | None = "xy",
@@ -58,7 +60,7 @@ def error_map(
     ----------
     x, y, z
         Commanded TCP positions, m, base axes: one number or an axis of numbers each. None: over the machine's
-        workspace (51 positions along an axis, three planes of z; a coordinate that is not commanded stays at home).
+        workspace (`points` positions along an axis, three planes of z; a coordinate that is not commanded stays at home).
     wrench
         (6,) N, N·m at `point`; (cases, 6) or a mapping name -> (6,) for several load cases, which
         adds the dimension ``case``.
@@ -114,7 +116,7 @@ def error_map(
         Where `out` cannot be written.
     """
     plan = map_plan(
-        machine, x=x, y=y, z=z, wrench=wrench, cases=cases, plane=plane, force=force, directions=directions,
+        machine, x=x, y=y, z=z, points=points, wrench=wrench, cases=cases, plane=plane, force=force, directions=directions,
         tolerance=tolerance, compliance=compliance, uncertainty=uncertainty, point=point, rotation=rotation,
         gravity=gravity, load_type=load_type, method=method, load_steps=load_steps, threads=threads,
     )  # fmt: skip

@@ -25,7 +25,15 @@ from stiffmap.solve.labels import (
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.options import LoadingKeywords, spelled_out
 from stiffmap.solve.validity import Validity
-from stiffmap.workspace.maps.inputs import axis, grid_of, magnitude, plane_axes, plane_force, wrench_cases
+from stiffmap.workspace.maps.inputs import (
+    POINTS,
+    axis,
+    grid_of,
+    magnitude,
+    plane_axes,
+    plane_force,
+    wrench_cases,
+)
 from stiffmap.workspace.maps.loading import Loading, describe
 from stiffmap.workspace.maps.uncertainty import METHOD, Uncertain, uncertain_numbers
 
@@ -220,6 +228,7 @@ def map_plan(
     x: ArrayLike | None = None,
     y: ArrayLike | None = None,
     z: ArrayLike | None = None,
+    points: int = POINTS,
     wrench: ArrayLike | Mapping[str, ArrayLike] | None = None,
     cases: Sequence[str] | None = None,
     plane: str | None = "xy",
@@ -235,7 +244,7 @@ def map_plan(
     Raises StiffmapError for bad input.
     """
     loading = Loading(machine, **how)
-    grid = grid_of(machine, {"x": x, "y": y, "z": z})
+    grid = grid_of(machine, {"x": x, "y": y, "z": z}, points)
     instance_of(compliance, (bool, np.bool_), "compliance", "True or False")
     wrenches, names = wrench_cases(wrench, None if cases is None else tuple(cases))
     if (directions := whole_number(directions, "directions", 1)) < 3:

@@ -12,7 +12,14 @@ from scipy.spatial.transform import Rotation
 import stiffmap as sm
 from stiffmap.experiment import Predictor, random_plan, save_experiment
 from stiffmap.experiment.comparison.prediction_error import left_by
-from stiffmap.machining.compensation import compensate, corrected_geometry, dh_list
+from stiffmap.machining.compensation import (
+    axis_errors,
+    check_compensation,
+    compensate,
+    corrected_geometry,
+    dh_list,
+    write_dh,
+)
 from stiffmap.ui.cli.app import main
 
 MACHINES = (
@@ -133,6 +140,17 @@ def test_the_command_line_writes_commands(tmp_path: Path, capsys: pytest.Capture
     assert main([*arguments, "--effect", "length bar x error=0.1mm", "--force", "0,0,-300"]) == 0
     assert "rows without an answer: none" in capsys.readouterr().out
     assert out.read_text().startswith("wanted_x_mm")
+    machine = sm.load_machine("orthoglide-revised").with_effect(
+        "length", element="bar", legs=["x"], error=1e-4
+    )
+    found = sm.compensate(machine, tmp_path / "poses.csv", wrench=[0, 0, -300, 0, 0, 0])
+    found.write(tmp_path / "own.csv")
+    assert (tmp_path / "own.csv").read_text() == out.read_text()
+    assert found.ids == ("1", "2")
+    table = axis_errors(machine, "x", points=5, zero=0.0)
+    assert len(table.position) == 5
+    assert np.interp(0.0, table.position, table.positioning[0]) == pytest.approx(0, abs=1e-12)
+    assert write_dh("ur10", tmp_path / "dh.csv") and "shoulder" in (tmp_path / "dh.csv").read_text()
     assert main(["compensate", "linear-delta", "--dh", str(tmp_path / "a.csv")]) == 2
     assert "serial arm" in capsys.readouterr().err
     assert main(["compensate", "linear-delta", "--check", str(tmp_path / "nothing")]) == 2
@@ -162,6 +180,7 @@ def test_what_compensation_leaves_of_held_out_readings(
     said = json.loads(capsys.readouterr().out)
     assert said["verdict"].startswith("worse")
     assert said["rms left by compensation, mm"] > 1.9 * said["rms as measured, mm"]
+    assert not check_compensation(both, tmp_path / "held_out").worse
     before, after = left_by(both, data)
     assert (before.n, after.rms * 1e3) == (24, pytest.approx(expected, rel=1e-3))
 

@@ -69,7 +69,7 @@ def test_findings_and_errors(tmp_path: Path, capsys: pytest.CaptureFixture[str])
         (["--stock", "1,2,3"], "--stock"),
         (["--stock=0,0,0,-1,1,1"], "stock: expected two corners"),
         (["--entry", "1000"], "entry: expected 0 to"),
-        (["--tolerance", "0"], "--tolerance"),
+        (["--tolerance", "0"], "tolerance: expected"),
         (["--offset", "G60=1"], "--offset"),
         (["--at", "1,2"], "--at"),
         (["--size", "1,2"], "size"),
@@ -78,3 +78,34 @@ def test_findings_and_errors(tmp_path: Path, capsys: pytest.CaptureFixture[str])
         said = capsys.readouterr()
         assert message in said.err
         assert len(said.err.splitlines()) == 1
+
+
+def test_python_does_what_the_command_does(capsys: pytest.CaptureFixture[str]) -> None:
+    asked = ["--size", "60", "--process", "trimming", "--at", "50,50,0", "--step", "5", "--json"]
+    more = ["--entry", "best", "--reverse", "--tolerance", "0.1"]
+    assert main(["mill", "orthoglide-revised", "circle", *asked, *more]) == 0
+    said = json.loads(capsys.readouterr().out)
+    ds = sm.mill(
+        "orthoglide-revised", "circle", "trimming", at=(0.05, 0.05, 0), size=(0.06,), step=5e-3,
+        entry="best", reverse=True, tolerance=1e-4,
+    )  # fmt: skip
+    assert ds.attrs["verdict"] == said["verdict"]
+    assert 1e3 * ds.attrs["entry"] == pytest.approx(said["entry"]["way_mm"])
+    assert ds.attrs["tolerance"] == 1e-4
+    assert ds.attrs["program"].count("\n") > 10
+    with pytest.raises(sm.StiffmapError, match="entry: expected a length"):
+        sm.mill("orthoglide-revised", "circle", "trimming", entry="first")
+    with pytest.raises(sm.StiffmapError, match="stock: expected two corners"):
+        sm.mill("orthoglide-revised", "circle", "trimming", stock=[1, 2, 3])
+    placed = sm.mill("linear-delta", "circle", "trimming", size=(0.06,), step=8e-3, place=4)
+    assert "placements the best leaves" in placed.attrs["placement"]
+
+
+def test_python_turns_the_tool_of_an_arm() -> None:
+    where = {"at": (-0.7, -0.05, 0.3), "size": (0.06,), "step": 8e-3}
+    turned = sm.mill("ur10", "circle", "trimming", redundancy=12, **where)
+    assert turned.angle.shape == turned.way.shape
+    fixed = sm.mill("ur10", "circle", "trimming", **where)
+    assert float(abs(turned.error_normal).max()) <= float(abs(fixed.error_normal).max()) * (1 + 1e-6)
+    with pytest.raises(sm.StiffmapError, match="size, offset"):
+        sm.mill("ur10", load_path("circle"), "trimming", size=(0.06,))

@@ -241,3 +241,11 @@ def test_effects_reach_the_machine(
     code, _, err = run(capsys, command, NAME, *options, "--effect", "rust actuator y")
     assert code == 2
     assert err.count("\n") == 1
+
+
+def test_python_maps_the_positions_of_the_command(tmp_path: Path) -> None:
+    load = ["--force", "100,0,0", "--z", "0", "--points", "5", "--no-pictures"]
+    assert main(["map", "orthoglide-revised", *load, "-o", str(tmp_path), "--json"]) == 0
+    ds = sm.error_map("orthoglide-revised", z=[0.0], points=5, wrench=[100, 0, 0, 0, 0, 0])
+    with xr.open_dataset(tmp_path / "map.nc") as written:
+        np.testing.assert_array_equal(written.deflection.values.ravel(), ds.deflection.values.ravel())

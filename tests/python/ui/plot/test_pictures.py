@@ -14,7 +14,7 @@ from matplotlib.text import Text
 
 import stiffmap as sm
 from stiffmap import plot
-from stiffmap.ui.cli.map import grid
+from stiffmap.ui.cli.map import planes as in_metres
 from stiffmap.ui.plot.error_maps import shares
 
 FORCE = {"Fx": [300.0, 0, 0, 0, 0, 0]}
@@ -50,7 +50,7 @@ def _beyond_the_axes(figure: Figure) -> Iterator[Text]:
 def error_map(
     machine: sm.Machine, planes: dict[str, list[float] | None] | None = None, plane: str = "xy"
 ) -> xr.Dataset:
-    return sm.error_map(machine, **grid(machine, planes or {}, 6), wrench=FORCE, plane=plane)
+    return sm.error_map(machine, **in_metres(planes or {}), points=6, wrench=FORCE, plane=plane)
 
 
 def pictures() -> Iterator[tuple[str, Figure]]:

@@ -1,0 +1,129 @@
+"""What is chosen before a cut is computed: sense of the travel, placement, entry, turns of an arm about its tool."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from os import PathLike
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from stiffmap.common.broadcasting import Floats
+from stiffmap.common.errors import StiffmapError
+from stiffmap.machining.milling.entry import Entry, best_entry
+from stiffmap.machining.milling.placement import Placements, placements
+from stiffmap.machining.milling.redundancy import Redundancy
+from stiffmap.machining.milling.redundancy import redundancy as best_turns
+from stiffmap.machining.milling.setting import Setting, setting
+from stiffmap.machining.milling.speed import other_side
+from stiffmap.machining.process import Process, load_process
+from stiffmap.machining.toolpath import Box, Placement, Toolpath, box, load_path, sampled
+from stiffmap.machining.toolpath.entry import entered_at, turned_round
+from stiffmap.solve.machine import Machine
+
+
+@dataclass(frozen=True, eq=False)
+class Choices:
+    """A path on a machine, and what was chosen on the way to it."""
+
+    path: Toolpath
+    process: Process
+    place: Placement
+    stock: Box | None
+    angle: Floats | None
+    """(points,) rad: turn of the tool; None: that of the path, else as at home."""
+    placement: Placements | None = None
+    entry: Entry | None = None
+    redundancy: Redundancy | None = None
+
+    @property
+    def said(self) -> dict[str, object]:
+        """Attributes of a dataset: what was asked for."""
+        out: dict[str, object] = {}
+        if self.placement is not None:
+            out["placement"] = self.placement.words(self.process.tolerance)
+        if self.entry is not None:
+            out["entry"] = self.entry.way
+        return out
+
+
+def choices(
+    machine: Machine,
+    path: Toolpath | str | PathLike[str],
+    process: Process | str | PathLike[str] | Mapping[str, Any],
+    *,
+    at: ArrayLike | None,
+    turn: float,
+    size: tuple[float, ...] | None,
+    offset: Mapping[str, ArrayLike] | None,
+    tolerance: float | None,
+    reverse: bool,
+    place: int | None,
+    entry: float | str | None,
+    redundancy: int | None,
+    angle: Floats | None,
+    step: float,
+    stock: Box | ArrayLike | None,
+    thickness: float | None,
+    threads: int | None,
+    scheduler: Any,
+    progress: Callable[[int], None] | None,
+) -> Choices:
+    """In this order: the sense, the placement, the entry, the turns; arguments as of `mill`. Raises StiffmapError."""
+    cut = process if isinstance(process, Process) else load_process(process)
+    if tolerance is not None:
+        if not tolerance > 0:
+            raise StiffmapError(f"tolerance: expected a length above zero (m), got {tolerance}")
+        cut = replace(cut, tolerance=tolerance)
+    if isinstance(path, Toolpath):
+        if size is not None or offset:
+            raise StiffmapError(
+                "size, offset: only of a built-in outline, or of a file; a toolpath has both in it"
+            )
+        p = path
+    else:
+        shifts = {
+            n: [float(v) for v in np.asarray(o, dtype=float)] for n, o in ({"G54": [0, 0, 0]} | dict(offset)).items()
+        } if offset else None  # fmt: skip
+        p = load_path(path, feed=cut.feed, spindle=cut.spindle, size=size, offsets=shifts, progress=progress)
+    if reverse:
+        p, cut = turned_round(p), other_side(cut)
+    if stock is not None and not isinstance(stock, Box):
+        corners = np.asarray(stock, dtype=float)
+        if corners.size != 6:
+            raise StiffmapError(f"stock: expected two corners (2, 3) in m, got {corners.shape}")
+        stock = box(corners.ravel()[:3], corners.ravel()[3:])
+    tried = None
+    if place is not None:
+        tried = placements(machine, p, cut, count=place, threads=threads, scheduler=scheduler)
+        at, turn = tried.best.at, tried.best.turn
+    origin = machine.description.home.p if at is None else at
+
+    def job(path: Toolpath, turns: Floats | None) -> Setting:
+        return setting(
+            machine, path, cut, sampled(path, step), path.placed(origin, turn), stock=stock, angle=turns,
+            thickness=thickness,
+        )  # fmt: skip
+
+    def turned(path: Toolpath) -> Redundancy | None:
+        if redundancy is None:
+            return None
+        return best_turns(job(path, None), redundancy, threads=threads, scheduler=scheduler)
+
+    if isinstance(entry, str) and entry != "best":
+        raise StiffmapError(f"entry: expected a length (m) or 'best', got {entry!r}")
+    turns = turned(p)
+    here = None
+    if entry is not None:
+        here = (
+            best_entry(job(p, angle if turns is None else turns.angle), threads)
+            if isinstance(entry, str)
+            else Entry(entry)
+        )
+        p = entered_at(p, here.way)
+        turns = turned(p)
+    return Choices(
+        p, cut, p.placed(origin, turn), stock, angle if turns is None else turns.angle, tried, here, turns
+    )
