@@ -27,6 +27,8 @@ from stiffmap.ui.cli.loading import import_all, load
 BAD_INPUT = 2
 DEFECT = 70
 INTERRUPTED = 130
+COMPLETION = "_STIFFMAP_COMPLETE"
+"""Set by a shell that asks what a word can become."""
 TRACEBACK = "STIFFMAP_TRACEBACK"
 
 HELP = """How far is a loaded machine pushed off its commanded position?
@@ -39,7 +41,7 @@ no memory), 70 a defect of stiffmap, 130 interrupted.
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run ``stiffmap`` (default: with the process's arguments); returns the exit code."""
-    given = joined(sys.argv[1:] if arguments is None else arguments)
+    given = joined(_words() if arguments is None else arguments)
     try:
         with plain_streams(), one_command():
             build_command(given)(args=given, prog_name="stiffmap")
@@ -69,6 +71,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
+def _words() -> list[str]:
+    """The process's arguments, or those that a shell (bash; zsh, fish) has of a line that is being typed."""
+    if COMPLETION not in os.environ:
+        return sys.argv[1:]
+    return (os.environ.get("COMP_WORDS") or os.environ.get("_TYPER_COMPLETE_ARGS", "")).split()[1:]
+
+
 def _refusal(error: OSError) -> str:
     """What the system refused, of which file."""
     what = error.strerror or one_line(error)
@@ -93,7 +102,6 @@ def build_app(arguments: Sequence[str]) -> typer.Typer:
     app = typer.Typer(
         help=flowed(HELP),
         no_args_is_help=True,
-        add_completion=False,
         rich_markup_mode="rich",
         pretty_exceptions_enable=False,
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import subprocess
 import sys
@@ -33,6 +34,22 @@ def test_help_lists_the_commands(capsys: pytest.CaptureFixture[str]) -> None:
     for command in COMMANDS:
         if command.exists():
             assert command.summary.split()[0] in out
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_a_shell_completes_commands_and_their_options(shell: str) -> None:
+    def completed(line: str) -> str:
+        asked = {
+            "_STIFFMAP_COMPLETE": f"complete_{shell}",
+            "COMP_CWORD": str(len(line.split()) - 1),
+            "_TYPER_COMPLETE_FISH_ACTION": "get-args",
+            "COMP_WORDS" if shell == "bash" else "_TYPER_COMPLETE_ARGS": line,
+        }
+        command = [sys.executable, "-m", "stiffmap"]
+        return subprocess.run(command, env={**os.environ, **asked}, stdout=subprocess.PIPE, text=True).stdout
+
+    assert "machines" in completed("stiffmap mac") and "mill" not in completed("stiffmap mac")
+    assert "--toolpath" in completed("stiffmap map --too")
 
 
 @pytest.mark.parametrize("name", [command.name for command in COMMANDS if command.exists()])
