@@ -252,3 +252,16 @@ def test_efforts_are_those_where_the_drives_are_commanded(name: str) -> None:
     assert found.effort == pytest.approx(held.actuator_effort, rel=1e-9, abs=1e-9)
     soft = machine.with_effect("compliance", element=machine.actuators[0].rpartition(".")[2], scale=2.0)
     assert drives_of(soft, plan).jacobian is found.jacobian  # of the rigid machine, found out once
+
+
+def test_the_way_of_a_load_is_that_of_the_component_that_varies_most() -> None:
+    """Up, down with noise, up; beside it a component at rest and one that varies less, the other way."""
+    up = np.linspace(0.0, 100.0, 11)
+    load = np.concatenate([up, up[-2::-1], up[1:]])
+    wrench = np.zeros((len(load), 6))
+    wrench[:, 2] = load + 0.5 * (-1.0) ** np.arange(len(load))
+    wrench[:, 0], wrench[:, 1] = 300.0, -0.1 * load
+    found = directions(wrench, np.arange(len(load)), np.zeros(len(load), dtype=np.intp))
+    assert found is not None
+    assert found.tolist() == [0, *[1] * 10, *[-1] * 10, *[1] * 10]
+    assert directions(wrench[:, [0, 3, 4, 5, 3, 4]], np.arange(31), np.zeros(31, dtype=np.intp)) is None
