@@ -11,6 +11,7 @@ from tests.python.experiment.conftest import Twin
 import stiffmap as sm
 from stiffmap.experiment import Predictor, residual
 from stiffmap.experiment.calls import placed
+from stiffmap.experiment.virtual.plans import grid_poses
 
 POSITION = ("--quantity", "position", "--poses", "12")
 FEW = ("--poses", "6", "--loads", "6")
@@ -142,3 +143,13 @@ def test_commanded_coordinates_are_the_poses(twin: Twin, orthoglide: sm.Machine)
     located = residual(orthoglide, e).experiment
     np.testing.assert_allclose(located.position, plain.position, atol=1e-10)
     assert located.rotation is None
+
+
+def test_a_grid_fills_the_workspace_but_for_its_border() -> None:
+    machine = sm.load_machine("orthoglide-revised")
+    low, high = machine.workspace
+    p = grid_poses(machine, [3, 2, 1])
+    assert p.shape == (6, 3)
+    for axis, places in enumerate(([0.02, 0.5, 0.98], [0.02, 0.98], [0.5])):
+        wanted = low[axis] + np.array(places) * (high[axis] - low[axis])
+        assert np.unique(p[:, axis]) == pytest.approx(wanted, abs=1e-6)

@@ -9,6 +9,7 @@ from tests.python.identification.inference.synthetic import READINGS, columns, p
 
 from stiffmap.identification.inference import amplitudes
 from stiffmap.identification.inference.constants import DEGREES, NOISE_SD, NUMBERS_SD
+from stiffmap.identification.inference.shares import shares
 
 
 def dense(c, some, ln_variance, weights):
@@ -127,3 +128,19 @@ def test_a_part_far_larger_than_the_noise_is_factorised_all_the_same():
     v = np.eye(40) + 1e17 * smooth
     root = amplitudes._root(v)
     assert np.abs(root @ root.T - v).max() < 1e-10 * v.max()
+
+
+def test_shares_are_those_of_the_readings_that_do_not_stand_alone():
+    """Squares of posterior means by their dense formulas; a reading of next to no weight counts in none of them."""
+    rng = np.random.default_rng(5)
+    c, some = columns(rng), parts(rng)
+    w, at = np.ones(READINGS), np.array([0.2, 0.5, -0.5, 0.8])
+    w[[3, 11]] = 1e-4
+    found = shares(c, amplitudes.evaluated(c, some, at, w))
+    solved = np.linalg.solve(dense(c, some, at, w), c.residual)
+    kept = w == 1.0
+    matrices = [p.full if p.full is not None else p.factor @ p.factor.T for p in some]
+    means = [np.exp(x) * (c.free @ (m @ solved))[kept] for x, m in zip(at[1:], matrices, strict=True)]
+    means.append(np.exp(at[0]) * (c.free @ solved)[kept])
+    squares = np.array([np.sum(m**2) for m in means])
+    assert list(found.values()) == pytest.approx(list(squares / squares.sum()), rel=1e-8)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ import stiffmap as sm
 from stiffmap.ui.cli import main
 from stiffmap.ui.plot.efforts import efforts_figure
 from stiffmap.workspace.performance import circle, drive_efforts, line, load_motion, timed
+from stiffmap.workspace.performance.motion.trajectory import Path, Trajectory, at_feed, through
 
 CUT = """
 name: cut
@@ -150,3 +152,24 @@ def test_the_picture_has_all_drives_and_their_limits():
     d = drive_efforts(sm.load_machine("hexapod"), timed(line([0, 0, 0.68], [0.05, 0, 0.7], 21), 0.5))
     panels = efforts_figure(d).axes
     assert len(panels) == 3 and all(len(a.lines) >= 6 for a in panels)
+
+
+@pytest.mark.parametrize("run", [lambda p: timed(p, 0.9), lambda p: at_feed(p, 0.4)])
+def test_velocity_and_acceleration_are_the_differences_of_the_position(
+    run: Callable[[Path], Trajectory],
+) -> None:
+    """Along a spline, whose speed in its parameter changes: central differences of half and whole steps in time."""
+    bent = through([[0, 0, 0], [0.05, 0.02, 0.1], [0.3, 0, 0.1], [0.35, 0.2, 0]], 4001)
+    t = run(bent)
+    gaps = []
+    for k in (40, 20):
+        inside = slice(200, -200)
+        step = (t.time[2 * k :] - t.time[: -2 * k])[:, None]
+        velocity = ((t.position[2 * k :] - t.position[: -2 * k]) / step)[inside]
+        acceleration = ((t.velocity[2 * k :] - t.velocity[: -2 * k]) / step)[inside]
+        here = slice(200 + k, -200 - k)
+        gaps.append(
+            [np.abs(velocity - t.velocity[here]).max(), np.abs(acceleration - t.acceleration[here]).max()]
+        )
+    assert (np.array(gaps[1]) < [2e-3, 0.1]).all()
+    assert (np.array(gaps[1]) < 0.55 * np.array(gaps[0])).all()

@@ -42,3 +42,22 @@ def test_noise_alone_has_no_mode():
     f, rng = np.linspace(5, 50, 400), np.random.default_rng(0)
     H = 1e-6 * (rng.normal(size=(400, 2)) @ [1, 1j])
     assert not len(extract_modes([MeasuredResponse("", f, H, np.full(400, np.nan))]).frequency)
+
+
+def test_uncertainties_are_the_scatter_of_many_measurements():
+    """Two modes whose peaks overlap: flexibilities are uncertain by noise, and by the poles that it moves."""
+    f, rng = np.linspace(20, 40, 300), np.random.default_rng(4)
+    poles = [(28.0, 0.05, 1e-6), (31.0, 0.05, 2e-6)]
+    H = sum(a * o**2 / (o**2 - f**2 + 2j * z * o * f) for o, z, a in poles)
+    s = 0.02 * np.abs(H).max()
+    found = []
+    for _ in range(30):
+        noisy = H + s * (rng.normal(size=(len(f), 2)) @ [1, 1j]) / np.sqrt(2)
+        found.append(extract_modes([MeasuredResponse("", f, noisy, np.full(len(f), np.nan))]))
+    found = [m for m in found if len(m.frequency) == 2]
+    assert len(found) > 20
+    for name in ("frequency", "ratio", "flexibility"):
+        values = np.array([getattr(m, name).reshape(2) for m in found])
+        promised = np.array([getattr(m, f"u_{name}").reshape(2) for m in found])
+        ratio = values.std(axis=0, ddof=1) / np.sqrt((promised**2).mean(axis=0))
+        assert ((ratio > 0.6) & (ratio < 1.5)).all(), (name, ratio)
