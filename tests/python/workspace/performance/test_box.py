@@ -13,7 +13,7 @@ from stiffmap.workspace.performance import drive_kinematics
 from stiffmap.workspace.performance.box.box import best_orientation
 from stiffmap.workspace.performance.box.box_search import BoxSearch
 from stiffmap.workspace.performance.box.cells import shrink
-from stiffmap.workspace.performance.box.proof import enclose, judge_cells
+from stiffmap.workspace.performance.box.proof import enclose, judge_cells, sample
 from stiffmap.workspace.performance.limits.bars import segment_distance
 from stiffmap.workspace.performance.limits.limits import Bounds, Limit
 
@@ -237,3 +237,21 @@ def test_a_drive_whose_range_ends_in_the_middle_of_a_face(tmp_path):
     assert box.proven
     assert box.edge > b + a - 4e-3
     assert box.edge_upper >= b + a
+
+
+@dataclass
+class Peak:
+    """A limit 0 whose value, at most `top`, is largest between two nodes of a cell of half a metre's width."""
+
+    top: float
+
+    def at(self, position: np.ndarray) -> tuple[np.ndarray, list[Limit]]:
+        value = self.top - 16.0 * (position[:, 0] - 0.125) ** 2
+        return np.ones(len(position), dtype=bool), [Limit("peak", value, 0.0, value[:, None], value[:, None])]
+
+
+@pytest.mark.parametrize(("top", "inside"), [(0.2, False), (-0.6, True)])
+def test_what_a_sampled_limit_may_reach_between_the_nodes_counts(top: float, inside: bool) -> None:
+    """At the nodes it is at most top - 0.25: with 0.2 it keeps the limit there, and not between them."""
+    found = sample(Peak(top), np.zeros((1, 3)), np.full((1, 3), 0.25), np.eye(3))
+    assert found.inside.tolist() == [inside] and not found.broken.any()
