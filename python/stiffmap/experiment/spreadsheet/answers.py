@@ -32,17 +32,6 @@ class Answers:
             self.noise | other.noise,
         )
 
-    def of(self, sheet: Sheet, given: Answers) -> Answers:
-        """These without columns that were made, which the next sheet of this form has not got, but as `given`."""
-        there = {*sheet.header, *(f"{sign}{h}" for h in sheet.header for sign in "+-")}
-        own = {k: v for k, v in self.chosen.items() if set(v) <= there}
-        return Answers(own | given.chosen, self.units, self.constants, self.noise)
-
-    def copy(self) -> Answers:
-        """As they stand now."""
-        chosen = {k: list(v) for k, v in self.chosen.items()}
-        return Answers(chosen, dict(self.units), dict(self.constants), dict(self.noise))
-
 
 @dataclass
 class Meant(Answers):
@@ -65,7 +54,9 @@ class Meant(Answers):
     @staticmethod
     def of_sheet(sheet: Sheet, answers: Answers) -> Meant:
         """A sheet as it was read, with what is said of it."""
-        return Meant(**vars(answers.copy()), sheet=sheet)
+        chosen = {k: list(v) for k, v in answers.chosen.items()}
+        a = answers
+        return Meant(chosen, dict(a.units), dict(a.constants), dict(a.noise), sheet=sheet)
 
     def spend(self, name: str) -> float:
         """A number of --set that is in a column from now on; 0 where there is none."""
@@ -74,9 +65,10 @@ class Meant(Answers):
         return self.spent.get(name, 0.0)
 
     def to_remember(self, sheet: Sheet, given: Answers) -> Answers:
-        """What is kept for the next sheet of this form: as `of`, with all numbers."""
-        found = self.of(sheet, given)
-        return Answers(found.chosen, found.units, self.spent | found.constants, found.noise)
+        """The answers without columns that were made, which the next sheet of this form has not got, but as `given`."""
+        there = {*sheet.header, *(f"{sign}{h}" for h in sheet.header for sign in "+-")}
+        own = {k: v for k, v in self.chosen.items() if set(v) <= there}
+        return Answers(own | given.chosen, self.units, self.spent | self.constants, self.noise)
 
     def add(self, name: str, values: ArrayLike, meaning: str) -> None:
         """A column more, the only one of its meaning."""

@@ -248,8 +248,8 @@ def _evaluate(
 ) -> tuple[Fit, Floats]:
     """The fit at these amplitudes without their price, and (m, 1 + k) what each part adds to the readings; parts that are off add
     nothing."""
-    v = columns.zero.copy()
-    for x, matrix in _on(parts, t, noise).values():
+    v, on = columns.zero.copy(), _on(parts, t, noise)
+    for x, matrix in on.values():
         v += x * matrix
     root = _root(v)
     r = columns.residual
@@ -258,7 +258,7 @@ def _evaluate(
     likelihood = -0.5 * float(r @ solved) - float(np.log(np.diag(root)).sum()) - 0.5 * m * np.log(2 * np.pi)
     likelihood += _bound(weights)
     along = np.zeros((m, len(t)), order="F")
-    for k, (x, matrix) in _on(parts, t, noise).items():
+    for k, (x, matrix) in on.items():
         along[:, k] = x * (matrix @ solved)
     centre, sd = _prior(columns, parts)
     score = likelihood - 0.5 * float(np.sum(((t - centre) / sd) ** 2))

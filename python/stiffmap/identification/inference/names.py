@@ -193,7 +193,6 @@ class _World:
         self.over, self.optima = over, optima
         self.known: dict[frozenset[tuple[int, int]], Model] = {}
         self.anchors: dict[int, tuple[Model, list[Fit]]] = {}
-        self.bounds: dict[int, tuple[Model, list[Bound]]] = {}
         self.gaps = parts.gaps
 
     def search(self) -> Search:
@@ -232,19 +231,12 @@ class _World:
 
     def _bounds(self, model: Model, more: tuple[Fit, ...] = ()) -> list[Bound]:
         """Per place a lower bound of the evidence with it, and the anchor that gives it; `more` anchors than its own."""
-        if id(model) not in self.bounds:
-            self.bounds[id(model)] = model, self._bounded(model, self._anchors(model))
-        own = self.bounds[id(model)][1]
-        also = self._bounded(model, more) if more else own
-        return [max(both, key=lambda b: b[0]) for both in zip(own, also, strict=True)]
-
-    def _bounded(self, model: Model, anchors: Sequence[Fit]) -> list[Bound]:
         taken = {id(c.place) for c in model.chosen}
         others = [c.place.candidate for c in model.chosen]
         free = tuple(p for p in self.columns.places if id(p) not in taken and not clash(p.candidate, others))
         if not free:
             return []
-        extra = model.score - model.fit.score
+        extra, anchors = model.score - model.fit.score, (*self._anchors(model), *more)
         found = [[log_mean(g) + a.score + extra for g in evidence(a, free)] for a in anchors]
         out = []
         for k, place in enumerate(free):

@@ -23,6 +23,9 @@ from stiffmap.machining.toolpath import Box, Placement, Toolpath, box, load_path
 from stiffmap.machining.toolpath.entry import entered_at, turned_round
 from stiffmap.solve.machine import Machine
 
+OFFSETS = tuple(f"G{n}" for n in range(54, 60))
+"""Work offsets that a program can name."""
+
 
 @dataclass(frozen=True, eq=False)
 class Choices:
@@ -84,9 +87,11 @@ def choices(
             )
         p = path
     else:
-        shifts = {
-            n: [float(v) for v in np.asarray(o, dtype=float)] for n, o in ({"G54": [0, 0, 0]} | dict(offset)).items()
-        } if offset else None  # fmt: skip
+        if lost := [n for n in offset or () if n not in OFFSETS]:
+            raise StiffmapError(f"offset: expected names from {OFFSETS[0]} to {OFFSETS[-1]}; got '{lost[0]}'")
+        shifts = {n: np.asarray(o, dtype=float).tolist() for n, o in offset.items()} if offset else None
+        if shifts:
+            shifts.setdefault(OFFSETS[0], [0.0, 0.0, 0.0])
         p = load_path(path, feed=cut.feed, spindle=cut.spindle, size=size, offsets=shifts, progress=progress)
     if reverse:
         p, cut = turned_round(p), other_side(cut)

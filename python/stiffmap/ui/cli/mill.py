@@ -9,7 +9,6 @@ from typing import Annotated
 
 import typer
 
-from stiffmap.common.errors import StiffmapError
 from stiffmap.machining.milling import mill_job
 from stiffmap.ui.cli.inputs import (
     MM,
@@ -134,8 +133,6 @@ def _offsets(given: list[str] | None) -> dict[str, list[float]] | None:
         return None
     out = {}
     for name, values in pairs(given, "offset").items():
-        if name.upper() not in {f"G{n}" for n in range(54, 60)}:
-            raise StiffmapError(f"--offset: expected such as G55=10,0,0; got '{name}={values}'")
         out[name.upper()] = [float(v) * MM for v in numbers(values, "offset", 3)]
     return out
 
