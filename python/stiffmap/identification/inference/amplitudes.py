@@ -18,7 +18,8 @@ from functools import cached_property
 import numpy as np
 from numpy.linalg import LinAlgError
 from scipy.linalg import cho_solve, cholesky, solve_triangular
-from scipy.linalg.lapack import dpotri
+from scipy.linalg.blas import dsyrk
+from scipy.linalg.lapack import dpotri, dtrtri
 from scipy.special import gammaln
 
 from stiffmap.experiment.experiment import Floats
@@ -55,7 +56,7 @@ NOISE, ALL_NUMBERS = "noise", "declared numbers"
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """A part of the covariance with an amplitude: `matrix` (m, m), or a factor F (m, p) of F Fᵀ."""
+    """A part of the covariance with an amplitude: a factor F (m, p) of F Fᵀ; the whole matrix (m, m) where it has no short one."""
 
     name: str
     kind: str
@@ -63,13 +64,11 @@ class Part:
     factor: Floats | None = None
     full: Floats | None = None
 
-    @cached_property
-    def matrix(self) -> Floats:
-        """(m, m)."""
-        if self.full is not None:
-            return self.full
-        assert self.factor is not None
-        return np.asarray(self.factor @ self.factor.T)
+    def times(self, values: Floats) -> Floats:
+        """(m,) product with values (m,)."""
+        if self.factor is not None:
+            return np.asarray(self.factor @ (self.factor.T @ values))
+        return np.asarray(self.full @ values)
 
     @property
     def sd(self) -> float:
@@ -119,14 +118,16 @@ class Fit:
     def mean(self, part: Part) -> Floats:
         """(m,) posterior mean of what a part of the model adds to the readings."""
         k = [p.name for p in self.parts].index(part.name)
-        scale = float(np.exp(self.t[1 + k]))
-        if part.factor is not None:
-            return np.asarray(scale * (part.factor @ (part.factor.T @ self.solved)))
-        return np.asarray(scale * (part.matrix @ self.solved))
+        return np.asarray(np.exp(self.t[1 + k]) * part.times(self.solved))
 
     def white(self, values: Floats) -> Floats:
         """(m, ...) L⁻¹ values."""
         return np.asarray(solve_triangular(self.root, values, lower=True, check_finite=False))
+
+    @cached_property
+    def of_readings(self) -> Floats:
+        """(N,) diagonal of B V⁻¹ Bᵀ: information of each reading."""
+        return np.asarray(np.sum(self.white(self.columns.free.T) ** 2, axis=0))
 
     def without(self, names: Sequence[str], noise: float | None = None) -> Fit:
         """The same with some parts taken away, nothing fitted anew; `noise`: κ of the result."""
@@ -149,14 +150,11 @@ class Parts:
 
     def __post_init__(self) -> None:
         c = self.columns
-        self.numbers = tuple(
-            Part(name, "number", full=c.numbers[:, index] @ c.numbers[:, index].T)
-            for name, index in c.groups.items()
-        )
+        self.numbers = tuple(Part(name, "number", c.numbers[:, index]) for name, index in c.groups.items())
         shared = c.numbers[:, [not u.setup for u in c.unknowns]]
         alone = [p for p, i in zip(self.numbers, c.groups.values(), strict=True) if c.unknowns[i[0]].setup]
-        self.together = (Part(ALL_NUMBERS, "number", full=shared @ shared.T), *alone) if c.unknowns else ()
-        along = (Part(name, "travel", factor=f) for name, f, _ in c.travel)
+        self.together = (Part(ALL_NUMBERS, "number", shared), *alone) if c.unknowns else ()
+        along = (Part(name, "travel", f) for name, f, _ in c.travel)
         self.gaps = (*(Part(name, kind, full=k) for kind, name, k in c.gaps), *along)
 
 
@@ -178,7 +176,7 @@ def fitted(
     first = np.array([given.get(NOISE, 0.0), *(given.get(p.name, BEGIN) for p in parts)])
     light = _optimum(columns, tuple(parts), first, np.ones(len(columns.rows)))
     if weights is not None and np.any(weights != 1.0):
-        heavy = _weighed(_optimum(columns, tuple(parts), first, weights))
+        heavy = _optimum(columns, tuple(parts), first, weights, heavy=True)
         return max(light, heavy, key=lambda f: f.score)
     mean, sd = noise_part(light)
     typical = min(light.noise, 1.4826 * float(np.median(np.abs(mean))))
@@ -190,22 +188,10 @@ def fitted(
     best = light
     for w in starts:
         begun = np.array([2.0 * np.log(typical), *first[1:]])  # what sank may rise
-        heavy = _weighed(_optimum(columns, tuple(parts), begun, w))
+        heavy = _optimum(columns, tuple(parts), begun, w, heavy=True)
         if heavy.score > best.score:
             best = heavy
     return best
-
-
-def _weighed(fit: Fit) -> Fit:
-    """The fit with the weights of its heavy tails: in turn weights, and a step to the amplitudes that go with them."""
-    for _ in range(WEIGHINGS):
-        before, fit = (
-            fit.score,
-            _optimum(fit.columns, fit.parts, fit.t, _heavy(fit, *noise_part(fit)), steps=1),
-        )
-        if abs(fit.score - before) < WEIGHED:
-            break
-    return fit
 
 
 def _heavy(fit: Fit, mean: Floats, sd: Floats) -> Floats:
@@ -232,15 +218,14 @@ def noise_part(f: Fit) -> tuple[Floats, Floats]:
     c = f.columns
     variance = f.noise**2 / f.weights
     back = c.free @ f.solved
-    spread = np.sum(f.white(c.free.T) ** 2, axis=0)
-    return variance * back, np.sqrt(np.maximum(variance - variance**2 * spread, 0.0))
+    return variance * back, np.sqrt(np.maximum(variance - variance**2 * f.of_readings, 0.0))
 
 
 def _noise_matrix(columns: Columns, weights: Floats) -> Floats:
+    """(m, m) lower half of N(w)."""
     if np.all(weights == 1.0):
-        return np.eye(len(columns))
-    scaled = columns.free / np.sqrt(weights)[:, None]
-    return np.asarray(scaled.T @ scaled)
+        return np.eye(len(columns), order="F")
+    return np.asarray(dsyrk(1.0, (columns.free / np.sqrt(weights)[:, None]).T, lower=1))
 
 
 def _evaluate(
@@ -248,9 +233,15 @@ def _evaluate(
 ) -> tuple[Fit, Floats]:
     """The fit at these amplitudes without their price, and (m, 1 + k) what each part adds to the readings; parts that are off add
     nothing."""
-    v, on = columns.zero.copy(), _on(parts, t, noise)
-    for x, matrix in on.values():
-        v += x * matrix
+    variance = np.exp(t)
+    on = _on(parts, t)
+    v = variance[0] * noise + columns.zero.T  # symmetric all: as the lower half lies
+    for k, p in on.items():
+        if p.full is not None:
+            v += variance[k] * p.full.T
+    short = [np.sqrt(variance[k]) * p.factor for k, p in on.items() if p.factor is not None]
+    if short:  # the lower half only
+        v = dsyrk(1.0, np.hstack(short), beta=1.0, c=v, lower=1, overwrite_c=1)
     root = _root(v)
     r = columns.residual
     solved = cho_solve((root, True), r, check_finite=False)
@@ -258,27 +249,39 @@ def _evaluate(
     likelihood = -0.5 * float(r @ solved) - float(np.log(np.diag(root)).sum()) - 0.5 * m * np.log(2 * np.pi)
     likelihood += _bound(weights)
     along = np.zeros((m, len(t)), order="F")
-    for k, (x, matrix) in on.items():
-        along[:, k] = x * (matrix @ solved)
+    along[:, 0] = variance[0] * (columns.free.T @ ((columns.free @ solved) / weights))
+    for k, p in on.items():
+        along[:, k] = variance[k] * p.times(solved)
     centre, sd = _prior(columns, parts)
     score = likelihood - 0.5 * float(np.sum(((t - centre) / sd) ** 2))
     return Fit(columns, parts, t, weights, root, solved, likelihood, score), along
 
 
-def _on(parts: tuple[Part, ...], t: Floats, noise: Floats) -> dict[int, tuple[float, Floats]]:
-    """Variances and matrices (m, m) of the noise and of the parts that are not off, by their places in t."""
-    matrices = {0: noise} | {k: p.matrix for k, p in enumerate(parts, 1) if t[k] > OFF}
-    return {k: (float(np.exp(t[k])), matrix) for k, matrix in matrices.items()}
+def _on(parts: tuple[Part, ...], t: Floats) -> dict[int, Part]:
+    """Parts that are not off, by their places in t."""
+    return {k: p for k, p in enumerate(parts, 1) if t[k] > OFF}
 
 
-def _gradient(fit: Fit, along: Floats, noise: Floats) -> Floats:
+def _gradient(fit: Fit, along: Floats) -> Floats:
     """(1 + k,) slope of the score, priced without."""
-    inverse = dpotri(fit.root, lower=1)[0]  # below the diagonal; above it zero, as the root is
-    trace = np.zeros(len(fit.t))
-    for k, (x, matrix) in _on(fit.parts, fit.t, noise).items():
-        trace[k] = x * float(2.0 * np.vdot(inverse.T, matrix) - np.diag(inverse) @ np.diag(matrix))
+    trace, on = np.zeros(len(fit.t)), _on(fit.parts, fit.t)
+    short = {k: p.factor for k, p in on.items() if p.factor is not None}
+    full = {k: p.full for k, p in on.items() if p.full is not None}
+    if short:
+        squares = np.sum(fit.white(np.hstack(list(short.values()))) ** 2, axis=0)
+        ends = np.cumsum([f.shape[1] for f in short.values()])
+        trace[list(short)] = [x.sum() for x in np.split(squares, ends[:-1])]
+    if full:
+        inverse = dpotri(fit.root, lower=1)[0]  # below the diagonal; above it zero, as the root is
+        for k, matrix in full.items():
+            trace[k] = 2.0 * np.vdot(inverse.T, matrix) - np.diag(inverse) @ np.diag(matrix)
+    if np.any(fit.weights != 1.0):
+        trace[0] = np.sum(fit.of_readings / fit.weights)
+    else:
+        trace[0] = np.trace(inverse) if full else np.sum(dtrtri(fit.root, lower=1)[0] ** 2)
     centre, sd = _prior(fit.columns, fit.parts)
-    return np.asarray(0.5 * (along.T @ fit.solved - trace) - (fit.t - centre) / sd**2)
+    slope = along.T @ fit.solved - np.exp(fit.t) * trace
+    return np.asarray(0.5 * slope - (fit.t - centre) / sd**2)
 
 
 def _information(fit: Fit, along: Floats) -> Floats:
@@ -365,15 +368,22 @@ def _bound(w: Floats) -> float:
 
 
 def _optimum(
-    columns: Columns, parts: tuple[Part, ...], t: Floats, weights: Floats, steps: int = STEPS
+    columns: Columns, parts: tuple[Part, ...], t: Floats, weights: Floats, *, heavy: bool = False
 ) -> Fit:
-    """Damped Newton steps on ln variances."""
+    """Damped Newton steps on ln variances; `heavy`: then further ones, each together with the weights of heavy tails at the posterior
+    before it, which by itself never makes the bound less."""
+    if heavy:
+        begun = _optimum(columns, parts, t, weights)
+        t, weights = begun.t, _heavy(begun, *noise_part(begun))
     damping, noise = SHRINK, _noise_matrix(columns, weights)
     fit, along = _evaluate(columns, parts, t, weights, noise)
     gradient, information = None, _information(fit, along)
-    for _ in range(steps):
+    for _ in range(WEIGHINGS if heavy else STEPS):
         if gradient is None:
-            gradient = _gradient(fit, along, noise)
+            gradient = _gradient(fit, along)
+            if heavy:
+                weights = _heavy(fit, *noise_part(fit))
+                noise = _noise_matrix(columns, weights)
         scale = np.maximum(np.diag(information), 1e-2)
         step = np.linalg.solve(information + damping * np.diag(scale), gradient)
         step = np.clip(step, -LARGEST_STEP, LARGEST_STEP)
@@ -388,6 +398,6 @@ def _optimum(
         fit, along, gradient = moved, along_there, None
         information = _information(fit, along)
         damping = max(damping / 4.0, 1e-3)
-        if gain < ENOUGH:
+        if gain < (WEIGHED if heavy else ENOUGH):
             break
     return _priced(fit, information)

@@ -305,7 +305,7 @@ class _World:
             missed = self.predict(at) - line
             if not np.isfinite(missed).all():
                 break
-            if shown is None and float(np.linalg.norm(missed)) < SETTLED:
+            if shown is None and _gain(fit, missed) < PROGRESS:
                 return fit, chosen
             shown = line
             now = self._less(missed, now)
@@ -443,6 +443,12 @@ class _World:
             near = [(p, s) for s, p in scores.values() if p is not c.place and s > -np.log(ODDS)]
             out.append((odds, tuple(sorted(near, key=lambda n: -n[1]))))
         return tuple(out)
+
+
+def _gain(fit: Fit, missed: Floats) -> float:
+    """Change of the evidence, at most, where the residual is less by something (m,), all amplitudes as they are."""
+    white = fit.white(missed)
+    return abs(float(missed @ fit.solved)) + 0.5 * float(white @ white)
 
 
 def _near(one: Floats, other: Floats) -> bool:

@@ -44,7 +44,7 @@ def parts(rng: np.random.Generator, m: int = READINGS - FREE) -> tuple[Part, ...
     u = np.linalg.qr(rng.normal(size=(m, 2)))[0] * np.sqrt(m / 2)
     d = rng.normal(size=(m, 4))
     return (
-        Part("numbers", "number", full=d @ d.T),
+        Part("numbers", "number", d),
         Part("gap", "field", full=smooth),
         Part("effect", "effect", factor=u),
     )
