@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
-from functools import reduce
+from functools import partial, reduce
 from operator import getitem
 from pathlib import Path
 from typing import Any
@@ -15,8 +15,9 @@ from pydantic import TypeAdapter, ValidationError
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.units import LENGTH
 from stiffmap.common.yaml_text import Document
-from stiffmap.model.description import Block, Branch, Element, MachineDescription
+from stiffmap.model.description import Element, MachineDescription
 from stiffmap.model.description.pose import Vector
+from stiffmap.model.description.tree import edit_path
 from stiffmap.model.files.build_elements import build_element
 from stiffmap.model.files.context import Context, Gathered
 from stiffmap.model.files.load import describe_document, validate
@@ -42,9 +43,12 @@ def steps(place: str) -> list[str | int | tuple[str, str]]:
     return out
 
 
-def put(data: Any, place: str, value: float) -> None:
-    """Set a number of a machine file's data, in place; StiffmapError names the step that is not there."""
-    _set(data, indices(data, place), value)
+def edited(data: Any, values: dict[str, float]) -> Any:
+    """A machine file's data with these numbers (place: value); StiffmapError names the step that is not there."""
+    data = unshared(data)
+    for place, value in values.items():
+        _set(data, indices(data, place), value)
+    return data
 
 
 def indices(data: Any, place: str) -> tuple[str | int, ...]:
@@ -159,10 +163,7 @@ class Editor:
     def description(self, values: dict[str, float]) -> MachineDescription:
         """The machine with these numbers (place: value in the file's units); StiffmapError where it cannot be."""
         if not self.can:
-            data = unshared(self.document.data)
-            for place, value in values.items():
-                put(data, place, value)
-            return described(data, self.document, self.file)
+            return described(edited(self.document.data, values), self.document, self.file)
         built: dict[Address, dict[Address, Element]] = {}
         known: dict[str, Element] = {}
         for (sequence, address), places in self.elements.items():
@@ -176,9 +177,11 @@ class Editor:
         legs = []
         for leg, model in zip(self.base.legs, self.document.data["legs"].values(), strict=True):
             own = ("templates", model["template"]) if "template" in model else ("legs", leg.name, "elements")
-            first = 1 if "frame" in model else 0
-            edits = built.get(own)
-            legs.append(leg if edits is None else replace(leg, elements=_put(leg.elements, edits, first)))
+            elements = leg.elements
+            for address, element in built.get(own, {}).items():
+                path = ".".join([*map(str, address[2::3]), element.name])  # branches, then the element
+                elements = edit_path(elements, path, partial(_if_alike, element)) or elements
+            legs.append(replace(leg, elements=elements))
         return replace(self.base, legs=tuple(legs), workspace=self._workspace(values))
 
     def _element(self, raw: Any, address: Address) -> Element:
@@ -209,6 +212,11 @@ def _depth(inner: Address) -> int:
     return depth
 
 
+def _if_alike(new: Element, old: Element) -> Element | None:
+    """In place of an element of its sort: a body may be called as the spring that follows it."""
+    return new if type(new) is type(old) else None
+
+
 def _set(raw: Any, path: Address, value: float) -> None:
     for key in path[:-1]:
         raw = raw[key]
@@ -217,26 +225,3 @@ def _set(raw: Any, path: Address, value: float) -> None:
         raw[last]["value"] = value
     else:
         raw[last] = value
-
-
-def _put(elements: tuple[Element, ...], edits: dict[Address, Element], first: int) -> tuple[Element, ...]:
-    """The sequence with elements at their addresses, which count from `first`."""
-    out = list(elements)
-    inside: dict[int, dict[str, dict[Address, Element]]] = {}
-    for address, element in edits.items():
-        i = int(address[0])
-        if len(address) == 1:
-            out[first + i] = element
-        else:
-            inside.setdefault(i, {}).setdefault(str(address[2]), {})[address[3:]] = element
-    for i, branches in inside.items():
-        block = out[first + i]
-        assert isinstance(block, Block)
-        out[first + i] = replace(
-            block,
-            branches=tuple(
-                Branch(b.name, _put(b.elements, branches[b.name], 0)) if b.name in branches else b
-                for b in block.branches
-            ),
-        )
-    return tuple(out)
