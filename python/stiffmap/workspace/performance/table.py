@@ -17,7 +17,7 @@ from stiffmap.common.short import short_repr
 from stiffmap.solve.machine import Machine, takes_machine
 from stiffmap.solve.status import Status
 from stiffmap.workspace.maps.inputs import magnitude
-from stiffmap.workspace.performance.motion.closing import drive_kinematics
+from stiffmap.workspace.performance.motion.closing import drive_kinematics, place_text
 from stiffmap.workspace.performance.motion.motion_files import Motion, load_motion
 from stiffmap.workspace.performance.poses import box_nodes, read_box
 from stiffmap.workspace.performance.registry import Case, Found, Measure, all_measures, get_measure
@@ -237,7 +237,7 @@ def _outside(machine: Machine, low: Floats, high: Floats, what: str) -> tuple[tu
     bad = drive_kinematics(machine, p, patient=False).status != Status.CONVERGED
     if not bad.any():
         return (), True
-    first = "({:.1f}, {:.1f}, {:.1f}) mm".format(*(1e3 * p[int(np.argmax(bad))]))
+    first = place_text(p[int(np.argmax(bad))])
     lost = f"{what} is not within reach: {int(bad.sum())} of {len(p)} nodes, for example {first}"
     return (lost,), not bad.all()
 
