@@ -103,6 +103,11 @@ class Design:
         low, high = np.array(rows, dtype=float).T
         return low, high
 
+    @property
+    def measures(self) -> list[str]:
+        """Names of the objectives, then of the other measures with a bound."""
+        return list(dict.fromkeys([*self.model.objectives, *(n for n, _ in self.constraints)]))
+
     def names(self, x: Floats) -> dict[str, float]:
         """Every name that expressions may use, for a vector of variables."""
         out = {k: float(v) for k, v in self.model.constants.items()}

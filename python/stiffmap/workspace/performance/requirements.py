@@ -75,6 +75,11 @@ class Bound:
             sides.append(self.at_most - value)
         return min(sides)
 
+    def text(self, factor: float) -> str:
+        """``≥ 500`` and the like, in the unit of which SI's has so many."""
+        sides = (("≥", self.at_least), ("≤", self.at_most))
+        return " ".join(f"{sign} {factor * v:.4g}" for sign, v in sides if v is not None)
+
 
 @short_repr
 @dataclass(frozen=True)

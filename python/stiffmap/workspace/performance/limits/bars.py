@@ -90,12 +90,9 @@ def segment_distance(a: Floats, b: Floats, c: Floats, d: Floats) -> Floats:
     best = np.full(s.shape, np.inf)
     with np.errstate(divide="ignore", invalid="ignore"):
         # the inner optimum, then each end of either segment
-        for first in (np.clip(s, 0, 1), np.zeros_like(s), np.ones_like(s)):
-            t = np.clip(np.where(vv > 0, (vr + first * uv) / vv, 0.0), 0, 1)
-            again = np.clip(np.where(uu > 0, (t * uv - ur) / uu, 0.0), 0, 1)
-            gap = r + again[..., None] * u - t[..., None] * v
-            best = np.fmin(best, np.linalg.norm(gap, axis=-1))
-        for t in (np.zeros_like(s), np.ones_like(s)):
+        ends = np.zeros_like(s), np.ones_like(s)
+        near = [np.where(vv > 0, (vr + first * uv) / vv, 0.0) for first in (np.clip(s, 0, 1), *ends)]
+        for t in (*(np.clip(t, 0, 1) for t in near), *ends):
             again = np.clip(np.where(uu > 0, (t * uv - ur) / uu, 0.0), 0, 1)
             gap = r + again[..., None] * u - t[..., None] * v
             best = np.fmin(best, np.linalg.norm(gap, axis=-1))

@@ -172,23 +172,24 @@ class Bounds:
 
     @cached_property
     def intervals_wanted(self) -> list[tuple[int, str, float, float]]:
-        """Index, name, least and most of each coordinate that counts."""
-        return _coordinate_limits(self.machine, self.ranges, self.joints)
+        """Index, name, sign and most of that sign times the coordinate, of each end of a range that counts."""
+        compiled, drives = self.machine.compiled, set(self.machine.compiled.drives)
+        out = []
+        for i, (low, high) in enumerate(compiled.limits):
+            if self.ranges if i in drives else self.joints:
+                name = f"{'range of' if i in drives else 'joint limit of'} {compiled.names.coordinates[i]}"
+                ends = ((1.0, high), (-1.0, -low))
+                out += [(i, name, sign, most) for sign, most in ends if abs(most) < UNLIMITED]
+        return out
 
     def intervals(self, x: Floats) -> list[Limit]:
         """Ranges of drives and limits of joints at coordinates (n, coordinates)."""
-        out = []
-        for index, name, low, high in self.intervals_wanted:
-            for sign, most in ((1.0, high), (-1.0, -low)):
-                if abs(most) < UNLIMITED:
-                    value = sign * x[:, index]
-                    out.append(Limit(name, value, most, value[:, None], np.ones((len(x), 1))))
-        return out
+        return [plain(name, sign * x[:, index], most) for index, name, sign, most in self.intervals_wanted]
 
     def _clearance(self, k: DriveKinematics) -> Limit:
         assert self.clearance is not None
         value = -self.bars.least_distance(k.coordinates)
-        return Limit("clearance of bars", value, -self.clearance, value[:, None], np.ones((len(value), 1)))
+        return plain("clearance of bars", value, -self.clearance)
 
     def _deflection(self, position: Floats, closed: NDArray[np.bool_]) -> Limit:
         from stiffmap.workspace.performance.limits.deflection import worst_deflection
@@ -202,19 +203,12 @@ class Bounds:
                 threads=self.threads,
             )  # fmt: skip
             value[closed] = np.where(np.isfinite(d.values), d.values, np.inf)
-        return Limit("deflection", value, most, value[:, None], np.ones((len(value), 1)))
+        return plain("deflection", value, most)
 
 
-def _coordinate_limits(machine: Machine, ranges: bool, joints: bool) -> list[tuple[int, str, float, float]]:
-    compiled = machine.compiled
-    drives = set(compiled.drives)
-    out = []
-    for i, (low, high) in enumerate(compiled.limits):
-        wanted = ranges if i in drives else joints
-        if wanted and (abs(low) < UNLIMITED or abs(high) < UNLIMITED):
-            kind = "range of" if i in drives else "joint limit of"
-            out.append((i, f"{kind} {compiled.names.coordinates[i]}", low, high))
-    return out
+def plain(name: str, value: Floats, most: float) -> Limit:
+    """A limit on a smooth number (n,) itself."""
+    return Limit(name, value, most, value[:, None], np.ones((len(value), 1)))
 
 
 Largest = Callable[[Floats], tuple[Floats, Floats]]
