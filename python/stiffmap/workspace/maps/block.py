@@ -12,7 +12,7 @@ from stiffmap.solve.solution import Solution
 from stiffmap.solve.validity import Validity
 from stiffmap.workspace.maps.extremes import DirectionSweep, TurningForce, direction, even_angles
 from stiffmap.workspace.maps.fixed_order_sums import norm
-from stiffmap.workspace.maps.loading import Loading, without_failed
+from stiffmap.workspace.maps.loading import Loading, deflections, without_failed
 from stiffmap.workspace.maps.plan import BEYOND, MapPlan
 from stiffmap.workspace.maps.uncertainty import Uncertain
 
@@ -46,11 +46,8 @@ def solve_block(plan: MapPlan, rows: slice) -> dict[str, Any]:
 
 def _loads(plan: MapPlan, position: Floats) -> dict[str, Any]:
     s = plan.loading.solve(position[:, None], plan.wrenches, stiffness=plan.compliance)
-    d = without_failed(s.displacement, s.status)
     out: dict[str, Any] = {
-        "displacement": d,
-        "deflection": norm(d[..., :3]),
-        f"deflection_{plan.shown_plane}": norm(d[..., plan.axes]),
+        **deflections(without_failed(s.displacement, s.status), plan.shown_plane),
         "status": s.status,
         "flags": s.flags,
     }

@@ -159,13 +159,8 @@ def measures(
     -----
     A measure that the machine lacks the data for says so in its row.
     """
-    task = (
-        requirements
-        if isinstance(requirements, Requirements)
-        else Requirements()
-        if requirements is None
-        else load_requirements(requirements)
-    )
+    task = Requirements() if requirements is None else requirements
+    task = task if isinstance(task, Requirements) else load_requirements(task)
     chosen = all_measures() if only is None else tuple(get_measure(n) for n in only)
     low, high, notes = _box(machine, box, task)
     size = force if force is not None else task.force if task.force is not None else 100.0
