@@ -156,8 +156,7 @@ def rest_efforts(
     g = machine.compiled.gravity(gravity)
     if velocity is None and not g.any():
         return np.zeros((*shape, drives))
-    if velocity is not None or g.any():
-        need_masses(machine, "gravity" if velocity is None else "motion")
+    need_masses(machine, "gravity" if velocity is None else "motion")
     flat = k.coordinates.reshape(-1, k.coordinates.shape[-1])
     twist = np.zeros((len(flat), 6))
     if velocity is not None:

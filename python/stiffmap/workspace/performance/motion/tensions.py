@@ -8,6 +8,7 @@ from scipy.spatial import HalfspaceIntersection
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
+from stiffmap.model.link.arrays import skew
 from stiffmap.solve.machine import Machine
 from stiffmap.workspace.cables.structure import Hanging, hanging, lines, matrix, nearest, scaled, weight
 from stiffmap.workspace.performance.motion.closing import DriveKinematics
@@ -60,11 +61,9 @@ def pushes(h: Hanging) -> Floats:
 
 def inertia_columns(h: Hanging, rotation: Floats) -> Floats:
     """(..., 6, 3) wrenches at the tcp that unit accelerations ask for, orientation kept."""
-    x, y, z = np.moveaxis(np.einsum("...ij,j->...i", rotation, h.com), -1, 0)
-    zero = np.zeros_like(x)
-    skew = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape((*x.shape, 3, 3))
-    linear = np.broadcast_to(np.eye(3), skew.shape)
-    return np.asarray(h.mass * np.concatenate([linear, skew], axis=-2))
+    turning = skew(np.einsum("...ij,j->...i", rotation, h.com))
+    linear = np.broadcast_to(np.eye(3), turning.shape)
+    return np.asarray(h.mass * np.concatenate([linear, turning], axis=-2))
 
 
 def farthest(found: Held) -> Floats:
