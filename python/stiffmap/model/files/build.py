@@ -57,7 +57,7 @@ def build(
         platform=build_elements(model.platform, context.at("platform").inside("platform")),
         home=home,
         search_home=model.home is not None and model.home.solve,
-        workspace=tried(partial(_workspace, model.workspace, context.at("workspace"), model.task, home)),
+        workspace=tried(partial(build_workspace, model.workspace, context.at("workspace"), model.task, home)),
         gravity=tried(partial(_gravity, model.gravity, context.at("gravity"))),
         external_springs=tuple(s for s in springs if s is not None),
         modal_damping=tried(partial(_ratios, model.modal_damping, context.at("modal_damping"))) or (),
@@ -89,7 +89,7 @@ def _check_points(description: MachineDescription, context: Context) -> None:
             context.at(spring.name, "point").fail(f"no point '{spring.point}'{near}; there are: {there}")
 
 
-def _workspace(
+def build_workspace(
     box: Box | None, context: Context, task: Sequence[str], home: Pose
 ) -> tuple[Vector, Vector] | None:
     """The box; flat at home along an axis that it leaves out, which the tool is not commanded along."""

@@ -159,10 +159,7 @@ def cells(r: Row) -> tuple[str, ...]:
 
 def required(r: Row) -> str:
     """``≥ 500`` and the like."""
-    if r.bound is None:
-        return ""
-    sides = [("≥", r.bound.at_least), ("≤", r.bound.at_most)]
-    return " ".join(f"{sign} {r.measure.factor * v:.4g}" for sign, v in sides if v is not None)
+    return "" if r.bound is None else r.bound.text(r.measure.factor)
 
 
 def write(table: MeasuresTable, output: Path) -> list[Path]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
-from functools import reduce
+from functools import partial, reduce
 from operator import getitem
 from pathlib import Path
 from typing import Any
@@ -13,14 +13,16 @@ from typing import Any
 from pydantic import TypeAdapter, ValidationError
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.units import LENGTH
 from stiffmap.common.yaml_text import Document
-from stiffmap.model.description import Block, Branch, Element, MachineDescription
+from stiffmap.model.description import Element, MachineDescription
 from stiffmap.model.description.pose import Vector
+from stiffmap.model.description.tree import edit_path
+from stiffmap.model.files.build import build_workspace
 from stiffmap.model.files.build_elements import build_element
 from stiffmap.model.files.context import Context, Gathered
 from stiffmap.model.files.load import describe_document, validate
 from stiffmap.model.files.schema.elements import ElementModel
+from stiffmap.model.files.schema.geometry import Box
 
 _STEP = re.compile(r"^([^\[\]]+)?((?:\[[^\[\]]+\])*)$")
 
@@ -42,9 +44,12 @@ def steps(place: str) -> list[str | int | tuple[str, str]]:
     return out
 
 
-def put(data: Any, place: str, value: float) -> None:
-    """Set a number of a machine file's data, in place; StiffmapError names the step that is not there."""
-    _set(data, indices(data, place), value)
+def edited(data: Any, values: dict[str, float]) -> Any:
+    """A machine file's data with these numbers (place: value); StiffmapError names the step that is not there."""
+    data = unshared(data)
+    for place, value in values.items():
+        _set(data, indices(data, place), value)
+    return data
 
 
 def indices(data: Any, place: str) -> tuple[str | int, ...]:
@@ -117,14 +122,14 @@ class Editor:
     """
 
     def __init__(self, document: Document, file: str, places: list[str]) -> None:
-        self.document, self.file, self.places = document, file, places
+        self.document, self.file = document, file
         self.can = True
         try:
-            self._prepare()
+            self._prepare(places)
         except (StiffmapError, ValidationError, LookupError, TypeError):
             self.can = False
 
-    def _prepare(self) -> None:
+    def _prepare(self, places: list[str]) -> None:
         data = self.document.data
         text = str(data)
         if data.get("effects") or "stroke" in text or "link:" in text or "'of':" in text:
@@ -136,50 +141,47 @@ class Editor:
         )
         self.elements: dict[tuple[Address, Address], list[tuple[str, Any]]] = {}
         self.space: list[tuple[str, Any]] = []
-        for place in self.places:
+        for place in places:
             path = indices(data, place)
             if path[0] == "workspace" and len(path) == 3:
                 self.space.append((place, path[1:]))
                 continue
-            sequence, inner = self._split(path)
-            self.elements.setdefault((sequence, inner[: _depth(inner)]), []).append((place, inner))
+            start = _start(path)
+            end = start + _depth(path[start:])
+            self.elements.setdefault((path[:start], path[start:end]), []).append((place, path[end:]))
+        self.legs = {sequence: self._legs_of(sequence) for sequence, _ in self.elements}
 
-    def _split(self, path: Address) -> tuple[Address, Address]:
-        """Which sequence (``templates``, ``leg``) a path of keys is in, and the way inside it."""
-        kind, name = path[0], str(path[1])
-        if kind == "templates" and isinstance(path[2], int):
-            legs = [leg for leg in self.document.data["legs"].values() if leg.get("template") == name]
-            if any("home" in leg for leg in legs):
-                raise LookupError("homes per leg")
-            return ("templates", name), path[2:]
-        if kind == "legs" and path[2] == "elements" and "home" not in self.document.data["legs"][name]:
-            return ("legs", name, "elements"), path[3:]
-        raise LookupError("a place outside elements and workspace")
+    def _legs_of(self, sequence: Address) -> list[str]:
+        """Names of the legs that are made of a sequence."""
+        name, legs = str(sequence[1]), self.document.data["legs"]
+        users = [name] if sequence[0] == "legs" else [n for n in legs if legs[n].get("template") == name]
+        if any("home" in legs[n] for n in users):
+            raise LookupError("homes per leg")
+        return users
 
     def description(self, values: dict[str, float]) -> MachineDescription:
         """The machine with these numbers (place: value in the file's units); StiffmapError where it cannot be."""
         if not self.can:
-            data = unshared(self.document.data)
-            for place, value in values.items():
-                put(data, place, value)
-            return described(data, self.document, self.file)
-        built: dict[Address, dict[Address, Element]] = {}
+            return described(edited(self.document.data, values), self.document, self.file)
         known: dict[str, Element] = {}
+        legs = {leg.name: leg for leg in self.base.legs}
         for (sequence, address), places in self.elements.items():
-            raw = unshared(reduce(getitem, (*sequence, *address), self.document.data))
-            for place, inner in places:
-                _set(raw, inner[len(address) :], values[place])
+            raw = self._raw((*sequence, *address), places, values)
             key = repr(raw)
             if key not in known:
                 known[key] = self._element(raw, (*sequence, *address))
-            built.setdefault(sequence, {})[address] = known[key]
-        legs = []
-        for leg, model in zip(self.base.legs, self.document.data["legs"].values(), strict=True):
-            own = ("templates", model["template"]) if "template" in model else ("legs", leg.name, "elements")
-            first = 1 if "frame" in model else 0
-            edits = built.get(own)
-            legs.append(leg if edits is None else replace(leg, elements=_put(leg.elements, edits, first)))
-        return replace(self.base, legs=tuple(legs), workspace=self._workspace(values))
+            path = ".".join([*map(str, address[2::3]), known[key].name])  # branches, then the element
+            for name in self.legs[sequence]:
+                elements = edit_path(legs[name].elements, path, partial(_if_alike, known[key]))
+                legs[name] = replace(legs[name], elements=elements or legs[name].elements)
+        return replace(self.base, legs=tuple(legs.values()), workspace=self._workspace(values))
+
+    def _raw(self, at: Address, places: list[tuple[str, Any]], values: dict[str, float]) -> Any:
+        """A part of the file's data with the numbers of some places, each with the way to it inside the part."""
+        raw = unshared(reduce(getitem, at, self.document.data))
+        for place, inner in places:
+            _set(raw, inner, values[place])
+        return raw
 
     def _element(self, raw: Any, address: Address) -> Element:
         here = self.context.at(*address)
@@ -189,16 +191,19 @@ class Editor:
             here.fail(str(error.errors()[0]["msg"]))
 
     def _workspace(self, values: dict[str, float]) -> tuple[Vector, Vector] | None:
-        space = self.base.workspace
-        if not self.space or space is None:
-            return space
-        corners = [list(corner) for corner in space]
-        for place, (axis, end) in self.space:
-            corners[int(end)]["xyz".index(axis)] = self.context.units.to_si(values[place], LENGTH)
-        low, high = corners
-        if any(a >= b for a, b in zip(low, high, strict=True)):
-            self.context.at("workspace").fail(f"expected lowest below highest, got {low} and {high} m")
-        return (low[0], low[1], low[2]), (high[0], high[1], high[2])
+        if not self.space:
+            return self.base.workspace
+        box = Box.model_validate(self._raw(("workspace",), self.space, values))
+        return build_workspace(box, self.context.at("workspace"), self.base.task, self.base.home)
+
+
+def _start(path: Address) -> int:
+    """Length of the way to the sequence of a template or leg."""
+    if path[0] == "templates" and isinstance(path[2], int):
+        return 2
+    if path[0] == "legs" and path[2] == "elements":
+        return 3
+    raise LookupError("a place outside elements and workspace")
 
 
 def _depth(inner: Address) -> int:
@@ -209,6 +214,11 @@ def _depth(inner: Address) -> int:
     return depth
 
 
+def _if_alike(new: Element, old: Element) -> Element | None:
+    """In place of an element of its sort: a body may be called as the spring that follows it."""
+    return new if type(new) is type(old) else None
+
+
 def _set(raw: Any, path: Address, value: float) -> None:
     for key in path[:-1]:
         raw = raw[key]
@@ -217,26 +227,3 @@ def _set(raw: Any, path: Address, value: float) -> None:
         raw[last]["value"] = value
     else:
         raw[last] = value
-
-
-def _put(elements: tuple[Element, ...], edits: dict[Address, Element], first: int) -> tuple[Element, ...]:
-    """The sequence with elements at their addresses, which count from `first`."""
-    out = list(elements)
-    inside: dict[int, dict[str, dict[Address, Element]]] = {}
-    for address, element in edits.items():
-        i = int(address[0])
-        if len(address) == 1:
-            out[first + i] = element
-        else:
-            inside.setdefault(i, {}).setdefault(str(address[2]), {})[address[3:]] = element
-    for i, branches in inside.items():
-        block = out[first + i]
-        assert isinstance(block, Block)
-        out[first + i] = replace(
-            block,
-            branches=tuple(
-                Branch(b.name, _put(b.elements, branches[b.name], 0)) if b.name in branches else b
-                for b in block.branches
-            ),
-        )
-    return tuple(out)

@@ -14,6 +14,7 @@ from stiffmap.solve.machine import Machine
 from stiffmap.workspace.design.problem import Design
 from stiffmap.workspace.performance.poses import read_box
 from stiffmap.workspace.performance.registry import Case, Measure, get_measure
+from stiffmap.workspace.performance.requirements import Bound
 
 IMPOSSIBLE = 1e6
 """Objective and violation of a design that cannot be built or reaches nothing."""
@@ -32,9 +33,8 @@ class Judged:
 
 def judge(design: Design, x: Floats) -> Judged:
     """Evaluate a vector of variables; a machine that cannot be is infeasible, never an error."""
-    names = list(dict.fromkeys([*design.model.objectives, *(n for n, _ in design.constraints)]))
     try:
-        values = values_of(design, design.quick_machine(x), names)
+        values = values_of(design, design.quick_machine(x))
     except StiffmapError as error:
         return Judged(
             np.full(len(design.model.objectives), IMPOSSIBLE),
@@ -43,14 +43,12 @@ def judge(design: Design, x: Floats) -> Judged:
             str(error),
         )
     objectives = np.array([_minimised(get_measure(n), values[n]) for n in design.model.objectives])
-    violations = np.array(
-        [violation(bound.margin(values[n]), bound.at_least, bound.at_most) for n, bound in design.constraints]
-    )
+    violations = np.array([violation(bound, values[n]) for n, bound in design.constraints])
     return Judged(objectives, violations, values)
 
 
-def values_of(design: Design, machine: Machine, names: list[str]) -> dict[str, float]:
-    """Worst values of measures on the search's nodes, SI."""
+def values_of(design: Design, machine: Machine) -> dict[str, float]:
+    """Worst values of all measures that the design asks for, on the search's nodes, SI."""
     task = design.requirements
     low, high = read_box(machine, None)
     if task.box is not None:
@@ -71,7 +69,7 @@ def values_of(design: Design, machine: Machine, names: list[str]) -> dict[str, f
         clearance=task.clearance,
         deflection=task.deflection,
     )
-    return {n: get_measure(n).compute(case).worst for n in names}
+    return {n: get_measure(n).compute(case).worst for n in design.measures}
 
 
 def _minimised(measure: Measure, value: float) -> float:
@@ -80,9 +78,10 @@ def _minimised(measure: Measure, value: float) -> float:
     return -value if measure.better == "high" else value
 
 
-def violation(margin: float, at_least: float | None, at_most: float | None) -> float:
+def violation(bound: Bound, value: float) -> float:
     """Minus the margin, relative to the bound."""
-    size = max(abs(at_least or 0.0), abs(at_most or 0.0)) or 1.0
+    margin = bound.margin(value)
+    size = max(abs(bound.at_least or 0.0), abs(bound.at_most or 0.0)) or 1.0
     return -margin / size if np.isfinite(margin) else IMPOSSIBLE
 
 

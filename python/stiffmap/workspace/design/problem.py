@@ -21,7 +21,7 @@ from stiffmap.model.files.schema.base import FileModel, Name
 from stiffmap.model.files.shipped import find
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.redesign import on_branch_of, settled
-from stiffmap.workspace.design.editing import Editor, described, put, unshared
+from stiffmap.workspace.design.editing import Editor, described, edited, unshared
 from stiffmap.workspace.performance.motion.motion_files import (
     Motion,
     given_or_shipped,
@@ -103,6 +103,11 @@ class Design:
         low, high = np.array(rows, dtype=float).T
         return low, high
 
+    @property
+    def measures(self) -> list[str]:
+        """Names of the objectives, then of the other measures with a bound."""
+        return list(dict.fromkeys([*self.model.objectives, *(n for n, _ in self.constraints)]))
+
     def names(self, x: Floats) -> dict[str, float]:
         """Every name that expressions may use, for a vector of variables."""
         out = {k: float(v) for k, v in self.model.constants.items()}
@@ -117,10 +122,7 @@ class Design:
 
     def data(self, x: Floats) -> Any:
         """The machine file's data with the design's numbers."""
-        data = unshared(self.document.data)
-        for place, value in self._numbers(x).items():
-            put(data, place, value)
-        return data
+        return edited(self.document.data, self._numbers(x))
 
     def _numbers(self, x: Floats) -> dict[str, float]:
         """Place -> value in the file's units."""
@@ -221,9 +223,8 @@ def _try(design: Design, fail: Any) -> None:
         names = design.names((low + high) / 2)
     except StiffmapError as error:
         raise fail(str(error), "derived") from None
-    data = unshared(design.document.data)
     for place, text in design.model.numbers.items():
         try:
-            put(data, place, evaluate(text, names))
+            edited(design.document.data, {place: evaluate(text, names)})
         except StiffmapError as error:
             raise fail(str(error), "numbers", place) from None

@@ -49,31 +49,21 @@ def robustness(design: Design, x: Floats, *, draws: int = DRAWS, seed: int = 0) 
     places = tuple(f[0] for f in found)
     values, u = (np.array(column) for column in list(zip(*found, strict=True))[1:])
     editor = Editor(document, design.machine_file, list(places))
-    names = list(dict.fromkeys([*design.model.objectives, *(n for n, _ in design.constraints)]))
+    names = design.measures
 
     def at(numbers: Floats) -> dict[str, float]:
         given = dict(zip(places, map(float, numbers), strict=True))
-        return values_of(design, Machine(editor.description(given)), names)
+        return values_of(design, Machine(editor.description(given)))
 
-    slopes = {n: np.zeros(len(u)) for n in names}
-    for i in range(len(u)):
-        step = np.zeros(len(u))
-        step[i] = SHARE * u[i]
-        up, down = at(values + step), at(values - step)
-        for n in names:
-            slopes[n][i] = (up[n] - down[n]) / (2 * SHARE)
-    rng, rows, met = random_numbers(seed), [], 0
-    for _ in range(draws):
-        row = at(values + u * rng.standard_normal(len(u)))
-        rows.append([row[n] for n in names])
-        met += all(violation(b.margin(row[n]), b.at_least, b.at_most) <= 0 for n, b in design.constraints)
-    spread = np.std(np.array(rows), axis=0, ddof=1)
+    pairs = [(at(values + step), at(values - step)) for step in SHARE * np.diag(u)]
+    slopes = {n: np.array([(up[n] - down[n]) / (2 * SHARE) for up, down in pairs]) for n in names}
+    rng = random_numbers(seed)
+    drawn = [at(values + u * rng.standard_normal(len(u))) for _ in range(draws)]
+    met = sum(all(violation(b, one[n]) <= 0 for n, b in design.constraints) for one in drawn)
+    spread = np.std(np.array([[one[n] for n in names] for one in drawn]), axis=0, ddof=1)
+    first_order = {n: float(np.linalg.norm(slopes[n])) for n in names}
     return Robustness(
-        places,
-        {n: float(np.linalg.norm(slopes[n])) for n in names},
-        dict(zip(names, map(float, spread), strict=True)),
-        met / draws,
-        draws,
+        places, first_order, dict(zip(names, map(float, spread), strict=True)), met / draws, draws
     )
 
 

@@ -171,12 +171,8 @@ def _shortfall(problem: Design, judged: list[Judged]) -> str:
     for (name, bound), v in zip(problem.constraints, nearest.violations, strict=True):
         if v > 0:
             m = get_measure(name)
-            sides = [
-                f"≥ {m.factor * bound.at_least:.4g}" if bound.at_least is not None else "",
-                f"≤ {m.factor * bound.at_most:.4g}" if bound.at_most is not None else "",
-            ]
             parts.append(
-                f"{name} is {m.factor * nearest.values[name]:.4g} {m.shown} where {' '.join(s for s in sides if s)} is required ({100 * v:.1f} % off)"
+                f"{name} is {m.factor * nearest.values[name]:.4g} {m.shown} where {bound.text(m.factor)} is required ({100 * v:.1f} % off)"
             )
     return f"{problem.file}: none of {len(judged)} designs meets all constraints; the nearest one misses: {'; '.join(parts)}"
 

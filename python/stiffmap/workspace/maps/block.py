@@ -10,13 +10,11 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.solve.kinematics import inverse_kinematics
 from stiffmap.solve.solution import Solution
 from stiffmap.solve.validity import Validity
-from stiffmap.workspace.maps.extremes import DirectionSweep, TurningForce, direction, even_angles
+from stiffmap.workspace.maps.extremes import ALL, TurningForce, direction, even_angles
 from stiffmap.workspace.maps.fixed_order_sums import norm
-from stiffmap.workspace.maps.loading import Loading, without_failed
+from stiffmap.workspace.maps.loading import Loading, deflections, without_failed
 from stiffmap.workspace.maps.plan import BEYOND, MapPlan
 from stiffmap.workspace.maps.uncertainty import Uncertain
-
-ALL = (0, 1, 2)
 
 
 def solve_block(plan: MapPlan, rows: slice) -> dict[str, Any]:
@@ -33,10 +31,17 @@ def solve_block(plan: MapPlan, rows: slice) -> dict[str, Any]:
         directions = force.solve(angle)
         out["direction_status"] = directions.status.max(axis=1)
         extremes: dict[str, Floats] = {}
-        for suffix, parts in (("", ALL), (f"_{plan.shown_plane}", plan.axes)):
-            values, status = _extremes(force, directions, parts, suffix, plan.tolerance)
-            extremes |= values
-            out["direction_status"] = np.maximum(out["direction_status"], status)
+        for suffix, parts, worst, best in force.extremes(directions, plan.shown_plane):
+            limit = force.limit(worst, parts, plan.tolerance)
+            extremes |= {
+                f"worst_deflection{suffix}": worst.value,
+                f"worst_direction{suffix}": worst.angle,
+                f"best_deflection{suffix}": best.value,
+                f"best_direction{suffix}": best.angle,
+                f"force_limit{suffix}": np.where(np.isnan(worst.value), np.nan, limit),
+            }
+            for one in (worst, best):
+                out["direction_status"] = np.maximum(out["direction_status"], one.status)
         # one status for all of them: where the worst is not known, the best is not either
         out |= {n: np.where(out["direction_status"] == 0, v, np.nan) for n, v in extremes.items()}
         if plan.uncertain is not None:
@@ -46,11 +51,8 @@ def solve_block(plan: MapPlan, rows: slice) -> dict[str, Any]:
 
 def _loads(plan: MapPlan, position: Floats) -> dict[str, Any]:
     s = plan.loading.solve(position[:, None], plan.wrenches, stiffness=plan.compliance)
-    d = without_failed(s.displacement, s.status)
     out: dict[str, Any] = {
-        "displacement": d,
-        "deflection": norm(d[..., :3]),
-        f"deflection_{plan.shown_plane}": norm(d[..., plan.axes]),
+        **deflections(without_failed(s.displacement, s.status), plan.shown_plane),
         "status": s.status,
         "flags": s.flags,
     }
@@ -67,21 +69,6 @@ def _beyond(plan: MapPlan, covered: Validity, position: Floats) -> Any:
     at = inverse_kinematics(machine, position, turns).coordinates
     each = [covered.outside(machine, at, np.broadcast_to(w, (len(position), 6))) for w in plan.wrenches]
     return np.stack(each, axis=-1).astype(np.uint8)
-
-
-def _extremes(
-    force: TurningForce, directions: DirectionSweep, parts: tuple[int, ...], suffix: str, tolerance: float
-) -> tuple[dict[str, Floats], Any]:
-    worst, best = (force.extreme(directions, parts, sign) for sign in (1, -1))
-    limit = force.limit(worst, parts, tolerance)
-    values = {
-        f"worst_deflection{suffix}": worst.value,
-        f"worst_direction{suffix}": worst.angle,
-        f"best_deflection{suffix}": best.value,
-        f"best_direction{suffix}": best.angle,
-        f"force_limit{suffix}": np.where(np.isnan(worst.value), np.nan, limit),
-    }
-    return values, np.maximum(worst.status, best.status)
 
 
 def load_deviations(plan: MapPlan, uncertain: Uncertain, position: Floats) -> dict[str, Any]:

@@ -8,6 +8,7 @@ most extreme of all equilibria is the answer. Nothing that is reported is interp
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -18,6 +19,9 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.solve.solution import Solution
 from stiffmap.workspace.maps.fixed_order_sums import apply, dot, norm
 from stiffmap.workspace.maps.loading import Loading, without_failed
+
+Parts = tuple[int, ...]
+ALL: Parts = (0, 1, 2)
 
 
 @dataclass(frozen=True)
@@ -130,6 +134,14 @@ class TurningForce:
         angle = np.mod(best.angle[:, 0] + np.pi, 2 * np.pi) - np.pi
         angle, size, growth = (np.where(failed, np.nan, a) for a in (angle, size, growth))
         return Extreme(angle, size, growth, directions.status.max(axis=1))
+
+    def extremes(
+        self, directions: DirectionSweep, plane: str
+    ) -> Iterator[tuple[str, Parts, Extreme, Extreme]]:
+        """Suffix of names, components, worst and best direction: of the whole translation, then in the plane."""
+        for suffix, parts in (("", ALL), (f"_{plane}", self.axes)):
+            worst, best = (self.extreme(directions, parts, sign) for sign in (1, -1))
+            yield suffix, parts, worst, best
 
     def limit(self, worst: Extreme, parts: tuple[int, ...], tolerance: float) -> Floats:
         """Force (p,) in N along the worst direction at which the deflection reaches the tolerance (m).

@@ -40,11 +40,10 @@ def write_dataset(ds: xr.Dataset, path: str | os.PathLike[str]) -> Path:
 
 def _write_zarr(ds: xr.Dataset, target: Path) -> None:
     fresh = target.with_name(f".{target.name}.writing")
+    zarr_package()
     try:
-        zarr_strings(ds).to_zarr(fresh, mode="w", zarr_format=3, consolidated=False)
+        write_zarr(ds, fresh)
         put_folder(fresh, target)
-    except ImportError as error:
-        raise MissingPartError("writing Zarr needs the package zarr: pip install 'stiffmap[zarr]'") from error
     except OSError as error:
         raise FileError(f"cannot be written: {error.strerror or error}", file=str(target)) from error
 
@@ -58,9 +57,19 @@ def read_dataset(path: str | os.PathLike[str]) -> xr.Dataset:
     return _changed(ds, "T", lambda v: np.array(v.values.tolist(), str).reshape(v.shape))
 
 
-def zarr_strings(ds: xr.Dataset) -> xr.Dataset:
-    """Names as strings of any length: the form that Zarr's third format has agreed on."""
-    return _changed(ds, "U", lambda v: v.values.astype(object))
+def write_zarr(ds: xr.Dataset, folder: Path) -> None:
+    """With names as strings of any length: the form that Zarr's third format has agreed on."""
+    named = _changed(ds, "U", lambda v: v.values.astype(object))
+    named.to_zarr(folder, mode="w", zarr_format=3, consolidated=False)
+
+
+def zarr_package() -> Any:
+    """The package zarr; MissingPartError where it is absent."""
+    try:
+        import zarr
+    except ImportError as error:
+        raise MissingPartError("writing Zarr needs the package zarr: pip install 'stiffmap[zarr]'") from error
+    return zarr
 
 
 def _changed(ds: xr.Dataset, kind: str, change: Callable[[xr.Variable], Any]) -> xr.Dataset:

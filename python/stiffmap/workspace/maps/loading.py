@@ -56,16 +56,31 @@ def without_failed(values: Floats, status: NDArray[np.uint8], keep_unstable: boo
     return np.where(kept.reshape(status.shape + tail), values, np.nan)
 
 
+def deflections(d: Floats, plane: str) -> dict[str, Floats]:
+    """Displacements (..., 6) by the names of maps, with the norms of their translations, whole and in a plane."""
+    return {
+        "displacement": d,
+        "deflection": norm(d[..., :3]),
+        f"deflection_{plane}": norm(d[..., plane_axes(plane)]),
+    }
+
+
+def meanings(plane: str, of: str) -> dict[str, dict[str, Any]]:
+    """Attributes of `deflections`, of the status of an equilibrium or pose (`of`) and of its flags."""
+    return {
+        "displacement": meaning(TWIST_UNITS, "displacement of the reference point"),
+        "deflection": meaning("m", "norm of the translation"),
+        f"deflection_{plane}": meaning("m", f"norm of the translation in the {plane} plane"),
+        "status": status_attrs(of),
+        "flags": flag_attrs(),
+    }
+
+
 def displaced(dim: str, d: Floats, status: Any, flags: Any, plane: str) -> dict[str, Any]:
     """Variables of equilibria along one dimension, displaced by d (n, 6)."""
-    within = meaning("m", f"norm of the translation in the {plane} plane")
-    return {
-        "displacement": ((dim, "component"), d, meaning(TWIST_UNITS, "displacement of the reference point")),
-        "deflection": (dim, norm(d[:, :3]), meaning("m", "norm of the translation")),
-        f"deflection_{plane}": (dim, norm(d[:, plane_axes(plane)]), within),
-        "status": (dim, status, status_attrs("the equilibrium")),
-        "flags": (dim, flags, flag_attrs()),
-    }
+    values = deflections(d, plane) | {"status": status, "flags": flags}
+    attrs = meanings(plane, "the equilibrium")
+    return {n: ((dim, "component") if v.ndim == 2 else dim, v, attrs[n]) for n, v in values.items()}
 
 
 def describe(loading: Loading, title: str, call: dict[str, Any]) -> dict[str, Any]:

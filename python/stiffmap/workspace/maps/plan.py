@@ -18,7 +18,6 @@ from stiffmap.solve.labels import (
     COMPONENTS,
     TWIST_UNITS,
     WRENCH,
-    flag_attrs,
     meaning,
     status_attrs,
 )
@@ -34,7 +33,7 @@ from stiffmap.workspace.maps.inputs import (
     plane_force,
     wrench_cases,
 )
-from stiffmap.workspace.maps.loading import Loading, describe
+from stiffmap.workspace.maps.loading import Loading, describe, meanings
 from stiffmap.workspace.maps.uncertainty import METHOD, Uncertain, uncertain_numbers
 
 BEYOND = "beyond_calibration"
@@ -52,14 +51,10 @@ class Variable:
 
 def load_variables(case: tuple[str, ...], plane: str, compliance: bool) -> list[Variable]:
     """Variables that each load case has."""
+    types = {"status": "u1", "flags": "u4"}
     out = [
-        Variable(
-            "displacement", (*case, "component"), meaning(TWIST_UNITS, "displacement of the reference point")
-        ),
-        Variable("deflection", case, meaning("m", "norm of the translation")),
-        Variable(f"deflection_{plane}", case, meaning("m", f"norm of the translation in the {plane} plane")),
-        Variable("status", case, status_attrs("the pose under its load"), "u1"),
-        Variable("flags", case, flag_attrs(), "u4"),
+        Variable(n, (*case, "component") if n == "displacement" else case, attrs, types.get(n, "f8"))
+        for n, attrs in meanings(plane, "the pose under its load").items()
     ]
     if compliance:
         dims = (*case, "component", "wrench_component")

@@ -74,9 +74,8 @@ def polar(
 
 def _extremes(force: TurningForce, plane: str, swept: DirectionSweep) -> dict[str, Any]:
     out = {}
-    for suffix, parts in (("", (0, 1, 2)), (f"_{plane}", force.axes)):
-        for word, size, sign in (("worst", "largest", 1), ("best", "smallest", -1)):
-            e = force.extreme(swept, parts, sign)
+    for suffix, _, worst, best in force.extremes(swept, plane):
+        for word, size, e in (("worst", "largest", worst), ("best", "smallest", best)):
             what = f"{size} deflection over the force directions of the {plane} plane"
             out[f"{word}_deflection{suffix}"] = ((), e.value[0], meaning("m", what))
             out[f"{word}_direction{suffix}"] = ((), e.angle[0], meaning("rad", "direction of that force"))

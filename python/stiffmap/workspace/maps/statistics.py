@@ -115,12 +115,10 @@ class _Deflection:
             if np.isnan(flat).all():
                 continue
             here = int(np.nanargmax(flat))
-            old, new = (
-                (self.most[plane, c], self.place[plane, c]),
-                (flat[here], y.start * self.plan.x.size + here),
-            )
-            if not old[0] >= new[0] or (old[0] == new[0] and new[1] < old[1]):
-                self.most[plane, c], self.place[plane, c] = new
+            value, place = flat[here], y.start * self.plan.x.size + here
+            first = value == self.most[plane, c] and place < self.place[plane, c]
+            if first or not self.most[plane, c] >= value:
+                self.most[plane, c], self.place[plane, c] = value, place
 
     def variables(self, name: str, percentiles: Floats) -> dict[str, Any]:
         """Variables of the Dataset."""

@@ -74,16 +74,14 @@ def sweep(
     s = loading.solve(p, wrench)
     d = without_failed(s.displacement, s.status, keep_unstable=True)
     c = without_failed(s.compliance, s.status, keep_unstable=True)
-    variables = _variables(
-        d,
-        along=dot(d[:, :3], u),
-        compliance_along=dot(dot(c[:, :3, :3], u), u),
-        unstable_modes=np.full(f.size, np.nan),
-        status=s.status,
-        flags=s.flags,
-        branch=np.zeros(f.size, dtype=np.intp),
-    )
-    return _dataset(loading, "force sweep", {"position": p, "direction": u, "forces": f}, f, variables)
+    variables = displaced("step", d, s.status, s.flags, "xy")
+    own = {
+        "deflection_along": dot(d[:, :3], u),
+        "compliance_along": dot(dot(c[:, :3, :3], u), u),
+        "unstable_modes": np.full(f.size, np.nan),
+        "branch": np.zeros(f.size, dtype=np.intp),
+    }
+    return _dataset(loading, "force sweep", {"position": p, "direction": u, "forces": f}, f, variables, own)
 
 
 UNITS = {"force": "N", "displacement": "m", "arc": "m"}
@@ -130,19 +128,19 @@ def load_path(
     both = points + crossing
     d = np.array([p["displacement"] for p in both], dtype=float).reshape(-1, 6)
     unstable = np.array([p["unstable"] for p in both], dtype=float)
-    variables = _variables(
-        d,
-        along=np.array([p["along"] for p in both], dtype=float),
-        compliance_along=np.full(len(both), np.nan),
-        unstable_modes=unstable,
-        status=np.where(unstable > 0, Status.UNSTABLE, Status.CONVERGED).astype(np.uint8),
-        flags=np.full(len(both), flags, dtype=np.uint32),  # those of the whole path
-        branch=np.repeat([0, 1], [len(points), len(crossing)]),
-    )
+    status = np.where(unstable > 0, Status.UNSTABLE, Status.CONVERGED).astype(np.uint8)
+    of_path = np.full(len(both), flags, dtype=np.uint32)
+    variables = displaced("step", d, status, of_path, "xy")
+    own = {
+        "deflection_along": np.array([p["along"] for p in both], dtype=float),
+        "compliance_along": np.full(len(both), np.nan),
+        "unstable_modes": unstable,
+        "branch": np.repeat([0, 1], [len(points), len(crossing)]),
+    }
     force = np.array([p["load"] for p in both], dtype=float)
     ends = ENDS[end], _crossing_end(cross, critical, crossing, ENDS[crossing_end])
     title = f"load path by {control}"
-    return _dataset(loading, title, call, force, variables, ends, (critical, crossing_critical))
+    return _dataset(loading, title, call, force, variables, own, ends, (critical, crossing_critical))
 
 
 def _crossing_end(cross: int, critical: list[dict[str, Any]], points: list[Any], end: str) -> str:
@@ -173,32 +171,20 @@ def check_control(control: str, limit: float | None, steps: int, load_type: obje
 BRANCH = meaning("1", "0: from the unloaded machine; 1: the branch that crosses it")
 
 
-def _variables(
-    d: Floats, *, along: Floats, compliance_along: Floats, unstable_modes: Floats, status: Any, flags: Any, branch: Any
-) -> dict[str, Any]:  # fmt: skip
-    """Variables over ``step`` of equilibria that are displaced by d (n, 6); NaN for what was not computed."""
-    return displaced("step", d, status, flags, "xy") | {
-        "deflection_along": ("step", along, meaning("m", "translation along the force")),
-        "compliance_along": (
-            "step",
-            compliance_along,
-            meaning("m/N", "loaded compliance along the force; NaN on a path"),
-        ),
-        "unstable_modes": (
-            "step",
-            unstable_modes,
-            meaning("1", "directions in which the energy falls; NaN for single forces"),
-        ),
-        "branch": ("step", branch, BRANCH),
-    }
+MEANINGS = {
+    "deflection_along": meaning("m", "translation along the force"),
+    "compliance_along": meaning("m/N", "loaded compliance along the force; NaN on a path"),
+    "unstable_modes": meaning("1", "directions in which the energy falls; NaN for single forces"),
+    "branch": BRANCH,
+}
 
 
 def _dataset(
-    loading: Loading, title: str, call: dict[str, Any], force: Floats, variables: dict[str, Any],
+    loading: Loading, title: str, call: dict[str, Any], force: Floats, variables: dict[str, Any], own: dict[str, Any],
     ends: tuple[str, str] = ("", ""), critical: tuple[Sequence[Any], Sequence[Any]] = ((), ()),
 ) -> xr.Dataset:  # fmt: skip
-    """What `sweep` describes; `call` holds position and direction. A path and the branch that crosses it have ends and
-    critical points."""
+    """What `sweep` describes, `own` the variables that only sweeps have; `call` holds position and direction. A path and the
+    branch that crosses it have ends and critical points."""
     modes, coordinate = critical_variables(loading.machine, [*critical[0], *critical[1]])
     modes["critical_branch"] = ("critical", np.repeat([0, 1], [len(c) for c in critical]), BRANCH)
     coords = coordinate | {
@@ -214,6 +200,7 @@ def _dataset(
         "crossing_end": ends[1],
         "critical_points": json.dumps([_summary(c) for c in critical[0]]),
     }
+    variables |= {name: ("step", values, MEANINGS[name]) for name, values in own.items()}
     return xr.Dataset(variables | modes, coords, attrs)
 
 

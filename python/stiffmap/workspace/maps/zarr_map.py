@@ -20,10 +20,10 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from stiffmap.common.errors import FileError, MissingPartError
+from stiffmap.common.errors import FileError
 from stiffmap.common.json_text import parse_json
 from stiffmap.common.outputs import add_lines, put_folder, write_text
-from stiffmap.workspace.maps.files import zarr_strings
+from stiffmap.workspace.maps.files import write_zarr, zarr_package
 from stiffmap.workspace.maps.plan import MapPlan
 from stiffmap.workspace.maps.store import FILL, kept_attributes, refuse_another_map
 from stiffmap.workspace.maps.tiles import Tiles, tiles_of
@@ -81,8 +81,7 @@ class ZarrMap:
     def _frame(self, folder: Path) -> None:
         """Write metadata and coordinates."""
         package = zarr_package()
-        frame = xr.Dataset(coords=self.plan.coords, attrs=self.plan.attrs)
-        zarr_strings(frame).to_zarr(folder, mode="w", zarr_format=3, consolidated=False)
+        write_zarr(xr.Dataset(coords=self.plan.coords, attrs=self.plan.attrs), folder)
         group = package.open_group(folder, mode="r+", zarr_format=3)
         from zarr.codecs import Crc32cCodec, ZstdCodec
 
@@ -145,15 +144,6 @@ class ZarrMap:
             return index, {self.chunk(n, index): value for n, value in checks.items()}
         except (KeyError, TypeError, ValueError) as error:
             raise damaged_line(self.folder / JOURNAL, line) from error
-
-
-def zarr_package() -> Any:
-    """The package zarr; MissingPartError where it is absent."""
-    try:
-        import zarr
-    except ImportError as error:
-        raise MissingPartError("writing Zarr needs the package zarr: pip install 'stiffmap[zarr]'") from error
-    return zarr
 
 
 def crc(path: Path) -> int:

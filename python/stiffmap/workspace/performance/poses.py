@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -37,6 +39,14 @@ def read_box(machine: Machine, box: ArrayLike | None) -> tuple[Floats, Floats]:
             f"box: expected lowest and highest corner (2, 3) in m, base axes, got {np.asarray(box).tolist()}"
         )
     return given[0], given[1]
+
+
+def read_region(region: ArrayLike, axes: Sequence[int] = (0, 1, 2)) -> Floats:
+    """(2, 3) m, where to look: lowest and highest corner, apart along these axes."""
+    out = real_array(region, "region")
+    if out.shape != (2, 3) or not (np.isfinite(out).all() and (out[1] > out[0])[list(axes)].all()):
+        raise StiffmapError(f"region: expected lowest and highest corner (2, 3) in m, got {region!r}")
+    return out
 
 
 def box_nodes(low: Floats, high: Floats, nodes: int) -> Floats:

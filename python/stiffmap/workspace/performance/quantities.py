@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.value_units import read_value
 from stiffmap.common.yaml_text import Document
@@ -27,7 +30,16 @@ def quantity(value: object, unit: str) -> float:
 
 def quantity_in(document: Document, file: str, value: object, unit: str, *keys: str | int) -> float:
     """`quantity` of a number that stands in a file under these keys; raises `FileError` with its line."""
-    try:
+    with under(document, file, *keys):
         return quantity(value, unit)
-    except StiffmapError as error:
+
+
+@contextmanager
+def under(document: Document, file: str, *keys: str | int) -> Iterator[None]:
+    """What is wrong with the value under these keys of a file is a `FileError` with its line."""
+    try:
+        yield
+    except FileError:
+        raise
+    except ValueError as error:
         raise FileError(str(error), file=file, line=document.line(keys), key=key_text(keys)) from None

@@ -17,7 +17,7 @@ from stiffmap.common.yaml_text import Document, read
 from stiffmap.model.files.report import validated
 from stiffmap.model.files.schema.base import FileModel, Name
 from stiffmap.workspace.performance.motion.motion_files import given_or_shipped, near_or_shipped
-from stiffmap.workspace.performance.quantities import quantity_in
+from stiffmap.workspace.performance.quantities import quantity_in, under
 from stiffmap.workspace.performance.registry import get_measure
 
 Written = str | float | int
@@ -75,6 +75,11 @@ class Bound:
             sides.append(self.at_most - value)
         return min(sides)
 
+    def text(self, factor: float) -> str:
+        """``≥ 500`` and the like, in the unit of which SI's has so many."""
+        sides = (("≥", self.at_least), ("≤", self.at_most))
+        return " ".join(f"{sign} {factor * v:.4g}" for sign, v in sides if v is not None)
+
 
 @short_repr
 @dataclass(frozen=True)
@@ -106,7 +111,7 @@ def bound_in(document: Document, file: str, given: BoundModel, *keys: str) -> Bo
     FileError for a measure that does not exist and for bounds that are no interval.
     """
     sides = (("at_least", given.at_least), ("at_most", given.at_most))
-    try:
+    with under(document, file, *keys):
         unit = get_measure(keys[-1]).unit
         least, most = (
             None if value is None else quantity_in(document, file, value, unit, *keys, side)
@@ -116,10 +121,6 @@ def bound_in(document: Document, file: str, given: BoundModel, *keys: str) -> Bo
             raise StiffmapError("give at_least or at_most")
         if least is not None and most is not None and least > most:
             raise StiffmapError(f"at_least ({given.at_least}) is above at_most ({given.at_most})")
-    except FileError:
-        raise
-    except StiffmapError as error:
-        raise FileError(str(error), file=file, line=document.line(keys), key=".".join(keys)) from None
     return Bound(least, most)
 
 

@@ -17,7 +17,7 @@ from stiffmap.common.short import short_repr
 from stiffmap.solve.machine import Machine, takes_machine
 from stiffmap.solve.status import Status
 from stiffmap.workspace.maps.inputs import magnitude
-from stiffmap.workspace.performance.motion.closing import drive_kinematics
+from stiffmap.workspace.performance.motion.closing import drive_kinematics, place_text
 from stiffmap.workspace.performance.motion.motion_files import Motion, load_motion
 from stiffmap.workspace.performance.poses import box_nodes, read_box
 from stiffmap.workspace.performance.registry import Case, Found, Measure, all_measures, get_measure
@@ -159,13 +159,8 @@ def measures(
     -----
     A measure that the machine lacks the data for says so in its row.
     """
-    task = (
-        requirements
-        if isinstance(requirements, Requirements)
-        else Requirements()
-        if requirements is None
-        else load_requirements(requirements)
-    )
+    task = Requirements() if requirements is None else requirements
+    task = task if isinstance(task, Requirements) else load_requirements(task)
     chosen = all_measures() if only is None else tuple(get_measure(n) for n in only)
     low, high, notes = _box(machine, box, task)
     size = force if force is not None else task.force if task.force is not None else 100.0
@@ -237,7 +232,7 @@ def _outside(machine: Machine, low: Floats, high: Floats, what: str) -> tuple[tu
     bad = drive_kinematics(machine, p, patient=False).status != Status.CONVERGED
     if not bad.any():
         return (), True
-    first = "({:.1f}, {:.1f}, {:.1f}) mm".format(*(1e3 * p[int(np.argmax(bad))]))
+    first = place_text(p[int(np.argmax(bad))])
     lost = f"{what} is not within reach: {int(bad.sum())} of {len(p)} nodes, for example {first}"
     return (lost,), not bad.all()
 

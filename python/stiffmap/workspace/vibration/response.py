@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from stiffmap.common.broadcasting import Floats, real_array, thread_count
 from stiffmap.common.errors import StiffmapError
+from stiffmap.solve.labels import batch_dims
 from stiffmap.solve.machine import Machine, takes_machine
 from stiffmap.workspace.vibration.modes import SYMMETRIC, TipModes, tip_modes
 
@@ -174,7 +175,7 @@ def frequency_response(
     if KINDS[kind]:
         values *= ((2j * np.pi * f) ** KINDS[kind])[:, None, None]
     batch = found.shape
-    poses = ("pose",) if len(batch) == 1 else tuple(f"pose_{i}" for i in range(len(batch)))
+    poses = batch_dims(len(batch))
     attrs: dict[str, object] = {
         "machine": machine.name, "point": point, "kind": kind, "axes": "base axes, linear part first, SI",
         "damping": found.damping.said,

@@ -19,6 +19,7 @@ from stiffmap.workspace.maps.inputs import magnitude
 from stiffmap.workspace.performance.box.box_search import BoxSearch
 from stiffmap.workspace.performance.box.proof import judge_on
 from stiffmap.workspace.performance.limits.limits import Bounds
+from stiffmap.workspace.performance.poses import read_region
 
 WORK = 100_000
 """Cells and poses at most; when they are used up, the bounds stay as far apart as they are."""
@@ -170,10 +171,7 @@ THIN = 1e-9
 def _region(machine: Machine, region: ArrayLike | None, shape: Floats) -> tuple[Floats, Floats]:
     """Where to look, and the box's shape: without thickness where the workspace has none or nothing is commanded."""
     if region is not None:
-        out = real_array(region, "region")
-        if out.shape != (2, 3) or not (np.isfinite(out).all() and (out[1] > out[0]).all()):
-            raise StiffmapError(f"region: expected lowest and highest corner (2, 3) in m, got {region!r}")
-        return out, shape
+        return read_region(region), shape
     low, high = machine.workspace
     centre, half = (low + high) / 2, (high - low) / 2
     flat = (half == 0) | ~np.isin(["x", "y", "z"], machine.description.task)

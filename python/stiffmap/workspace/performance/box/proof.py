@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from stiffmap.common.broadcasting import Floats, thread_count
 from stiffmap.common.tasks import workers
-from stiffmap.workspace.performance.limits.limits import UNLIMITED, Bounds
+from stiffmap.workspace.performance.limits.limits import Bounds
 from stiffmap.workspace.performance.motion.closing import kernel_starts
 from stiffmap.workspace.performance.motion.scaling import revolute_drives
 from stiffmap.workspace.performance.motion.zonotopes import corners
@@ -158,12 +158,10 @@ def enclose(bounds: Bounds, centre: Floats, half: Floats, axes: Floats) -> Cells
         places.append(place)
 
     x = e["coordinates"]
-    for index, name, low, high in bounds.intervals_wanted:
-        for sign, bound in ((1.0, high), (-1.0, -low)):
-            if abs(bound) < UNLIMITED:
-                slope = sign * e["slope"][:, index, :3]
-                value = sign * x[:, index] + (np.abs(slope) * half).sum(axis=1)
-                add(name, value, e["radius"][:, index], bound, np.where(slope < 0, -1.0, 1.0) * half)
+    for index, name, sign, bound in bounds.intervals_wanted:
+        slope = sign * e["slope"][:, index, :3]
+        value = sign * x[:, index] + (np.abs(slope) * half).sum(axis=1)
+        add(name, value, e["radius"][:, index], bound, np.where(slope < 0, -1.0, 1.0) * half)
     if bounds.clearance is not None:
         d, moved = bounds.bars.over(e["points"], e["moved"])
         add("clearance of bars", -d, moved, -bounds.clearance, np.zeros_like(half))

@@ -18,6 +18,7 @@ from stiffmap.workspace.performance.box.cells import halved
 from stiffmap.workspace.performance.box.inside import Inside, Judged
 from stiffmap.workspace.performance.box.proof import Judge, judge_on
 from stiffmap.workspace.performance.limits.limits import Bounds
+from stiffmap.workspace.performance.poses import read_region
 
 CELLS = {3: 24, 2: 120, 1: 1000}
 """Along each edge, by the number of axes."""
@@ -157,12 +158,9 @@ class _Drawn:
 
 
 def _begun(machine: Machine, region: ArrayLike | None, axes: list[int]) -> tuple[Floats, Floats]:
-    low, high = machine.workspace
+    low, high = machine.workspace if region is None else read_region(region, axes)
     if region is not None:
-        out = real_array(region, "region")
-        if out.shape != (2, 3) or not (np.isfinite(out).all() and (out[1] > out[0])[axes].all()):
-            raise StiffmapError(f"region: expected lowest and highest corner (2, 3) in m, got {region!r}")
-        return out[0], out[1]
+        return low, high
     centre, half = (low + high) / 2, (high - low) / 2
     moves = np.isin(np.arange(3), axes)
     half = np.where(half == 0, half.max(), half)

@@ -9,6 +9,7 @@ import numpy as np
 from stiffmap.common.broadcasting import Floats
 from stiffmap.solve.compiled.names import Role
 from stiffmap.solve.machine import Machine
+from stiffmap.workspace.performance.motion.inertia import movers
 
 SHORT = 0.02
 """Of the machine's characteristic length: joints nearer than that are one."""
@@ -39,25 +40,17 @@ class Bars:
 
     def _joints(self, node: int) -> list[int]:
         """Frames of the joints from the base to a frame; what lies beyond the last one is the platform."""
-        out, at = list[int](), node
         roles = self._compiled.names.roles
-        while at > 0:
-            parent, coordinate = self._compiled.nodes[at]
-            if coordinate >= 0 and roles[coordinate] != Role.SPRING:
-                out.append(at)
-            at = parent
-        return out[::-1]
+        return [at for at, coordinate in movers(self._compiled, node) if roles[coordinate] != Role.SPRING][
+            ::-1
+        ]
 
     def _leg(self, node: int) -> str:
         """Leg that moves a frame; empty where none does."""
         names = self._compiled.names
-        while node > 0:
-            parent, coordinate = self._compiled.nodes[node]
-            if coordinate >= 0:
-                first = names.coordinates[coordinate].split(".")[0]
-                return first if first in names.legs else ""
-            node = parent
-        return ""
+        first = (names.coordinates[c].split(".")[0] for _, c in movers(self._compiled, node))
+        leg = next(first, "")
+        return leg if leg in names.legs else ""
 
     def least_distance(self, coordinates: Floats) -> Floats:
         """(n,) m between the axes of members of different legs at (n, coordinates); NaN stays NaN."""
@@ -97,12 +90,9 @@ def segment_distance(a: Floats, b: Floats, c: Floats, d: Floats) -> Floats:
     best = np.full(s.shape, np.inf)
     with np.errstate(divide="ignore", invalid="ignore"):
         # the inner optimum, then each end of either segment
-        for first in (np.clip(s, 0, 1), np.zeros_like(s), np.ones_like(s)):
-            t = np.clip(np.where(vv > 0, (vr + first * uv) / vv, 0.0), 0, 1)
-            again = np.clip(np.where(uu > 0, (t * uv - ur) / uu, 0.0), 0, 1)
-            gap = r + again[..., None] * u - t[..., None] * v
-            best = np.fmin(best, np.linalg.norm(gap, axis=-1))
-        for t in (np.zeros_like(s), np.ones_like(s)):
+        ends = np.zeros_like(s), np.ones_like(s)
+        near = [np.where(vv > 0, (vr + first * uv) / vv, 0.0) for first in (np.clip(s, 0, 1), *ends)]
+        for t in (*(np.clip(t, 0, 1) for t in near), *ends):
             again = np.clip(np.where(uu > 0, (t * uv - ur) / uu, 0.0), 0, 1)
             gap = r + again[..., None] * u - t[..., None] * v
             best = np.fmin(best, np.linalg.norm(gap, axis=-1))

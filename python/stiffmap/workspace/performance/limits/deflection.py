@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -10,8 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 from stiffmap.common.broadcasting import Floats, real_array, whole_number
 from stiffmap.common.short import short_repr
 from stiffmap.solve.machine import Machine, takes_machine
+from stiffmap.solve.solution import Solution
 from stiffmap.solve.status import Status
 from stiffmap.workspace.maps.inputs import magnitude, plane_axes
+from stiffmap.workspace.maps.loading import Loading
 from stiffmap.workspace.performance.poses import box_nodes, read_box
 
 TURNS = 12
@@ -90,7 +93,8 @@ def worst_deflection(
     force = magnitude(force, "force", "N")
     whole_number(turns, "turns", 0)
     axes = (0, 1, 2) if plane is None else plane_axes(plane)
-    ask = _Ask(machine, force, axes, direction, linear, rotation, gravity, threads, turns)
+    loading = Loading(machine, rotation=rotation, gravity=gravity, threads=threads)
+    ask = _Ask(loading, force, axes, direction, linear, turns)
     if position is not None:
         p = real_array(position, "position").reshape(-1, 3)
         return _result(ask, p, *ask.at(p), plane)
@@ -102,23 +106,18 @@ def worst_deflection(
 
 @dataclass(frozen=True, eq=False)
 class _Ask:
-    machine: Machine
+    loading: Loading
     force: float
     axes: tuple[int, ...]
     direction: ArrayLike | None
     linear: bool
-    rotation: ArrayLike | None
-    gravity: ArrayLike | None
-    threads: int | None
     turns: int
 
-    def solve(self, p: Floats, unit: Floats | None, stiffness: bool):  # type: ignore[no-untyped-def]
+    def solve(self, p: Floats, unit: Floats | None, stiffness: bool) -> Solution:
         wrench = np.zeros((len(p), 6))
         if unit is not None:
             wrench[:, :3] = self.force * unit
-        return self.machine.solve(
-            p, wrench, rotation=self.rotation, gravity=self.gravity, stiffness=stiffness, threads=self.threads
-        )
+        return self.loading.solve(p, wrench, stiffness=stiffness)
 
     def at(self, p: Floats) -> tuple[Floats, Floats, NDArray[np.uint8]]:
         """Largest deflections, their directions and the status at poses (n, 3)."""
@@ -192,7 +191,7 @@ def _refined(ask: _Ask, out: WorstDeflection, low: Floats, high: Floats, nodes: 
         return out
     best, at, unit = out.value, out.position, out.direction
     h = (high - low) / (nodes - 1)
-    around = np.array([(a, b, c) for a in (-1, 0, 1) for b in (-1, 0, 1) for c in (-1, 0, 1)], dtype=float)
+    around = np.array([*product((-1.0, 0.0, 1.0), repeat=3)])
     for _ in range(REFINEMENTS):
         h = h / 2
         p = np.unique(np.clip(at + around * h, low, high), axis=0)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -151,17 +152,17 @@ class Bounds:
         assert self.transmission is not None
         j = weighted(self.machine, k.jacobian, self.size, "all")
         low, high = self.transmission
-        out = []
-        if self.factors == "cube":
-            if np.isfinite(high):
-                out.append(vertices("cube factor above", j, high, closed))
-            if low > 0:
-                out.append(rows("cube factor below", inverse_rows(j), 1 / low, closed))
-            return out
+        sphere, out = self.factors == "sphere", list[Limit]()
+        word = "transmission" if sphere else "cube factor"
         if np.isfinite(high):
-            out.append(spectral("transmission above", j, high, closed))
+            above = convex(f"{word} above", j, high, closed, spectral if sphere else vertices)
+            # the change of a corner is at most sqrt(d) times that of the matrix
+            scale = 1.0 if sphere else float(np.sqrt(j.shape[2]))
+            out.append(replace(above, array=scale * above.array, left=above.left / scale))
         if low > 0:
-            out.append(spectral("transmission below", inverse_rows(j), 1 / low, closed))
+            out.append(
+                convex(f"{word} below", inverse_rows(j), 1 / low, closed, spectral if sphere else rows)
+            )
         return out
 
     @cached_property
@@ -171,23 +172,24 @@ class Bounds:
 
     @cached_property
     def intervals_wanted(self) -> list[tuple[int, str, float, float]]:
-        """Index, name, least and most of each coordinate that counts."""
-        return _coordinate_limits(self.machine, self.ranges, self.joints)
+        """Index, name, sign and most of that sign times the coordinate, of each end of a range that counts."""
+        compiled, drives = self.machine.compiled, set(self.machine.compiled.drives)
+        out = []
+        for i, (low, high) in enumerate(compiled.limits):
+            if self.ranges if i in drives else self.joints:
+                name = f"{'range of' if i in drives else 'joint limit of'} {compiled.names.coordinates[i]}"
+                ends = ((1.0, high), (-1.0, -low))
+                out += [(i, name, sign, most) for sign, most in ends if abs(most) < UNLIMITED]
+        return out
 
     def intervals(self, x: Floats) -> list[Limit]:
         """Ranges of drives and limits of joints at coordinates (n, coordinates)."""
-        out = []
-        for index, name, low, high in self.intervals_wanted:
-            for sign, most in ((1.0, high), (-1.0, -low)):
-                if abs(most) < UNLIMITED:
-                    value = sign * x[:, index]
-                    out.append(Limit(name, value, most, value[:, None], np.ones((len(x), 1))))
-        return out
+        return [plain(name, sign * x[:, index], most) for index, name, sign, most in self.intervals_wanted]
 
     def _clearance(self, k: DriveKinematics) -> Limit:
         assert self.clearance is not None
         value = -self.bars.least_distance(k.coordinates)
-        return Limit("clearance of bars", value, -self.clearance, value[:, None], np.ones((len(value), 1)))
+        return plain("clearance of bars", value, -self.clearance)
 
     def _deflection(self, position: Floats, closed: NDArray[np.bool_]) -> Limit:
         from stiffmap.workspace.performance.limits.deflection import worst_deflection
@@ -201,71 +203,58 @@ class Bounds:
                 threads=self.threads,
             )  # fmt: skip
             value[closed] = np.where(np.isfinite(d.values), d.values, np.inf)
-        return Limit("deflection", value, most, value[:, None], np.ones((len(value), 1)))
+        return plain("deflection", value, most)
 
 
-def _coordinate_limits(machine: Machine, ranges: bool, joints: bool) -> list[tuple[int, str, float, float]]:
-    compiled = machine.compiled
-    drives = set(compiled.drives)
-    out = []
-    for i, (low, high) in enumerate(compiled.limits):
-        wanted = ranges if i in drives else joints
-        if wanted and (abs(low) < UNLIMITED or abs(high) < UNLIMITED):
-            kind = "range of" if i in drives else "joint limit of"
-            out.append((i, f"{kind} {compiled.names.coordinates[i]}", low, high))
-    return out
+def plain(name: str, value: Floats, most: float) -> Limit:
+    """A limit on a smooth number (n,) itself."""
+    return Limit(name, value, most, value[:, None], np.ones((len(value), 1)))
 
 
-def spectral(name: str, matrix: Floats, most: float, closed: NDArray[np.bool_]) -> Limit:
-    """Largest singular value, and its dyad: a linear lower estimate at neighbours."""
-    n = len(matrix)
-    value = np.full(n, np.inf)
-    left = np.full((n, matrix.shape[1] * matrix.shape[2]), np.nan)
+Largest = Callable[[Floats], tuple[Floats, Floats]]
+"""Of matrices (k, r, c): a convex value (k,), and (k, r, c) its slope, a linear lower estimate at neighbours."""
+
+
+def convex(name: str, matrix: Floats, most: float, closed: NDArray[np.bool_], largest: Largest) -> Limit:
+    """A limit on matrices (n, r, c); infinite where the pose is not closed."""
+    n, size = len(matrix), matrix.shape[1] * matrix.shape[2]
+    value, left = np.full(n, np.inf), np.full(matrix.shape, np.nan)
     ok = closed & np.isfinite(matrix).all(axis=(1, 2))
     if ok.any():
-        a = matrix[ok]
-        wide = a.shape[2] > a.shape[1]
-        a = np.swapaxes(a, 1, 2) if wide else a
-        v = np.linalg.eigh(np.swapaxes(a, 1, 2) @ a)[1][
-            :, :, -1
-        ]  # quicker than svd, exact enough for the largest
-        image = (a @ v[:, :, None])[:, :, 0]
-        value[ok] = size = np.linalg.norm(image, axis=1)
-        u = image / np.maximum(size, 1e-300)[:, None]
-        u, v = (v, u) if wide else (u, v)
-        left[ok] = (u[:, :, None] * v[:, None, :]).reshape(len(a), -1)
-    return Limit(name, value, most, matrix.reshape(n, left.shape[1]), left)
+        value[ok], left[ok] = largest(matrix[ok])
+    return Limit(name, value, most, matrix.reshape(n, size), left.reshape(n, size))
 
 
-def vertices(name: str, matrix: Floats, most: float, closed: NDArray[np.bool_]) -> Limit:
+def spectral(a: Floats) -> tuple[Floats, Floats]:
+    """Largest singular value, and its dyad."""
+    wide = a.shape[2] > a.shape[1]
+    a = np.swapaxes(a, 1, 2) if wide else a
+    v = np.linalg.eigh(np.swapaxes(a, 1, 2) @ a)[1][
+        :, :, -1
+    ]  # quicker than svd, exact enough for the largest
+    image = (a @ v[:, :, None])[:, :, 0]
+    size = np.linalg.norm(image, axis=1)
+    u = image / np.maximum(size, 1e-300)[:, None]
+    u, v = (v, u) if wide else (u, v)
+    return size, u[:, :, None] * v[:, None, :]
+
+
+def vertices(a: Floats) -> tuple[Floats, Floats]:
     """Farthest corner of the image of the cube: the norm of J s for the worst s."""
-    n, rows, d = matrix.shape
-    value, left = np.full(n, np.inf), np.full((n, rows * d), np.nan)
-    ok = closed & np.isfinite(matrix).all(axis=(1, 2))
-    if ok.any():
-        signs = corners(d)
-        images = matrix[ok] @ signs.T
-        norms = np.linalg.norm(images, axis=1)
-        worst = np.argmax(norms, axis=1)
-        rows_of = np.arange(len(worst))
-        value[ok] = norms[rows_of, worst]
-        unit = images[rows_of, :, worst] / value[ok][:, None]
-        left[ok] = (unit[:, :, None] * signs[worst][:, None, :]).reshape(len(worst), -1)
-    # the change of the value is at most sqrt(d) times that of the matrix
-    return Limit(name, value, most, np.sqrt(d) * matrix.reshape(n, rows * d), left / np.sqrt(d))
+    signs, every = corners(a.shape[2]), np.arange(len(a))
+    images = a @ signs.T
+    norms = np.linalg.norm(images, axis=1)
+    worst = np.argmax(norms, axis=1)
+    value = norms[every, worst]
+    unit = images[every, :, worst] / value[:, None]
+    return value, unit[:, :, None] * signs[worst][:, None, :]
 
 
-def rows(name: str, matrix: Floats, most: float, closed: NDArray[np.bool_]) -> Limit:
+def rows(a: Floats) -> tuple[Floats, Floats]:
     """Longest row of the inverse: the drive that first stops a motion."""
-    n, d, columns = matrix.shape
-    value, left = np.full(n, np.inf), np.full((n, d * columns), np.nan)
-    ok = closed & np.isfinite(matrix).all(axis=(1, 2))
-    if ok.any():
-        norms = np.linalg.norm(matrix[ok], axis=2)
-        worst = np.argmax(norms, axis=1)
-        rows_of = np.arange(len(worst))
-        value[ok] = norms[rows_of, worst]
-        pick = np.zeros((len(worst), d, columns))
-        pick[rows_of, worst] = matrix[ok][rows_of, worst] / value[ok][:, None]
-        left[ok] = pick.reshape(len(worst), -1)
-    return Limit(name, value, most, matrix.reshape(n, left.shape[1]), left)
+    norms, every = np.linalg.norm(a, axis=2), np.arange(len(a))
+    worst = np.argmax(norms, axis=1)
+    value = norms[every, worst]
+    pick = np.zeros_like(a)
+    pick[every, worst] = a[every, worst] / value[:, None]
+    return value, pick

@@ -110,7 +110,7 @@ STEPS = 24
 def refuse_failed(machine: Machine, k: DriveKinematics, time: Floats | None, position: Floats) -> None:
     """StiffmapError with place and time of the first pose of a motion that cannot be; between two samples it is
     sought by halving."""
-    failed = (k.status != Status.CONVERGED) | _crossed(machine, k)
+    failed = (k.status != Status.CONVERGED) | _crossed(machine, k.jacobian, k.together)
     if not failed.any():
         return
     i = int(np.argmax(failed))
@@ -130,28 +130,20 @@ def _between(machine: Machine, k: DriveKinematics, position: Floats, i: int) -> 
     for _ in range(STEPS):
         middle = (low + high) / 2
         there = drive_kinematics(machine, a + middle * (b - a), k.rotation[i - 1], start=start)
-        if there.status != Status.CONVERGED or _crossed_between(machine, k, i - 1, there):
+        jacobian, together = (
+            np.stack([getattr(k, name)[i - 1], getattr(there, name)]) for name in ("jacobian", "together")
+        )
+        if there.status != Status.CONVERGED or _crossed(machine, jacobian, together)[1]:
             high = middle
         else:
             low, start = middle, there.coordinates
     return 1 - high, a + high * (b - a)
 
 
-def _crossed(machine: Machine, k: DriveKinematics) -> NDArray[np.bool_]:
+def _crossed(machine: Machine, jacobian: Floats, together: NDArray[np.int32]) -> NDArray[np.bool_]:
     """(n,) where the drive Jacobian loses rank, or changes its orientation since the pose before; False where it is
     NaN."""
-    return _lost(k.jacobian, k.together, machine.compiled.redundancy)
-
-
-def _crossed_between(machine: Machine, k: DriveKinematics, i: int, there: DriveKinematics) -> bool:
-    """The same between pose `i` and another one."""
-    pair, together = (
-        np.stack([getattr(k, name)[i], getattr(there, name)]) for name in ("jacobian", "together")
-    )
-    return bool(_lost(pair, together, machine.compiled.redundancy)[1])
-
-
-def _lost(jacobian: Floats, together: NDArray[np.int32], redundancy: int) -> NDArray[np.bool_]:
+    redundancy = machine.compiled.redundancy
     ok = np.isfinite(jacobian).all(axis=(1, 2))
     out = np.zeros(len(jacobian), dtype=bool)
     if not ok.any():

@@ -25,17 +25,16 @@ from stiffmap.workspace.performance.motion.inertia import (
     rest_efforts,
     rigid_dynamics,
 )
-from stiffmap.workspace.performance.motion.scaling import drive_table, drive_values, revolute_drives
+from stiffmap.workspace.performance.motion.scaling import declared, drive_table, drive_values, revolute_drives
 from stiffmap.workspace.performance.motion.tensions import (
     as_tensions,
     farthest,
     held,
     in_cables,
     inertia_columns,
-    radius,
 )
 from stiffmap.workspace.performance.motion.trajectory import Trajectory
-from stiffmap.workspace.performance.motion.zonotopes import inverse_rows
+from stiffmap.workspace.performance.motion.zonotopes import inner_radius, inverse_rows
 
 IMPOSSIBLE = 1e-6
 """Relative part of a motion that the machine cannot do: above it, the trajectory is refused."""
@@ -104,11 +103,7 @@ def _dataset(
     effort = out["effort"] + friction_effort
     power = effort * out["rate"]
     span = t.time[-1] - t.time[0]
-    drives = drive_table(machine)
-    most = {
-        f: np.array([np.nan if getattr(d, f) is None else getattr(d, f) for d in drives])
-        for f in ("force", "speed")
-    }
+    peak_effort, peak_speed = np.abs(effort).max(axis=0), np.abs(out["rate"]).max(axis=0)
     over = ("time", "drive")
     return xr.Dataset(
         {
@@ -120,13 +115,13 @@ def _dataset(
             "power": (over, power, {"units": "W"}),
             "kinetic": ("time", out["kinetic"], {"units": "J"}),
             "potential": ("time", out["potential"], {"units": "J"}),
-            "peak_effort": ("drive", np.abs(effort).max(axis=0)),
+            "peak_effort": ("drive", peak_effort),
             "rms_effort": ("drive", np.sqrt(np.trapezoid(effort**2, t.time, axis=0) / span)),
-            "peak_speed": ("drive", np.abs(out["rate"]).max(axis=0)),
+            "peak_speed": ("drive", peak_speed),
             "peak_power": ("drive", np.abs(power).max(axis=0)),
-            "effort_margin": ("drive", most["force"] - np.abs(effort).max(axis=0)),
-            "speed_margin": ("drive", most["speed"] - np.abs(out["rate"]).max(axis=0)),
-            "range_margin": ("drive", _room(drives, k.actuators)),
+            "effort_margin": ("drive", declared(machine, "force", np.nan) - peak_effort),
+            "speed_margin": ("drive", declared(machine, "speed", np.nan) - peak_speed),
+            "range_margin": ("drive", _room(drive_table(machine), k.actuators)),
         },
         coords={"time": t.time, "drive": list(machine.actuators)},
         attrs={"machine": machine.name, "revolute": revolute_drives(machine).astype(int).tolist()},
@@ -180,13 +175,13 @@ def acceleration_of(
     shape, n = k.status.shape, len(most)
     if (h := in_cables(machine, "acceleration")) is not None:
         found = held(machine, h, k, inertia_columns(h, k.rotation), most, gravity)
-        return PeakAcceleration(radius(found), farthest(found))
+        return PeakAcceleration(inner_radius(*found), farthest(found))
     bias = rest_efforts(machine, k, gravity=gravity, velocity=None)
     flat = k.coordinates.reshape(-1, k.coordinates.shape[-1])
     zero = np.zeros((len(flat), 6))
     mass = rigid_dynamics(machine, flat, zero, zero, zero, np.zeros(3))["mass"].reshape((*shape, n, n))
     needed = mass @ inverse_rows(k.jacobian)[..., :3]  # effort per acceleration of the TCP
-    return PeakAcceleration(radius((needed, most, bias)), _farthest(needed, most, bias))
+    return PeakAcceleration(inner_radius(needed, most, bias), _farthest(needed, most, bias))
 
 
 def _farthest(needed: Floats, most: Floats, bias: Floats) -> Floats:

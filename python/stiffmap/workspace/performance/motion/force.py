@@ -23,12 +23,13 @@ from stiffmap.workspace.performance.motion.scaling import (
     drive_values,
     weighted,
 )
-from stiffmap.workspace.performance.motion.tensions import as_tensions, held, in_cables, pushes, radius
+from stiffmap.workspace.performance.motion.tensions import as_tensions, held, in_cables, pushes
 from stiffmap.workspace.performance.motion.velocity import of_motions, singular_values
 from stiffmap.workspace.performance.motion.zonotopes import (
     Polygon,
     corners,
     farthest_vertex,
+    inner_radius,
     section_polygon,
     worst_corner,
 )
@@ -177,7 +178,7 @@ def force_transmission(
     return ForceTransmission(
         sphere_min=least,
         sphere_max=largest,
-        force_min=radius(found),
+        force_min=inner_radius(*found),
         plane=section_polygon(rows[..., list(plane_axes(plane))], room, k.status, offset),
         bias=bias,
         limits=most,

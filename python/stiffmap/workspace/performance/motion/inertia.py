@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,11 +18,12 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.common.short import short_repr
 from stiffmap.model.description import Body
 from stiffmap.model.description.tree import all_elements, core_name, joints
+from stiffmap.solve.compiled.machine import CompiledMachine
 from stiffmap.solve.compiled.names import Role
 from stiffmap.solve.machine import Machine, takes_machine
 from stiffmap.solve.results import OverPoses
 from stiffmap.workspace.performance.motion.closing import DriveKinematics
-from stiffmap.workspace.performance.motion.scaling import drive_table
+from stiffmap.workspace.performance.motion.scaling import declared
 from stiffmap.workspace.performance.motion.sharing import drive_weights, followed
 from stiffmap.workspace.performance.poses import loaded_poses
 
@@ -39,17 +41,20 @@ class BodyMass:
 def body_masses(machine: Machine) -> list[BodyMass]:
     """All bodies, in the order of the file."""
     compiled = machine.compiled
-    nodes = compiled.nodes
+    roles = compiled.names.roles
+    return [
+        BodyMass(name, mass, any(roles[c] != Role.SPRING for _, c in movers(compiled, node)))
+        for name, node, mass in compiled.bodies
+    ]
 
-    def moves(node: int) -> bool:
-        while node > 0:
-            parent, coordinate = nodes[node]
-            if coordinate >= 0 and compiled.names.roles[coordinate] != Role.SPRING:
-                return True
-            node = parent
-        return False
 
-    return [BodyMass(name, mass, moves(node)) for name, node, mass in compiled.bodies]
+def movers(compiled: CompiledMachine, node: int) -> Iterator[tuple[int, int]]:
+    """Frame and number of each coordinate that moves a frame, from that frame to the base."""
+    while node > 0:
+        parent, coordinate = compiled.nodes[node]
+        if coordinate >= 0:
+            yield node, coordinate
+        node = parent
 
 
 def total_mass(machine: Machine) -> float:
@@ -94,24 +99,24 @@ def motion_friction(machine: Machine, rates: Floats) -> Floats:
 
     Where a drive declares no speed, its own largest rate along the motion, and that of the fastest drive of its kind, stand in.
     """
-    drives = drive_table(machine)
     named = joints(machine.description)
     kinds = [named[name].kind == "prismatic" for name in machine.actuators]
     own = np.abs(rates).reshape(-1, rates.shape[-1]).max(axis=0, initial=0.0)
     fastest = np.array([max(v for v, other in zip(own, kinds, strict=True) if other == k) for k in kinds])
-    limit = SLOW * np.array([d.speed if d.speed else f for d, f in zip(drives, fastest, strict=True)])
-    coulomb = np.array([d.coulomb_friction or 0.0 for d in drives])
-    viscous = np.array([d.viscous_friction or 0.0 for d in drives])
-    share = np.clip(rates / np.where(limit > 0.0, limit, 1.0), -1.0, 1.0)
-    return np.asarray(coulomb * share + viscous * rates)
+    speed = declared(machine, "speed", 0.0)
+    limit = SLOW * np.where(speed > 0.0, speed, fastest)
+    return _friction(machine, rates, np.clip(rates / np.where(limit > 0.0, limit, 1.0), -1.0, 1.0))
 
 
 def friction_efforts(machine: Machine, rates: Floats) -> Floats:
     """(..., drives) Coulomb and viscous friction of the drives against their rates."""
-    drives = drive_table(machine)
-    coulomb = np.array([d.coulomb_friction or 0.0 for d in drives])
-    viscous = np.array([d.viscous_friction or 0.0 for d in drives])
-    return np.asarray(coulomb * np.sign(rates) + viscous * rates)
+    return _friction(machine, rates, np.sign(rates))
+
+
+def _friction(machine: Machine, rates: Floats, sense: Floats) -> Floats:
+    """With the share of Coulomb friction that acts, -1 to 1."""
+    coulomb, viscous = (declared(machine, f"{word}_friction", 0.0) for word in ("coulomb", "viscous"))
+    return np.asarray(coulomb * sense + viscous * rates)
 
 
 def rigid_dynamics(
@@ -151,8 +156,7 @@ def rest_efforts(
     g = machine.compiled.gravity(gravity)
     if velocity is None and not g.any():
         return np.zeros((*shape, drives))
-    if velocity is not None or g.any():
-        need_masses(machine, "gravity" if velocity is None else "motion")
+    need_masses(machine, "gravity" if velocity is None else "motion")
     flat = k.coordinates.reshape(-1, k.coordinates.shape[-1])
     twist = np.zeros((len(flat), 6))
     if velocity is not None:

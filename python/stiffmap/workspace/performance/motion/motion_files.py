@@ -32,7 +32,7 @@ from stiffmap.workspace.performance.motion.trajectory import (
     timed,
     way_along,
 )
-from stiffmap.workspace.performance.quantities import quantity_in
+from stiffmap.workspace.performance.quantities import quantity_in, under
 
 Written = str | float | int
 LEAST_ROWS = 6
@@ -166,7 +166,7 @@ def _described(document: Document, file: str) -> Motion:
         raise FileError(f"expected one of line, circle, points; found {found}", file=file)
     if m.duration is not None and m.speed is not None:
         raise FileError("give duration or speed, not both", file=file, line=document.line(("speed",)))
-    try:
+    with under(document, file, given[0]):
         if m.line is not None:
             start, end = row(m.line.start, "m", "line", "start"), row(m.line.end, "m", "line", "end")
             path = line(start, end, m.samples)
@@ -176,10 +176,6 @@ def _described(document: Document, file: str) -> Motion:
             path = circle(centre, radius, m.circle.plane, m.samples)
         else:
             path = through([row(p, "m", "points", i) for i, p in enumerate(m.points or [])], m.samples)
-    except FileError:
-        raise
-    except (StiffmapError, ValueError) as error:
-        raise FileError(str(error), file=file, line=document.line((given[0],)), key=given[0]) from None
     span = None if m.duration is None else si(m.duration, "s", "duration")
     speed = np.inf if m.speed is None else si(m.speed, "m/s", "speed")
     for name, value in (("duration", span), ("speed", speed)):

@@ -21,6 +21,12 @@ def drive_table(machine: Machine) -> list[Drive]:
     return [found[name].drive or Drive() for name in machine.actuators]
 
 
+def declared(machine: Machine, field: str, otherwise: float) -> Floats:
+    """(drives,) of one number of the drives; where the file declares none, this one."""
+    given = [getattr(d, field) for d in drive_table(machine)]
+    return np.array([otherwise if v is None else v for v in given], dtype=float)
+
+
 def drive_values(machine: Machine, field: str, given: ArrayLike | None, unit: str) -> Floats:
     """(drives,) of one number of the drives: as given (one, or one each), else what the file declares.
 

@@ -94,6 +94,13 @@ def facets(j: Floats, rank: int) -> tuple[Floats, Floats]:
     return normals, distance
 
 
+def sides(j: Floats, rank: int) -> tuple[Floats, Floats]:
+    """`facets` as rows (..., f, rows) and limits (..., f) of |rows t| <= limits; 0 and 1 where there is no facet."""
+    normals, distance = facets(j, rank)
+    bounded = ~np.isinf(distance)
+    return np.where(bounded[..., None], normals, 0.0), np.where(bounded, distance, 1.0)
+
+
 def followed(
     machine: Machine,
     coordinates: Floats,

@@ -8,11 +8,12 @@ from scipy.spatial import HalfspaceIntersection
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
+from stiffmap.model.link.arrays import skew
 from stiffmap.solve.machine import Machine
 from stiffmap.workspace.cables.structure import Hanging, hanging, lines, matrix, nearest, scaled, weight
 from stiffmap.workspace.performance.motion.closing import DriveKinematics
-from stiffmap.workspace.performance.motion.sharing import drive_weights, facets
-from stiffmap.workspace.performance.motion.zonotopes import inverse_rows
+from stiffmap.workspace.performance.motion.sharing import drive_weights, sides
+from stiffmap.workspace.performance.motion.zonotopes import inner_radius, inverse_rows
 
 Held = tuple[Floats, Floats, Floats]
 """Rows (..., f, c), limits (..., f), offsets (..., f): what is held is all v with |rows v + offsets| <= limits."""
@@ -48,11 +49,9 @@ def held(
     wanted = (np.broadcast_to(columns, (*a.shape[:-2], *columns.shape[-2:])) * size[:, None])[
         ..., list(h.rows), :
     ]
-    normals, distance = facets(a * (most / 2), len(h.rows))
+    normals, distance = sides(a * (most / 2), len(h.rows))
     offset = np.einsum("...fr,...r->...f", normals, load + (a * (most / 2)).sum(axis=-1))
-    bounded = ~np.isinf(distance)
-    rows = np.where(bounded[..., None], normals @ wanted, 0.0)
-    return rows, np.where(bounded, distance, 1.0), np.where(bounded, offset, 0.0)
+    return normals @ wanted, distance, offset
 
 
 def pushes(h: Hanging) -> Floats:
@@ -62,22 +61,9 @@ def pushes(h: Hanging) -> Floats:
 
 def inertia_columns(h: Hanging, rotation: Floats) -> Floats:
     """(..., 6, 3) wrenches at the tcp that unit accelerations ask for, orientation kept."""
-    x, y, z = np.moveaxis(np.einsum("...ij,j->...i", rotation, h.com), -1, 0)
-    zero = np.zeros_like(x)
-    skew = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape((*x.shape, 3, 3))
-    linear = np.broadcast_to(np.eye(3), skew.shape)
-    return np.asarray(h.mass * np.concatenate([linear, skew], axis=-2))
-
-
-def radius(found: Held) -> Floats:
-    """(...) of the largest ball about 0 of what is held; 0 where nothing is."""
-    rows, most, offset = found
-    norms = np.linalg.norm(rows, axis=-1)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        room = most - np.abs(offset)
-        reach = np.where(norms > 1e-12, room / norms, np.where(room >= 0, np.inf, 0.0))
-    bad = ~np.isfinite(rows).all(axis=(-2, -1))
-    return np.where(bad, np.nan, np.maximum(reach.min(axis=-1), 0.0))
+    turning = skew(np.einsum("...ij,j->...i", rotation, h.com))
+    linear = np.broadcast_to(np.eye(3), turning.shape)
+    return np.asarray(h.mass * np.concatenate([linear, turning], axis=-2))
 
 
 def farthest(found: Held) -> Floats:
@@ -85,7 +71,7 @@ def farthest(found: Held) -> Floats:
     rows, most, offset = found
     shape = rows.shape[:-2]
     out = np.zeros(int(np.prod(shape, dtype=int)))
-    inside = radius(found).reshape(-1)
+    inside = inner_radius(*found).reshape(-1)
     r, m, o = (v.reshape(len(out), *v.shape[len(shape) :]) for v in (rows, most, offset))
     for i in range(len(out)):
         if not inside[i] > 0:

@@ -12,11 +12,11 @@ from numpy.typing import ArrayLike
 from stiffmap.common.broadcasting import Floats, real_array
 from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.machine import Machine
-from stiffmap.workspace.performance.motion.closing import drive_kinematics, refuse_failed
+from stiffmap.workspace.performance.motion.closing import drive_kinematics, place_text, refuse_failed
 from stiffmap.workspace.performance.motion.inertia import friction_efforts, need_masses, rigid_dynamics
 from stiffmap.workspace.performance.motion.scaling import drive_values
 from stiffmap.workspace.performance.motion.tensions import held, in_cables, inertia_columns, pushes
-from stiffmap.workspace.performance.motion.trajectory import Path, Trajectory
+from stiffmap.workspace.performance.motion.trajectory import Path, Trajectory, run_along
 
 BISECTIONS = 60
 FASTEST = 1e6
@@ -66,8 +66,7 @@ def fastest(
     if ((low > 0) | (high < 0)).any():
         i = int(np.argmax(((low > 0) | (high < 0)).any(axis=1)))
         raise StiffmapError(
-            f"{machine.name}: its drives cannot hold the load at "
-            "({:.1f}, {:.1f}, {:.1f}) mm of the path".format(*(1e3 * path.position[i]))
+            f"{machine.name}: its drives cannot hold the load at {place_text(path.position[i])} of the path"
         )
     x = _passes(np.diff(path.s), a, b, low, high, np.minimum(top, FASTEST))
     return _run(path, x)
@@ -147,15 +146,7 @@ def _run(path: Path, x: Floats) -> Trajectory:
     if not np.isfinite(spans).all():
         i = int(np.argmax(~np.isfinite(spans)))
         raise StiffmapError(
-            "the drives cannot move the tool along the path at ({:.1f}, {:.1f}, {:.1f}) mm".format(
-                *(1e3 * path.position[i])
-            )
+            f"the drives cannot move the tool along the path at {place_text(path.position[i])}"
         )
     u = np.append(np.diff(x) / (2 * step), 0.0)
-    return Trajectory(
-        time=np.concatenate([[0.0], np.cumsum(spans)]),
-        position=path.position,
-        velocity=path.first * root[:, None],
-        acceleration=path.first * u[:, None] + path.second * x[:, None],
-        force=np.zeros_like(path.position),
-    )
+    return run_along(path, np.concatenate([[0.0], np.cumsum(spans)]), root, x, u)

@@ -108,6 +108,17 @@ def through(points: ArrayLike, samples: int = 401) -> Path:
     return Path(s, spline(s), spline(s, 1), spline(s, 2))
 
 
+def run_along(path: Path, time: Floats, rate: Floats, square: Floats, bend: Floats) -> Trajectory:
+    """At each sample of a path the time (s), ds/dt, its square and d²s/dt²; no force on the tool."""
+    return Trajectory(
+        time=time,
+        position=path.position,
+        velocity=path.first * rate[:, None],
+        acceleration=path.second * square[:, None] + path.first * bend[:, None],
+        force=np.zeros_like(path.position),
+    )
+
+
 def timed(path: Path, duration: float) -> Trajectory:
     """A path run from rest to rest in `duration` s (a polynomial of degree 7: no jump of acceleration or jerk)."""
     if not duration > 0:
@@ -117,14 +128,8 @@ def timed(path: Path, duration: float) -> Trajectory:
     s = smooth(u)
     spline = [CubicSpline(path.s, values) for values in (path.position, path.first, path.second)]
     rate, bend = smooth.deriv()(u) / duration, smooth.deriv(2)(u) / duration**2
-    p, first, second = (f(s) for f in spline)
-    return Trajectory(
-        time=u * duration,
-        position=p,
-        velocity=first * rate[:, None],
-        acceleration=second * rate[:, None] ** 2 + first * bend[:, None],
-        force=np.zeros_like(p),
-    )
+    there = Path(s, *(f(s) for f in spline))
+    return run_along(there, u * duration, rate, rate**2, bend)
 
 
 def at_feed(path: Path, feed: float) -> Trajectory:
@@ -138,13 +143,7 @@ def at_feed(path: Path, feed: float) -> Trajectory:
     time = np.concatenate([[0.0], np.cumsum(step)]) / feed
     rate = feed / size  # ds/dt
     bend = -(path.first * path.second).sum(axis=1) / size**2 * rate**2  # d²s/dt²: the speed stays
-    return Trajectory(
-        time=time,
-        position=path.position,
-        velocity=path.first * rate[:, None],
-        acceleration=path.second * rate[:, None] ** 2 + path.first * bend[:, None],
-        force=np.zeros_like(path.position),
-    )
+    return run_along(path, time, rate, rate**2, bend)
 
 
 def read_points(file: str | PathLike[str], unit: str = "mm") -> Path:

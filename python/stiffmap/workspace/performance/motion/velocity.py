@@ -19,7 +19,7 @@ from stiffmap.workspace.performance.motion.scaling import (
     mixes_units,
     weighted,
 )
-from stiffmap.workspace.performance.motion.sharing import facets, motions
+from stiffmap.workspace.performance.motion.sharing import facets, motions, sides
 from stiffmap.workspace.performance.motion.zonotopes import (
     Polygon,
     farthest_vertex,
@@ -184,8 +184,6 @@ def velocity_section(
     if machine.compiled.redundancy:
         s = of_motions(machine, k, singular_values(j))[0]
         rank = int((np.isfinite(s) & (s > 0)).sum(axis=-1).max(initial=1))
-        normals, distance = facets(k.jacobian * speeds, rank)
-        bounded = np.isfinite(distance)
-        rows = np.where(bounded[..., None], normals, 0.0)
-        return section_polygon(rows[..., axes], np.where(bounded, distance, 1.0), k.status)
+        rows, most = sides(k.jacobian * speeds, rank)
+        return section_polygon(rows[..., axes], most, k.status)
     return section_polygon(inverse_rows(j)[..., axes], speeds, k.status)
