@@ -107,7 +107,7 @@ def command(
 
       [cyan]stiffmap view orthoglide-revised --set x.foot/beam.EIx=4000 --no-browser --port 8090[/cyan]
     """
-    from stiffmap.ui.view.optional import need_viser
+    from stiffmap.ui.view.serving import need_viser
 
     need_viser()
     model = _model(machine, effect, link, at=at, rotation=rotation, force=force, moment=moment, gravity=gravity,

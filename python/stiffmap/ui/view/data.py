@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+import json
+from dataclasses import dataclass
 from html import escape
+from os import PathLike
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stiffmap.common.broadcasting import Floats
+from stiffmap.common.errors import FileError
 from stiffmap.experiment import Experiment
 from stiffmap.experiment.comparison.residual import residual
-from stiffmap.solve.machine import Machine
+from stiffmap.solve.machine import Machine, load_machine
+from stiffmap.ui.plot.elements import element_links
 from stiffmap.ui.plot.loaded import round_factor
 from stiffmap.ui.plot.style import BLUE, GREEN, VERMILLION
-from stiffmap.ui.view.diagnosed import Findings
 from stiffmap.ui.view.moment import Moment
 from stiffmap.ui.view.place import solved
 from stiffmap.ui.view.scene import Scene
@@ -26,6 +32,65 @@ BEFORE, NOW, NAMED = VERMILLION, BLUE, "#E8279B"
 """Residuals of the machine as opened, with what was changed in the view, and with what a diagnosis named."""
 Arrows = tuple[Floats, Floats]
 """Places (n, 3) m and what is drawn there (n, 3) m."""
+
+RESULT, CORRECTED = "diagnosis.json", "machine.yaml"
+"""Files of the folder that ``stiffmap diagnose -o`` wrote."""
+
+
+@dataclass(frozen=True)
+class Named:
+    """An effect on its element; `legs` is empty where the element is in none."""
+
+    kind: str
+    element: str
+    legs: tuple[str, ...]
+    text: str
+
+    def links(self, machine: Machine) -> list[int]:
+        """Which links of a drawing are lit for it."""
+        return element_links(machine, self.element, self.legs)
+
+
+@dataclass(frozen=True, eq=False)
+class Findings:
+    """A verdict, the effects that it names, and the machine with them."""
+
+    verdict: str
+    effects: tuple[Named, ...]
+    machine: Machine
+
+
+def findings(diagnosis: Any) -> Findings:
+    """Of a `Diagnosis`, or of the folder of one (or its ``diagnosis.json``); FileError where that cannot be read."""
+    if isinstance(diagnosis, str | PathLike):
+        return _from_folder(Path(diagnosis))
+    return Findings(diagnosis.verdict, tuple(map(_named, diagnosis.as_plain()["effects"])), diagnosis.machine)
+
+
+def _from_folder(given: Path) -> Findings:
+    file = given / RESULT if given.is_dir() else given
+    try:
+        data = json.loads(file.read_text(encoding="utf-8"))
+        verdict, effects = str(data["verdict"]), tuple(map(_named, data["effects"]))
+    except OSError as problem:
+        message = f"{problem.strerror}; expected the folder that stiffmap diagnose -o wrote"
+        raise FileError(message, file=str(file)) from None
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        raise FileError(f"expected the {RESULT} that stiffmap diagnose -o wrote", file=str(file)) from None
+    return Findings(verdict, effects, load_machine(file.with_name(CORRECTED)))
+
+
+def _named(e: Any) -> Named:
+    legs = tuple(map(str, e["legs"]))
+    where = f", leg{'s' if len(legs) > 1 else ''} {', '.join(legs)}" if legs else ""
+    values = ", ".join(
+        f"{name} {v[0]:.4g} [{v[1]:.4g}, {v[2]:.4g}] {v[3]}" for name, v in e["parameters"].items()
+    )
+    others = len(e["aliases"])
+    more = f" (or {others} other place{'s' if others > 1 else ''})" if others else ""
+    return Named(
+        str(e["kind"]), str(e["element"]), legs, f"{e['kind']} of {e['element']}{where}: {values}{more}"
+    )
 
 
 class Data:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,10 +16,13 @@ from stiffmap.solve.machine import Machine
 from stiffmap.solve.solution import Solution
 from stiffmap.ui.plot.loaded import SHOWN, round_factor
 from stiffmap.ui.plot.skeleton import Skeleton, skeleton, standing
-from stiffmap.ui.view.place import box_of, orientation, solved
-from stiffmap.ui.view.plane import FINE, PlaneMap, plane_map
+from stiffmap.ui.view.place import box_of, moves, orientation, solved
+from stiffmap.ui.view.plane import FINE, PlaneMap, plane_map, values_at
+from stiffmap.ui.view.quantities import QUANTITIES
 from stiffmap.ui.view.state import State
 
+CLOUD = 15
+"""Poses of the cloud along each commanded axis."""
 BRANCHES_TRIED, ALIKE = 96, 1e-4
 """Starts of the search for assembly modes; rad or m by which two of them differ."""
 
@@ -37,6 +41,24 @@ class Moment:
     def plane(self, count: int = FINE) -> PlaneMap:
         """The plane through the tool."""
         return plane_map(self.machine, self.state, count)
+
+    def at(self, point: Sequence[float]) -> tuple[float, Status]:
+        """Value (SI) of the quantity with the tool at a point (3,) m, solved there, and the status."""
+        value, status = values_at(self.machine, self.state, np.array(point, dtype=float))
+        return float(value), Status(int(status))
+
+    def cloud(self) -> tuple[Floats, Floats]:
+        """The quantity over the whole box: points (n, 3) m, values (n,) in the unit of the screen; none where it needs modes."""
+        quantity, at = QUANTITIES[self.state.quantity], self.state.position
+        if quantity.of is None:
+            return np.zeros((0, 3)), np.zeros(0)
+        low, high = self.box()
+        axes = [
+            np.linspace(low[i], high[i], CLOUD) if free else np.array([at[i]])
+            for i, free in enumerate(moves(self.machine))
+        ]
+        points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+        return points, values_at(self.machine, self.state, points)[0] * quantity.factor
 
     def rest(self) -> Skeleton:
         """The machine at its pose, springs at rest."""

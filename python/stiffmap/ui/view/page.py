@@ -11,7 +11,6 @@ from stiffmap.common.number_text import vector_text
 from stiffmap.common.outputs import write_text
 from stiffmap.ui.view.data import Data
 from stiffmap.ui.view.moment import Moment
-from stiffmap.ui.view.optional import need_viser
 from stiffmap.ui.view.panels import (
     colour_bar,
     compliance_panel,
@@ -20,7 +19,7 @@ from stiffmap.ui.view.panels import (
     status_line,
 )
 from stiffmap.ui.view.scene import Scene, look_at_machine
-from stiffmap.ui.view.serving import HERE, silent
+from stiffmap.ui.view.serving import HERE, need_viser, silent
 
 BOX = (
     "position:fixed;z-index:1000;background:rgba(255,255,255,.92);color:#111;font:13px system-ui,sans-serif;"

@@ -19,7 +19,6 @@ from stiffmap.ui.plot.loaded import draw_budget
 from stiffmap.ui.plot.scene import draw_box, draw_force, draw_skeleton, finish
 from stiffmap.ui.plot.style import COLOURS, MM, ORANGE, TOLERANCE, headline, leg_colours, paper
 from stiffmap.ui.view.colours import plane_image
-from stiffmap.ui.view.isolines import isolines, tolerance_lines
 from stiffmap.ui.view.moment import Moment
 from stiffmap.ui.view.plane import PlaneMap
 from stiffmap.ui.view.quantities import QUANTITIES
@@ -41,8 +40,8 @@ def view_figure(moment: Moment) -> Figure:
         ax: Any = figure.add_subplot(1, 2, 1, projection="3d")
         draw_box(ax, *moment.box())
         _plane(ax, found, limits)
-        _lines(ax, isolines(found, limits), "white", 0.5)
-        _lines(ax, tolerance_lines(found, s.tolerance), TOLERANCE, 1.5)
+        _lines(ax, found.isolines(limits), "white", 0.5)
+        _lines(ax, found.tolerance_lines(s.tolerance), TOLERANCE, 1.5)
         draw_skeleton(ax, rest, leg_colours(moment.machine.legs))
         loaded, factor = moment.loaded(solution), moment.magnification(rest, solution)
         if loaded is not None and factor:

@@ -34,7 +34,6 @@ class Quantity:
     """None: needs the modes of the machine, many times dearer than a solution."""
     stiffness: bool = False
     """Whether the compliance is needed."""
-    low_is_bad: bool = False
 
 
 def deflection(s: Solution, load: Load) -> Floats:
@@ -95,15 +94,21 @@ QUANTITIES: dict[str, Quantity] = {
         "worst deflection by a force of this size", "µm", 1e6, worst_deflection, stiffness=True
     ),
     "stiffness": Quantity(
-        "stiffness of the softest direction", "N/µm", 1e-6, weakest_stiffness, stiffness=True, low_is_bad=True
+        "stiffness of the softest direction", "N/µm", 1e-6, weakest_stiffness, stiffness=True
     ),
-    "margin": Quantity("margin to the tolerance", "µm", 1e6, margin, low_is_bad=True),
+    "margin": Quantity("margin to the tolerance", "µm", 1e6, margin),
     "status": Quantity("status", "", 1.0, status),
-    "frequency": Quantity("lowest natural frequency", "Hz", 1.0, None, low_is_bad=True),
-    "dynamic": Quantity(
-        "dynamic stiffness of the softest direction", "N/µm", 1e-6, None, stiffness=True, low_is_bad=True
-    ),
+    "frequency": Quantity("lowest natural frequency", "Hz", 1.0, None),
+    "dynamic": Quantity("dynamic stiffness of the softest direction", "N/µm", 1e-6, None, stiffness=True),
 }
 """By the word that names it in a state."""
+
+
+def tolerance_level(quantity: str, tolerance: float) -> float | None:
+    """The value on the screen at which the tolerance is met; None where it has no meaning."""
+    if quantity in ("deflection", "worst"):
+        return tolerance * QUANTITIES[quantity].factor
+    return 0.0 if quantity == "margin" else None
+
 
 Mask = NDArray[np.bool_]

@@ -15,10 +15,9 @@ from stiffmap.ui.plot.scene import ARROW, FORCE, box_edges
 from stiffmap.ui.plot.skeleton import Skeleton
 from stiffmap.ui.plot.style import BLACK, ORANGE, SKY, TOLERANCE, leg_colours
 from stiffmap.ui.view.colours import plane_image
-from stiffmap.ui.view.isolines import isolines, tolerance_lines
 from stiffmap.ui.view.moment import Moment
 from stiffmap.ui.view.place import moves, rotation_of, turns
-from stiffmap.ui.view.plane import PlaneMap
+from stiffmap.ui.view.plane import NO_LINES, PlaneMap
 from stiffmap.ui.view.surfaces import ellipsoid, polar_surface, sphere
 
 SURFACE = 0.12
@@ -128,11 +127,11 @@ class Scene:
             if self._plate is None:
                 self._plate = self.mesh("/platform", middle, fan, DARK)
             self._plate.vertices = np.asarray(middle, np.float32)
-        moved = NOTHING[:0] if loaded is None or factor == 0 else rest.enlarged(loaded, factor).links
+        moved = NO_LINES if loaded is None or factor == 0 else rest.enlarged(loaded, factor).links
         self.lines("/ghost", moved, GHOST, 0.004 * self.extent)
-        named = rest.links[self.diagnosed] if self.diagnosed else NOTHING[:0]
+        named = rest.links[self.diagnosed] if self.diagnosed else NO_LINES
         self.lines("/diagnosis/element", named, DIAGNOSED, 0.025 * self.extent)
-        self.lines("/lit", rest.links[self.lit] if self.lit else NOTHING[:0], LIT, 0.03 * self.extent)
+        self.lines("/lit", rest.links[self.lit] if self.lit else NO_LINES, LIT, 0.03 * self.extent)
 
     def tool(self, moment: Moment) -> None:
         """The gizmo at the tool of the state."""
@@ -179,13 +178,11 @@ class Scene:
         self._image.position = tuple(f.centre)
         self._image.wxyz = quaternion(np.stack([f.u, f.v, f.normal], axis=1))
         self._image.visible = True
-        flat = isolines(found, limits) if lines else NOTHING[:0]
-        lift = 5e-4 * self.extent * f.normal
-        both = np.concatenate([flat + lift, flat - lift]) if len(flat) else flat
-        self.lines("/isolines", both, "#FFFFFF", 1.2, "screen")
-        edge = tolerance_lines(found, tolerance)
-        both = np.concatenate([edge + lift, edge - lift]) if len(edge) else edge
-        self.lines("/tolerance", both, TOLERANCE, 3.5, "screen")
+        lift = 5e-4 * self.extent * f.normal  # to both sides of the plane
+        flat = found.isolines(limits) if lines else NO_LINES
+        self.lines("/isolines", np.concatenate([flat + lift, flat - lift]), "#FFFFFF", 1.2, "screen")
+        edge = found.tolerance_lines(tolerance)
+        self.lines("/tolerance", np.concatenate([edge + lift, edge - lift]), TOLERANCE, 3.5, "screen")
 
     def no_plane(self) -> None:
         """Hide the map."""

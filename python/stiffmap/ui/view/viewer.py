@@ -13,7 +13,6 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.solution import Solution
 from stiffmap.ui.plot.elements import element_links
 from stiffmap.ui.view.animation import Swing
-from stiffmap.ui.view.box_cloud import box_cloud
 from stiffmap.ui.view.colours import colours_of
 from stiffmap.ui.view.controls import Controls
 from stiffmap.ui.view.data import Data
@@ -139,11 +138,9 @@ class Viewer:
 
     def probe_along(self, origin: Any, direction: Any) -> None:
         """Solve where a ray meets the plane."""
-        from stiffmap.ui.view.probe import under_ray
-
         if self._plane is None:
             return
-        point = under_ray(self._plane.frame, origin, direction)
+        point = self._plane.frame.under_ray(origin, direction)
         if point is not None:
             self.probe_at(point)
 
@@ -267,7 +264,7 @@ class Viewer:
         if key == self._cloud_key:
             return
         self._cloud_key = key
-        points, values = box_cloud(moment) if self.controls.cloud else (np.zeros((0, 3)), np.zeros(0))
+        points, values = moment.cloud() if self.controls.cloud else (np.zeros((0, 3)), np.zeros(0))
         limits = self._held or (0.0, 1.0)
         self.scene.cloud(points, colours_of(values, *limits))
 
