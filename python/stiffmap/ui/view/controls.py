@@ -47,7 +47,6 @@ class Controls:
             self._numbers(gui, moment)
         with tabs.add_tab("Out"):
             self.outputs = Outputs(viewer, gui)
-        self._shown: dict[int, Any] = {}
         self.map_on, self.hold, self.isolines, self.cloud = True, False, True, False
         self.surface, self.lit = NONE, ""
 

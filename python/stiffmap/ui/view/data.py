@@ -20,15 +20,16 @@ from stiffmap.solve.machine import Machine, load_machine
 from stiffmap.ui.plot.elements import element_links
 from stiffmap.ui.plot.loaded import round_factor
 from stiffmap.ui.plot.style import BLUE, GREEN, VERMILLION
+from stiffmap.ui.view.colours import rgb
 from stiffmap.ui.view.moment import Moment
 from stiffmap.ui.view.place import solved
-from stiffmap.ui.view.scene import Scene
+from stiffmap.ui.view.scene import DIAGNOSED, Scene
 
 DRAWN = 0.06
 """Of the machine's extent, the longest arrow and the widest ribbon."""
 MOST_POINTS = 400
 """Of a path that are solved."""
-BEFORE, NOW, NAMED = VERMILLION, BLUE, "#E8279B"
+BEFORE, NOW, NAMED = VERMILLION, BLUE, DIAGNOSED
 """Residuals of the machine as opened, with what was changed in the view, and with what a diagnosis named."""
 Arrows = tuple[Floats, Floats]
 """Places (n, 3) m and what is drawn there (n, 3) m."""
@@ -156,7 +157,7 @@ class Data:
             words.append(f"{said} {which} {1e6 * rms(arrows):.3g} µm rms")
         text = f"{len(places)} rows, residuals (measured less predicted) × {factor:g}: {', '.join(words)}"
         self._said["Experiment"] = f"{escape(e.name)}, {text}"
-        scene.points("/rows/places", places, "#444444")
+        scene.points("/rows/places", places, rgb("#444444"), 0.005)
 
     def _effects(self, scene: Scene, moment: Moment, found: Findings) -> None:
         scene.diagnosed = list(dict.fromkeys(i for e in found.effects for i in e.links(moment.machine)))

@@ -17,7 +17,7 @@ from stiffmap.solve.solution import Solution
 from stiffmap.ui.plot.loaded import SHOWN, round_factor
 from stiffmap.ui.plot.skeleton import Skeleton, skeleton, standing
 from stiffmap.ui.view.place import box_of, moves, orientation, solved
-from stiffmap.ui.view.plane import FINE, PlaneMap, plane_map, values_at
+from stiffmap.ui.view.plane import FINE, NO_LINES, PlaneMap, plane_map, values_at
 from stiffmap.ui.view.quantities import QUANTITIES
 from stiffmap.ui.view.state import State
 
@@ -52,7 +52,7 @@ class Moment:
         quantity, at = QUANTITIES[self.state.quantity], self.state.position
         if quantity.of is None:
             return np.zeros((0, 3)), np.zeros(0)
-        low, high = self.box()
+        low, high = box_of(self.machine)
         axes = [
             np.linspace(low[i], high[i], CLOUD) if free else np.array([at[i]])
             for i, free in enumerate(moves(self.machine))
@@ -65,9 +65,12 @@ class Moment:
         s = self.state
         return standing(self.machine, s.position, orientation(s), start=s.start_array)
 
-    def loaded(self, solution: Solution) -> Skeleton | None:
-        """The machine under the load; None where there is no equilibrium."""
-        return skeleton(self.machine, solution.coordinates) if bool(solution.ok) else None
+    def ghost(self, rest: Skeleton, solution: Solution) -> Floats:
+        """(n, 2, 3) m, links of the machine under the load, its deflection magnified; none without an equilibrium."""
+        factor = self.magnification(rest, solution)
+        if not bool(solution.ok) or factor == 0:
+            return NO_LINES
+        return rest.enlarged(skeleton(self.machine, solution.coordinates), factor).links
 
     def magnification(self, rest: Skeleton, solution: Solution) -> float:
         """Of the deflected machine: as the state says, else a round factor."""
@@ -104,10 +107,6 @@ class Moment:
             if all(o > ALIKE for o in off):
                 found.append(x)
         return [tuple(map(float, x)) for x in found]
-
-    def box(self) -> tuple[Floats, Floats]:
-        """Lowest and highest corner, m."""
-        return box_of(self.machine)
 
 
 def _difference(a: Floats, b: Floats, angular: Floats) -> float:

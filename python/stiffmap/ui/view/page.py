@@ -55,12 +55,12 @@ def draw(server: object, moment: Moment, data: Data | None = None) -> str:
     scene.gizmo.visible = scene.force_handle.visible = False
     solution, rest, found = moment.solve(), moment.rest(), moment.plane()
     factor = moment.magnification(rest, solution)
-    scene.machine(moment, rest, moment.loaded(solution), factor)
+    scene.machine(rest, moment.ghost(rest, solution))
     scene.force(moment)
     scene.plane(found, found.range, moment.state.tolerance, True)
     if data is not None:
         data(scene, moment)
-        scene.machine(moment, rest, moment.loaded(solution), factor)
+        scene.lights()
     look_at_machine(server, rest, scene.extent)
     try:
         shares = shares_panel(moment.shares())

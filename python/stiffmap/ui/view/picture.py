@@ -20,6 +20,7 @@ from stiffmap.ui.plot.scene import draw_box, draw_force, draw_skeleton, finish
 from stiffmap.ui.plot.style import COLOURS, MM, ORANGE, TOLERANCE, headline, leg_colours, paper
 from stiffmap.ui.view.colours import plane_image
 from stiffmap.ui.view.moment import Moment
+from stiffmap.ui.view.place import box_of
 from stiffmap.ui.view.plane import PlaneMap
 from stiffmap.ui.view.quantities import QUANTITIES
 
@@ -38,14 +39,12 @@ def view_figure(moment: Moment) -> Figure:
     q, limits, s = QUANTITIES[moment.state.quantity], found.range, moment.state
     with paper(9.6, 5.2, most=0) as figure:
         ax: Any = figure.add_subplot(1, 2, 1, projection="3d")
-        draw_box(ax, *moment.box())
+        draw_box(ax, *box_of(moment.machine))
         _plane(ax, found, limits)
         _lines(ax, found.isolines(limits), "white", 0.5)
         _lines(ax, found.tolerance_lines(s.tolerance), TOLERANCE, 1.5)
         draw_skeleton(ax, rest, leg_colours(moment.machine.legs))
-        loaded, factor = moment.loaded(solution), moment.magnification(rest, solution)
-        if loaded is not None and factor:
-            _lines(ax, rest.enlarged(loaded, factor).links, ORANGE, 1.0)
+        _lines(ax, moment.ghost(rest, solution), ORANGE, 1.0)
         draw_force(ax, rest.tcp, np.array(s.force), rest.extent)
         finish(ax, (22, -50))
         if s.quantity != "status":
@@ -55,7 +54,7 @@ def view_figure(moment: Moment) -> Figure:
         at = ", ".join(f"{MM * v:.4g}" for v in s.position)
         moved = length_text(float(np.linalg.norm(solution.displacement[:3])))
         headline(figure, f"{moment.machine.name} at ({at}) mm under {vector_text(s.force, 4)} N: the tool moves {moved} "
-                         f"(orange: × {factor:g})")  # fmt: skip
+                         f"(orange: × {moment.magnification(rest, solution):g})")  # fmt: skip
     return figure
 
 

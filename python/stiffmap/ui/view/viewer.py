@@ -168,12 +168,11 @@ class Viewer:
         moment = self.now()
         s = moment.solve()
         rest = moment.rest()
-        loaded = moment.loaded(s)
+        ghost = moment.ghost(rest, s)
         self._solution = s
         found = self._map(moment, self._count())
         with self.server.atomic():
-            factor = moment.magnification(rest, s)
-            self.scene.machine(moment, rest, loaded, factor)
+            self.scene.machine(rest, ghost)
             self.scene.force(moment, self.pulling)
             if not self.dragging:
                 self.scene.tool(moment)
@@ -252,10 +251,7 @@ class Viewer:
             parts.insert(0, self._data.html)
         self.scene.lit = element_links(moment.machine, lit) if lit else []
         self.controls.why("".join(parts), self.scene.surface(moment, s, self.controls.surface))
-        if self._solution is s:
-            self.scene.machine(
-                moment, self.scene.rest, moment.loaded(s), moment.magnification(self.scene.rest, s)
-            )
+        self.scene.lights()
 
     def cloud(self) -> None:
         """The quantity over the whole box."""
@@ -266,7 +262,7 @@ class Viewer:
         self._cloud_key = key
         points, values = moment.cloud() if self.controls.cloud else (np.zeros((0, 3)), np.zeros(0))
         limits = self._held or (0.0, 1.0)
-        self.scene.cloud(points, colours_of(values, *limits))
+        self.scene.points("/cloud", points, colours_of(values, *limits), 0.012)
 
     def data_again(self) -> Data | None:
         """The same data for another scene, such as that of a page."""
