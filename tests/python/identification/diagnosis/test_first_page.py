@@ -14,10 +14,9 @@ from stiffmap.identification.diagnosis import Diagnosis
 from stiffmap.model.description import AppliedEffect
 from stiffmap.solve.kinematics import inverse_kinematics
 from stiffmap.ui.report.diagnosis.page import html
-from stiffmap.ui.report.diagnosis.pictures import figures
+from stiffmap.ui.report.diagnosis.pictures import figures, vectors
 from stiffmap.ui.report.diagnosis.place import lit
 from stiffmap.ui.report.diagnosis.trends import drivers_of, trending
-from stiffmap.ui.report.diagnosis.vectors import vectors
 
 RECORD = (
     ("operator", "M. Weber"),

@@ -9,9 +9,8 @@ import pytest
 from PIL import Image
 
 import stiffmap as sm
-from stiffmap.ui.plot.along_paths import path_measures_figure
 from stiffmap.ui.plot.box import box_figure
-from stiffmap.ui.plot.measures import caption, measure_figures
+from stiffmap.ui.plot.measures import caption, measure_figures, path_measures_figure
 from stiffmap.ui.plot.modes import mode_frames
 from stiffmap.ui.report.pictures import animation, inline
 from stiffmap.workspace.design import load_design
