@@ -15,10 +15,9 @@ from numpy.typing import ArrayLike
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.machine import Machine
-from stiffmap.ui.plot.box import box_figure
+from stiffmap.ui.plot.box import box_figure, workspace_figure
 from stiffmap.ui.plot.modes import mode_figure, mode_frames
 from stiffmap.ui.plot.style import BLACK, BLUE, COLOURS, MM, SKY, VERMILLION, headline, line_look, paper
-from stiffmap.ui.plot.workspace import workspace_figure
 from stiffmap.workspace.performance.box.box import LargestBox
 from stiffmap.workspace.performance.box.workspace import Workspace
 from stiffmap.workspace.performance.motion.trajectory import way_along

@@ -11,8 +11,8 @@ from stiffmap.common.number_text import length_text, length_unit, percents
 from stiffmap.solve.budget import DeflectionBudget
 from stiffmap.solve.solution import Solution
 from stiffmap.solve.status import Status
-from stiffmap.ui.plot.isolines import levels
 from stiffmap.ui.plot.loaded import budget_rows
+from stiffmap.ui.plot.planes import levels
 from stiffmap.ui.plot.style import BLUE, ORANGE, TOLERANCE
 from stiffmap.ui.view.colours import STATUS_COLOURS, table
 from stiffmap.ui.view.moment import Moment

@@ -12,7 +12,7 @@ from contourpy import contour_generator
 from stiffmap.common.broadcasting import Floats
 from stiffmap.solve.compiled import Status
 from stiffmap.solve.machine import Machine
-from stiffmap.ui.plot.isolines import levels
+from stiffmap.ui.plot.planes import levels
 from stiffmap.ui.view.dynamics import dynamic_stiffness, lowest_frequency
 from stiffmap.ui.view.place import drawn_box, solved
 from stiffmap.ui.view.quantities import QUANTITIES, Load, Mask, tolerance_level

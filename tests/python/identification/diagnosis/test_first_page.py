@@ -13,10 +13,10 @@ from stiffmap.experiment import random_plan, simulate
 from stiffmap.identification.diagnosis import Diagnosis
 from stiffmap.model.description import AppliedEffect
 from stiffmap.solve.kinematics import inverse_kinematics
+from stiffmap.ui.plot.experiment import drivers_of, trending
 from stiffmap.ui.report.diagnosis.page import html
 from stiffmap.ui.report.diagnosis.pictures import figures, vectors
 from stiffmap.ui.report.diagnosis.place import lit
-from stiffmap.ui.report.diagnosis.trends import drivers_of, trending
 
 RECORD = (
     ("operator", "M. Weber"),

@@ -9,7 +9,7 @@ import pytest
 
 import stiffmap as sm
 from stiffmap.solve.status import Status
-from stiffmap.ui.plot.isolines import levels
+from stiffmap.ui.plot.planes import levels
 from stiffmap.ui.view.colours import DARK, GREY, colours_of, plane_image, table
 from stiffmap.ui.view.dynamics import dynamic_stiffness
 from stiffmap.ui.view.model import Model

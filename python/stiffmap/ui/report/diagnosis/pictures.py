@@ -14,11 +14,10 @@ from stiffmap.experiment.experiment import WRENCH, Floats
 from stiffmap.identification.diagnosis.report.findings import Findings
 from stiffmap.identification.diagnosis.report.wording import noise_size
 from stiffmap.solve.machine import Machine
-from stiffmap.ui.plot.experiment import arrow_figure, kept, pose_means, vector_cases
+from stiffmap.ui.plot.experiment import arrow_figure, kept, pose_means, trending, trends, vector_cases
 from stiffmap.ui.plot.loaded import loaded_figure
 from stiffmap.ui.plot.style import AFTER, BEFORE, MM, UM, new_figure
 from stiffmap.ui.report.diagnosis.place import place_figure
-from stiffmap.ui.report.diagnosis.trends import trending, trends
 
 CAPTIONS = {
     "residual_vectors": "Mean residual (reading less prediction) of each pose as arrows, with the machine of your file and "
