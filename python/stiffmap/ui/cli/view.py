@@ -173,11 +173,12 @@ def _change(text: str) -> tuple[str, float]:
 
 
 def _write(model: Any, data: Any, html: Path | None, picture: Path | None, as_json: bool) -> None:
+    from stiffmap.ui.plot import save
     from stiffmap.ui.view.page import write_page
-    from stiffmap.ui.view.picture import write_view_picture
+    from stiffmap.ui.view.picture import view_figure
 
     files = [] if html is None else [write_page(model.moment, html, data)]
-    files += [] if picture is None else [write_view_picture(model.moment, picture)]
+    files += [] if picture is None else [save(view_figure(model.moment), picture)]
     show(as_json, {"machine": model.declared.name}, [], files)
 
 

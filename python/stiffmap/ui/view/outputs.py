@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from stiffmap.ui.plot import save
 from stiffmap.ui.view.moment import Moment
 from stiffmap.ui.view.page import page_of
-from stiffmap.ui.view.picture import write_view_picture
+from stiffmap.ui.view.picture import view_figure
 from stiffmap.ui.view.state import State, as_plain, permalink
 
 
@@ -56,9 +57,7 @@ class Outputs:
 
 def _picture(moment: Moment, kind: str) -> bytes:
     with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / f"view.{kind}"
-        write_view_picture(moment, file)
-        return file.read_bytes()
+        return save(view_figure(moment), Path(folder) / f"view.{kind}").read_bytes()
 
 
 def command_line(machine: str, moment: Moment) -> str:

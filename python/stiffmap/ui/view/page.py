@@ -61,7 +61,7 @@ def draw(server: object, moment: Moment, data: Data | None = None) -> str:
     if data is not None:
         data(scene, moment)
         scene.lights()
-    look_at_machine(server, rest, scene.extent)
+    look_at_machine(server, rest)
     try:
         shares = shares_panel(moment.shares())
     except StiffmapError:

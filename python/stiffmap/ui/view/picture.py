@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from os import PathLike
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,7 +12,6 @@ from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import length_text, vector_text
-from stiffmap.ui.plot import save
 from stiffmap.ui.plot.loaded import draw_budget
 from stiffmap.ui.plot.scene import draw_box, draw_force, draw_skeleton, finish
 from stiffmap.ui.plot.style import COLOURS, MM, ORANGE, TOLERANCE, headline, leg_colours, paper
@@ -26,11 +23,6 @@ from stiffmap.ui.view.quantities import QUANTITIES
 
 SHOWN = 51
 """Poses along each edge of the plane in a picture."""
-
-
-def write_view_picture(moment: Moment, path: str | PathLike[str]) -> Path:
-    """PNG, SVG or PDF by the name of the file; raises FileError, StiffmapError for another format."""
-    return save(view_figure(moment), path)
 
 
 def view_figure(moment: Moment) -> Figure:

@@ -13,6 +13,7 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.solve.compiled import Status
 from stiffmap.solve.machine import Machine
 from stiffmap.ui.plot.planes import levels
+from stiffmap.ui.plot.scene import box_corners
 from stiffmap.ui.view.dynamics import dynamic_stiffness, lowest_frequency
 from stiffmap.ui.view.place import drawn_box, solved
 from stiffmap.ui.view.quantities import QUANTITIES, Load, Mask, tolerance_level
@@ -72,7 +73,7 @@ def plane_frame(machine: Machine, state: State) -> Frame:
         u = np.cross(other, n)
         u /= np.linalg.norm(u)
         v = np.cross(n, u)
-        corners = np.array([[(low, high)[c >> i & 1][i] for i in range(3)] for c in range(8)]) - p
+        corners = box_corners(low, high) - p
         along = np.stack([corners @ u, corners @ v])
         lowest, highest = along.min(axis=1), along.max(axis=1)
         middle = (lowest + highest) / 2
@@ -153,19 +154,17 @@ class PlaneMap:
         return NO_LINES if level is None else self.lines_at(level)
 
 
-def values_at(
-    machine: Machine, state: State, position: Floats, threads: int | None = None
-) -> tuple[Floats, Floats]:
+def values_at(machine: Machine, state: State, position: Floats) -> tuple[Floats, Floats]:
     """(...) of the state's quantity with the tool at (..., 3) m, SI, and statuses."""
     quantity = QUANTITIES[state.quantity]
     if quantity.of is None:
         make = lowest_frequency if state.quantity == "frequency" else dynamic_stiffness
-        return make(machine, state, position, threads)
-    s = solved(machine, state, position, stiffness=quantity.stiffness, threads=threads)
+        return make(machine, state, position)
+    s = solved(machine, state, position, stiffness=quantity.stiffness)
     return quantity.of(s, Load(np.array(state.force), state.tolerance)), np.asarray(s.status, dtype=float)
 
 
-def plane_map(machine: Machine, state: State, count: int = FINE, *, threads: int | None = None) -> PlaneMap:
+def plane_map(machine: Machine, state: State, count: int = FINE) -> PlaneMap:
     """Solve the poses of the plane; outside the box they are solved as well and hidden."""
     begun = time.perf_counter()
     frame = plane_frame(machine, state)
@@ -175,6 +174,6 @@ def plane_map(machine: Machine, state: State, count: int = FINE, *, threads: int
     low, high = drawn_box(machine)
     slack = INSIDE * (high - low)
     outside = np.asarray(((p < low - slack) | (p > high + slack)).any(axis=-1))
-    values, status = values_at(machine, state, p, threads)
+    values, status = values_at(machine, state, p)
     values = np.where(outside, np.nan, values)
     return PlaneMap(frame, state.quantity, values, status, outside, time.perf_counter() - begun)

@@ -221,7 +221,7 @@ def _active(moment: Moment) -> tuple[bool, bool, bool]:
     return free if any(free) else (True, True, True)
 
 
-def look_at_machine(server: Any, rest: Skeleton, extent: float) -> None:
+def look_at_machine(server: Any, rest: Skeleton) -> None:
     """The first look: from the front right, from above where all lies in a plane of constant height."""
     points = np.vstack(
         [rest.links.reshape(-1, 3), rest.tcp]
@@ -229,5 +229,5 @@ def look_at_machine(server: Any, rest: Skeleton, extent: float) -> None:
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
     direction = np.array([0.02, -0.05, 1.0] if rest.is_flat else [0.75, -0.9, 0.6])
     server.initial_camera.look_at = tuple(middle)
-    server.initial_camera.position = tuple(middle + 0.8 * extent * direction / np.linalg.norm(direction))
+    server.initial_camera.position = tuple(middle + 0.8 * rest.extent * direction / np.linalg.norm(direction))
     server.initial_camera.up = (0.0, 0.0, 1.0)

@@ -74,7 +74,7 @@ class Viewer:
 
         if data is not None:
             data(self.scene, model.moment)
-        look_at_machine(server, self.scene.rest, self.scene.extent)
+        look_at_machine(server, self.scene.rest)
         self.worker.ask()
 
     # -- what hands do ------------------------------------------------------------------------------------------
