@@ -174,8 +174,7 @@ def _change(text: str) -> tuple[str, float]:
 
 def _write(model: Any, data: Any, html: Path | None, picture: Path | None, as_json: bool) -> None:
     from stiffmap.ui.plot import save
-    from stiffmap.ui.view.page import write_page
-    from stiffmap.ui.view.picture import view_figure
+    from stiffmap.ui.view.outputs import view_figure, write_page
 
     files = [] if html is None else [write_page(model.moment, html, data)]
     files += [] if picture is None else [save(view_figure(model.moment), picture)]

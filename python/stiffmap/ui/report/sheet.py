@@ -1,25 +1,29 @@
-"""What pages are made of: the jinja2 templates next to this file, where a report comes from; and the report of one table:
+"""What pages are made of: the jinja2 templates next to this file, pictures, where a report comes from; and the report of one table:
 the answer, its numbers, its pictures; one file, nothing from the network."""
 
 from __future__ import annotations
 
+import base64
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
+from io import BytesIO
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from matplotlib.figure import Figure
+from PIL import Image
 
 from stiffmap.common.fingerprints import file_digest
 from stiffmap.common.outputs import write_text
 from stiffmap.common.version import __version__
-from stiffmap.ui.report.pictures import inline
 
 SHOWN = 16
 """Digits of a digest that are printed."""
+PAUSE = 70
+"""ms between two frames."""
 
 
 def provenance(
@@ -59,6 +63,31 @@ def _environment() -> Environment:
 def render(template: str, /, **values: Any) -> str:
     """A template filled in; values are escaped."""
     return _environment().get_template(template).render(**values)
+
+
+def inline(picture: Figure | bytes) -> str:
+    """PNG of a figure, or a GIF, as a data address."""
+    kind, data = ("gif", picture) if isinstance(picture, bytes) else ("png", _png(picture, 110))
+    return f"data:image/{kind};base64," + base64.b64encode(data).decode()
+
+
+def animation(frames: Iterable[Figure], dpi: int = 80) -> bytes:
+    """GIF that repeats; each frame is drawn before the next one is asked for."""
+    images = [
+        Image.open(BytesIO(_png(figure, dpi))).convert("P", palette=Image.Palette.ADAPTIVE)
+        for figure in frames
+    ]
+    buffer = BytesIO()
+    images[0].save(
+        buffer, format="GIF", save_all=True, append_images=images[1:], duration=PAUSE, loop=0, optimize=True
+    )
+    return buffer.getvalue()
+
+
+def _png(figure: Figure, dpi: int) -> bytes:
+    buffer = BytesIO()
+    figure.savefig(buffer, format="png", dpi=dpi)
+    return buffer.getvalue()
 
 
 @dataclass(frozen=True)

@@ -144,7 +144,7 @@ class Data:
             return
         factor = round_factor(DRAWN * scene.extent, float(np.linalg.norm(before[1], axis=1).max()))
         sets = [("before", BEFORE, "red", "as opened", before)]
-        sets += [] if same(now, before) else [("now", NOW, "blue", "as changed here", now)]
+        sets += [] if np.array_equal(now, before) else [("now", NOW, "blue", "as changed here", now)]
         sets += (
             [] if self._named is None else [("diagnosed", NAMED, "pink", "with the diagnosis", self._named)]
         )
@@ -188,11 +188,6 @@ class Data:
             f"errors × {factor:g}: wanted green, as cut red (most {off[0]:.3g} µm), "
             f"compensated by one mirror step blue (most {off[1]:.3g} µm){more}"
         )
-
-
-def same(a: Arrows, b: Arrows) -> bool:
-    """Whether two sets of arrows are equal."""
-    return np.array_equal(a[0], b[0]) and np.array_equal(a[1], b[1])
 
 
 def rms(arrows: Floats) -> float:

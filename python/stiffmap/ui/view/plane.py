@@ -16,7 +16,7 @@ from stiffmap.ui.plot.planes import levels
 from stiffmap.ui.plot.scene import box_corners
 from stiffmap.ui.view.dynamics import dynamic_stiffness, lowest_frequency
 from stiffmap.ui.view.place import drawn_box, solved
-from stiffmap.ui.view.quantities import QUANTITIES, Load, Mask, tolerance_level
+from stiffmap.ui.view.quantities import QUANTITIES, Mask, tolerance_level
 from stiffmap.ui.view.state import State
 
 FINE, COARSE, DEAR = 101, 51, 15
@@ -161,7 +161,8 @@ def values_at(machine: Machine, state: State, position: Floats) -> tuple[Floats,
         make = lowest_frequency if state.quantity == "frequency" else dynamic_stiffness
         return make(machine, state, position)
     s = solved(machine, state, position, stiffness=quantity.stiffness)
-    return quantity.of(s, Load(np.array(state.force), state.tolerance)), np.asarray(s.status, dtype=float)
+    size = float(np.linalg.norm(state.force))
+    return quantity.of(s, size, state.tolerance), np.asarray(s.status, dtype=float)
 
 
 def plane_map(machine: Machine, state: State, count: int = FINE) -> PlaneMap:

@@ -13,16 +13,6 @@ from stiffmap.solve.solution import Solution
 
 
 @dataclass(frozen=True)
-class Load:
-    """What else a quantity depends on."""
-
-    force: Floats
-    """(3,) N."""
-    tolerance: float
-    """m."""
-
-
-@dataclass(frozen=True)
 class Quantity:
     """A name, its unit on the screen, and how it is read off a solution."""
 
@@ -30,34 +20,34 @@ class Quantity:
     unit: str
     factor: float
     """From SI to the unit."""
-    of: Callable[[Solution, Load], Floats] | None
-    """None: needs the modes of the machine, many times dearer than a solution."""
+    of: Callable[[Solution, float, float], Floats] | None
+    """Of a solution, the size of the force (N) and the tolerance (m). None: needs the modes of the machine, many times dearer than a solution."""
     stiffness: bool = False
     """Whether the compliance is needed."""
 
 
-def deflection(s: Solution, load: Load) -> Floats:
+def deflection(s: Solution, force: float, tolerance: float) -> Floats:
     """(...) m, of the tool against its command, under the load and gravity."""
     return np.asarray(np.linalg.norm(s.displacement[..., :3], axis=-1))
 
 
-def worst_deflection(s: Solution, load: Load) -> Floats:
+def worst_deflection(s: Solution, force: float, tolerance: float) -> Floats:
     """(...) m: a further force of this size in its worst direction, to first order at the loaded pose."""
-    return np.asarray(np.linalg.norm(load.force) * greatest(s.compliance[..., :3, :3]))
+    return np.asarray(force * greatest(s.compliance[..., :3, :3]))
 
 
-def weakest_stiffness(s: Solution, load: Load) -> Floats:
+def weakest_stiffness(s: Solution, force: float, tolerance: float) -> Floats:
     """(...) N/m of the softest direction."""
     with np.errstate(divide="ignore"):
         return np.asarray(1.0 / greatest(s.compliance[..., :3, :3]))
 
 
-def margin(s: Solution, load: Load) -> Floats:
+def margin(s: Solution, force: float, tolerance: float) -> Floats:
     """(...) m, of the tolerance that the deflection leaves."""
-    return np.asarray(load.tolerance - deflection(s, load))
+    return np.asarray(tolerance - deflection(s, force, tolerance))
 
 
-def status(s: Solution, load: Load) -> Floats:
+def status(s: Solution, force: float, tolerance: float) -> Floats:
     """(...) `Status` as a number."""
     return np.asarray(s.status, dtype=float)
 

@@ -190,10 +190,10 @@ class Scene:
             return ""
         make = ellipsoid if kind == "ellipsoid" else polar_surface
         around, most = make(c, SURFACE * self.extent)
-        points = np.asarray(around + np.array(moment.state.position), np.float32)
+        points = around + np.array(moment.state.position)
         if self._surface is None:
             self._surface = self.mesh("/surface", points, sphere()[1], SKY, 0.45)
-        self._surface.vertices = points
+        self._surface.vertices = np.asarray(points, np.float32)
         self._surface.visible = True
         return f"longest radius: {1e6 * most:.4g} µm/N"
 

@@ -17,7 +17,7 @@ from stiffmap.ui.plot.elements import element_links
 from stiffmap.ui.plot.skeleton import skeleton
 from stiffmap.ui.view import model_of
 from stiffmap.ui.view.model import Model
-from stiffmap.ui.view.outputs import command_line, python_lines
+from stiffmap.ui.view.outputs import command_line, python_lines, view_figure
 from stiffmap.ui.view.panels import (
     bars,
     colour_bar,
@@ -28,7 +28,6 @@ from stiffmap.ui.view.panels import (
     shares_panel,
     status_line,
 )
-from stiffmap.ui.view.picture import view_figure
 from stiffmap.ui.view.plane import plane_map
 from stiffmap.ui.view.state import State
 
