@@ -5,12 +5,11 @@ never shown as a value. No display is needed.
 """
 
 from stiffmap.ui.plot.error_maps import map_figure
+from stiffmap.ui.plot.forces import ellipse_figure, polar_figure, sweep_figure
 from stiffmap.ui.plot.loaded import loaded_figure, machine_figure
 from stiffmap.ui.plot.paths import mode_figure, path_figure
-from stiffmap.ui.plot.polars import ellipse_figure, polar_figure
 from stiffmap.ui.plot.stresses import stress_figure
 from stiffmap.ui.plot.style import save
-from stiffmap.ui.plot.sweeps import sweep_figure
 
 __all__ = [
     "ellipse_figure",

@@ -12,8 +12,8 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from stiffmap.common.errors import StiffmapError
+from stiffmap.ui.plot.forces import in_words
 from stiffmap.ui.plot.planes import Planes, draw_isolines, draw_tolerance, halo, hatch_failed, on_grid, planes
-from stiffmap.ui.plot.polars import in_words
 from stiffmap.ui.plot.style import BLUE, COLOURS, MM, TOLERANCE, length_unit, panel, paper, wrench_text
 
 TITLES = {
