@@ -82,7 +82,7 @@ def test_arrows_of_planar_readings_stay_in_their_plane_and_on_the_canvas() -> No
 def test_trends_are_shown_where_residuals_follow_a_driver() -> None:
     d = planar()
     shown, others = trending(d)
-    assert {name for name, _ in shown} == {"fx, N", "fy, N"}
+    assert {name for name, *_ in shown} == {"fx, N", "fy, N"}
     assert len(shown) + len(others) == len(drivers_of(d.experiment))
     page = words_of(d)
     assert page.index("Residual of every reading against the conditions on which it depends") < page.index(
