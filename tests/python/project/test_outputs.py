@@ -31,7 +31,7 @@ ELSEWHERE = {
         "mkdir",
     },  # chunks and frame of a map that grows
     "stiffmap.model.link.calculix": {"write_text"},  # a temporary folder, for another program
-    "stiffmap.ui.report.pictures": {"savefig"},  # into memory
+    "stiffmap.ui.report.sheet": {"savefig"},  # into memory
 }
 
 

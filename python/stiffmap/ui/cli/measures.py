@@ -165,7 +165,7 @@ def required(r: Row) -> str:
 def write(table: MeasuresTable, output: Path) -> list[Path]:
     """Table, maps and pictures."""
     from stiffmap.ui.plot.measures import measure_figures, moving_modes
-    from stiffmap.ui.report.pictures import animation
+    from stiffmap.ui.report.sheet import animation
 
     figures = measure_figures(table)
     named = {f"{name}.png": f for name, f in figures.items()}

@@ -91,8 +91,8 @@ def command(
 
 def _files(found: ParetoSet, report: Report) -> Iterator[tuple[str, Any]]:
     """The set and its pictures."""
-    from stiffmap.ui.plot.along_paths import path_measures_figure
     from stiffmap.ui.plot.design import beside_figure, front_figure, parallel_figure, progress_figure
+    from stiffmap.ui.plot.measures import path_measures_figure
 
     yield "pareto.nc", found.dataset
     figures = {"fronts": front_figure, "parallel": parallel_figure, "progress": progress_figure}

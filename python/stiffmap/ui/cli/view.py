@@ -107,7 +107,7 @@ def command(
 
       [cyan]stiffmap view orthoglide-revised --set x.foot/beam.EIx=4000 --no-browser --port 8090[/cyan]
     """
-    from stiffmap.ui.view.optional import need_viser
+    from stiffmap.ui.view.serving import need_viser
 
     need_viser()
     model = _model(machine, effect, link, at=at, rotation=rotation, force=force, moment=moment, gravity=gravity,
@@ -173,11 +173,11 @@ def _change(text: str) -> tuple[str, float]:
 
 
 def _write(model: Any, data: Any, html: Path | None, picture: Path | None, as_json: bool) -> None:
-    from stiffmap.ui.view.page import write_page
-    from stiffmap.ui.view.picture import write_view_picture
+    from stiffmap.ui.plot import save
+    from stiffmap.ui.view.outputs import view_figure, write_page
 
     files = [] if html is None else [write_page(model.moment, html, data)]
-    files += [] if picture is None else [write_view_picture(model.moment, picture)]
+    files += [] if picture is None else [save(view_figure(model.moment), picture)]
     show(as_json, {"machine": model.declared.name}, [], files)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from stiffmap.model.description import Element, Joint, Spring
 from stiffmap.solve.machine import Machine
 from stiffmap.ui.paper.results import POINTS, Results
-from stiffmap.ui.paper.statement import Statement, judge, rounds_to
+from stiffmap.ui.paper.statement import Statement, judge, of_section_5_3, rounds_to
 
 ROOT2 = float(np.sqrt(2))
 
@@ -63,8 +63,7 @@ def _isotropic(at: dict[str, Point]) -> Statement:
     ratios = {name: p.ratio for name, p in at.items()}
     others = min(r for name, r in ratios.items() if name != "isotropic")
     text = ", ".join(f"{r:.5g}" for r in ratios.values())
-    return Statement(
-        "5.3",
+    return of_section_5_3(
         "Only for the isotropic work point (x=y=z=0) it is constant for each direction",
         f"max/min = {text} at the four points",
         judge(ratios["isotropic"] < 1.001 and others > 1.1),
@@ -79,8 +78,7 @@ def _quarter(at: dict[str, Point]) -> Statement:
         n: abs((p.worst_angle - p.best_angle + 90) % 180 - 90) for n, p in at.items() if n != "isotropic"
     }
     text = ", ".join(f"{a:.2f}" for a in apart.values())
-    return Statement(
-        "5.3",
+    return of_section_5_3(
         "The lowest and the highest compliant directions of the manipulator differ on π/2",
         f"{text} deg",
         judge(all(abs(a - 90) < 1 for a in apart.values())),
@@ -92,8 +90,7 @@ def _quarter(at: dict[str, Point]) -> Statement:
 
 
 def _seven(p: Point) -> Statement:
-    return Statement(
-        "5.3",
+    return of_section_5_3(
         "For the work point x=y=z=-200, the manipulator is 7 times stronger in the direction 135/-45 deg "
         "than "
         "in the direction 45/-135 deg",
@@ -111,8 +108,7 @@ def _seven(p: Point) -> Statement:
 
 def _twenty_more(p: Point) -> Statement:
     more = 100 * (p.worst / p.fx - 1)
-    return Statement(
-        "5.3",
+    return of_section_5_3(
         "The maximum compliance is 20% higher than for the single force (Fx, Fy)",
         f"{more:.1f} % higher",
         judge(rounds_to(more, "20")),
@@ -136,8 +132,7 @@ def ratio_of(worst_over_fx: float) -> float:
 
 def _twenty_less(p: Point) -> Statement:
     less = 100 * (1 - p.fx / p.worst)
-    return Statement(
-        "5.3",
+    return of_section_5_3(
         "For x=y=z=300, a force along the principal axes causes deformations 20% less than for the worst "
         "direction",
         f"{less:.1f} % less",
@@ -150,8 +145,7 @@ def _twenty_less(p: Point) -> Statement:
 
 def _fifty_more(p: Point) -> Statement:
     more, theirs = 100 * (p.fx / p.best - 1), ratio_of(1 / 0.8)
-    return Statement(
-        "5.3",
+    return of_section_5_3(
         "… and 50% more than for the strongest direction",
         f"{more:.1f} % more",
         judge(rounds_to(more, "50")),
@@ -165,8 +159,7 @@ def _fifty_more(p: Point) -> Statement:
 
 
 def _different(p: Point) -> Statement:
-    return Statement(
-        "5.3",
+    return of_section_5_3(
         "in the workpoint (x=-200, y=300, z=0), forces along x and y directions cause different deformations",
         f"Fx {p.fx:.4f} mm, Fy {p.fy:.4f} mm",
         judge(abs(p.fy / p.fx - 1) > 0.05),
@@ -178,8 +171,7 @@ def _different(p: Point) -> Statement:
 
 def _close(p: Point) -> Statement:
     x, y = (100 * (v - p.best) / (p.worst - p.best) for v in (p.fx, p.fy))
-    return Statement(
-        "5.3",
+    return of_section_5_3(
         "Along the x direction, the deformations are close to the minimum, while along the y direction, they "
         "are close to the maximum",
         f"Fx at {x:.0f} %, Fy at {y:.0f} % of the way from minimum to maximum",
@@ -196,8 +188,7 @@ def _seven_again(p: Point, results: Results) -> Statement:
     ratio = results.maps.worst_deflection_xy / results.maps.best_deflection_xy
     where = ratio.where(ratio == ratio.max(), drop=True)
     place = ", ".join(f"{n} = {1e3 * where[n].values[0]:.0f}" for n in ("x", "y", "z"))
-    return Statement(
-        "5.3",
+    return of_section_5_3(
         "The rate between the maximal and minimal deformations is about 7",
         f"{p.ratio:.2f}",
         judge(rounds_to(p.ratio, "7")),

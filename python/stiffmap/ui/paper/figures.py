@@ -8,11 +8,9 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from stiffmap.ui.paper.results import FORCE, TOLERANCE, Results
-from stiffmap.ui.plot.ellipses import draw_ellipse
 from stiffmap.ui.plot.error_maps import map_figure
-from stiffmap.ui.plot.polars import draw_polar, position_text
+from stiffmap.ui.plot.forces import draw_ellipse, draw_polar, position_text, sweep_figure
 from stiffmap.ui.plot.style import MM, headline, panel, paper, save
-from stiffmap.ui.plot.sweeps import sweep_figure
 
 
 def figure_5(results: Results) -> Figure:

@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from stiffmap.ui.paper.results import Results
-from stiffmap.ui.paper.statement import Statement, judge, rounds_to
+from stiffmap.ui.paper.statement import Statement, judge, of_section_5_3, rounds_to
 
 LINEAR = 5.0
 """Percent: what a straight line in a printed figure can hide."""
@@ -37,8 +37,7 @@ def _limits(point: xr.Dataset, sweeps: dict[str, xr.Dataset]) -> dict[str, float
 def _linear(results: Results) -> Statement:
     off = {n: max(nonlinearity(s) for s in sweeps.values()) for n, sweeps in results.sweeps.items()}
     text = ", ".join(f"{v:.2g}" for v in off.values())
-    return Statement(
-        "5.3",
+    return of_section_5_3(
         "The force-deflection relationship for the force less than 1000 N is linear",
         f"off a straight line by at most {text} % at the four points",
         judge(max(off.values()) < LINEAR),
@@ -53,8 +52,7 @@ def _linear(results: Results) -> Statement:
 def _depends(results: Results) -> Statement:
     slope = {n: 1e6 * s["Fx"].compliance_along.values[0] for n, s in results.sweeps.items()}
     text = ", ".join(f"{v:.3g}" for v in slope.values())
-    return Statement(
-        "5.3",
+    return of_section_5_3(
         "… but depends on the manipulator configuration",
         f"{text} µm/N along x at the four points",
         judge(max(slope.values()) > 1.5 * min(slope.values())),
@@ -65,8 +63,7 @@ def _depends(results: Results) -> Statement:
 
 
 def _600(limits: dict[str, float]) -> Statement:
-    return Statement(
-        "5.3",
+    return of_section_5_3(
         "in the work point x=y=z=0, the required accuracy can be satisfied for the force up to 600 N",
         f"{limits['worst']:.1f} N",
         judge(rounds_to(limits["worst"], "600")),
@@ -81,8 +78,7 @@ def _100(limits: dict[str, dict[str, float]]) -> Statement:
     text = "; ".join(
         f"{n}: worst {v['worst']:.0f}, Fx {v['Fx']:.0f}, Fy {v['Fy']:.0f} N" for n, v in others.items()
     )
-    return Statement(
-        "5.3",
+    return of_section_5_3(
         "while for all other tested workpoints, it can be satisfied only for forces inferior to 100 N",
         text,
         judge(all(v["worst"] < 100 for v in others.values())),
@@ -102,8 +98,7 @@ def _100(limits: dict[str, dict[str, float]]) -> Statement:
 def _1mm(results: Results) -> Statement:
     points = max(1e3 * float(p.worst_deflection_xy) for p in results.points.values())
     planes, space = (1e3 * float(results.maps[f"worst_deflection{s}"].max()) for s in ("_xy", ""))
-    return Statement(
-        "5.3",
+    return of_section_5_3(
         "maximum compliance errors for the force 300 N may raise up to 1 mm and more",
         f"{points:.3f} mm at the four points, {planes:.3f} mm in the three planes",
         judge(max(planes, space) >= 1.0),

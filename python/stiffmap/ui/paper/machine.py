@@ -10,7 +10,7 @@ from stiffmap.model.description import Block, Spring
 from stiffmap.solve.kinematics import inverse_kinematics
 from stiffmap.solve.machine import Machine
 from stiffmap.ui.paper.results import Results
-from stiffmap.ui.paper.statement import Statement, Verdict, judge, rounds_to
+from stiffmap.ui.paper.statement import Statement, Verdict, judge, of_section_5_3, rounds_to
 
 LOW, HIGH = 0.5, 2.0
 
@@ -138,8 +138,7 @@ def geometry(original: Machine) -> Statement:
 
 def too_small(edge: float) -> Statement:
     """Why the machine is revised."""
-    return Statement(
-        "5.3",
+    return of_section_5_3(
         "the workspace of the Orthoglide manipulator is lower than required for milling",
         f"{edge:.2f} mm < 500 mm",
         judge(edge < 500),
@@ -217,8 +216,7 @@ def _row(name: str, compliance: Floats) -> Statement:
     ours = np.diag(compliance)
     same = all(np.isclose(o, float(p), rtol=1e-9) for o, p in zip(ours, PRINTED[name], strict=True))
     text = ", ".join(f"{v:.3g}" for v in ours)
-    return Statement(
-        "5.3",
+    return of_section_5_3(
         f"Table 1, {name} bar: k11 … k66 = {', '.join(PRINTED[name])}",
         text,
         judge(same),
@@ -234,8 +232,7 @@ def _row(name: str, compliance: Floats) -> Statement:
 def _stronger(bars: dict[str, Floats]) -> Statement:
     area = {n: LENGTH[n] / c[0, 0] for n, c in bars.items()}
     ratio = area["revised"] / area["original"]
-    return Statement(
-        "5.3",
+    return of_section_5_3(
         "the length and cross-section of the bar element was increased",
         f"EA = L/k11 grows {ratio:.2f} times",
         judge(ratio > 1),
@@ -248,8 +245,7 @@ def _stronger(bars: dict[str, Floats]) -> Statement:
 
 def _length(c: Floats) -> Statement:
     y, z = np.sqrt(3 * c[1, 1] / c[5, 5]), np.sqrt(3 * c[2, 2] / c[4, 4])
-    return Statement(
-        "5.3",
+    return of_section_5_3(
         "new stiffness matrix for the bar element (its length is not stated)",
         f"L = {y:.0f} and {z:.0f} mm",
         judge(rounds_to(y, "780") and rounds_to(z, "790")),

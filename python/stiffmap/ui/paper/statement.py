@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from decimal import Decimal
 from enum import StrEnum
+from functools import partial
 
 
 class Verdict(StrEnum):
@@ -31,6 +32,10 @@ class Statement:
     """The paper's number, with its unit; empty where it states none."""
     own_input: bool = False
     """Whether our number is one that our model was given from this very sentence or table: agreement proves nothing."""
+
+
+of_section_5_3 = partial(Statement, "5.3")
+"""A statement of §5.3, as most are."""
 
 
 def rounds_to(ours: float, printed: str) -> bool:

@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from stiffmap.ui.paper.results import Results
-from stiffmap.ui.paper.statement import Statement, judge, rounds_to
+from stiffmap.ui.paper.statement import Statement, judge, of_section_5_3, rounds_to
 
 Ranges = dict[str, dict[float, tuple[float, float]]]
 READINGS = ("worst", "Fx", "Fy", "best")
@@ -48,8 +48,7 @@ def _varies(ranges: Ranges) -> Statement:
     low = min(ranges[r][z][0] for r in READINGS for z in (-0.2, 0.3))
     high = min(ranges[r][z][1] for r in ("worst", "Fx", "Fy") for z in (-0.2, 0.3))
     both = {f"z{1e3 * z:g}_{k}": v for z in (-0.2, 0.3) for k, v in _numbers(ranges, z).items()}
-    return Statement(
-        "5.3",
+    return of_section_5_3(
         "the position accuracy … vary from 0,1 mm to more than 0.5 mm for z=-200 and z=300",
         f"z = -200: {_text(ranges, -0.2)}; z = 300: {_text(ranges, 0.3)}",
         judge(rounds_to(low, "0.1") and high > 0.5),
@@ -62,8 +61,7 @@ def _varies(ranges: Ranges) -> Statement:
 
 def _zero_plane(ranges: Ranges) -> Statement:
     satisfied = [r for r in READINGS if ranges[r][0.0][1] <= 0.25]
-    return Statement(
-        "5.3",
+    return of_section_5_3(
         'The accuracy of the "zero plane" is satisfied for the operation',
         _text(ranges, 0.0),
         judge(set(satisfied) >= {"Fx", "Fy"}),
@@ -77,8 +75,7 @@ def _zero_plane(ranges: Ranges) -> Statement:
 
 def _guaranteed(ranges: Ranges, z: float, words: str, printed: str) -> Statement:
     fitting = [r for r in READINGS if rounds_to(ranges[r][z][1], printed)]
-    return Statement(
-        "5.3",
+    return of_section_5_3(
         words,
         f"at most {', '.join(f'{r} {ranges[r][z][1]:.2f}' for r in READINGS)} mm",
         judge(bool(fitting)),
@@ -95,8 +92,7 @@ def _guaranteed(ranges: Ranges, z: float, words: str, printed: str) -> Statement
 def _strongest(ranges: Ranges) -> Statement:
     top = {z: ranges["best"][z][1] for z in ranges["best"]}
     text = ", ".join(f"{v:.3f} mm (z = {1e3 * z:g})" for z, v in top.items())
-    return Statement(
-        "5.3",
+    return of_section_5_3(
         "milling in the strongest direction of the manipulator leads to an accuracy more than 0,2 mm",
         f"at most {text}",
         judge(all(v <= 0.2 for v in top.values())),
@@ -110,8 +106,7 @@ def _three_times(maps: xr.Dataset) -> Statement:
     ratio = maps.worst_deflection_xy / maps.best_deflection_xy
     share = 100 * float((ratio > 3).mean())
     ends = [float(maps[f"{w}_deflection_xy"].max()) for w in ("worst", "best")]
-    return Statement(
-        "5.3",
+    return of_section_5_3(
         "optimizing the milling process for the specialized Orthoglide manipulator may improve the "
         "accuracy more "
         "than 3 times",

@@ -4,15 +4,12 @@ Lengths in mm, angles in deg; colours that a colour-blind reader can distinguish
 never shown as a value. No display is needed.
 """
 
-from stiffmap.ui.plot.ellipses import ellipse_figure
 from stiffmap.ui.plot.error_maps import map_figure
-from stiffmap.ui.plot.loaded import loaded_figure
-from stiffmap.ui.plot.machines import machine_figure
+from stiffmap.ui.plot.forces import ellipse_figure, polar_figure, sweep_figure
+from stiffmap.ui.plot.loaded import loaded_figure, machine_figure
 from stiffmap.ui.plot.paths import mode_figure, path_figure
-from stiffmap.ui.plot.polars import polar_figure
 from stiffmap.ui.plot.stresses import stress_figure
 from stiffmap.ui.plot.style import save
-from stiffmap.ui.plot.sweeps import sweep_figure
 
 __all__ = [
     "ellipse_figure",

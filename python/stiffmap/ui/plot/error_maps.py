@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,16 +12,13 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.ui.plot.failed import hatch_failed
-from stiffmap.ui.plot.isolines import draw_isolines, draw_tolerance, halo
-from stiffmap.ui.plot.map_lines import draw_line
-from stiffmap.ui.plot.planes import Planes, on_grid, planes
-from stiffmap.ui.plot.style import COLOURS, MM, length_unit, panel, paper, wrench_text
+from stiffmap.ui.plot.forces import in_words
+from stiffmap.ui.plot.planes import Planes, draw_isolines, draw_tolerance, halo, hatch_failed, on_grid, planes
+from stiffmap.ui.plot.style import BLUE, COLOURS, MM, TOLERANCE, length_unit, panel, paper, wrench_text
 
 TITLES = {
     "worst_deflection": "worst direction of the force",
     "best_deflection": "best direction of the force",
-    "deflection": "",
 }
 FORCE_PLANES = ("xy", "xz", "yz")
 
@@ -53,49 +51,87 @@ def map_figure(
         variable = variable or "deflection"
     variable = default_variable(ds) if variable is None else variable
     values = pick(ds, variable, case)
-    how = planes(values)
     unit, factor = length_unit(limits[1] if limits else float(np.nanmax(values.values, initial=0.0)))
+    how = planes(values)
+    m = Drawn(ds, variable, case, values, how, unit, factor, tolerance)
     count = len(how.values)
     width = 5.2 if how.is_line else max((2.35 if common_scale else 2.9) * count + 0.9, 4.6)
-    with paper(width, 3.4, title(ds, variable, case)) as figure:
+    with paper(width, 3.4, m.title) as figure:
         if how.is_line:
-            draw_line(figure, ds, values, how, (unit, factor), tolerance)
-        else:
-            _panels(figure, ds, values, how, (unit, factor), tolerance, limits, common_scale,
-                    variable, case, directions, isolines)  # fmt: skip
+            draw_line(figure.subplots(), m)
+            return figure
+        axes = figure.subplots(1, count, squeeze=False, sharey=True)[0]
+        whole = Normalize(factor * limits[0], factor * limits[1]) if limits else m.colour_range(values)
+        for i, ax in enumerate(axes):
+            plane = values.isel({how.across: i}).transpose(how.up, how.right)
+            own = whole if common_scale or limits else m.colour_range(plane)
+            mesh = draw_plane(ax, m, plane, own)
+            if isolines:
+                draw_isolines(ax, plane, how, factor, own)
+            if directions:
+                draw_directions(ax, m, i)
+            ax.set_title(f"{panel(i, count)} {how.title(i)}{shares(plane.values, tolerance)}".strip())
+            if not common_scale:
+                figure.colorbar(mesh, ax=ax, label=m.colour_label, shrink=0.85)
+        axes[0].set_ylabel(f"{how.up}, mm")
+        if common_scale:
+            figure.colorbar(mesh, ax=list(axes), label=m.colour_label, shrink=0.85)
     return figure
 
 
-def _panels(
-    figure: Figure,
-    ds: xr.Dataset,
-    values: xr.DataArray,
-    how: Planes,
-    unit: tuple[str, float],
-    tolerance: float | None,
-    limits: tuple[float, float] | None,
-    common_scale: bool,
-    variable: str,
-    case: str | None,
-    directions: bool,
-    isolines: bool,
-) -> None:
-    axes = figure.subplots(1, len(how.values), squeeze=False, sharey=True)[0]
-    norm = Normalize(unit[1] * limits[0], unit[1] * limits[1]) if limits else colour_range(values, unit[1])
-    for i, ax in enumerate(axes):
-        plane = values.isel({how.across: i}).transpose(how.up, how.right)
-        own = norm if common_scale or limits else colour_range(plane, unit[1])
-        mesh = draw_plane(ax, ds, plane, how, variable, case, own, tolerance, unit)
-        if isolines:
-            draw_isolines(ax, plane, how, unit[1], own)
-        if directions:
-            draw_directions(ax, ds, variable, how, i)
-        ax.set_title(f"{panel(i, len(axes))} {how.title(i)}{shares(plane.values, tolerance)}".strip())
-        if not common_scale:
-            figure.colorbar(mesh, ax=ax, label=colour_label(values, unit[0]), shrink=0.85)
-    axes[0].set_ylabel(f"{how.up}, mm")
-    if common_scale:
-        figure.colorbar(mesh, ax=list(axes), label=colour_label(values, unit[0]), shrink=0.85)
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """A deflection of a map, and how it is drawn."""
+
+    ds: xr.Dataset
+    variable: str
+    case: str | None
+    values: xr.DataArray
+    """(z, y, x) m."""
+    how: Planes
+    unit: str
+    factor: float
+    """From m to the unit."""
+    tolerance: float | None
+    """m."""
+
+    def status(self, plane: xr.DataArray) -> Any:
+        """Status of each position of a plane (up, right)."""
+        turned = self.variable.startswith(("worst_", "best_"))
+        status = self._of_case(self.ds["direction_status" if turned else "status"])
+        across = self.how.across
+        return status.sel({across: plane[across]}).transpose(self.how.up, self.how.right).values
+
+    def _of_case(self, values: xr.DataArray) -> xr.DataArray:
+        if "case" not in values.dims:
+            return values
+        return values.sel(case=self.case) if self.case is not None else values.isel(case=0)
+
+    def colour_range(self, values: xr.DataArray) -> Normalize:
+        """From the least to the largest value, in the unit."""
+        v = self.factor * values.values[np.isfinite(values.values)]
+        return Normalize(v.min(), v.max()) if v.size else Normalize(0, 1)
+
+    @property
+    def colour_label(self) -> str:
+        """What the colours mean."""
+        name = str(self.values.name or "")
+        if name in ("dx", "dy", "dz"):
+            return f"{name}, {self.unit}"
+        if name.endswith("_std"):
+            return f"standard deviation, {self.unit}"
+        return f"{in_words(name)}, {self.unit}"
+
+    @property
+    def title(self) -> str:
+        """Machine, load and direction."""
+        variable, deviation, _ = self.variable.partition("_std")
+        base = variable.removesuffix("_xy").removesuffix("_xz").removesuffix("_yz")
+        ending = ": standard deviation of the deflection" if deviation else ""
+        machine = self.ds.attrs["machine"]
+        if base not in TITLES:
+            return f"{machine}: {wrench_text(self._of_case(self.ds.wrench).values)}{ending}"
+        return f"{machine}: {self.ds.attrs['turning_force_N']:g} N, {TITLES[base]}{ending}"
 
 
 def default_variable(ds: xr.Dataset) -> str:
@@ -137,12 +173,6 @@ def component(ds: xr.Dataset, variable: str) -> xr.DataArray:
     return found
 
 
-def colour_range(values: xr.DataArray, factor: float = MM) -> Normalize:
-    """From the least to the largest value, times `factor`."""
-    v = factor * values.values[np.isfinite(values.values)]
-    return Normalize(v.min(), v.max()) if v.size else Normalize(0, 1)
-
-
 def shares(values: Any, tolerance: float | None) -> str:
     """How much of a panel lies beyond the tolerance (m), and has no value."""
     good = np.isfinite(values)
@@ -161,77 +191,45 @@ def _percent(share: float) -> str:
     return "> 99 %" if 0.995 < share < 1 else f"{100 * share:.0f} %"
 
 
-def draw_plane(
-    ax: Axes,
-    ds: xr.Dataset,
-    plane: xr.DataArray,
-    how: Planes,
-    variable: str,
-    case: str | None,
-    norm: Normalize,
-    tolerance: float | None,
-    unit: tuple[str, float],
-) -> Any:
+def draw_plane(ax: Axes, m: Drawn, plane: xr.DataArray, norm: Normalize) -> Any:
     """One plane: colours, tolerance, hatched failures."""
-    x, y, v = MM * plane[how.right].values, MM * plane[how.up].values, unit[1] * plane.values
+    x, y, v = MM * plane[m.how.right].values, MM * plane[m.how.up].values, m.factor * plane.values
     mesh = ax.pcolormesh(x, y, v, shading="nearest", cmap=COLOURS, norm=norm, rasterized=True)
-    hatch_failed(ax, x, y, v, status_of(ds, plane, how, variable, case))
-    if tolerance is not None:
-        draw_tolerance(ax, x, y, v, unit[1] * tolerance, f"{MM * tolerance:g} mm")
+    hatch_failed(ax, x, y, v, m.status(plane))
+    if m.tolerance is not None:
+        draw_tolerance(ax, x, y, v, m.factor * m.tolerance, f"{MM * m.tolerance:g} mm")
     ax.set_aspect("equal")
-    ax.set_xlabel(f"{how.right}, mm")
+    ax.set_xlabel(f"{m.how.right}, mm")
     return mesh
 
 
-def status_of(ds: xr.Dataset, plane: xr.DataArray, how: Planes, variable: str, case: str | None) -> Any:
-    """Status of each position of a plane (up, right)."""
-    turned = variable.startswith(("worst_", "best_"))
-    status = ds["direction_status" if turned else "status"]
-    if "case" in status.dims:
-        status = status.sel(case=case) if case is not None else status.isel(case=0)
-    return status.sel({how.across: plane[how.across]}).transpose(how.up, how.right).values
-
-
-def colour_label(values: xr.DataArray, unit: str = "mm") -> str:
-    """What the colours mean."""
-    name = str(values.name or "")
-    if name in ("dx", "dy", "dz"):
-        return f"{name}, {unit}"
-    if name.endswith("_std"):
-        return f"standard deviation, {unit}"
-    plane = name.rpartition("_")[2]
-    return f"deflection in the {plane} plane, {unit}" if plane in FORCE_PLANES else f"deflection, {unit}"
-
-
-def title(ds: xr.Dataset, variable: str, case: str | None) -> str:
-    """Machine, load and direction."""
-    variable, deviation, _ = variable.partition("_std")
-    base = variable.removesuffix("_xy").removesuffix("_xz").removesuffix("_yz")
-    ending = ": standard deviation of the deflection" if deviation else ""
-    if base not in TITLES or base == "deflection":
-        return f"{ds.attrs['machine']}: {load_text(ds, case)}{ending}"
-    return f"{ds.attrs['machine']}: {ds.attrs['turning_force_N']:g} N, {TITLES[base]}{ending}"
-
-
-def load_text(ds: xr.Dataset, case: str | None) -> str:
-    """The external wrench of a case in words."""
-    wrench = ds.wrench
-    if "case" in wrench.dims:
-        wrench = wrench.sel(case=case) if case is not None else wrench.isel(case=0)
-    return wrench_text(wrench.values)
+def draw_line(ax: Axes, m: Drawn) -> None:
+    """Deflection over the only coordinate that varies; positions without a value are crosses on the axis."""
+    along = m.how.right
+    at, v = MM * m.values[along].values, m.factor * m.values.values.reshape(-1)
+    ax.plot(at, v, color=BLUE, marker=".", ms=3, label=str(m.values.name).replace("_", " "))
+    if m.tolerance is not None:
+        level, words = m.factor * m.tolerance, f"tolerance {MM * m.tolerance:g} mm"
+        ax.axhline(level, color=TOLERANCE, ls="--", lw=1, label=words)
+    lost = ~np.isfinite(v)
+    if lost.any():
+        ax.plot(at[lost], np.zeros(int(lost.sum())), "x", color="0.3", label="without a value")
+    where = ", ".join(f"{a} = {MM * float(m.values[a].values[0]):g}" for a in "xyz" if a != along)
+    ax.set(xlabel=f"{along}, mm", ylabel=f"deflection, {m.unit}", title=f"at {where} mm")
+    ax.set_ylim(0, None)
 
 
 LINE: dict[str, Any] = {"pivot": "mid", "headwidth": 0, "headlength": 0, "headaxislength": 0, "width": 0.005}
 
 
-def draw_directions(ax: Axes, ds: xr.Dataset, variable: str, how: Planes, index: int) -> None:
+def draw_directions(ax: Axes, m: Drawn, index: int) -> None:
     """Lines along the force, as they are seen in the panel's plane; shorter where the force leaves it."""
-    name = variable.replace("_deflection", "_direction")
-    if name == variable or name not in ds:
+    name, how = m.variable.replace("_deflection", "_direction"), m.how
+    if name == m.variable or name not in m.ds:
         return
-    angle = ds[name].isel({how.across: index}).transpose(how.up, how.right)
+    angle = m.ds[name].isel({how.across: index}).transpose(how.up, how.right)
     angle = angle.isel({how.up: _spread(angle.sizes[how.up]), how.right: _spread(angle.sizes[how.right])})
-    first, second = ds[name].attrs["plane"]
+    first, second = m.ds[name].attrs["plane"]
     parts = {first: np.cos(angle.values), second: np.sin(angle.values)}
     u, v = (parts.get(a, np.zeros(angle.shape)) for a in (how.right, how.up))
     x, y = np.meshgrid(MM * angle[how.right], MM * angle[how.up])

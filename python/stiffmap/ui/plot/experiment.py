@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from scipy.stats import f as f_distribution
 
 from stiffmap.experiment.comparison.residual import Residual
 from stiffmap.experiment.experiment import Experiment, Floats
@@ -118,7 +119,7 @@ def against(r: Residual, drivers: list[Driver], channels: list[int]) -> Figure:
     for row, channel in enumerate(channels):
         for column, driver in enumerate(drivers):
             _scatter(grid[row][column], r, channel, driver)
-        grid[row][0].set_ylabel(_label(r, channel))
+        grid[row][0].set_ylabel(_label(r.experiment, channel))
     for column, (name, _, _) in enumerate(drivers):
         grid[-1][column].set_xlabel(name)
     aside = "; crosses: outliers" if r.set_aside.any() else ""
@@ -143,14 +144,26 @@ def _scatter(ax: Any, r: Residual, channel: int, driver: Driver) -> None:
         ax.set_xlim(-0.5, len(labels) - 0.5)
 
 
-def _label(r: Residual, channel: int) -> str:
-    c = r.experiment.channels[channel]
+def _label(e: Experiment, channel: int) -> str:
+    c = e.channels[channel]
     return f"{c.name}, {'µm' if c.unit == 'm' else 'µrad'}"
+
+
+def _coordinates(e: Experiment) -> list[Driver]:
+    return [(f"{c}, mm", e.position[:, i] * MM, []) for i, c in enumerate("xyz")]
+
+
+def _forces(e: Experiment) -> list[Driver]:
+    return [(f"f{c}, N", e.wrench[:, i], []) for i, c in enumerate("xyz") if e.wrench[:, i].any()]
+
+
+def _series(e: Experiment) -> list[Driver]:
+    return [(n, x, []) for n, x in (("order", e.order), ("temperature", e.temperature)) if x is not None]
 
 
 def pose_drivers(e: Experiment) -> list[Driver]:
     """Commanded coordinates; actuator coordinates where they are commanded."""
-    out: list[Driver] = [(f"{c}, mm", e.position[:, i] * MM, []) for i, c in enumerate("xyz")]
+    out = _coordinates(e)
     if e.other is not None:
         out.append(("distance, mm", np.linalg.norm(e.other - e.position, axis=1) * MM, []))
     for i, c in enumerate(e.command_of):
@@ -165,7 +178,7 @@ def force_drivers(e: Experiment) -> list[Driver]:
     if not e.wrench.any():
         return []
     force = e.wrench[:, :3]
-    out: list[Driver] = [(f"f{c}, N", force[:, i], []) for i, c in enumerate("xyz") if force[:, i].any()]
+    out = _forces(e)
     moments = [i for i in range(3, 6) if e.wrench[:, i].any()]
     out += [(f"m{'xyz'[i - 3]}, N·m", e.wrench[:, i], []) for i in moments]
     if not force.any():
@@ -193,12 +206,79 @@ def direction_name(ratio: Floats) -> str:
 
 def history_drivers(e: Experiment) -> list[Driver]:
     """Order, temperature, branch, set-up."""
-    series = (("order", e.order), ("temperature", e.temperature))
-    out: list[Driver] = [(name, x, []) for name, x in series if x is not None]
+    out = _series(e)
     for name, words in (("branch", e.branch), ("set-up", e.setup)):
         if words:
             labels, at = np.unique(words, return_inverse=True)
             out.append((name, at.reshape(-1).astype(float), [str(w) or "none" for w in labels]))
+    return out
+
+
+TREND = 1e-3
+"""p-value below which residuals follow a driver, over all drivers and channels."""
+
+
+def trending(d: Findings) -> tuple[list[Driver], list[Driver]]:
+    """Drivers that residuals follow, before or after, and the others."""
+    drivers = drivers_of(d.experiment)
+    read = np.flatnonzero(d.experiment.axis_read)
+    level = TREND / max(2 * len(drivers) * len(read), 1)
+    followed = [
+        any(
+            _follows(x, kept(d, r)[:, i]) < level for r in (d.residual_before, d.residual_after) for i in read
+        )
+        for _, x, _ in drivers
+    ]
+    both = list(zip(drivers, followed, strict=True))
+    return [v for v, f in both if f], [v for v, f in both if not f]
+
+
+def _follows(x: Floats, y: Floats) -> float:
+    """p-value of a parabola through residuals over a driver."""
+    good = np.isfinite(x) & np.isfinite(y)
+    columns = min(3, len(np.unique(x[good])))
+    n = int(good.sum())
+    if columns < 2 or n < columns + 3:
+        return 1.0
+    u = (x[good] - x[good].mean()) / np.ptp(x[good])
+    a = np.vander(u, columns)
+    left = y[good] - a @ np.linalg.lstsq(a, y[good], rcond=None)[0]
+    rest, whole = float(left @ left), float(np.sum((y[good] - y[good].mean()) ** 2))
+    if rest <= 0:
+        return 1.0 if whole <= 0 else 0.0
+    ratio = ((whole - rest) / (columns - 1)) / (rest / (n - columns))
+    return float(f_distribution.sf(ratio, columns - 1, n - columns))
+
+
+def trends(d: Findings, drivers: list[Driver]) -> Figure:
+    """Residual of each channel against what may drive it."""
+    axes_read = [int(i) for i in np.flatnonzero(d.experiment.axis_read)]
+    # a row per driver fits an upright page; its columns are the channels
+    figure = new_figure(max(6.0, 3.0 * len(axes_read)), 1.9 * len(drivers) + 0.6)
+    grid = figure.subplots(len(drivers), len(axes_read), squeeze=False, sharex="row", sharey="col")
+    for row, (name, x, _) in enumerate(drivers):
+        for column, axis in enumerate(axes_read):
+            ax = grid[row][column]
+            for values, colour, label in (
+                (d.residual_before, BEFORE, "before"),
+                (d.residual_after, AFTER, "after"),
+            ):
+                ax.plot(x, kept(d, values)[:, axis] * UM, ".", ms=3, color=colour, alpha=0.6, label=label)
+            ax.axhline(0, color="0.5", lw=0.6)
+            ax.set_xlabel(name, fontsize=9)
+            ax.tick_params(labelsize=8)
+            ax.set_ylabel(_label(d.experiment, axis), fontsize=9)
+    grid[0][0].legend(fontsize=8)
+    figure.suptitle("Residual: reading minus prediction")
+    return figure
+
+
+def drivers_of(e: Experiment) -> list[Driver]:
+    """What residuals of a diagnosis are drawn against, whole numbers for the branch."""
+    out = _coordinates(e) + _forces(e) + _series(e)
+    if e.branch:
+        unloading = np.array([b == "unloading" for b in e.branch], float)
+        out.append(("branch: 0 loading, 1 unloading", unloading, []))
     return out
 
 

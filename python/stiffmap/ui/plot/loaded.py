@@ -1,4 +1,4 @@
-"""A machine under load: its shape without it (grey), with it (enlarged), and where the deflection comes from."""
+"""A machine at a pose, and under load: its shape without it (grey), with it (enlarged), and where the deflection comes from."""
 
 from __future__ import annotations
 
@@ -15,14 +15,39 @@ from stiffmap.common.number_text import length_text, length_unit, percents, vect
 from stiffmap.solve.budget import DeflectionBudget, deflection_budget
 from stiffmap.solve.compiled import Status
 from stiffmap.solve.machine import Machine, takes_machine
-from stiffmap.ui.plot.scene import draw_force, draw_skeleton, finish, on, scene_axes
-from stiffmap.ui.plot.skeleton import Skeleton, skeleton
+from stiffmap.ui.plot.scene import draw_box, draw_force, draw_skeleton, finish, on, scene_axes
+from stiffmap.ui.plot.skeleton import Skeleton, skeleton, standing
 from stiffmap.ui.plot.style import BLUE, ORANGE, headline, leg_colours, paper, place_text
 
 SHOWN = 0.08
 """Of the machine's extent, how far the tool moves in the picture."""
 MOST_BARS = 10
 FAINT = 5e-4  # share of an element that is not worth a bar
+
+
+@takes_machine
+def machine_figure(
+    machine: Machine,
+    position: ArrayLike | None = None,
+    *,
+    rotation: ArrayLike | None = None,
+    view: tuple[float, float] | None = None,
+) -> Figure:
+    """The machine at a commanded TCP pose (m, base axes; None: home), springs at rest.
+
+    `view`: elevation and azimuth in deg; None: from above where everything lies in a plane of constant z,
+    else (22, 35). Raises StiffmapError where the pose cannot be reached.
+    """
+    p = machine.description.home.p if position is None else real_array(position, "position")
+    shape = standing(machine, p, rotation)
+    with paper(5.6, 5.2, most=4) as figure:
+        ax: Any = scene_axes(figure, shape, view)
+        draw_skeleton(ax, shape, leg_colours(machine.legs))
+        if machine.description.workspace is not None:
+            draw_box(ax, *machine.workspace)
+        finish(ax, view)
+        ax.set_title(f"{machine.name} at {place_text(p)}", fontsize=10)
+    return figure
 
 
 @dataclass(frozen=True)

@@ -1,27 +1,27 @@
-"""Pictures of the measures: Figure 1 of the paper, maps, the table against its requirements."""
+"""Pictures of the measures: Figure 1 of the paper, maps, the table against its requirements, lines along a toolpath."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from itertools import product
 from typing import Any, cast
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.machine import Machine
-from stiffmap.ui.plot.along_paths import ALONG, path_measures_figure, path_rows
-from stiffmap.ui.plot.box import box_figure
+from stiffmap.ui.plot.box import box_figure, workspace_figure
 from stiffmap.ui.plot.modes import mode_figure, mode_frames
-from stiffmap.ui.plot.style import BLUE, COLOURS, MM, SKY, VERMILLION, headline, paper
-from stiffmap.ui.plot.workspace import workspace_figure
+from stiffmap.ui.plot.style import BLACK, BLUE, COLOURS, MM, SKY, VERMILLION, headline, line_look, paper
 from stiffmap.workspace.performance.box.box import LargestBox
 from stiffmap.workspace.performance.box.workspace import Workspace
-from stiffmap.workspace.performance.registry import Measure
+from stiffmap.workspace.performance.motion.trajectory import way_along
+from stiffmap.workspace.performance.requirements import Bound
 from stiffmap.workspace.performance.table import MeasuresTable, Row, box_map, levels
 
 
@@ -127,6 +127,56 @@ def _slowest(table: MeasuresTable) -> Floats | None:
     return row.found.worst_at if row is not None and np.isfinite(row.found.worst) else None
 
 
+ALONG = ("path_compliance", "path_effort")
+
+
+def path_rows(table: MeasuresTable) -> list[Row]:
+    """Measures along the path that have values there."""
+    return [r for r in table.rows if r.measure.name in ALONG and r.found.values is not None]
+
+
+def path_measures_figure(tables: Mapping[str, MeasuresTable]) -> Figure:
+    """A panel per measure over the way along the path: of one machine its drives, of several machines a line each.
+
+    Raises StiffmapError where nothing was measured along a path.
+    """
+    names = [n for n in ALONG if any(r.measure.name == n for t in tables.values() for r in path_rows(t))]
+    if not names:
+        raise StiffmapError("no measure along a toolpath; asked for path_compliance, path_effort")
+    one = len(tables) == 1
+    with paper(6.4, 0.9 + 2.2 * len(names)) as figure:
+        panels = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
+        for axes, name in zip(panels, names, strict=True):
+            for i, (machine, table) in enumerate(tables.items()):
+                for row in path_rows(table):
+                    if row.measure.name == name:
+                        _lines(axes, row, machine, i, one)
+            axes.set_ylim(bottom=0)
+        panels[-1].set_xlabel("way along the path, mm")
+        told = f"{next(iter(tables))}: along" if one else "Along"
+        headline(figure, f"{told} the toolpath, with its force")
+    return figure
+
+
+def _lines(axes: Axes, row: Row, machine: str, number: int, one: bool) -> None:
+    positions, values = row.found.positions, row.found.values
+    assert positions is not None
+    assert values is not None
+    way = MM * way_along(positions)
+    share = row.found.extra.get("share")
+    if one and isinstance(share, np.ndarray):
+        for j, drive in enumerate(row.found.extra["drives"]):  # type: ignore[arg-type, var-annotated]
+            axes.plot(way, share[:, j], label=str(drive), **line_look(j))
+    else:
+        look = line_look(number) | ({"color": BLACK, "label": ""} if one else {"label": machine})
+        axes.plot(way, row.measure.factor * values, **look)
+    unit = "share of the declared effort" if share is not None else f"compliance, {row.measure.shown}"
+    axes.set_ylabel(unit)
+    limit = None if row.bound is None else row.bound.at_most
+    if limit is not None and number == 0:
+        axes.axhline(row.measure.factor * limit, color="0.4", linewidth=0.8, label="required: below")
+
+
 CAPTIONS = {
     "requirements": "Each requirement: the worst value over its bound. The line at 1 is the bound.",
     "transmission": "Velocities of the tool at the worst pose for drive rates within a sphere (a), within a cube (b), and in the "
@@ -165,20 +215,22 @@ def requirement_figure(table: MeasuresTable) -> Figure:
     return figure
 
 
+def _limit(bound: Bound | None) -> float | None:
+    """The one number of a requirement that is drawn."""
+    return None if bound is None else bound.at_least if bound.at_least is not None else bound.at_most
+
+
 def _share(r: Row) -> float:
-    assert r.bound is not None
-    limit = r.bound.at_least if r.bound.at_least is not None else r.bound.at_most
+    limit = _limit(r.bound)
     return float(r.found.worst / limit) if limit else float("nan")
 
 
 def _bound_text(r: Row) -> str:
+    limit = _limit(r.bound)
     assert r.bound is not None
-    least = r.bound.at_least is not None
-    limit = r.bound.at_least if least else r.bound.at_most
     assert limit is not None
-    return (
-        f"{r.measure.name} {'≥' if least else '≤'} {r.measure.factor * limit:.4g} {r.measure.shown}".rstrip()
-    )
+    sign = "≤" if r.bound.at_least is None else "≥"
+    return f"{r.measure.name} {sign} {r.measure.factor * limit:.4g} {r.measure.shown}".rstrip()
 
 
 def map_figure(table: MeasuresTable, row: Row) -> Figure:
@@ -191,7 +243,7 @@ def map_figure(table: MeasuresTable, row: Row) -> Figure:
         axes = figure.subplots(1, len(planes), squeeze=False)[0]
         steps = levels(grid)
         for a, k in zip(axes, planes, strict=True):
-            _plane(a, row.measure, row, x, y, grid[:, :, k], steps)
+            _plane(a, row, x, y, grid[:, :, k], steps)
             a.set_title(f"z = {MM * z[k]:.0f} mm")
         drawn = next((a.collections[0] for a in axes if a.collections), None)
         if drawn is not None:
@@ -203,13 +255,12 @@ def map_figure(table: MeasuresTable, row: Row) -> Figure:
     return figure
 
 
-def _plane(axes, measure: Measure, row: Row, x: Floats, y: Floats, values: Floats, steps: Floats) -> None:  # type: ignore[no-untyped-def]
+def _plane(axes: Axes, row: Row, x: Floats, y: Floats, values: Floats, steps: Floats) -> None:
+    measure, limit = row.measure, _limit(row.bound)
     if not np.isfinite(values).any():
         axes.text(0.5, 0.5, "no value in this plane", transform=axes.transAxes, ha="center", va="center")
     elif len(x) > 1 and len(y) > 1:
         axes.contourf(MM * x, MM * y, values.T, levels=steps, cmap=COLOURS, extend="both")
-        bound = row.bound
-        limit = None if bound is None else bound.at_least if bound.at_least is not None else bound.at_most
         inside = limit is not None and np.nanmin(values) < measure.factor * limit < np.nanmax(values)
         if inside and limit is not None:
             axes.contour(MM * x, MM * y, values.T, levels=[measure.factor * limit], colors=[VERMILLION])

@@ -12,7 +12,7 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.status import Status
-from stiffmap.ui.plot.polars import position_text
+from stiffmap.ui.plot.forces import position_text
 from stiffmap.ui.plot.scene import draw_skeleton, finish, marks, on, scene_axes
 from stiffmap.ui.plot.skeleton import Skeleton, skeleton
 from stiffmap.ui.plot.style import BLACK, BLUE, GREEN, MM, VERMILLION, leg_colours, paper

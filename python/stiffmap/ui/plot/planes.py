@@ -1,16 +1,35 @@
-"""Which planes of a map are drawn, and the axes of each."""
+"""Planes of a map: which are drawn, with which axes, and what lies over their colours: lines of equal deflection, what is beyond
+the tolerance, and regions without a value, hatched, with their status in the legend."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import xarray as xr
+from matplotlib import patheffects
+from matplotlib.axes import Axes
+from matplotlib.collections import PatchCollection
+from matplotlib.colors import Normalize
+from matplotlib.patches import Rectangle
+from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
 
+from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
-from stiffmap.ui.plot.style import MM
+from stiffmap.solve.status import Status
+from stiffmap.ui.plot.style import MM, TOLERANCE
 
 AXES = ("x", "y", "z")
+FEWEST = 5
+"""Positions along each axis below which isolines would say more than was computed."""
+LOOK: dict[Status, tuple[str, str, str]] = {
+    Status.UNREACHABLE: ("unreachable", "////", "#DDDDDD"),
+    Status.SINGULAR: ("singular", "....", "#FFFFFF"),
+    Status.UNSTABLE: ("unstable", "\\\\\\\\", "#F2F2F2"),
+    Status.NOT_CONVERGED: ("not converged", "xxxx", "#FFFFFF"),
+}
 
 
 @dataclass(frozen=True)
@@ -60,3 +79,65 @@ def planes(values: xr.DataArray) -> Planes:
     )
     at = tuple(float(v) for v in values[across].values)
     return Planes(across, right, up, at[:1] if same else at, same)
+
+
+def halo(width: float, colour: str) -> list[patheffects.AbstractPathEffect]:
+    """An outline that keeps a line visible on any colour."""
+    return [patheffects.withStroke(linewidth=width, foreground=colour)]
+
+
+def levels(low: float, high: float, most: int = 8) -> list[float]:
+    """Round values inside a range."""
+    return [float(t) for t in MaxNLocator(most).tick_values(low, high) if low < t < high]
+
+
+def draw_isolines(ax: Axes, plane: xr.DataArray, how: Planes, factor: float, norm: Normalize) -> None:
+    """Some thin labelled lines of equal deflection, on a grid that is fine enough."""
+    v = factor * plane.values
+    if min(v.shape) < FEWEST or not np.isfinite(v).any() or norm.vmin is None or norm.vmax is None:
+        return
+    inside = [t for t in levels(norm.vmin, norm.vmax, 6) if np.nanmin(v) < t < np.nanmax(v)]
+    if not inside:
+        return
+    x, y = MM * plane[how.right].values, MM * plane[how.up].values
+    lines = ax.contour(x, y, v, levels=inside, colors="white", linewidths=0.5, alpha=0.8)
+    for text in ax.clabel(lines, fontsize=6, fmt="%g"):
+        text.set_path_effects(halo(1.2, "#444444"))
+
+
+def draw_tolerance(ax: Axes, x: Any, y: Any, v: Any, level: float, words: str) -> None:
+    """Outline and dots of what lies beyond the tolerance (unit of v)."""
+    finite = v[np.isfinite(v)]
+    if min(v.shape) < 2 or finite.size == 0 or not finite.max() > level:
+        return
+    look: dict[str, Any] = {"hatch": "..", "facecolor": "none", "edgecolor": TOLERANCE, "linewidth": 0}
+    beyond = ax.contourf(x, y, v, levels=[level, finite.max()], colors="none", hatches=[".."], extend="max")
+    beyond.set_edgecolor(TOLERANCE)
+    beyond.set_linewidth(0)
+    ax.fill([], [], label=f"beyond {words}", **look)
+    if finite.min() < level:
+        lines = ax.contour(x, y, v, levels=[level], colors=TOLERANCE, linewidths=1.6)
+        lines.set_path_effects(halo(3, "white"))
+        ax.plot([], [], color=TOLERANCE, label=f"tolerance {words}")
+
+
+def edges(centres: Floats) -> Floats:
+    """Borders of the cells around sorted grid values."""
+    if centres.size == 1:
+        return np.array([centres[0] - 0.5, centres[0] + 0.5])
+    middle = (centres[1:] + centres[:-1]) / 2
+    first, last = centres[0] - (middle[0] - centres[0]), centres[-1] + (centres[-1] - middle[-1])
+    return np.concatenate([[first], middle, [last]])
+
+
+def hatch_failed(ax: Axes, x: Floats, y: Floats, values: Floats, status: NDArray[np.uint8]) -> None:
+    """Hatch the cells (y, x) without a value."""
+    for state, (name, hatch, colour) in LOOK.items():
+        cells = np.argwhere(np.isnan(values) & (status == state))
+        if len(cells) == 0:
+            continue
+        look: dict[str, Any] = {"facecolor": colour, "edgecolor": "#555555", "hatch": hatch, "linewidth": 0}
+        right, up = edges(x), edges(y)
+        corners = [((right[j], up[i]), right[j + 1] - right[j], up[i + 1] - up[i]) for i, j in cells]
+        ax.add_collection(PatchCollection([Rectangle(*c) for c in corners], **look))
+        ax.fill([], [], label=name, **look)

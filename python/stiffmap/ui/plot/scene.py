@@ -79,9 +79,14 @@ def draw_skeleton(ax: Any, s: Skeleton, colours: Mapping[str, str], *, joints: b
                **marks(ax))  # fmt: skip
 
 
+def box_corners(low: Floats, high: Floats) -> Floats:
+    """(8, 3) corners of a box: bit i of the number says which end of axis i."""
+    return np.array([[(low, high)[c >> i & 1][i] for i in range(3)] for c in range(8)])
+
+
 def box_edges(low: Floats, high: Floats) -> Floats:
     """(12, 2, 3) edges of a box."""
-    corners = np.array([[(low, high)[c >> i & 1][i] for i in range(3)] for c in range(8)])
+    corners = box_corners(low, high)
     return np.array([[corners[c], corners[c | 1 << i]] for c in range(8) for i in range(3) if not c >> i & 1])
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
@@ -76,9 +76,9 @@ def _renderer(figure: Figure) -> Any:
     return canvas.get_renderer()
 
 
-def headline(figure: Figure, text: str, size: float = 10) -> None:
+def headline(figure: Figure, text: str) -> None:
     """Title of the whole picture, broken into lines where it is wider than the picture."""
-    artist = figure.suptitle(text, fontsize=size)
+    artist = figure.suptitle(text, fontsize=10)
     renderer = _renderer(figure)
     for columns in range(len(text), 15, -1):
         if artist.get_window_extent(renderer).width <= EDGE * figure.bbox.width:
@@ -86,10 +86,9 @@ def headline(figure: Figure, text: str, size: float = 10) -> None:
         artist.set_text("\n".join(fill(line, columns) for line in text.splitlines()))
 
 
-def legend_below(figure: Figure, handles: Sequence[Any] | None = None, most: int = 7) -> None:
-    """Legend under the picture (None: of all its axes), in as many columns as its width and `most` allow."""
-    if handles is None:
-        handles = [h for ax in figure.axes for h in ax.get_legend_handles_labels()[0]]
+def legend_below(figure: Figure, most: int = 7) -> None:
+    """Legend of all axes under the picture, in as many columns as its width and `most` allow."""
+    handles = [h for ax in figure.axes for h in ax.get_legend_handles_labels()[0]]
     entries = {str(h.get_label()): h for h in handles}
     renderer = _renderer(figure)
     for columns in range(min(len(entries), most), 0, -1):
@@ -116,7 +115,7 @@ def length_unit(largest: float) -> tuple[str, float]:
     return number_text.length_unit(largest, 0.0995e-3)[:2]
 
 
-def place_text(position: Floats) -> str:
+def place_text(position: Iterable[float]) -> str:
     """A position (3,) m in mm."""
     return f"({', '.join(f'{MM * v:g}' for v in position)}) mm"
 

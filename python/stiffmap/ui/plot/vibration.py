@@ -52,11 +52,11 @@ def lobes_figure(
     return figure
 
 
-def response_figure(responses: Mapping[str, xr.DataArray], axes: str = "xyz") -> Figure:
+def response_figure(responses: Mapping[str, xr.DataArray]) -> Figure:
     """Size of the receptances (µm/N) along base axes over the frequency, a panel for each axis."""
-    with paper(2.5 * len(axes) + 0.5, 3.0, "Frequency response at the tool", most=0) as figure:
-        panels = figure.subplots(1, len(axes), squeeze=False, sharey=True)[0]
-        for ax, axis in zip(panels, axes, strict=True):
+    with paper(8.0, 3.0, "Frequency response at the tool", most=0) as figure:
+        panels = figure.subplots(1, 3, sharey=True)
+        for ax, axis in zip(panels, "xyz", strict=True):
             for i, (label, H) in enumerate(responses.items()):
                 own = np.abs(H.sel(response=axis, force=f"f{axis}"))
                 ax.semilogy(H.frequency, UM * own, label=label, **line_look(i))

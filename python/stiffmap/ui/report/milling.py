@@ -7,7 +7,6 @@ from os import PathLike
 from pathlib import Path
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from stiffmap.common.outputs import make_folder, write_rows, write_text
 from stiffmap.machining.milling.choices import Choices
@@ -25,8 +24,6 @@ from stiffmap.ui.plot.milling import error_figure, machine_path_figure, outline_
 from stiffmap.ui.plot.style import save
 from stiffmap.ui.report.sheet import Sheet, write_sheet
 from stiffmap.workspace.maps.files import write_dataset
-
-PICTURES = ("outline", "error", "machine")
 
 
 def summary(found: Milled) -> dict[str, object]:
@@ -145,10 +142,14 @@ def write_report(found: Milled, folder: str | PathLike[str]) -> dict[str, str]:
     if found.job.angle is not None:
         made["drives"] = "drives.csv"
         write_rows(target / made["drives"], *_drives(found))
-    pictures = _pictures(found)
-    for name, figure in zip(PICTURES, pictures.values(), strict=True):
-        made[name] = f"{name}.png"
-        save(figure, target / made[name])
+    pictures = {}
+    for name, caption, figure in (
+        ("outline", "The wall of the part, wanted and cut.", outline_figure(found)),
+        ("error", "Error across the wall along the path.", error_figure(found.dataset)),
+        ("machine", "The path on the machine.", machine_path_figure(found)),
+    ):
+        made[name] = save(figure, target / f"{name}.png").name
+        pictures[caption] = figure
     write_sheet(target / made["report"], _sheet(found), pictures, _digests(found))
     return made
 
@@ -164,14 +165,6 @@ def _drives(found: Milled) -> tuple[list[str], list[list[str]]]:
     assert job.angle is not None
     columns = np.hstack([1e3 * job.points.way[:, None], np.degrees(job.angle)[:, None], at * scale])
     return names, [[f"{v:.9g}" for v in row] for row in columns]
-
-
-def _pictures(found: Milled) -> dict[str, Figure]:
-    return {
-        "The wall of the part, wanted and cut.": outline_figure(found),
-        "Error across the wall along the path.": error_figure(found.dataset),
-        "The path on the machine.": machine_path_figure(found),
-    }
 
 
 def _digests(found: Milled) -> dict[str, str]:

@@ -16,6 +16,7 @@ from stiffmap.solve.budget import deflection_budget
 from stiffmap.solve.machine import Machine
 from stiffmap.ui.plot.loaded import LoadedShape, loaded_shape
 from stiffmap.ui.plot.style import leg_colours
+from stiffmap.ui.report.sheet import render
 
 
 def write_page(
@@ -29,8 +30,6 @@ def write_page(
     """Write the page; raises FileError where it cannot be written, StiffmapError for a failed pose."""
     shape = loaded_shape(machine, position, wrench, rotation=rotation)
     budget = deflection_budget(machine, position, wrench, rotation=rotation)
-    from stiffmap.ui.report.templates import render
-
     size = sum(v * v for v in shape.displacement[:3]) ** 0.5
     unit, scale, decimals = length_unit(size)
     text = render(

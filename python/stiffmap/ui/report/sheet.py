@@ -1,18 +1,93 @@
-"""A report of one table: the answer, its numbers, its pictures; one file, nothing from the network."""
+"""What pages are made of: the jinja2 templates next to this file, pictures, where a report comes from; and the report of one table:
+the answer, its numbers, its pictures; one file, nothing from the network."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import base64
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
+from io import BytesIO
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from matplotlib.figure import Figure
+from PIL import Image
 
+from stiffmap.common.fingerprints import file_digest
 from stiffmap.common.outputs import write_text
-from stiffmap.ui.report.pictures import inline
-from stiffmap.ui.report.provenance import provenance
-from stiffmap.ui.report.templates import render
+from stiffmap.common.version import __version__
+
+SHOWN = 16
+"""Digits of a digest that are printed."""
+PAUSE = 70
+"""ms between two frames."""
+
+
+def provenance(
+    date: str | None, seed: int | None, inputs: Iterable[str | PathLike[str]], digests: dict[str, str]
+) -> list[tuple[str, str]]:
+    """Rows of the table: what and its value. ``date`` is the caller's own words; files of ``inputs`` (of a folder, those in it)
+    are hashed (SHA-256), ``digests`` are of what is only in memory."""
+    rows = [("date", date or "not given"), ("stiffmap", __version__)]
+    rows += [] if seed is None else [("seed", str(seed))]
+    rows += [(f"file {path.name}", f"sha256 {digest_of(path)}") for path in _files(inputs)]
+    return rows + [(name, f"sha256 {value[:SHOWN]}") for name, value in digests.items()]
+
+
+def _files(inputs: Iterable[str | PathLike[str]]) -> list[Path]:
+    out = []
+    for given in map(Path, inputs):
+        out += sorted(p for p in given.iterdir() if p.is_file()) if given.is_dir() else [given]
+    return out
+
+
+def digest_of(path: Path) -> str:
+    """First digits of the SHA-256 of a file; raises FileError where it cannot be read."""
+    return file_digest(path)[:SHOWN]
+
+
+@cache
+def _environment() -> Environment:
+    return Environment(
+        loader=FileSystemLoader(Path(__file__).parent / "pages"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+
+
+def render(template: str, /, **values: Any) -> str:
+    """A template filled in; values are escaped."""
+    return _environment().get_template(template).render(**values)
+
+
+def inline(picture: Figure | bytes) -> str:
+    """PNG of a figure, or a GIF, as a data address."""
+    kind, data = ("gif", picture) if isinstance(picture, bytes) else ("png", _png(picture, 110))
+    return f"data:image/{kind};base64," + base64.b64encode(data).decode()
+
+
+def animation(frames: Iterable[Figure], dpi: int = 80) -> bytes:
+    """GIF that repeats; each frame is drawn before the next one is asked for."""
+    images = [
+        Image.open(BytesIO(_png(figure, dpi))).convert("P", palette=Image.Palette.ADAPTIVE)
+        for figure in frames
+    ]
+    buffer = BytesIO()
+    images[0].save(
+        buffer, format="GIF", save_all=True, append_images=images[1:], duration=PAUSE, loop=0, optimize=True
+    )
+    return buffer.getvalue()
+
+
+def _png(figure: Figure, dpi: int) -> bytes:
+    buffer = BytesIO()
+    figure.savefig(buffer, format="png", dpi=dpi)
+    return buffer.getvalue()
 
 
 @dataclass(frozen=True)

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from functools import cache
 
+import matplotlib
 import numpy as np
+from matplotlib.colors import to_rgb
 from numpy.typing import NDArray
 
 from stiffmap.solve.status import Status
-from stiffmap.ui.plot.style import COLOURS
+from stiffmap.ui.plot.style import BLUE, COLOURS, ORANGE, PURPLE, VERMILLION
 from stiffmap.ui.view.plane import PlaneMap
 from stiffmap.ui.view.quantities import Mask
 
@@ -16,20 +18,26 @@ Image = NDArray[np.uint8]
 HATCHED, PERIOD = 4, 8
 """Pixels per pose where there is something to hatch (else one), and from one line to the next."""
 GREY, DARK = (205, 205, 205), (120, 40, 40)
+
+
+def rgb(colour: str) -> tuple[int, int, int]:
+    """0 to 255."""
+    r, g, b = (round(255 * v) for v in to_rgb(colour))
+    return r, g, b
+
+
 STATUS_COLOURS = {
-    Status.CONVERGED: (0, 114, 178),
-    Status.UNREACHABLE: (160, 160, 160),
-    Status.SINGULAR: (204, 121, 167),
-    Status.UNSTABLE: (213, 94, 0),
-    Status.NOT_CONVERGED: (230, 159, 0),
+    Status.CONVERGED: rgb(BLUE),
+    Status.UNREACHABLE: rgb("#A0A0A0"),
+    Status.SINGULAR: rgb(PURPLE),
+    Status.UNSTABLE: rgb(VERMILLION),
+    Status.NOT_CONVERGED: rgb(ORANGE),
 }
 
 
 @cache
 def table() -> Image:
     """(256, 3) colours from low to high."""
-    import matplotlib
-
     return np.asarray(255 * matplotlib.colormaps[COLOURS](np.linspace(0, 1, 256))[:, :3] + 0.5, np.uint8)
 
 

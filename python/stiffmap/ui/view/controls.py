@@ -47,7 +47,6 @@ class Controls:
             self._numbers(gui, moment)
         with tabs.add_tab("Out"):
             self.outputs = Outputs(viewer, gui)
-        self._shown: dict[int, Any] = {}
         self.map_on, self.hold, self.isolines, self.cloud = True, False, True, False
         self.surface, self.lit = NONE, ""
 
@@ -138,8 +137,7 @@ class Controls:
         )
 
     def _numbers(self, gui: Any, moment: Moment) -> None:
-        self._all, self._units = addresses(moment.machine.description), units(moment.machine.description)
-        names = tuple(self._all)
+        names = self._list(moment)
         self._find = gui.add_text("Find", "", hint="part of an address")
         self._address = gui.add_dropdown("Number", names, initial_value=names[0])
         self._value = gui.add_number("Value, SI", 0.0)
@@ -264,8 +262,13 @@ class Controls:
 
     def renew(self, moment: Moment) -> None:
         """The machine's file has changed."""
-        self._all, self._units = addresses(moment.machine.description), units(moment.machine.description)
-        self._address.options = tuple(self._all)
+        self._address.options = self._list(moment)
+
+    def _list(self, moment: Moment) -> tuple[str, ...]:
+        """Addresses that may be changed; what the file says of each is kept."""
+        d = moment.machine.description
+        self._all, self._units = addresses(d), units(d)
+        return tuple(self._all)
 
     def _write(self, handle: Any, field: str, value: Any) -> None:
         """Only what differs is sent."""

@@ -2,30 +2,96 @@
 
 from __future__ import annotations
 
+import json
+from dataclasses import dataclass
 from html import escape
+from os import PathLike
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stiffmap.common.broadcasting import Floats
+from stiffmap.common.errors import FileError
 from stiffmap.experiment import Experiment
 from stiffmap.experiment.comparison.residual import residual
-from stiffmap.solve.machine import Machine
+from stiffmap.solve.machine import Machine, load_machine
+from stiffmap.ui.plot.elements import element_links
 from stiffmap.ui.plot.loaded import round_factor
 from stiffmap.ui.plot.style import BLUE, GREEN, VERMILLION
-from stiffmap.ui.view.diagnosed import Findings
+from stiffmap.ui.view.colours import rgb
 from stiffmap.ui.view.moment import Moment
 from stiffmap.ui.view.place import solved
-from stiffmap.ui.view.scene import Scene
+from stiffmap.ui.view.scene import DIAGNOSED, Scene
 
 DRAWN = 0.06
 """Of the machine's extent, the longest arrow and the widest ribbon."""
 MOST_POINTS = 400
 """Of a path that are solved."""
-BEFORE, NOW, NAMED = VERMILLION, BLUE, "#E8279B"
+BEFORE, NOW, NAMED = VERMILLION, BLUE, DIAGNOSED
 """Residuals of the machine as opened, with what was changed in the view, and with what a diagnosis named."""
 Arrows = tuple[Floats, Floats]
 """Places (n, 3) m and what is drawn there (n, 3) m."""
+
+RESULT, CORRECTED = "diagnosis.json", "machine.yaml"
+"""Files of the folder that ``stiffmap diagnose -o`` wrote."""
+
+
+@dataclass(frozen=True)
+class Named:
+    """An effect on its element; `legs` is empty where the element is in none."""
+
+    kind: str
+    element: str
+    legs: tuple[str, ...]
+    text: str
+
+    def links(self, machine: Machine) -> list[int]:
+        """Which links of a drawing are lit for it."""
+        return element_links(machine, self.element, self.legs)
+
+
+@dataclass(frozen=True, eq=False)
+class Findings:
+    """A verdict, the effects that it names, and the machine with them."""
+
+    verdict: str
+    effects: tuple[Named, ...]
+    machine: Machine
+
+
+def findings(diagnosis: Any) -> Findings:
+    """Of a `Diagnosis`, or of the folder of one (or its ``diagnosis.json``); FileError where that cannot be read."""
+    if isinstance(diagnosis, str | PathLike):
+        return _from_folder(Path(diagnosis))
+    return Findings(diagnosis.verdict, tuple(map(_named, diagnosis.as_plain()["effects"])), diagnosis.machine)
+
+
+def _from_folder(given: Path) -> Findings:
+    file = given / RESULT if given.is_dir() else given
+    try:
+        data = json.loads(file.read_text(encoding="utf-8"))
+        verdict, effects = str(data["verdict"]), tuple(map(_named, data["effects"]))
+    except OSError as problem:
+        message = f"{problem.strerror}; expected the folder that stiffmap diagnose -o wrote"
+        raise FileError(message, file=str(file)) from None
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        raise FileError(f"expected the {RESULT} that stiffmap diagnose -o wrote", file=str(file)) from None
+    return Findings(verdict, effects, load_machine(file.with_name(CORRECTED)))
+
+
+def _named(e: Any) -> Named:
+    legs = tuple(map(str, e["legs"]))
+    where = f", leg{'s' if len(legs) > 1 else ''} {', '.join(legs)}" if legs else ""
+    values = ", ".join(
+        f"{name} {v[0]:.4g} [{v[1]:.4g}, {v[2]:.4g}] {v[3]}" for name, v in e["parameters"].items()
+    )
+    others = len(e["aliases"])
+    more = f" (or {others} other place{'s' if others > 1 else ''})" if others else ""
+    return Named(
+        str(e["kind"]), str(e["element"]), legs, f"{e['kind']} of {e['element']}{where}: {values}{more}"
+    )
 
 
 class Data:
@@ -78,7 +144,7 @@ class Data:
             return
         factor = round_factor(DRAWN * scene.extent, float(np.linalg.norm(before[1], axis=1).max()))
         sets = [("before", BEFORE, "red", "as opened", before)]
-        sets += [] if same(now, before) else [("now", NOW, "blue", "as changed here", now)]
+        sets += [] if np.array_equal(now, before) else [("now", NOW, "blue", "as changed here", now)]
         sets += (
             [] if self._named is None else [("diagnosed", NAMED, "pink", "with the diagnosis", self._named)]
         )
@@ -91,7 +157,7 @@ class Data:
             words.append(f"{said} {which} {1e6 * rms(arrows):.3g} µm rms")
         text = f"{len(places)} rows, residuals (measured less predicted) × {factor:g}: {', '.join(words)}"
         self._said["Experiment"] = f"{escape(e.name)}, {text}"
-        scene.points("/rows/places", places, "#444444")
+        scene.points("/rows/places", places, rgb("#444444"), 0.005)
 
     def _effects(self, scene: Scene, moment: Moment, found: Findings) -> None:
         scene.diagnosed = list(dict.fromkeys(i for e in found.effects for i in e.links(moment.machine)))
@@ -122,11 +188,6 @@ class Data:
             f"errors × {factor:g}: wanted green, as cut red (most {off[0]:.3g} µm), "
             f"compensated by one mirror step blue (most {off[1]:.3g} µm){more}"
         )
-
-
-def same(a: Arrows, b: Arrows) -> bool:
-    """Whether two sets of arrows are equal."""
-    return np.array_equal(a[0], b[0]) and np.array_equal(a[1], b[1])
 
 
 def rms(arrows: Floats) -> float:

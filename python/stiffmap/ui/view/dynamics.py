@@ -19,7 +19,7 @@ STEP = 1e-7
 
 
 def modes_at(
-    machine: Machine, state: State, position: Floats, modes: int, threads: int | None
+    machine: Machine, state: State, position: Floats, modes: int, threads: int | None = None
 ) -> NaturalFrequencies:
     """The lowest modes at (..., 3) m under the load of a state; StiffmapError where bodies lack masses."""
     return natural_frequencies(
@@ -28,30 +28,20 @@ def modes_at(
     )  # fmt: skip
 
 
-def lowest_frequency(
-    machine: Machine, state: State, position: Floats, threads: int | None = None
-) -> tuple[Floats, Floats]:
+def lowest_frequency(machine: Machine, state: State, position: Floats) -> tuple[Floats, Floats]:
     """(...) Hz and statuses."""
-    w = modes_at(machine, state, position, 1, threads)
+    w = modes_at(machine, state, position, 1)
     return np.asarray(w.frequency[..., 0]), np.asarray(w.status, dtype=float)
 
 
-def dynamic_stiffness(
-    machine: Machine, state: State, position: Floats, threads: int | None = None
-) -> tuple[Floats, Floats]:
+def dynamic_stiffness(machine: Machine, state: State, position: Floats) -> tuple[Floats, Floats]:
     """(...) N/m of the softest direction at the state's frequency, and statuses.
 
     Compliance of the tool = the static one, in which all modes are, plus what the lowest modes add at the frequency:
     C + sum phi phiᵀ (1/(w² - W² + 2 i z w W) - 1/w²), with the damping ratio z = 0.02 of every mode.
     """
-    w = modes_at(machine, state, position, MODES, threads)
-    static = machine.solve(
-        position,
-        state.wrench,
-        rotation=orientation(state),
-        gravity=state.gravity,
-        threads=threads,
-    )
+    w = modes_at(machine, state, position, MODES)
+    static = machine.solve(position, state.wrench, rotation=orientation(state), gravity=state.gravity)
     shape = w.frequency.shape[:-1]
     c = static.compliance[..., :3, :3].reshape(-1, 3, 3)
     out = np.full(len(c), np.nan)

@@ -16,6 +16,7 @@ from stiffmap.solve.closing import Kinematics
 from stiffmap.solve.compiled import Role, Status
 from stiffmap.solve.kinematics import inverse_kinematics
 from stiffmap.solve.machine import Machine, load_machine
+from stiffmap.ui.plot.style import place_text
 from stiffmap.ui.view.changes import changed
 from stiffmap.ui.view.moment import Moment
 from stiffmap.ui.view.place import first_plane, orientation, rotation_of
@@ -65,8 +66,8 @@ class Model:
             self._with(state.changes), state.position, orientation(state), start=state.start_array, threads=1
         )
         if int(k.status) != Status.CONVERGED:
-            where = ", ".join(f"{1e3 * v:g}" for v in state.position)
-            raise StiffmapError(f"{self.declared.name} cannot reach ({where}) mm with this orientation")
+            where = place_text(state.position)
+            raise StiffmapError(f"{self.declared.name} cannot reach {where} with this orientation")
 
     def put(self, *, keep: bool = True, **values: Any) -> State:
         """New values of the state; all or none. The message on the screen is cleared."""

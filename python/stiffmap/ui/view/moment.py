@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,10 +16,13 @@ from stiffmap.solve.machine import Machine
 from stiffmap.solve.solution import Solution
 from stiffmap.ui.plot.loaded import SHOWN, round_factor
 from stiffmap.ui.plot.skeleton import Skeleton, skeleton, standing
-from stiffmap.ui.view.place import box_of, orientation, solved
-from stiffmap.ui.view.plane import FINE, PlaneMap, plane_map
+from stiffmap.ui.view.place import box_of, moves, orientation, solved
+from stiffmap.ui.view.plane import FINE, NO_LINES, PlaneMap, plane_map, values_at
+from stiffmap.ui.view.quantities import QUANTITIES
 from stiffmap.ui.view.state import State
 
+CLOUD = 15
+"""Poses of the cloud along each commanded axis."""
 BRANCHES_TRIED, ALIKE = 96, 1e-4
 """Starts of the search for assembly modes; rad or m by which two of them differ."""
 
@@ -38,14 +42,35 @@ class Moment:
         """The plane through the tool."""
         return plane_map(self.machine, self.state, count)
 
+    def at(self, point: Sequence[float]) -> tuple[float, Status]:
+        """Value (SI) of the quantity with the tool at a point (3,) m, solved there, and the status."""
+        value, status = values_at(self.machine, self.state, np.array(point, dtype=float))
+        return float(value), Status(int(status))
+
+    def cloud(self) -> tuple[Floats, Floats]:
+        """The quantity over the whole box: points (n, 3) m, values (n,) in the unit of the screen; none where it needs modes."""
+        quantity, at = QUANTITIES[self.state.quantity], self.state.position
+        if quantity.of is None:
+            return np.zeros((0, 3)), np.zeros(0)
+        low, high = box_of(self.machine)
+        axes = [
+            np.linspace(low[i], high[i], CLOUD) if free else np.array([at[i]])
+            for i, free in enumerate(moves(self.machine))
+        ]
+        points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+        return points, values_at(self.machine, self.state, points)[0] * quantity.factor
+
     def rest(self) -> Skeleton:
         """The machine at its pose, springs at rest."""
         s = self.state
         return standing(self.machine, s.position, orientation(s), start=s.start_array)
 
-    def loaded(self, solution: Solution) -> Skeleton | None:
-        """The machine under the load; None where there is no equilibrium."""
-        return skeleton(self.machine, solution.coordinates) if bool(solution.ok) else None
+    def ghost(self, rest: Skeleton, solution: Solution) -> Floats:
+        """(n, 2, 3) m, links of the machine under the load, its deflection magnified; none without an equilibrium."""
+        factor = self.magnification(rest, solution)
+        if not bool(solution.ok) or factor == 0:
+            return NO_LINES
+        return rest.enlarged(skeleton(self.machine, solution.coordinates), factor).links
 
     def magnification(self, rest: Skeleton, solution: Solution) -> float:
         """Of the deflected machine: as the state says, else a round factor."""
@@ -82,10 +107,6 @@ class Moment:
             if all(o > ALIKE for o in off):
                 found.append(x)
         return [tuple(map(float, x)) for x in found]
-
-    def box(self) -> tuple[Floats, Floats]:
-        """Lowest and highest corner, m."""
-        return box_of(self.machine)
 
 
 def _difference(a: Floats, b: Floats, angular: Floats) -> float:

@@ -13,11 +13,10 @@ from typing import Any
 from stiffmap.common.broadcasting import real_array
 from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.machine import Machine
-from stiffmap.ui.view.data import Data
+from stiffmap.ui.view.data import Data, findings
 from stiffmap.ui.view.model import Model
-from stiffmap.ui.view.optional import need_viser
-from stiffmap.ui.view.serving import HERE, LOCAL, Guard, silent, start_server
-from stiffmap.ui.view.state import State, from_permalink, permalink
+from stiffmap.ui.view.serving import HERE, LOCAL, Guard, need_viser, silent, start_server
+from stiffmap.ui.view.state import State, as_plain, from_permalink, from_plain, permalink
 from stiffmap.ui.view.viewer import Viewer
 
 POLL = 0.2
@@ -160,8 +159,6 @@ def data_of(machine: Machine, experiment: Any = None, diagnosis: Any = None, pat
                 f"path: expected positions (n, 3) m with n of 2 or more, got shape {line.shape}"
             )
     if diagnosis is not None:
-        from stiffmap.ui.view.diagnosed import findings
-
         found = findings(diagnosis)
     return Data(rows, line, found, machine)
 
@@ -170,8 +167,6 @@ def model_of(
     machine: Machine, position: Any = None, file: str | PathLike[str] | None = None, **state: Any
 ) -> Model:
     """A model in a state given by keywords; StiffmapError for bad ones."""
-    from stiffmap.ui.view.state import as_plain, from_plain
-
     model = Model(machine, file=None if file is None else Path(file))
     given = {k: _listed(v) for k, v in state.items() if v is not None}
     if position is not None:

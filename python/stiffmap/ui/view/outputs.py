@@ -1,18 +1,51 @@
-"""What leaves a view: pictures, the page, the link, and the lines that make the same."""
+"""What leaves a view: pictures, the scene as one file of HTML that opens without a server and without a network, the link, and
+the lines that make the same."""
 
 from __future__ import annotations
 
 import shlex
 import tempfile
+from html import escape
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
+from stiffmap.common.errors import StiffmapError
+from stiffmap.common.number_text import length_text, vector_text
+from stiffmap.common.outputs import write_text
+from stiffmap.ui.plot import save
+from stiffmap.ui.plot.loaded import draw_budget
+from stiffmap.ui.plot.scene import draw_box, draw_force, draw_skeleton, finish
+from stiffmap.ui.plot.style import COLOURS, MM, ORANGE, TOLERANCE, headline, leg_colours, paper
+from stiffmap.ui.view.colours import plane_image
+from stiffmap.ui.view.data import Data
 from stiffmap.ui.view.moment import Moment
-from stiffmap.ui.view.page import page_of
-from stiffmap.ui.view.picture import write_view_picture
+from stiffmap.ui.view.panels import (
+    colour_bar,
+    compliance_panel,
+    efforts_panel,
+    shares_panel,
+    status_line,
+)
+from stiffmap.ui.view.place import box_of
+from stiffmap.ui.view.plane import PlaneMap
+from stiffmap.ui.view.quantities import QUANTITIES
+from stiffmap.ui.view.scene import Scene, look_at_machine
+from stiffmap.ui.view.serving import HERE, need_viser, silent
 from stiffmap.ui.view.state import State, as_plain, permalink
+
+SHOWN = 51
+"""Poses along each edge of the plane in a picture."""
+BOX = (
+    "position:fixed;z-index:1000;background:rgba(255,255,255,.92);color:#111;font:13px system-ui,sans-serif;"
+    "border-radius:4px;padding:.3em .6em;left:.6em;width:min(24em,45vw)"
+)
 
 
 class Outputs:
@@ -56,9 +89,7 @@ class Outputs:
 
 def _picture(moment: Moment, kind: str) -> bytes:
     with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / f"view.{kind}"
-        write_view_picture(moment, file)
-        return file.read_bytes()
+        return save(view_figure(moment), Path(folder) / f"view.{kind}").read_bytes()
 
 
 def command_line(machine: str, moment: Moment) -> str:
@@ -109,3 +140,99 @@ def python_lines(machine: str, moment: Moment) -> str:
 
 def _numbers(values: object) -> str:
     return ",".join(f"{v:.12g}" for v in np.asarray(values, dtype=float))
+
+
+def write_page(moment: Moment, path: str | PathLike[str], data: Data | None = None) -> Path:
+    """Write the page; raises FileError where it cannot be written, MissingPartError without viser."""
+    return write_text(path, page_of(moment, data))
+
+
+def page_of(moment: Moment, data: Data | None = None) -> str:
+    """The page: the scene, the colour bar and the panels, all in it."""
+    viser = need_viser()
+    with silent():
+        server = viser.ViserServer(host=HERE, port=0, verbose=False)  # it alone can write its scene down
+        try:
+            said = draw(server, moment, data)
+            text: str = server.scene.as_html()
+        finally:
+            server.stop()
+    title = escape(f"{moment.machine.name}: stiffness view")
+    box = f'<div style="{BOX};top:.6em;max-height:90vh;overflow:auto">{said}</div>'
+    text = text.replace("<title>", f"<title>{title} - ", 1)
+    head, _, tail = text.rpartition("</body>")
+    return f"{head}{box}</body>{tail}"
+
+
+def draw(server: Any, moment: Moment, data: Data | None = None) -> str:
+    """The whole scene of a moment; its panels as HTML."""
+    scene = Scene(server.scene, moment)
+    scene.gizmo.visible = scene.force_handle.visible = False
+    solution, rest, found = moment.solve(), moment.rest(), moment.plane()
+    factor = moment.magnification(rest, solution)
+    scene.machine(rest, moment.ghost(rest, solution))
+    scene.force(moment)
+    scene.plane(found, found.range, moment.state.tolerance, True)
+    if data is not None:
+        data(scene, moment)
+        scene.lights()
+    look_at_machine(server, rest)
+    try:
+        shares = shares_panel(moment.shares())
+    except StiffmapError:
+        shares = ""
+    words = f"force {vector_text(moment.state.force)} N; deflected machine (orange) magnified × {factor:g}"
+    return (
+        f"{status_line(moment, solution, '', '')}<div>{escape(words)}</div>"
+        f"{colour_bar(found, found.range, moment.state.tolerance)}"
+        f"<details open><summary>where it comes from</summary>{shares}{compliance_panel(solution)}"
+        f"{efforts_panel(moment, solution)}</details>{data.html if data is not None else ''}"
+    )
+
+
+def view_figure(moment: Moment) -> Figure:
+    """Machine, deflected ghost, plane with isolines, and where the deflection comes from."""
+    solution, rest, found = moment.solve(), moment.rest(), moment.plane(SHOWN)
+    q, limits, s = QUANTITIES[moment.state.quantity], found.range, moment.state
+    with paper(9.6, 5.2, most=0) as figure:
+        ax: Any = figure.add_subplot(1, 2, 1, projection="3d")
+        draw_box(ax, *box_of(moment.machine))
+        _plane(ax, found, limits)
+        _lines(ax, found.isolines(limits), "white", 0.5)
+        _lines(ax, found.tolerance_lines(s.tolerance), TOLERANCE, 1.5)
+        draw_skeleton(ax, rest, leg_colours(moment.machine.legs))
+        _lines(ax, moment.ghost(rest, solution), ORANGE, 1.0)
+        draw_force(ax, rest.tcp, np.array(s.force), rest.extent)
+        finish(ax, (22, -50))
+        if s.quantity != "status":
+            bar = ScalarMappable(Normalize(*limits), COLOURS)
+            figure.colorbar(bar, ax=ax, label=f"{q.title}, {q.unit}", shrink=0.6, location="bottom", pad=0.08)
+        _shares(figure.add_subplot(1, 2, 2), moment)
+        at = ", ".join(f"{MM * v:.4g}" for v in s.position)
+        moved = length_text(float(np.linalg.norm(solution.displacement[:3])))
+        headline(figure, f"{moment.machine.name} at ({at}) mm under {vector_text(s.force, 4)} N: the tool moves {moved} "
+                         f"(orange: × {moment.magnification(rest, solution):g})")  # fmt: skip
+    return figure
+
+
+def _lines(ax: Any, pieces: Any, colour: str, width: float) -> None:
+    if len(pieces):
+        ax.add_collection3d(Line3DCollection(MM * pieces, colors=colour, linewidths=width))
+
+
+def _plane(ax: Any, found: PlaneMap, limits: tuple[float, float]) -> None:
+    p = MM * found.frame.poses(found.count)
+    step = plane_image(found, limits)
+    colours = step[:: len(step) // found.count, :: len(step) // found.count] / 255.0
+    ax.plot_surface(
+        p[..., 0], p[..., 1], p[..., 2], facecolors=colours, rcount=found.count, ccount=found.count, shade=False,
+        antialiased=False, linewidth=0,
+    )  # fmt: skip
+
+
+def _shares(ax: Any, moment: Moment) -> None:
+    try:
+        draw_budget(ax, moment.shares())
+    except StiffmapError as problem:
+        ax.text(0.5, 0.5, str(problem), ha="center", wrap=True)
+        ax.axis("off")

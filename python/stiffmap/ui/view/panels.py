@@ -11,15 +11,13 @@ from stiffmap.common.number_text import length_text, length_unit, percents
 from stiffmap.solve.budget import DeflectionBudget
 from stiffmap.solve.solution import Solution
 from stiffmap.solve.status import Status
-from stiffmap.ui.plot.isolines import levels
 from stiffmap.ui.plot.loaded import budget_rows
+from stiffmap.ui.plot.planes import levels
 from stiffmap.ui.plot.style import BLUE, ORANGE, TOLERANCE
 from stiffmap.ui.view.colours import STATUS_COLOURS, table
-from stiffmap.ui.view.isolines import tolerance_level
 from stiffmap.ui.view.moment import Moment
 from stiffmap.ui.view.plane import PlaneMap
-from stiffmap.ui.view.probe import probe
-from stiffmap.ui.view.quantities import QUANTITIES
+from stiffmap.ui.view.quantities import QUANTITIES, tolerance_level
 from stiffmap.ui.view.surfaces import principal
 from stiffmap.workspace.performance.motion.scaling import drive_table
 
@@ -166,7 +164,7 @@ def frequencies_panel(frequency: Sequence[float], shown: int) -> str:
 
 def probe_text(moment: Moment, point: Sequence[float]) -> str:
     """What the chosen quantity is at a point of the plane, solved there."""
-    value, status = probe(moment, point)
+    value, status = moment.at(point)
     q = QUANTITIES[moment.state.quantity]
     at = ", ".join(f"{1e3 * v:.1f}" for v in point)
     said = f"{value * q.factor:.5g} {q.unit}".strip() if np.isfinite(value) else status.name.lower()

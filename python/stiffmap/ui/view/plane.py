@@ -7,18 +7,21 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.interpolate import RegularGridInterpolator
+from contourpy import contour_generator
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.solve.compiled import Status
 from stiffmap.solve.machine import Machine
+from stiffmap.ui.plot.planes import levels
+from stiffmap.ui.plot.scene import box_corners
 from stiffmap.ui.view.dynamics import dynamic_stiffness, lowest_frequency
 from stiffmap.ui.view.place import drawn_box, solved
-from stiffmap.ui.view.quantities import QUANTITIES, Load, Mask
+from stiffmap.ui.view.quantities import QUANTITIES, Mask, tolerance_level
 from stiffmap.ui.view.state import State
 
 FINE, COARSE, DEAR = 101, 51, 15
 """Poses along each edge: at rest, while something is dragged, and of quantities that need modes."""
+NO_LINES = np.zeros((0, 2, 3))
 INSIDE = 1e-9
 """Of the box, how far outside it a pose may lie by round-off."""
 
@@ -38,15 +41,26 @@ class Frame:
         """(3,) unit vector."""
         return np.asarray(np.cross(self.u, self.v))
 
+    def nodes(self, count: int) -> tuple[Floats, Floats]:
+        """(count,) along u and along v from the centre, m."""
+        part = np.linspace(-0.5, 0.5, count)
+        return part * self.width, part * self.height
+
     def poses(self, count: int) -> Floats:
         """(count, count, 3) m, rows along v."""
-        a, b = (np.linspace(-0.5, 0.5, count) * size for size in (self.width, self.height))
+        a, b = self.nodes(count)
         return np.asarray(self.centre + b[:, None, None] * self.v + a[None, :, None] * self.u)
 
-    def coordinates(self, point: Floats) -> tuple[float, float]:
-        """Along u and v from the centre, m."""
-        d = np.asarray(point) - self.centre
-        return float(d @ self.u), float(d @ self.v)
+    def under_ray(self, origin: Floats, direction: Floats) -> Floats | None:
+        """(3,) where a ray (m) meets the rectangle; None where it misses."""
+        across = float(np.dot(direction, self.normal))
+        if abs(across) < 1e-9:
+            return None
+        t = float(np.dot(self.centre - origin, self.normal)) / across
+        point = np.asarray(origin) + t * np.asarray(direction)
+        off = point - self.centre
+        inside = abs(off @ self.u) <= self.width / 2 and abs(off @ self.v) <= self.height / 2
+        return point if t > 0 and inside else None
 
 
 def plane_frame(machine: Machine, state: State) -> Frame:
@@ -59,7 +73,7 @@ def plane_frame(machine: Machine, state: State) -> Frame:
         u = np.cross(other, n)
         u /= np.linalg.norm(u)
         v = np.cross(n, u)
-        corners = np.array([[(low, high)[c >> i & 1][i] for i in range(3)] for c in range(8)]) - p
+        corners = box_corners(low, high) - p
         along = np.stack([corners @ u, corners @ v])
         lowest, highest = along.min(axis=1), along.max(axis=1)
         middle = (lowest + highest) / 2
@@ -114,28 +128,44 @@ class PlaneMap:
             return low - max(1e-3 * abs(low), 1e-12), high + max(1e-3 * abs(high), 1e-12)
         return low, high
 
-    def between(self, point: Floats) -> float:
-        """Bilinear value (unit of the screen) at a point of the plane; NaN outside."""
-        f = self.frame
-        grids = tuple(np.linspace(-0.5, 0.5, self.count) * s for s in (f.height, f.width))
-        a, b = f.coordinates(point)
-        look = RegularGridInterpolator(grids, self.shown, bounds_error=False)
-        return float(look((b, a)))
+    def lines_at(self, level: float) -> Floats:
+        """(n, 2, 3) m, pieces of the line on which the value (unit of the screen) is `level`."""
+        if self.count < 2 or not np.isfinite(self.shown).any():
+            return NO_LINES
+        pieces = contour_generator(*self.frame.nodes(self.count), np.ma.masked_invalid(self.shown)).lines(
+            level
+        )
+        lines = [np.asarray(line) for line in pieces]
+        ends = [np.stack([line[:-1], line[1:]], axis=1) for line in lines if len(line) > 1]
+        if not ends:
+            return NO_LINES
+        flat, f = np.concatenate(ends), self.frame
+        return np.asarray(f.centre + flat[..., :1] * f.u + flat[..., 1:] * f.v)
+
+    def isolines(self, limits: tuple[float, float]) -> Floats:
+        """(n, 2, 3) of all round levels; none of a status."""
+        if self.quantity == "status":
+            return NO_LINES
+        return np.concatenate([NO_LINES, *map(self.lines_at, levels(*limits))])
+
+    def tolerance_lines(self, tolerance: float) -> Floats:
+        """(n, 2, 3) of the line at which the tolerance (m) is met."""
+        level = tolerance_level(self.quantity, tolerance)
+        return NO_LINES if level is None else self.lines_at(level)
 
 
-def values_at(
-    machine: Machine, state: State, position: Floats, threads: int | None = None
-) -> tuple[Floats, Floats]:
+def values_at(machine: Machine, state: State, position: Floats) -> tuple[Floats, Floats]:
     """(...) of the state's quantity with the tool at (..., 3) m, SI, and statuses."""
     quantity = QUANTITIES[state.quantity]
     if quantity.of is None:
         make = lowest_frequency if state.quantity == "frequency" else dynamic_stiffness
-        return make(machine, state, position, threads)
-    s = solved(machine, state, position, stiffness=quantity.stiffness, threads=threads)
-    return quantity.of(s, Load(np.array(state.force), state.tolerance)), np.asarray(s.status, dtype=float)
+        return make(machine, state, position)
+    s = solved(machine, state, position, stiffness=quantity.stiffness)
+    size = float(np.linalg.norm(state.force))
+    return quantity.of(s, size, state.tolerance), np.asarray(s.status, dtype=float)
 
 
-def plane_map(machine: Machine, state: State, count: int = FINE, *, threads: int | None = None) -> PlaneMap:
+def plane_map(machine: Machine, state: State, count: int = FINE) -> PlaneMap:
     """Solve the poses of the plane; outside the box they are solved as well and hidden."""
     begun = time.perf_counter()
     frame = plane_frame(machine, state)
@@ -145,6 +175,6 @@ def plane_map(machine: Machine, state: State, count: int = FINE, *, threads: int
     low, high = drawn_box(machine)
     slack = INSIDE * (high - low)
     outside = np.asarray(((p < low - slack) | (p > high + slack)).any(axis=-1))
-    values, status = values_at(machine, state, p, threads)
+    values, status = values_at(machine, state, p)
     values = np.where(outside, np.nan, values)
     return PlaneMap(frame, state.quantity, values, status, outside, time.perf_counter() - begun)

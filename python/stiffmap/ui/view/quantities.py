@@ -13,16 +13,6 @@ from stiffmap.solve.solution import Solution
 
 
 @dataclass(frozen=True)
-class Load:
-    """What else a quantity depends on."""
-
-    force: Floats
-    """(3,) N."""
-    tolerance: float
-    """m."""
-
-
-@dataclass(frozen=True)
 class Quantity:
     """A name, its unit on the screen, and how it is read off a solution."""
 
@@ -30,35 +20,34 @@ class Quantity:
     unit: str
     factor: float
     """From SI to the unit."""
-    of: Callable[[Solution, Load], Floats] | None
-    """None: needs the modes of the machine, many times dearer than a solution."""
+    of: Callable[[Solution, float, float], Floats] | None
+    """Of a solution, the size of the force (N) and the tolerance (m). None: needs the modes of the machine, many times dearer than a solution."""
     stiffness: bool = False
     """Whether the compliance is needed."""
-    low_is_bad: bool = False
 
 
-def deflection(s: Solution, load: Load) -> Floats:
+def deflection(s: Solution, force: float, tolerance: float) -> Floats:
     """(...) m, of the tool against its command, under the load and gravity."""
     return np.asarray(np.linalg.norm(s.displacement[..., :3], axis=-1))
 
 
-def worst_deflection(s: Solution, load: Load) -> Floats:
+def worst_deflection(s: Solution, force: float, tolerance: float) -> Floats:
     """(...) m: a further force of this size in its worst direction, to first order at the loaded pose."""
-    return np.asarray(np.linalg.norm(load.force) * greatest(s.compliance[..., :3, :3]))
+    return np.asarray(force * greatest(s.compliance[..., :3, :3]))
 
 
-def weakest_stiffness(s: Solution, load: Load) -> Floats:
+def weakest_stiffness(s: Solution, force: float, tolerance: float) -> Floats:
     """(...) N/m of the softest direction."""
     with np.errstate(divide="ignore"):
         return np.asarray(1.0 / greatest(s.compliance[..., :3, :3]))
 
 
-def margin(s: Solution, load: Load) -> Floats:
+def margin(s: Solution, force: float, tolerance: float) -> Floats:
     """(...) m, of the tolerance that the deflection leaves."""
-    return np.asarray(load.tolerance - deflection(s, load))
+    return np.asarray(tolerance - deflection(s, force, tolerance))
 
 
-def status(s: Solution, load: Load) -> Floats:
+def status(s: Solution, force: float, tolerance: float) -> Floats:
     """(...) `Status` as a number."""
     return np.asarray(s.status, dtype=float)
 
@@ -95,15 +84,21 @@ QUANTITIES: dict[str, Quantity] = {
         "worst deflection by a force of this size", "µm", 1e6, worst_deflection, stiffness=True
     ),
     "stiffness": Quantity(
-        "stiffness of the softest direction", "N/µm", 1e-6, weakest_stiffness, stiffness=True, low_is_bad=True
+        "stiffness of the softest direction", "N/µm", 1e-6, weakest_stiffness, stiffness=True
     ),
-    "margin": Quantity("margin to the tolerance", "µm", 1e6, margin, low_is_bad=True),
+    "margin": Quantity("margin to the tolerance", "µm", 1e6, margin),
     "status": Quantity("status", "", 1.0, status),
-    "frequency": Quantity("lowest natural frequency", "Hz", 1.0, None, low_is_bad=True),
-    "dynamic": Quantity(
-        "dynamic stiffness of the softest direction", "N/µm", 1e-6, None, stiffness=True, low_is_bad=True
-    ),
+    "frequency": Quantity("lowest natural frequency", "Hz", 1.0, None),
+    "dynamic": Quantity("dynamic stiffness of the softest direction", "N/µm", 1e-6, None, stiffness=True),
 }
 """By the word that names it in a state."""
+
+
+def tolerance_level(quantity: str, tolerance: float) -> float | None:
+    """The value on the screen at which the tolerance is met; None where it has no meaning."""
+    if quantity in ("deflection", "worst"):
+        return tolerance * QUANTITIES[quantity].factor
+    return 0.0 if quantity == "margin" else None
+
 
 Mask = NDArray[np.bool_]

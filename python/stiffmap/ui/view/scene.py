@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from matplotlib.colors import to_rgb
 from scipy.spatial.transform import Rotation
 
 from stiffmap.common.broadcasting import Floats
@@ -14,24 +13,21 @@ from stiffmap.ui.plot.elements import thicknesses
 from stiffmap.ui.plot.scene import ARROW, FORCE, box_edges
 from stiffmap.ui.plot.skeleton import Skeleton
 from stiffmap.ui.plot.style import BLACK, ORANGE, SKY, TOLERANCE, leg_colours
-from stiffmap.ui.view.colours import plane_image
-from stiffmap.ui.view.isolines import isolines, tolerance_lines
+from stiffmap.ui.view.colours import plane_image, rgb
 from stiffmap.ui.view.moment import Moment
-from stiffmap.ui.view.place import moves, rotation_of, turns
-from stiffmap.ui.view.plane import PlaneMap
+from stiffmap.ui.view.place import box_of, moves, rotation_of, turns
+from stiffmap.ui.view.plane import NO_LINES, PlaneMap
 from stiffmap.ui.view.surfaces import ellipsoid, polar_surface, sphere
 
 SURFACE = 0.12
 """Of the extent, size of the surface at the tool."""
 GHOST, LIT, DIAGNOSED = ORANGE, "#FFD400", "#E8279B"
 GREY, DARK = "#BBBBBB", "#666666"
-NOTHING = np.zeros((1, 2, 3))
 
 
-def rgb(colour: str) -> tuple[int, int, int]:
-    """0 to 255."""
-    r, g, b = (round(255 * v) for v in to_rgb(colour))
-    return r, g, b
+def _seen(points: Floats) -> Any:
+    """Points as they are sent; where there are none, one that is hidden, as no node is empty."""
+    return np.asarray(points if len(points) else np.zeros((1, *np.shape(points)[1:])), np.float32)
 
 
 def quaternion(rotation: Floats) -> tuple[float, float, float, float]:
@@ -57,19 +53,12 @@ class Scene:
         api.set_up_direction("+z")
         api.world_axes.visible = False
         api.add_frame("/axes", axes_length=0.08 * self.extent, axes_radius=0.002 * self.extent)
-        self._points = api.add_point_cloud(
-            "/joints/passive", rest.passive, rgb("#FFFFFF"), point_size=0.008 * self.extent, point_shape="circle",
-            precision="float32", visible=len(rest.passive) > 0,
-        )  # fmt: skip
-        self._drives = api.add_point_cloud(
-            "/joints/drives", rest.actuators, rgb(BLACK), point_size=0.014 * self.extent, point_shape="square",
-            precision="float32", visible=len(rest.actuators) > 0,
-        )  # fmt: skip
+        self._points = self.points("/joints/passive", rest.passive, rgb("#FFFFFF"), 0.008)
+        self._drives = self.points("/joints/drives", rest.actuators, rgb(BLACK), 0.014, "square")
         self._arrow: Any = None
         self._plate: Any = None
         self._surface: Any = None
-        low, high = moment.box()
-        self.lines("/box", box_edges(low, high), GREY, 1.5, "screen")
+        self.lines("/box", box_edges(*box_of(moment.machine)), GREY, 1.5, "screen")
         if len(rest.guides):
             self.lines("/travel", rest.guides, GREY, 0.006 * self.extent)
         self.gizmo = api.add_transform_controls(
@@ -85,7 +74,7 @@ class Scene:
         """Pieces of lines (n, 2, 3); none hide the node."""
         there = self._lines.get(name)
         shown = len(points) > 0
-        p = np.asarray(points if shown else NOTHING, np.float32)
+        p = _seen(points)
         if there is None or there.points.shape != p.shape:
             self._lines[name] = self.api.add_line_segments(
                 name, p, rgb(colour), thickness=thick, thickness_units=units, visible=shown
@@ -95,32 +84,27 @@ class Scene:
         if there.visible != shown:
             there.visible = shown
 
-    def points(self, name: str, places: Floats, colour: str) -> None:
-        """Places (n, 3) as dots."""
-        self.api.add_point_cloud(
-            name, np.asarray(places, np.float32), rgb(colour), point_size=0.005 * self.extent,
-            point_shape="circle", precision="float32",
+    def points(self, name: str, places: Floats, colours: Any, size: float, shape: str = "circle") -> Any:
+        """Places (n, 3) as dots of a size (of the extent), in one colour or one for each; none hide them. Their handle."""
+        return self.api.add_point_cloud(
+            name, _seen(places), colours if len(places) else rgb(GREY), point_size=size * self.extent,
+            point_shape=shape, precision="float32", visible=len(places) > 0,
         )  # fmt: skip
 
-    def mesh(self, name: str, vertices: Floats, faces: Any, colour: str) -> Any:
+    def mesh(self, name: str, vertices: Floats, faces: Any, colour: str, opacity: float = 0.4) -> Any:
         """A surface seen from both sides; without triangles it is hidden. Its handle."""
         shown = len(faces) > 0
         return self.api.add_mesh_simple(
             name, np.asarray(vertices, np.float32), faces if shown else np.zeros((1, 3), np.uint32),
-            color=rgb(colour), opacity=0.4, side="double", cast_shadow=False, visible=shown,
+            color=rgb(colour), opacity=opacity, side="double", cast_shadow=False, visible=shown,
         )  # fmt: skip
 
-    def machine(self, moment: Moment, rest: Skeleton, loaded: Skeleton | None, factor: float) -> None:
-        """Links, joints, the deflected ghost and the tool."""
+    def machine(self, rest: Skeleton, ghost: Floats) -> None:
+        """Links, joints, platform, and the links of the deflected ghost."""
         self.rest = rest
         for name, colour, thick, chosen in self._groups:
             self.lines(name, rest.links[chosen], colour, thick)
-        self._points.points = (
-            np.asarray(rest.passive, np.float32) if len(rest.passive) else np.zeros((1, 3), np.float32)
-        )
-        self._drives.points = (
-            np.asarray(rest.actuators, np.float32) if len(rest.actuators) else np.zeros((1, 3), np.float32)
-        )
+        self._points.points, self._drives.points = _seen(rest.passive), _seen(rest.actuators)
         if len(rest.plate):
             middle = np.concatenate([rest.plate, rest.plate.mean(axis=0)[None]])
             n = len(rest.plate)
@@ -128,11 +112,15 @@ class Scene:
             if self._plate is None:
                 self._plate = self.mesh("/platform", middle, fan, DARK)
             self._plate.vertices = np.asarray(middle, np.float32)
-        moved = NOTHING[:0] if loaded is None or factor == 0 else rest.enlarged(loaded, factor).links
-        self.lines("/ghost", moved, GHOST, 0.004 * self.extent)
-        named = rest.links[self.diagnosed] if self.diagnosed else NOTHING[:0]
+        self.lines("/ghost", ghost, GHOST, 0.004 * self.extent)
+        self.lights()
+
+    def lights(self) -> None:
+        """Links on which an element is lit."""
+        links = self.rest.links
+        named = links[self.diagnosed] if self.diagnosed else NO_LINES
         self.lines("/diagnosis/element", named, DIAGNOSED, 0.025 * self.extent)
-        self.lines("/lit", rest.links[self.lit] if self.lit else NOTHING[:0], LIT, 0.03 * self.extent)
+        self.lines("/lit", links[self.lit] if self.lit else NO_LINES, LIT, 0.03 * self.extent)
 
     def tool(self, moment: Moment) -> None:
         """The gizmo at the tool of the state."""
@@ -179,13 +167,11 @@ class Scene:
         self._image.position = tuple(f.centre)
         self._image.wxyz = quaternion(np.stack([f.u, f.v, f.normal], axis=1))
         self._image.visible = True
-        flat = isolines(found, limits) if lines else NOTHING[:0]
-        lift = 5e-4 * self.extent * f.normal
-        both = np.concatenate([flat + lift, flat - lift]) if len(flat) else flat
-        self.lines("/isolines", both, "#FFFFFF", 1.2, "screen")
-        edge = tolerance_lines(found, tolerance)
-        both = np.concatenate([edge + lift, edge - lift]) if len(edge) else edge
-        self.lines("/tolerance", both, TOLERANCE, 3.5, "screen")
+        lift = 5e-4 * self.extent * f.normal  # to both sides of the plane
+        flat = found.isolines(limits) if lines else NO_LINES
+        self.lines("/isolines", np.concatenate([flat + lift, flat - lift]), "#FFFFFF", 1.2, "screen")
+        edge = found.tolerance_lines(tolerance)
+        self.lines("/tolerance", np.concatenate([edge + lift, edge - lift]), TOLERANCE, 3.5, "screen")
 
     def no_plane(self) -> None:
         """Hide the map."""
@@ -204,28 +190,12 @@ class Scene:
             return ""
         make = ellipsoid if kind == "ellipsoid" else polar_surface
         around, most = make(c, SURFACE * self.extent)
-        points = np.asarray(around + np.array(moment.state.position), np.float32)
+        points = around + np.array(moment.state.position)
         if self._surface is None:
-            self._surface = self.api.add_mesh_simple(
-                "/surface",
-                points,
-                sphere()[1],
-                color=rgb(SKY),
-                opacity=0.45,
-                side="double",
-                cast_shadow=False,
-            )
-        self._surface.vertices = points
+            self._surface = self.mesh("/surface", points, sphere()[1], SKY, 0.45)
+        self._surface.vertices = np.asarray(points, np.float32)
         self._surface.visible = True
         return f"longest radius: {1e6 * most:.4g} µm/N"
-
-    def cloud(self, points: Floats, colours: Any) -> None:
-        """Coloured points over the whole box; none hide them."""
-        shown = len(points) > 0
-        self.api.add_point_cloud(
-            "/cloud", points if shown else np.zeros((1, 3)), colours if shown else rgb(GREY),
-            point_size=0.012 * self.extent, point_shape="circle", precision="float32", visible=shown,
-        )  # fmt: skip
 
     def marker(self, point: Floats, text: str) -> None:
         """What the probe says, at its place."""
@@ -251,7 +221,7 @@ def _active(moment: Moment) -> tuple[bool, bool, bool]:
     return free if any(free) else (True, True, True)
 
 
-def look_at_machine(server: Any, rest: Skeleton, extent: float) -> None:
+def look_at_machine(server: Any, rest: Skeleton) -> None:
     """The first look: from the front right, from above where all lies in a plane of constant height."""
     points = np.vstack(
         [rest.links.reshape(-1, 3), rest.tcp]
@@ -259,5 +229,5 @@ def look_at_machine(server: Any, rest: Skeleton, extent: float) -> None:
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
     direction = np.array([0.02, -0.05, 1.0] if rest.is_flat else [0.75, -0.9, 0.6])
     server.initial_camera.look_at = tuple(middle)
-    server.initial_camera.position = tuple(middle + 0.8 * extent * direction / np.linalg.norm(direction))
+    server.initial_camera.position = tuple(middle + 0.8 * rest.extent * direction / np.linalg.norm(direction))
     server.initial_camera.up = (0.0, 0.0, 1.0)

@@ -3,25 +3,37 @@
 from __future__ import annotations
 
 import contextlib
+import gzip
 import hmac
 import io
 import logging
 import secrets
 import socket
 from collections.abc import Callable, Iterator
+from functools import lru_cache
 from http import HTTPStatus
 from http.cookies import CookieError, SimpleCookie
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
-from stiffmap.common.errors import StiffmapError
-from stiffmap.ui.view.names import named
-from stiffmap.ui.view.optional import need_viser
+from stiffmap.common.errors import MissingPartError, StiffmapError
 
 HERE = "127.0.0.1"
 LOCAL = (HERE, "localhost", "::1")
 FIRST_PORT, TRIED_PORTS = 8080, 100
 COOKIE = "stiffmap_view"
+
+
+def need_viser() -> Any:
+    """The library of the extra ``[view]``, imported only when something is to be looked at; MissingPartError that says how
+    to install it."""
+    try:
+        import viser
+    except ModuleNotFoundError:
+        raise MissingPartError(
+            "a view needs viser, which is not installed: pip install stiffmap[view]"
+        ) from None
+    return viser
 
 
 class Guard:
@@ -154,3 +166,39 @@ def free_port(host: str, port: int | None) -> int:
             if port is not None or isinstance(problem, socket.gaierror):
                 raise StiffmapError(f"cannot listen on {host}, port {p}: {problem.strerror}") from None
     raise StiffmapError(f"no port from {FIRST_PORT} to {FIRST_PORT + TRIED_PORTS - 1} is free; give --port")
+
+
+SCRIPT = """<script>(() => {
+  const buttons = {
+    "button:has(.tabler-icon-list-search)": "Search commands",
+    "button:has(.tabler-icon-adjustments)": "Connection, camera and scene",
+    ".mantine-Notification-closeButton": "Close the message",
+  };
+  const fields = () => document.querySelectorAll("label[for]").forEach(label => {
+    const row = label.closest(".mantine-Flex-root");
+    const found = row ? [...row.querySelectorAll("input:not([type=hidden]), textarea, [role=slider]")] : [];
+    found.forEach((field, i) => {
+      const text = label.textContent + (found.length === 3 ? ", " + "xyz"[i] : "");
+      if (field.getAttribute("aria-label") !== text) field.setAttribute("aria-label", text);
+    });
+  });
+  const name = () => {
+    fields();
+    for (const [where, text] of Object.entries(buttons))
+      document.querySelectorAll(where + ":not([aria-label])").forEach(b => b.setAttribute("aria-label", text));
+  };
+  let waiting = false;
+  new MutationObserver(() => {
+    if (!waiting) { waiting = true; setTimeout(() => { waiting = false; name(); }, 250); }
+  }).observe(document, {childList: true, subtree: true});
+})();</script>"""
+"""Names for screen readers: viser's client labels the first field of a row at best, and no button with a picture."""
+
+
+@lru_cache(maxsize=4)
+def named(body: bytes, packed: bool) -> bytes:
+    """The page with the script in its head; `packed`: as it is sent, by gzip."""
+    text = gzip.decompress(body) if packed else body
+    head, end, tail = text.partition(b"</head>")
+    out = head + SCRIPT.encode() + end + tail if end else text
+    return gzip.compress(out, mtime=0) if packed else out

@@ -99,12 +99,10 @@ def checked(state: State) -> State:
         raise StiffmapError(f"quantity: expected one of {', '.join(QUANTITIES)}, got {state.quantity!r}")
     if not (math.isfinite(state.tolerance) and state.tolerance > 0):
         raise StiffmapError(f"tolerance: expected a positive number, got {state.tolerance}")
-    if state.magnification is not None and not (
-        math.isfinite(state.magnification) and state.magnification >= 0
-    ):
-        raise StiffmapError(f"magnification: expected 0 or more, got {state.magnification}")
-    if not (math.isfinite(state.frequency) and state.frequency >= 0):
-        raise StiffmapError(f"frequency: expected 0 or more, got {state.frequency}")
+    for name in ("magnification", "frequency"):
+        value = getattr(state, name)
+        if value is not None and not (math.isfinite(value) and value >= 0):
+            raise StiffmapError(f"{name}: expected 0 or more, got {value}")
     return state
 
 

@@ -13,7 +13,6 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.solution import Solution
 from stiffmap.ui.plot.elements import element_links
 from stiffmap.ui.view.animation import Swing
-from stiffmap.ui.view.box_cloud import box_cloud
 from stiffmap.ui.view.colours import colours_of
 from stiffmap.ui.view.controls import Controls
 from stiffmap.ui.view.data import Data
@@ -75,7 +74,7 @@ class Viewer:
 
         if data is not None:
             data(self.scene, model.moment)
-        look_at_machine(server, self.scene.rest, self.scene.extent)
+        look_at_machine(server, self.scene.rest)
         self.worker.ask()
 
     # -- what hands do ------------------------------------------------------------------------------------------
@@ -139,11 +138,9 @@ class Viewer:
 
     def probe_along(self, origin: Any, direction: Any) -> None:
         """Solve where a ray meets the plane."""
-        from stiffmap.ui.view.probe import under_ray
-
         if self._plane is None:
             return
-        point = under_ray(self._plane.frame, origin, direction)
+        point = self._plane.frame.under_ray(origin, direction)
         if point is not None:
             self.probe_at(point)
 
@@ -171,12 +168,11 @@ class Viewer:
         moment = self.now()
         s = moment.solve()
         rest = moment.rest()
-        loaded = moment.loaded(s)
+        ghost = moment.ghost(rest, s)
         self._solution = s
         found = self._map(moment, self._count())
         with self.server.atomic():
-            factor = moment.magnification(rest, s)
-            self.scene.machine(moment, rest, loaded, factor)
+            self.scene.machine(rest, ghost)
             self.scene.force(moment, self.pulling)
             if not self.dragging:
                 self.scene.tool(moment)
@@ -255,10 +251,7 @@ class Viewer:
             parts.insert(0, self._data.html)
         self.scene.lit = element_links(moment.machine, lit) if lit else []
         self.controls.why("".join(parts), self.scene.surface(moment, s, self.controls.surface))
-        if self._solution is s:
-            self.scene.machine(
-                moment, self.scene.rest, moment.loaded(s), moment.magnification(self.scene.rest, s)
-            )
+        self.scene.lights()
 
     def cloud(self) -> None:
         """The quantity over the whole box."""
@@ -267,9 +260,9 @@ class Viewer:
         if key == self._cloud_key:
             return
         self._cloud_key = key
-        points, values = box_cloud(moment) if self.controls.cloud else (np.zeros((0, 3)), np.zeros(0))
+        points, values = moment.cloud() if self.controls.cloud else (np.zeros((0, 3)), np.zeros(0))
         limits = self._held or (0.0, 1.0)
-        self.scene.cloud(points, colours_of(values, *limits))
+        self.scene.points("/cloud", points, colours_of(values, *limits), 0.012)
 
     def data_again(self) -> Data | None:
         """The same data for another scene, such as that of a page."""

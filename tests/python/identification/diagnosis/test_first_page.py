@@ -13,11 +13,10 @@ from stiffmap.experiment import random_plan, simulate
 from stiffmap.identification.diagnosis import Diagnosis
 from stiffmap.model.description import AppliedEffect
 from stiffmap.solve.kinematics import inverse_kinematics
+from stiffmap.ui.plot.experiment import drivers_of, trending
 from stiffmap.ui.report.diagnosis.page import html
-from stiffmap.ui.report.diagnosis.pictures import figures
+from stiffmap.ui.report.diagnosis.pictures import figures, vectors
 from stiffmap.ui.report.diagnosis.place import lit
-from stiffmap.ui.report.diagnosis.trends import drivers_of, trending
-from stiffmap.ui.report.diagnosis.vectors import vectors
 
 RECORD = (
     ("operator", "M. Weber"),
@@ -83,7 +82,7 @@ def test_arrows_of_planar_readings_stay_in_their_plane_and_on_the_canvas() -> No
 def test_trends_are_shown_where_residuals_follow_a_driver() -> None:
     d = planar()
     shown, others = trending(d)
-    assert {name for name, _ in shown} == {"fx, N", "fy, N"}
+    assert {name for name, *_ in shown} == {"fx, N", "fy, N"}
     assert len(shown) + len(others) == len(drivers_of(d.experiment))
     page = words_of(d)
     assert page.index("Residual of every reading against the conditions on which it depends") < page.index(

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 import stiffmap as sm
 from stiffmap import plot
-from stiffmap.ui.plot.failed import edges
+from stiffmap.ui.plot.planes import edges
 from stiffmap.ui.plot.skeleton import skeleton
 
 

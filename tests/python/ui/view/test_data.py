@@ -11,8 +11,7 @@ import pytest
 import stiffmap as sm
 from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.ui.cli import main
-from stiffmap.ui.view.data import ribbon
-from stiffmap.ui.view.diagnosed import Findings, Named, findings
+from stiffmap.ui.view.data import Findings, Named, findings, ribbon
 from stiffmap.ui.view.open import View, data_of, model_of
 
 pytest.importorskip("viser", reason="viser is not installed (pip install stiffmap[view])")

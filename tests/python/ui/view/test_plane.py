@@ -9,13 +9,11 @@ import pytest
 
 import stiffmap as sm
 from stiffmap.solve.status import Status
-from stiffmap.ui.plot.isolines import levels
+from stiffmap.ui.plot.planes import levels
 from stiffmap.ui.view.colours import DARK, GREY, colours_of, plane_image, table
 from stiffmap.ui.view.dynamics import dynamic_stiffness
-from stiffmap.ui.view.isolines import isolines, lines_at, tolerance_lines
 from stiffmap.ui.view.model import Model
 from stiffmap.ui.view.plane import plane_frame, plane_map
-from stiffmap.ui.view.probe import probe, under_ray
 from stiffmap.ui.view.quantities import QUANTITIES, greatest
 from stiffmap.ui.view.state import State
 
@@ -45,7 +43,7 @@ def test_values_are_those_of_solve(machine: sm.Machine, quantity: str) -> None:
             "status": 0.0,
         }[quantity]
         assert found.values[i, j] == pytest.approx(want, rel=1e-9)
-        assert probe(replace_moment(machine, s), p[i, j])[0] == pytest.approx(want, rel=1e-9)
+        assert replace_moment(machine, s).at(p[i, j])[0] == pytest.approx(want, rel=1e-9)
 
 
 def replace_moment(machine: sm.Machine, s: State) -> object:
@@ -109,13 +107,13 @@ def test_failed_poses_are_hatched() -> None:
 def test_isolines_lie_at_their_values(machine: sm.Machine) -> None:
     found = plane_map(machine, State((0.0, 0.0, 0.1), force=FORCE), 41)
     for level in levels(*found.range)[:3]:
-        for a, _ in lines_at(found, level)[::40]:
+        for a, _ in found.lines_at(level)[::40]:
             s = machine.solve(a, (*FORCE, 0, 0, 0))
             assert 1e6 * np.linalg.norm(s.displacement[:3]) == pytest.approx(level, rel=2e-3)
     middle = float(np.mean(found.range)) * 1e-6
-    assert len(tolerance_lines(found, middle)) > 10
-    assert len(tolerance_lines(found, 1.0)) == 0
-    assert len(isolines(replace(found, quantity="status"), found.range)) == 0
+    assert len(found.tolerance_lines(middle)) > 10
+    assert len(found.tolerance_lines(1.0)) == 0
+    assert len(replace(found, quantity="status").isolines(found.range)) == 0
 
 
 def test_greatest_singular_value_is_that_of_lapack() -> None:
@@ -133,7 +131,7 @@ def test_dynamic_stiffness_begins_at_the_static_one(machine: sm.Machine) -> None
     static = 1 / np.linalg.svd(machine.solve(p, s.wrench).compliance[:3, :3], compute_uv=False)[0]
     assert float(dynamic_stiffness(machine, s, p)[0]) == pytest.approx(static, rel=1e-9)
     first = float(sm.natural_frequencies(machine, p, s.wrench).frequency[0])
-    value, status = probe(Model(machine, replace(s, quantity="frequency")).moment, p)
+    value, status = Model(machine, replace(s, quantity="frequency")).moment.at(p)
     assert value == pytest.approx(first) and status == Status.CONVERGED
 
 
@@ -166,9 +164,9 @@ def test_quantities_of_modes_are_mapped_coarsely(machine: sm.Machine) -> None:
 
 def test_a_ray_meets_the_plane(machine: sm.Machine) -> None:
     f = plane_frame(machine, State((0.0, 0.0, 0.1)))
-    hit = under_ray(f, np.array([0.1, 0.2, 5.0]), np.array([0.0, 0.0, -1.0]))
+    hit = f.under_ray(np.array([0.1, 0.2, 5.0]), np.array([0.0, 0.0, -1.0]))
     assert hit is not None
     np.testing.assert_allclose(hit, [0.1, 0.2, 0.1], atol=1e-12)
-    assert under_ray(f, np.array([0.1, 0.2, 5.0]), np.array([0.0, 0.0, 1.0])) is None
-    assert under_ray(f, np.array([9.0, 0.2, 5.0]), np.array([0.0, 0.0, -1.0])) is None
-    assert under_ray(f, np.array([0.0, 0.2, 5.0]), np.array([1.0, 0.0, 0.0])) is None
+    assert f.under_ray(np.array([0.1, 0.2, 5.0]), np.array([0.0, 0.0, 1.0])) is None
+    assert f.under_ray(np.array([9.0, 0.2, 5.0]), np.array([0.0, 0.0, -1.0])) is None
+    assert f.under_ray(np.array([0.0, 0.2, 5.0]), np.array([1.0, 0.0, 0.0])) is None

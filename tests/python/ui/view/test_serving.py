@@ -10,8 +10,7 @@ from types import SimpleNamespace
 import pytest
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.ui.view.names import SCRIPT, named
-from stiffmap.ui.view.serving import COOKIE, FIRST_PORT, Guard, free_port, in_one_line
+from stiffmap.ui.view.serving import COOKIE, FIRST_PORT, SCRIPT, Guard, free_port, in_one_line, named
 
 HERE = {"Host": "127.0.0.1:8080"}
 

@@ -9,11 +9,10 @@ import pytest
 from PIL import Image
 
 import stiffmap as sm
-from stiffmap.ui.plot.along_paths import path_measures_figure
 from stiffmap.ui.plot.box import box_figure
-from stiffmap.ui.plot.measures import caption, measure_figures
+from stiffmap.ui.plot.measures import caption, measure_figures, path_measures_figure
 from stiffmap.ui.plot.modes import mode_frames
-from stiffmap.ui.report.pictures import animation, inline
+from stiffmap.ui.report.sheet import animation, inline
 from stiffmap.workspace.design import load_design
 from stiffmap.workspace.performance import largest_box, load_motion
 

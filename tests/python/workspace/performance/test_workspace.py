@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import stiffmap as sm
+from stiffmap.ui.plot.box import workspace_figure
 from stiffmap.ui.plot.measures import measure_figures
-from stiffmap.ui.plot.workspace import workspace_figure
 from stiffmap.workspace.performance.registry import get_measure
 
 L, R = 0.775, 0.0775  # of the revised Orthoglide

@@ -48,9 +48,7 @@ def write_report(
 def html(d: Findings, *, date: str | None = None, inputs: Iterable[str | PathLike[str]] = ()) -> str:
     """The report as text."""
     from stiffmap.ui.report.diagnosis.pictures import CAPTIONS, figures
-    from stiffmap.ui.report.pictures import inline
-    from stiffmap.ui.report.provenance import provenance
-    from stiffmap.ui.report.templates import render
+    from stiffmap.ui.report.sheet import inline, provenance, render
 
     pictures = {n: {"caption": CAPTIONS[n], "data": inline(f)} for n, f in figures(d).items()}
     return render(

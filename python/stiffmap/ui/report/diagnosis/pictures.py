@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from stiffmap.common.errors import StiffmapError
@@ -13,12 +14,10 @@ from stiffmap.experiment.experiment import WRENCH, Floats
 from stiffmap.identification.diagnosis.report.findings import Findings
 from stiffmap.identification.diagnosis.report.wording import noise_size
 from stiffmap.solve.machine import Machine
-from stiffmap.ui.plot.experiment import kept, pose_means
+from stiffmap.ui.plot.experiment import arrow_figure, kept, pose_means, trending, trends, vector_cases
 from stiffmap.ui.plot.loaded import loaded_figure
 from stiffmap.ui.plot.style import AFTER, BEFORE, MM, UM, new_figure
 from stiffmap.ui.report.diagnosis.place import place_figure
-from stiffmap.ui.report.diagnosis.trends import trending, trends
-from stiffmap.ui.report.diagnosis.vectors import vectors
 
 CAPTIONS = {
     "residual_vectors": "Mean residual (reading less prediction) of each pose as arrows, with the machine of your file and "
@@ -89,6 +88,23 @@ def loaded(d: Findings) -> Figure:
     return loaded_figure(d.machine, *worst)
 
 
+def vectors(d: Findings) -> Figure:
+    """Mean residual vector of each pose, before and after, on one scale."""
+    e = d.experiment
+
+    # of loads along x, y or z, turned to one sign (else + and - would cancel), those that leave most
+    def seen(values: Floats, weight: Floats) -> Floats:
+        return pose_means(e, kept(d, values)[:, :3] * weight[:, None])
+
+    cases = [(n, seen(d.residual_before, w), seen(d.residual_after, w)) for n, w in vector_cases(e)]
+    case, before, after = max(cases, key=lambda c: float(np.nansum(c[1] ** 2)))
+    told = "mean residual of each pose"
+    both = ((f"before: {told}", before, BEFORE), (f"after: {told}", after, AFTER))
+    figure, longest = arrow_figure(pose_means(e, e.position), both)
+    figure.supxlabel(f"longest arrow: {longest * UM:.1f} µm{'; ' + case if case else ''}", fontsize=9)
+    return figure
+
+
 def loops(d: Findings) -> Figure:
     """Readings over the load that runs up and down, of the channel that moves most in noise floors."""
     e = d.experiment
@@ -123,16 +139,22 @@ def shared_out(d: Findings) -> Figure:
     """Bars of the shares, the largest first, on a logarithmic scale."""
     found = [(name, 100 * s) for name, s in sorted(d.shares.items(), key=lambda s: s[1]) if s >= LEAST_SHARE]
     figure = new_figure(7, 0.8 + 0.35 * len(found))
-    ax = figure.subplots()
     effects = {str(e).partition(":")[0] for e in d.effects}
-    colours = [AFTER if name in effects else "0.7" for name, _ in found]
-    bars = ax.barh([name for name, _ in found], [s for _, s in found], color=colours)
-    ax.bar_label(bars, [percent(s / 100) for _, s in found], padding=3)
+    rows = [(n, s, AFTER if n in effects else "0.7", percent(s / 100)) for n, s in found]
+    ax = _bars(figure, rows)
     ax.set_xscale("log")
     ax.set(xlabel="share of the squares, %", xlim=(50 * LEAST_SHARE, 400))
+    return figure
+
+
+def _bars(figure: Figure, rows: Sequence[tuple[str, float, str, str]]) -> Axes:
+    """A bar for each row of name, length, colour and what is written behind it."""
+    ax = figure.subplots()
+    names, lengths, colours, texts = zip(*rows, strict=True) if rows else ((),) * 4
+    ax.bar_label(ax.barh(names, lengths, color=colours), texts, padding=3)
     for side in ("top", "right"):
         ax.spines[side].set_visible(False)
-    return figure
+    return ax
 
 
 def left(d: Findings) -> Figure:
@@ -158,16 +180,14 @@ def before_after(d: Findings) -> Figure:
     unit = d.before.size[1]
     values = [UM * d.before.size[0], UM * d.after.size[0], UM * noise_size(d)]
     figure = new_figure(4.6, 2.4)
-    ax = figure.subplots()
-    bars = ax.barh(["your file", "corrected", "noise"], values, color=[BEFORE, AFTER, "0.7"])
-    ax.bar_label(bars, [f"{v:#.3g} µ{unit}".replace(". ", " ") for v in values], padding=3)
+    texts = [f"{v:#.3g} µ{unit}".replace(". ", " ") for v in values]
+    named = (("your file", BEFORE), ("corrected", AFTER), ("noise", "0.7"))
+    ax = _bars(figure, [(n, v, c, text) for (n, c), v, text in zip(named, values, texts, strict=True)])
     ax.invert_yaxis()
     ax.set_xlim(0, 1.3 * max(values))
     ax.set(xlabel=f"left of {d.after.n} readings, rms, µ{unit}")
     if d.held_out is None:
         ax.set_title("not held out: the fit saw these readings", fontsize=9)
-    for side in ("top", "right"):
-        ax.spines[side].set_visible(False)
     return figure
 
 

@@ -1,0 +1,167 @@
+"""Deflection against the direction of the force, in polar coordinates and as the way of the tool, and against its size."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from stiffmap.solve.status import Status
+from stiffmap.ui.plot.style import (
+    BLACK,
+    BLUE,
+    CYCLE,
+    MM,
+    TOLERANCE,
+    headline,
+    length_unit,
+    line_look,
+    panel,
+    paper,
+    place_text,
+)
+
+
+def polar_figure(
+    diagrams: Sequence[xr.Dataset] | xr.Dataset,
+    *,
+    variable: str = "deflection_xy",
+    tolerance: float | None = 0.25e-3,
+) -> Figure:
+    """One diagram per Dataset of `polar`: radius = deflection (mm), angle = direction of the force."""
+    many = [diagrams] if isinstance(diagrams, xr.Dataset) else list(diagrams)
+    with paper(max(2.6 * len(many) + 0.4, 4.0), 3.3) as figure:
+        unit, factor = length_unit(max(float(np.nanmax(p[variable].values, initial=0.0)) for p in many))
+        for i, pol in enumerate(many):
+            ax: Any = figure.add_subplot(1, len(many), i + 1, projection="polar")
+            draw_polar(ax, pol, variable, tolerance, factor)
+            ax.set_title(f"{panel(i, len(many))} {position_text(pol)}".strip())
+        machine = many[0].attrs["machine"]
+        headline(figure, f"{machine}: deflection, {unit}, under {force_text(many[0])}")
+    return figure
+
+
+def draw_polar(ax: Any, pol: xr.Dataset, variable: str, tolerance: float | None, factor: float = MM) -> None:
+    """One diagram on a polar axis; gaps where a direction failed."""
+    angle, value = (np.append(pol[n].values, pol[n].values[0]) for n in ("angle", variable))
+    ax.plot(angle, factor * value, color=BLUE, label=in_words(variable))
+    if tolerance is not None:
+        ring = np.linspace(0, 2 * np.pi, 181)
+        ax.plot(ring, np.full(181, factor * tolerance), color=TOLERANCE, lw=1, ls="--",
+                label=f"tolerance {MM * tolerance:g} mm")  # fmt: skip
+    ax.set_ylim(0, None)
+    ax.set_rlabel_position(100)
+    ax.yaxis.get_major_locator().base.set_params(nbins=4)
+    ax.tick_params(pad=1)
+    for text in ax.get_yticklabels():
+        text.set_bbox({"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 0.5})
+
+
+def ellipse_figure(
+    diagrams: Sequence[xr.Dataset] | xr.Dataset, *, plane: str = "xy", tolerance: float | None = 0.25e-3
+) -> Figure:
+    """Displacement of the TCP in the plane (mm) as the force turns; one panel per Dataset of `polar`."""
+    many = [diagrams] if isinstance(diagrams, xr.Dataset) else list(diagrams)
+    with paper(max(2.5 * len(many) + 0.4, 4.0), 3.2) as figure:
+        axes = figure.subplots(1, len(many), squeeze=False)[0]
+        for i, (ax, pol) in enumerate(zip(axes, many, strict=True)):
+            draw_ellipse(ax, pol, plane, tolerance)
+            ax.set_title(f"{panel(i, len(many))} {position_text(pol)}".strip())
+        machine = many[0].attrs["machine"]
+        headline(figure, f"{machine}: displacement under {force_text(many[0])}")
+    return figure
+
+
+def draw_ellipse(ax: Axes, pol: xr.Dataset, plane: str, tolerance: float | None) -> None:
+    """One ellipse with equal axes; a dot marks the displacement under a force along the first axis."""
+    names = [f"d{n}" for n in plane]
+    u, v = (MM * pol.displacement.sel(component=n).values for n in names)
+    ax.plot(np.append(u, u[0]), np.append(v, v[0]), color=BLUE, label="displacement")
+    ax.plot(u[:1], v[:1], "o", ms=4, color=BLUE, label=f"force along +{plane[0]}")
+    if tolerance is not None:
+        ring, r = np.linspace(0, 2 * np.pi, 181), MM * tolerance
+        ax.plot(
+            r * np.cos(ring), r * np.sin(ring), color=TOLERANCE, lw=1, ls="--", label=f"tolerance {r:g} mm"
+        )
+    ax.axhline(0, color="0.7", lw=0.5, zorder=0)
+    ax.axvline(0, color="0.7", lw=0.5, zorder=0)
+    ax.set_aspect("equal", adjustable="datalim")
+    ax.set_xlabel(f"{names[0]}, mm")
+    ax.set_ylabel(f"{names[1]}, mm")
+
+
+def sweep_figure(
+    panels: Mapping[str, xr.Dataset] | Sequence[Mapping[str, xr.Dataset]],
+    *,
+    variable: str = "deflection_xy",
+    tolerance: float | None = 0.25e-3,
+) -> Figure:
+    """Lines of force against deflection (mm), by label; several panels where several mappings are given.
+
+    Unstable equilibria are drawn as open circles; failed ones leave a gap and a cross on the axis.
+    """
+    many = [panels] if isinstance(panels, Mapping) else list(panels)
+    with paper(max(2.3 * len(many) + 0.6, 4.0), 3.1) as figure:
+        axes = figure.subplots(1, len(many), squeeze=False)[0]
+        for i, (ax, lines) in enumerate(zip(axes, many, strict=True)):
+            draw_sweeps(ax, lines, variable, tolerance)
+            ax.set_title(f"{panel(i, len(many))} {position_text(next(iter(lines.values())))}".strip())
+        axes[0].set_ylabel(f"{in_words(variable)}, mm")
+        machine = next(iter(many[0].values())).attrs["machine"]
+        headline(figure, f"{machine}: deflection against force")
+    return figure
+
+
+def draw_sweeps(ax: Axes, lines: Mapping[str, xr.Dataset], variable: str, tolerance: float | None) -> None:
+    """The sweeps of one panel."""
+    for i, (label, swp) in enumerate(lines.items()):
+        colour = CYCLE[i % len(CYCLE)]
+        stable = swp.status == Status.CONVERGED
+        force, value = swp.force, MM * swp[variable]
+        ax.plot(force, value.where(stable), label=label, **line_look(i))
+        unstable = (swp.status == Status.UNSTABLE) & np.isfinite(value)
+        if unstable.any():
+            ax.plot(
+                force[unstable],
+                value[unstable],
+                "o",
+                mfc="none",
+                ms=3.5,
+                color=colour,
+                label=f"{label}: unstable",
+            )
+        lost = ~np.isfinite(value)
+        if lost.any():
+            ax.plot(
+                force[lost],
+                np.zeros(int(lost.sum())),
+                "x",
+                ms=4,
+                color=colour,
+                label=f"{label}: no equilibrium",
+            )
+    if tolerance is not None:
+        ax.axhline(MM * tolerance, color=BLACK, lw=1, ls=":", label=f"tolerance {MM * tolerance:g} mm")
+    ax.set_xlabel("force, N")
+    ax.set_ylim(0 if min(float(s[variable].min()) for s in lines.values()) >= 0 else None, None)
+    ax.margins(x=0)
+
+
+def in_words(variable: str) -> str:
+    """What a deflection variable means."""
+    plane = variable.rpartition("_")[2]
+    return f"deflection in the {plane} plane" if plane in ("xy", "xz", "yz") else "deflection"
+
+
+def position_text(ds: xr.Dataset) -> str:
+    """Position in mm."""
+    return place_text(ds.position.values)
+
+
+def force_text(ds: xr.Dataset) -> str:
+    """The force of a polar diagram."""
+    return f"a force of {float(ds.force):g}\u00a0N"
