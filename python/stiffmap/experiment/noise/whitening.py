@@ -80,30 +80,10 @@ class Problem:
             out[where] = inverse @ picked[where]
         return np.asarray(out - self.nuisance @ (self.nuisance.T @ out))
 
-    def adjoint(self, white: Floats) -> Floats:
-        """(N, S) -> (R, S) y: `lines @ y` is `white_lines(lines).T @ white`."""
-        return self.unwhite(white - self.nuisance @ (self.nuisance.T @ white))
-
-    def unwhite(self, white: Floats) -> Floats:
-        """(N, S) -> (R, S): the same without any projection."""
-        out = white / self.sigma[self.index][:, None]
-        for where, inverse in self.blocks:
-            out[where] = inverse.T @ white[where]
-        wide = np.zeros((len(self.used), white.shape[1]))
-        wide[self.used] = out
-        return wide
-
     @cached_property
     def used(self) -> Mask:
         """(R,) which of all readings of the experiment are in the problem."""
         return np.asarray(self.keep[readings_of(self.experiment, self.base)[0]])
-
-    @cached_property
-    def precision(self) -> Floats:
-        """(R,) inverse variance of each reading where none share a zero; 0 where it is not in the problem."""
-        wide = np.zeros(len(self.used))
-        wide[self.used] = 1.0 / self.sigma[self.index] ** 2
-        return wide
 
     def check(self, prediction: Floats) -> Floats:
         """The prediction; StiffmapError where a pose that the problem reads could not be solved."""

@@ -13,7 +13,6 @@ from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.identification.candidates.candidates import Candidate, candidates
 from stiffmap.identification.candidates.sensitivity import Variant, variants
 from stiffmap.identification.candidates.slopes import Slopes
-from stiffmap.identification.candidates.stack import Stack
 from stiffmap.identification.clock import Clock
 from stiffmap.model.effects import get, kinds
 
@@ -24,8 +23,8 @@ class Plan:
 
     base: Floats
     """(n, 6) prediction of the declared machine."""
-    stack: Stack
-    """All variants, with their columns."""
+    variants: tuple[Variant, ...]
+    """All of them, with their columns."""
     failed: tuple[tuple[Candidate, str], ...]
     digest: str = ""
     """Of the machine and the plan."""
@@ -33,12 +32,7 @@ class Plan:
     @staticmethod
     def empty(base: Floats) -> Plan:
         """Without any effect."""
-        return Plan(base, Stack.of([]), ())
-
-    @property
-    def variants(self) -> tuple[Variant, ...]:
-        """All of them."""
-        return self.stack.variants
+        return Plan(base, (), ())
 
 
 _PLANS: Kept[str, Plan] = Kept(8)
@@ -85,4 +79,4 @@ def _compute(predictor: Predictor, clock: Clock) -> tuple[Plan, bool]:
         good += usable
         if not usable:
             failed.append((candidate, "the machine has no equilibrium with it at some poses"))
-    return Plan(base, Stack.of(good), tuple(failed)), whole
+    return Plan(base, tuple(good), tuple(failed)), whole

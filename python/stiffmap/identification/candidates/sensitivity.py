@@ -7,36 +7,52 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.experiment.experiment import Experiment, Floats
+from stiffmap.experiment.experiment import Experiment, Floats, Integers
 from stiffmap.experiment.noise.whitening import readings_of
 from stiffmap.experiment.poses.configuration import coordinates_of
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.identification.candidates.candidates import Candidate
 from stiffmap.identification.candidates.slopes import Slopes, side
-from stiffmap.identification.candidates.waves import Wave, Waves
 from stiffmap.model.description import AppliedEffect
 from stiffmap.model.effects import Parameter, get
 from stiffmap.model.effects.evidence import Periods, Tried, signatures_on_a_grid
 
 Shape = tuple[tuple[str, float], ...]
 Start = Callable[[Floats], Mapping[str, float]]
-Numbers = NDArray[np.intp]
-MOST_STORED = 5_000_000
-"""Numbers that the periods of one candidate may store; more are computed anew wherever they are needed."""
+Index = tuple[Integers, Integers]
+"""Row and channel of each of R readings."""
+EVERY = slice(None)
 # Share of a parameter's scale for a difference: laws that only grow from their null take all of it
 SMOOTH, ONE_SIDED = 0.1, 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Wave:
+    """Sine and cosine of one of many periods: columns that are made where they are asked for, never kept."""
+
+    periods: Periods
+    number: int
+    index: Index
+
+    def lines(self, use: Integers | slice) -> Floats:
+        """(2, N) columns of some of the readings."""
+        rows, channel = self.index[0][use], self.index[1][use]
+        out = np.zeros((2, len(rows)))
+        turn = 2.0 * np.pi * self.periods.frequencies[self.number]
+        for travel, change in zip(self.periods.travels, self.periods.changes, strict=True):
+            angle, slope = turn * travel[rows], change[rows, channel]
+            out += slope * np.stack([np.sin(angle), np.cos(angle)])
+        return out
 
 
 @dataclass(frozen=True, eq=False)
 class Variant:
     """Linear model of a candidate at the null.
 
-    lines
-        (p, R) change of all readings (`readings_of`) per `scale` of each linear parameter; a `Wave` where they are not
-        stored.
+    columns
+        (p, R) change of all readings (`readings_of`) per `scale` of each linear parameter, or what makes them.
     shape
         Values of the parameters without a null at which the columns hold.
     sign
@@ -46,14 +62,14 @@ class Variant:
     """
 
     candidate: Candidate
-    lines: Floats | Wave
+    columns: Floats | Wave
     sign: Floats
     shape: Shape = ()
     start: Start | None = None
 
-    def array(self) -> Floats:
-        """(p, R) the columns, one per line."""
-        return self.lines.array() if isinstance(self.lines, Wave) else self.lines
+    def lines(self, use: Integers | slice = EVERY) -> Floats:
+        """(p, N) the columns, one per line, of some of the readings, else of all."""
+        return self.columns.lines(use) if isinstance(self.columns, Wave) else self.columns[:, use]
 
 
 def variants(
@@ -64,16 +80,14 @@ def variants(
     tried = Tried(candidate.element, candidate.legs, candidate.parameters)
     linear = candidate.linear
     index = readings_of(predictor.experiment, base)
-    waves: dict[int, tuple[Waves, Floats | None] | None] = {}
+    solved = np.isfinite(base)
     for s in (get(candidate.kind).signature or signatures_on_a_grid)(PlanProbe(predictor, base), tried):
         shape = tuple(s.values.items())
         if s.period is not None:
             periods, k = s.period
-            if id(periods) not in waves:
-                waves[id(periods)] = _waves(periods, base, index)
-            yield _variant(
-                candidate, _wave(waves[id(periods)], k), np.full(2, float(s.grows)), shape, s.start
-            )
+            finite = all(np.isfinite(c[solved]).all() for c in periods.changes)
+            wave = Wave(periods, k, index) if finite else None
+            yield _variant(candidate, wave, np.full(2, float(s.grows)), shape, s.start)
         elif s.columns is not None:
             sign = np.full(s.columns.shape[-1], float(s.grows))
             yield _variant(candidate, lines_of(s.columns, base, index), sign, shape, s.start)
@@ -88,35 +102,16 @@ def variants(
 
 
 def _variant(
-    candidate: Candidate, lines: Floats | Wave | None, sign: Floats, shape: Shape, start: Start | None
+    candidate: Candidate, columns: Floats | Wave | None, sign: Floats, shape: Shape, start: Start | None
 ) -> Variant | None:
-    return None if lines is None else Variant(candidate, lines, sign, shape, start)
+    return None if columns is None else Variant(candidate, columns, sign, shape, start)
 
 
-def lines_of(columns: Floats, base: Floats, index: tuple[Numbers, Numbers]) -> Floats | None:
+def lines_of(columns: Floats, base: Floats, index: Index) -> Floats | None:
     """(p, R) of (n, c, p): the columns of the readings, one per line; None where the machine fails."""
     if not np.isfinite(columns[np.isfinite(base)]).all():
         return None
     return np.ascontiguousarray(columns[index].T)
-
-
-def _waves(
-    periods: Periods, base: Floats, index: tuple[Numbers, Numbers]
-) -> tuple[Waves, Floats | None] | None:
-    """All periods, and their columns (F, 2, R) where these are few enough to be stored; None where the machine fails."""
-    solved = np.isfinite(base)
-    if not all(np.isfinite(c[solved]).all() for c in periods.changes):
-        return None
-    waves = Waves.of(index[0], periods.travels, [c[index] for c in periods.changes], periods.frequencies)
-    stored = 2 * len(periods.frequencies) * len(index[0]) <= MOST_STORED
-    return waves, waves.arrays() if stored else None
-
-
-def _wave(found: tuple[Waves, Floats | None] | None, k: int) -> Floats | Wave | None:
-    if found is None:
-        return None
-    waves, stored = found
-    return Wave(waves, k) if stored is None else np.asarray(stored[k])
 
 
 def difference(

@@ -21,7 +21,7 @@ from stiffmap.identification.diagnosis.answer import answer
 from stiffmap.identification.diagnosis.report.findings import Effect
 from stiffmap.identification.diagnosis.report.result import Diagnosis
 from stiffmap.identification.diagnosis.slips.factors import named_within
-from stiffmap.identification.diagnosis.slips.find import Readings, find_slip
+from stiffmap.identification.diagnosis.slips.find import find_slip
 from stiffmap.identification.diagnosis.slips.slip import Slip
 from stiffmap.identification.inference.inference import infer
 from stiffmap.identification.numbers import GROUPS, Tolerances
@@ -88,7 +88,7 @@ def diagnose(
         plan = plan_of(predictor, clock)
         clock.say("units, signs, swaps and shifted rows")
         while len(slips) < SLIPS and not clock.over:
-            found = find_slip(Readings.of(predictor, plan))
+            found = find_slip(predictor, plan)
             if found is None:
                 break
             slips.append(found.slip)

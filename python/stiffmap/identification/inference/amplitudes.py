@@ -68,6 +68,7 @@ class Part:
         """(m,) product with values (m,)."""
         if self.factor is not None:
             return np.asarray(self.factor @ (self.factor.T @ values))
+        assert self.full is not None
         return np.asarray(self.full @ values)
 
     @property

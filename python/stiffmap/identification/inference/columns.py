@@ -105,7 +105,7 @@ class Columns:
 
     def lines(self, variant: Variant) -> Floats:
         """(N, p) m, rad: columns of a candidate, per scale of its linear parameters."""
-        return variant.array()[:, self.use].T
+        return variant.lines(self.use).T
 
     def __len__(self) -> int:
         return len(self.residual)

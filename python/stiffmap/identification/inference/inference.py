@@ -60,9 +60,7 @@ def infer(
     `travel`: whether drives may err along their travel in any smooth way."""
     e, clock = predictor.experiment, clock or Clock()
     noise, suspects = without_suspects(e, plan.base)
-    kept = np.flatnonzero([v.candidate.kind not in exclude for v in plan.variants])
-    if len(kept) < len(plan.variants):
-        plan = replace(plan, stack=plan.stack.only(kept))
+    plan = replace(plan, variants=tuple(v for v in plan.variants if v.candidate.kind not in exclude))
     every = unknowns(predictor.machine.description, e, certified(tolerances, e))
     uncertain = tuple(u for u in every if u.group not in exclude)
     clock.say("columns of the declared numbers")

@@ -56,8 +56,7 @@ def places(
     """Candidates with their directions; those that show alike under one name, that of the coarsest part."""
     by: dict[int, list[Shape]] = {}
     for v in plan.variants:
-        white = free.T @ (v.array()[:, use] / noise).T
-        found = _directions(white, v)
+        found = shape_of(v, free.T @ (v.lines(use) / noise).T)
         if found is not None:
             by.setdefault(id(v.candidate), []).append(found)
     tolerance = VISIBLE / (LARGEST * np.sqrt(free.shape[1]))
@@ -87,8 +86,8 @@ def places(
     return tuple(out)
 
 
-def _directions(white: Floats, v: Variant) -> Shape | None:
-    """(m, p) orthonormal directions of the columns (m, q) that a plausible size makes visible; None without any."""
+def shape_of(v: Variant, white: Floats) -> Shape | None:
+    """A variant by its columns (m, q) in noise: those that a plausible size makes visible; None without any."""
     length = np.linalg.norm(white, axis=0)
     most = np.minimum([_reach(v, k) for k in range(white.shape[1])], 1.0 / NULL)
     seen = length * most > VISIBLE

@@ -17,7 +17,8 @@ from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.identification.candidates.plan import plan_of
 from stiffmap.identification.diagnosis.report.findings import Effect
 from stiffmap.identification.diagnosis.report.sentences import aliases, measured, next_step, opening
-from stiffmap.identification.diagnosis.slips.find import Found, Readings, find_slip
+from stiffmap.identification.diagnosis.slips import find
+from stiffmap.identification.diagnosis.slips.find import Found, find_slip
 from stiffmap.identification.diagnosis.slips.slip import Slip
 from stiffmap.identification.diagnosis.stages import by_gain
 from stiffmap.model import effects
@@ -40,7 +41,7 @@ def readings(name: str, soft: bool = False) -> Experiment:
 
 def found(name: str, e: Experiment) -> Found | None:
     predictor = Predictor(sm.load_machine(name), e)
-    return find_slip(Readings.of(predictor, plan_of(predictor)))
+    return find_slip(predictor, plan_of(predictor))
 
 
 def gauges(factor: float, axes: tuple[int, ...] = (0, 1, 2)) -> Change:
@@ -216,3 +217,13 @@ def test_a_gain_beside_a_cause_names_the_unit(low: float, high: float, words: st
     assert by_gain(s, [e]).check == (words or units)
     assert by_gain(s, []) == s
     assert by_gain(replace(s, undone=True), [e]).check == units
+
+
+@pytest.mark.parametrize("case", ["sign of y", "lbf as N", "one row down"])
+def test_of_many_rows_the_first_ones_say_it(case: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Undone is the mistake in all rows."""
+    e = readings("orthoglide-revised")
+    monkeypatch.setattr(find, "ROWS", len(e) - 4)
+    f = found("orthoglide-revised", CASES[case][0](e))
+    assert f is not None and f.slip.kind == CASES[case][1]
+    assert len(f.experiment) >= len(e) - 1

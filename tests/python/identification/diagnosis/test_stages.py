@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -13,9 +14,9 @@ from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.noise.whitening import Problem
 from stiffmap.identification.candidates.candidates import Candidate
 from stiffmap.identification.candidates.sensitivity import Variant
-from stiffmap.identification.candidates.stack import Stack
 from stiffmap.identification.diagnosis.report import separation as stage
 from stiffmap.identification.diagnosis.slips.screen import Screen
+from stiffmap.model import effects
 from stiffmap.model.effects import Parameter
 
 
@@ -50,47 +51,35 @@ E = np.eye(5)
 DATA = 3 * E[0] + 4 * E[1]
 
 
-def screen() -> Screen:
-    both, back = variant("both", E[0], 2 * E[1]), variant("back", -E[1], sign=1.0)
-    blind = variant("blind", 0 * E[0])
-    return Screen.of(problem_of(DATA), Stack.of([variant("one", 2 * E[0]), both, back, blind]))
+def gain(*variants: Variant, of: Floats = DATA) -> float:
+    return Screen.of(problem_of(DATA), np.arange(len(DATA)), variants).gain(of)
 
 
-def test_screen_takes_away_the_squared_projection() -> None:
+def test_the_best_part_takes_away_the_squared_projection() -> None:
     """Residual (3, 4): 9 along the first axis, 25 in their plane; -e2 may only grow, but would have to shrink."""
-    s = screen()
-    assert s.rank.tolist() == [1, 2, 1, 0]
-    assert s.delta_chi2(DATA[:, None])[:, 0] == pytest.approx([9.0, 25.0, 0.0, 0.0])
-    assert s.estimate(0, DATA) == pytest.approx([1.5])
-    assert s.estimate(1, DATA) == pytest.approx([3.0, 2.0])
+    one, both = variant("one", 2 * E[0]), variant("both", E[0], 2 * E[1])
+    back, blind = variant("back", -E[1], sign=1.0), variant("blind", 0 * E[0])
+    assert gain(one) == pytest.approx(9.0)
+    assert gain(both, one) == gain(one, both) == pytest.approx(25.0)
+    assert gain(back) == gain(blind) == gain() == 0.0
+    assert gain(back, of=-DATA) == pytest.approx(16.0)
+    assert gain(one, back, blind) == pytest.approx(9.0)
 
 
-def test_screen_beside_a_model_sees_what_the_model_leaves() -> None:
-    s = screen().beside(E[:, :1])
-    assert s.rank.tolist() == [0, 1, 1, 0]
-    assert s.delta_chi2((4 * E[1])[:, None])[:, 0] == pytest.approx([0.0, 16.0, 0.0, 0.0])
+def test_a_part_that_would_have_to_be_larger_than_it_can_is_none() -> None:
+    """The second axis needs 0.4 scales, 40 µm, of one that may be 1 m or 35 µm; half of it is within both."""
+    wide, narrow = variant("wide", E[1]), variant("narrow", 10 * E[1])
+    assert gain(wide) == gain(narrow) == pytest.approx(16.0)
+    short = tuple(replace(p, lower=-3.5e-5, upper=3.5e-5) for p in narrow.candidate.linear)
+    bounded = replace(narrow, candidate=replace(narrow.candidate, parameters=short))
+    assert gain(bounded) == 0.0 and gain(bounded, variant("one", E[0])) == pytest.approx(9.0)
+    assert gain(bounded, of=0.5 * DATA) == pytest.approx(4.0)
 
 
-def test_screen_beside_a_model_is_a_projection() -> None:
-    """Against columns that are projected and orthonormalised one variant at a time."""
-    rng = np.random.default_rng(3)
-    data = rng.standard_normal(40)
-    columns = [rng.standard_normal((40, p)) for p in (1, 2, 3, 2)]
-    columns[3][:, 1] = columns[3][:, 0]
-    tangent = np.linalg.qr(np.column_stack([columns[1][:, 0], rng.standard_normal(40)]))[0]
-    s = Screen.of(problem_of(data), Stack.of([variant(f"v{i}", *c.T) for i, c in enumerate(columns)]))
-    s = s.beside(tangent)
-    left = data - tangent @ (tangent.T @ data)
-    found = s.delta_chi2(left[:, None])[:, 0]
-    for i, c in enumerate(columns):
-        rest = c - tangent @ (tangent.T @ c)
-        u, size, _ = np.linalg.svd(rest, full_matrices=False)
-        q = u[:, size > 1e-8]
-        assert s.rank[i] == q.shape[1]
-        assert found[i] == pytest.approx(float(np.sum((q.T @ left) ** 2)), rel=1e-9)
-        b = s.basis(i)
-        assert b.T @ b == pytest.approx(np.eye(q.shape[1]), abs=1e-9)
-        assert b @ b.T == pytest.approx(q @ q.T, abs=1e-9)
+def test_what_a_measurement_does_is_no_part_of_the_machine() -> None:
+    kind = next(k for k in effects.kinds() if effects.get(k).measurement)
+    v = variant("one", E[0])
+    assert gain(replace(v, candidate=replace(v.candidate, kind=kind))) == 0.0
 
 
 def test_separation_reads_where_two_explanations_differ_most(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -186,7 +186,7 @@ def test_contradictory_repeats_are_a_named_limit(machine: sm.Machine, plan: sm.E
 def test_drive_and_foot_are_aliases(machine: sm.Machine) -> None:
     plan = random_plan(machine, "deflection", poses=4, loads=5, seed=3)
     predictor = Predictor(machine, plan)
-    variants = {v.candidate.place: v.array()[0] for v in plan_of(predictor).variants}
+    variants = {v.candidate.place: v.lines()[0] for v in plan_of(predictor).variants}
     drive = variants[("compliance", "actuator", ("x",))]
     foot = variants[("compliance", "foot.k11", ("x",))]
     cosine = drive @ foot / np.linalg.norm(drive) / np.linalg.norm(foot)

@@ -37,7 +37,7 @@ def place(name: str, column: np.ndarray, free: np.ndarray) -> Place:
         (replace(scale, name="strength", lower=-np.inf, plausible=None, upper=np.inf),),
     )
     lines = (free @ column)[None]
-    variant: Any = SimpleNamespace(array=lambda: lines, candidate=candidate)
+    variant: Any = SimpleNamespace(lines=lambda use: lines[:, use], candidate=candidate)
     return Place(candidate, (Shape(variant, (column / np.linalg.norm(column))[:, None], 0),))
 
 
@@ -189,7 +189,7 @@ def test_a_number_is_no_effect_that_contains_a_named_one():
         ),
     )  # fmt: skip
     lines = (c.free @ both).T
-    wide = Place(candidate, (Shape(SimpleNamespace(array=lambda: lines, candidate=candidate), both, 0),))
+    wide = Place(candidate, (Shape(SimpleNamespace(lines=lambda use: lines[:, use], candidate=candidate), both, 0),))
     narrow = replace(narrow, wider=(candidate,))
     d = other.shapes[0].directions
     unknown = Unknown("turn of an axis", "joints", "rad", 1e-4)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -17,14 +17,13 @@ from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.noise.checks import checks
 from stiffmap.experiment.noise.level import Noise, noise_of
 from stiffmap.experiment.noise.outliers import without_suspects
-from stiffmap.experiment.noise.whitening import Problem
+from stiffmap.experiment.noise.whitening import Problem, readings_of
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.identification.candidates.plan import Plan
 from stiffmap.identification.diagnosis.slips.axes import coordinates, gauges, loads, moved, shifts, steps
 from stiffmap.identification.diagnosis.slips.factors import factors
 from stiffmap.identification.diagnosis.slips.screen import Screen
 from stiffmap.identification.diagnosis.slips.slip import Hypothesis, Slip
-from stiffmap.model.effects import get
 
 MOST, LEFT = 0.5, 0.1
 """Share of the misfit beyond noise that may stay with a mistake alone, and jointly with one part of the machine."""
@@ -61,41 +60,58 @@ class Judged:
 
 @dataclass(frozen=True, eq=False)
 class Readings:
-    """Readings, and what each single part of the machine would change in them."""
+    """The first rows of an experiment, and what each single part of the machine would change in them."""
 
     predictor: Predictor
     plan: Plan
-    noise: Noise
-    problem: Problem
-    screen: Screen
+    base: Floats
+    """(n, c) prediction of the declared machine."""
+    sigma: Floats
+    """(n, c) noise of readings that do not stand alone."""
+    least: Floats
+    """(n, c) the least noise of rows that may be shifted."""
 
     @staticmethod
     def of(predictor: Predictor, plan: Plan) -> Readings:
-        """With the noise of readings that do not stand alone."""
+        """Of at most `ROWS` rows."""
         e = predictor.experiment
         noise, _ = without_suspects(e, plan.base)
-        problem = Problem.of(e, noise.sigma, plan.base)
-        return Readings(predictor, plan, noise, problem, Screen.of(problem, plan.stack))
+        if len(e) > ROWS:
+            part = e.rows(np.arange(ROWS))
+            predictor = Predictor(predictor.machine, part, threads=predictor.threads)
+        return Readings(predictor, plan, plan.base[:ROWS], noise.sigma[:ROWS], quiet(e, noise)[:ROWS])
 
     @property
     def experiment(self) -> Experiment:
-        """The experiment."""
+        """Its rows that are judged."""
         return self.predictor.experiment
 
+    @cached_property
+    def problem(self) -> Problem:
+        """In the noise of readings that do not stand alone."""
+        return Problem.of(self.experiment, self.sigma, self.base)
 
-def find_slip(s: Readings) -> Found | None:
-    """The mistake in the readings, or nothing."""
-    e = s.experiment
-    plain = e.frame != "unknown" and e.tool != "unknown" and e.seen is None and not e.absolute
-    if not plain or not np.isfinite(s.plan.base[e.read]).any():
+    @cached_property
+    def screen(self) -> Screen:
+        """The parts of the machine."""
+        use = np.arange(len(readings_of(self.experiment, self.base)[0]))
+        return Screen.of(self.problem, use, self.plan.variants)
+
+
+def find_slip(predictor: Predictor, plan: Plan) -> Found | None:
+    """The mistake in the readings of an experiment, or nothing."""
+    whole = predictor.experiment
+    plain = whole.frame != "unknown" and whole.tool != "unknown" and whole.seen is None and not whole.absolute
+    if not plain or not np.isfinite(plan.base[whole.read]).any():
         return None
-    sigma = quiet(e, s.noise)
-    problem = Problem.of(e, sigma, s.plan.base)
-    misfit = problem.residual(s.plan.base)
+    s = Readings.of(predictor, plan)
+    e, sigma = s.experiment, s.least
+    problem = Problem.of(e, sigma, s.base)
+    misfit = problem.residual(s.base)
     of = float(misfit @ misfit)
     if len(problem) < FEWEST or of < MISFIT * problem.freedom:
         return None
-    judged = [j for j in _judged(s, e, sigma, s.plan.base) if j.beside < LEFT]
+    judged = [j for j in _judged(s, problem) if j.beside < LEFT]
     if not judged:
         return None
     slack = max(SAME * min(j.beside for j in judged), 3.0 * (2.0 * problem.freedom) ** 0.5 / of)
@@ -106,7 +122,7 @@ def find_slip(s: Readings) -> Found | None:
     first = near[0]
     h = first.hypothesis
     # shifted rows look like noise where they are repeats: of that the noise of the readings holds too much
-    noise = float(np.nanmedian((sigma / s.noise.sigma) ** 2))
+    noise = float(np.nanmedian((sigma / s.sigma) ** 2))
     if (h.physical or h.kind != "factor") and first.beside > BETTER * best_part(
         s, noise * problem.freedom
     ) - slack:
@@ -116,7 +132,7 @@ def find_slip(s: Readings) -> Found | None:
         for j in near[1:]
         if j.hypothesis.changes <= h.changes and j.hypothesis.check != h.check
     )
-    after = h.undo(e) if h.undo else e
+    after = h.undo(whole) if h.undo else whole
     slip = Slip(
         h.kind,
         h.seen,
@@ -124,26 +140,18 @@ def find_slip(s: Readings) -> Found | None:
         tuple(same)[:3],
         first.left,
         h.undo is not None,
-        _evidence(e, after),
+        _evidence(whole, after),
         h.factor,
     )
     return Found(slip, after)
 
 
-def _judged(s: Readings, e: Experiment, sigma: Floats, base: Floats) -> list[Judged]:
+def _judged(s: Readings, problem: Problem) -> Iterator[Judged]:
     """Mistakes that take away enough to be one, jointly with a fault that the machine may have as well."""
-    predictor = s.predictor
-    if len(e) > ROWS:
-        e, base, sigma = e.rows(np.arange(ROWS)), base[:ROWS], sigma[:ROWS]
-        predictor = Predictor(predictor.machine, e, threads=predictor.threads)
-    problem = Problem.of(e, sigma, base)
-    out = []
-    for h in _all(s, predictor, problem, base):
-        left = _left(e, sigma, base, h, problem)
+    for h in _all(s, problem):
+        left = _left(h, problem)
         if left < MOST:
-            beside = min(left, _beside(s, h)) if len(e) == len(s.experiment) else left
-            out.append(Judged(h, left, beside))
-    return out
+            yield Judged(h, left, min(left, _beside(s, h)))
 
 
 def _beside(s: Readings, h: Hypothesis) -> float:
@@ -154,13 +162,13 @@ def _beside(s: Readings, h: Hypothesis) -> float:
     there = h.undo(e) if h.undo is not None else e
     if not np.array_equal(there.wrench[: len(there)], e.wrench[: len(there)]) or h.keep is not None:
         return 1.0
-    gap = there.reading - s.plan.base
+    gap = there.reading - s.base
     if not np.isfinite(gap[problem.index]).all():
         return 1.0
-    misfit = problem.residual(s.plan.base)
+    misfit = problem.residual(s.base)
     residual = problem.white(np.nan_to_num(gap))
     scale = 1.0 if h.factor is None else abs(h.factor)
-    left = scale**2 * (float(residual @ residual) - _gain(s, residual))
+    left = scale**2 * (float(residual @ residual) - s.screen.gain(residual))
     return _excess(left, float(misfit @ misfit), problem.freedom)
 
 
@@ -181,16 +189,16 @@ def quiet(e: Experiment, noise: Noise) -> Floats:
     return np.asarray(noise.sigma * np.where(noise.floor > 0, least / noise.floor, 1.0))
 
 
-def _all(s: Readings, predictor: Predictor, problem: Problem, base: Floats) -> Iterator[Hypothesis]:
-    e = predictor.experiment
-    shown = coordinates(e, base)
+def _all(s: Readings, problem: Problem) -> Iterator[Hypothesis]:
+    e = s.experiment
+    shown = coordinates(e, s.base)
     if e.quantity == "deflection" or _orthogonal(e):
         yield from gauges(e, shown)
         yield from shifts(e, shown)
     if e.quantity == "deflection":
-        yield from factors(e, problem, base, partial(left_beside, s))
+        yield from factors(e, problem, s.base, partial(left_beside, s))
         if e.wrench[:, :3].any():
-            yield from loads(predictor)
+            yield from loads(s.predictor)
 
 
 def _orthogonal(e: Experiment) -> bool:
@@ -198,9 +206,10 @@ def _orthogonal(e: Experiment) -> bool:
     return e.command is None and int(e.groups.max()) > 0
 
 
-def _left(e: Experiment, sigma: Floats, base: Floats, h: Hypothesis, problem: Problem) -> float:
+def _left(h: Hypothesis, problem: Problem) -> float:
     """Share of the misfit beyond noise that stays with a mistake, on the rows that it speaks of."""
-    own = problem if h.keep is None else Problem.of(e, sigma, base, h.keep)
+    e, base = problem.experiment, problem.base
+    own = problem if h.keep is None else Problem.of(e, problem.sigma, base, h.keep)
     values = []
     for prediction in (h.prediction, base):
         gap = own.white(e.reading - np.where(np.isfinite(prediction), prediction, e.reading))
@@ -210,42 +219,17 @@ def _left(e: Experiment, sigma: Floats, base: Floats, h: Hypothesis, problem: Pr
 
 def best_part(s: Readings, freedom: float) -> float:
     """Share of the misfit beyond noise that the best single part of the machine leaves."""
-    residual = s.problem.residual(s.plan.base)
+    residual = s.problem.residual(s.base)
     of = float(residual @ residual)
-    return _excess(of - _gain(s, residual), of, freedom)
+    return _excess(of - s.screen.gain(residual), of, freedom)
 
 
 def left_beside(s: Readings, factor: float, axes: tuple[int, ...]) -> float:
     """Chi-square that the best single part of the machine leaves where some channels read `factor` times too much."""
-    prediction = s.plan.base.copy()
+    prediction = s.base.copy()
     prediction[:, axes] *= factor
     residual = s.problem.residual(prediction)
-    return float(residual @ residual) - _gain(s, residual)
-
-
-def _gain(s: Readings, residual: Floats) -> float:
-    """What the best single part of the machine takes from chi-square, by linear screening within its bounds."""
-    screen = s.screen
-    if not len(screen.variants):
-        return 0.0
-    gains = screen.delta_chi2(residual[:, None])[:, 0]
-    for i in np.argsort(-gains):
-        v = screen.variants[int(i)]
-        if get(v.candidate.kind).measurement:
-            continue
-        if v.start is not None or _possible(screen, int(i), residual):
-            return float(gains[i])
-    return 0.0
-
-
-def _possible(screen: Screen, i: int, residual: Floats) -> bool:
-    """Whether the values that would explain most are within the bounds of their parameters."""
-    numbers = screen.variants[i].candidate.linear
-    values = [
-        float(p.null or 0.0) + float(v) * p.scale
-        for p, v in zip(numbers, screen.estimate(i, residual), strict=True)
-    ]
-    return all(p.lower <= v <= p.upper for p, v in zip(numbers, values, strict=True))
+    return float(residual @ residual) - s.screen.gain(residual)
 
 
 def _evidence(before: Experiment, after: Experiment) -> tuple[str, ...]:
