@@ -189,7 +189,9 @@ def test_a_number_is_no_effect_that_contains_a_named_one():
         ),
     )  # fmt: skip
     lines = (c.free @ both).T
-    wide = Place(candidate, (Shape(SimpleNamespace(lines=lambda use: lines[:, use], candidate=candidate), both, 0),))
+    wide = Place(
+        candidate, (Shape(SimpleNamespace(lines=lambda use: lines[:, use], candidate=candidate), both, 0),)
+    )
     narrow = replace(narrow, wider=(candidate,))
     d = other.shapes[0].directions
     unknown = Unknown("turn of an axis", "joints", "rad", 1e-4)
