@@ -110,6 +110,10 @@ class Fit:
             0.0,
         )
 
+    def is_on(self, name: str) -> bool:
+        """Whether the readings ask for a part."""
+        return self.amplitude(name) > np.exp(0.5 * OFF)
+
     def spread(self, group: str) -> float:
         """Standard deviation of the numbers of a group, in standard uncertainties: its own, or that of all together."""
         return self.amplitude(group) or (
@@ -193,6 +197,12 @@ def fitted(
         if heavy.score > best.score:
             best = heavy
     return best
+
+
+def refitted(fit: Fit, residual: Floats) -> Fit:
+    """The same parts for another residual (m,): from the amplitudes of a fit, with heavy tails where it has them."""
+    columns = replace(fit.columns, residual=residual)
+    return _optimum(columns, fit.parts, fit.t, fit.weights, heavy=bool(np.any(fit.weights != 1.0)))
 
 
 def _heavy(fit: Fit, mean: Floats, sd: Floats) -> Floats:

@@ -25,6 +25,7 @@ from stiffmap.identification.inference.amplitudes import (
     fitted,
     gains,
     log_mean,
+    refitted,
     spectrum,
 )
 from stiffmap.identification.inference.candidates import evidence, of_pairs
@@ -249,8 +250,12 @@ class _World:
         fit = model.fit
         if id(model) in self.anchors:
             return self.anchors[id(model)][1]
-        effects = tuple(c.part for c in model.chosen)
-        bare = fitted(fit.columns, (*self.numbers, *effects), amplitudes(fit), fit.weights)
+        gaps = [g.name for g in self.gaps]
+        if any(fit.is_on(name) for name in gaps):
+            effects = tuple(c.part for c in model.chosen)
+            bare = fitted(fit.columns, (*self.numbers, *effects), amplitudes(fit), fit.weights)
+        else:
+            bare = fit.without(gaps)
         at_rest = np.array([0.0, *bare.t[1:]])
         found = [fit, bare, evaluated(fit.columns, bare.parts, at_rest, bare.weights)]
         self.anchors[id(model)] = model, found
@@ -341,8 +346,7 @@ class _World:
 
     def _less(self, missed: Floats, fit: Fit) -> Fit:
         """The fit on a residual less something."""
-        residual = self.columns.residual - missed
-        return fitted(replace(self.columns, residual=residual), fit.parts, amplitudes(fit), fit.weights)
+        return refitted(fit, self.columns.residual - missed)
 
     def _optimum(self, fit: Fit, chosen: tuple[Chosen, ...]) -> tuple[Chosen, ...]:
         """The effects at the least squares of whole predictions, all else of the fit as it is; found once for each set."""
