@@ -62,16 +62,17 @@ def main() -> int:
     if a.out.suffix not in (".md", ".html"):
         parser.error(f"--out: expected a name that ends in .md or .html, got {a.out}")
     beside = a.out.with_suffix(".json")
-    kept = a.page_of or (beside if a.speed is not None and beside.exists() else None)
-    if kept:
-        try:
-            data = json.loads(kept.read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
-            parser.error(f"{kept}: {error}")
+    kept = a.page_of or (beside if beside.exists() else None)
+    try:
+        before = json.loads(kept.read_text(encoding="utf-8")) if kept else {}
+    except (OSError, ValueError) as error:
+        parser.error(f"{kept}: {error}")
+    if a.page_of or (a.speed is not None and kept):
+        data = before
     else:
-        data = measured(a.data, a.quick, dict(p.split("=", 1) for p in a.peer), a.only, beside)
-        if beside.exists():
-            data["speed"] = json.loads(beside.read_text(encoding="utf-8")).get("speed", [])
+        peers = dict(p.split("=", 1) for p in a.peer)
+        data = measured(a.data, a.quick, peers, a.only, before.get("rows", []))
+        data["speed"] = before.get("speed", [])
     if a.speed is not None:
         from board.speed import speed
 
@@ -86,9 +87,9 @@ def main() -> int:
 
 
 def measured(
-    folder: Path, quick: bool, peers: dict[str, str], only: list[str] | None, before: Path
+    folder: Path, quick: bool, peers: dict[str, str], only: list[str] | None, before: list[dict[str, Any]]
 ) -> dict[str, Any]:
-    """Rows of all sets, and with what they were measured."""
+    """Rows of all sets, those that were not measured as `before`, and with what they were measured."""
     from board.sets import SETS, Asked, all_rows
 
     import stiffmap
@@ -109,8 +110,8 @@ def measured(
     rows = [r.to_json() for r in all_rows(folder, Asked(quick, peers), say, only)]
     if only:
         fresh = {known[name].source: [r for r in rows if r["source"] == known[name].source] for name in only}
-        kept, rows = json.loads(before.read_text(encoding="utf-8"))["rows"], []
-        for r in kept:
+        rows = []
+        for r in before:
             rows += fresh.pop(r["source"], []) if r["source"] in fresh else []
             rows += [] if r["source"] in {known[name].source for name in only} else [r]
         rows += [r for some in fresh.values() for r in some]
