@@ -119,11 +119,16 @@ def _panda(folder: Path) -> sm.Machine:
 
 def board(data: Path, folder: Path, draws: int) -> Iterator[Case]:
     """Poses of the camera that a fit may see."""
+    yield "fit", _panda(folder), board_poses(data, folder / "board", "fit")
+
+
+def board_poses(data: Path, folder: Path, part: str) -> Experiment:
+    """Poses of the camera: those to `fit`, or those that are `unseen`."""
     head = "noise: {dx: 0.5, dy: 0.5, dz: 0.5, rx: 0.06, ry: 0.06, rz: 0.06}\nframe: unknown\ntool: unknown\n"
     seen = [*(f"camera_{a}_mm" for a in "xyz"), *(f"camera_q{a}" for a in "xyzw")]
-    rows = [[*_joints(r), *(r[k] for k in seen)] for r in _rows(data / "poses.csv") if r["part"] == "fit"]
+    rows = [[*_joints(r), *(r[k] for k in seen)] for r in _rows(data / "poses.csv") if r["part"] == part]
     columns = [*(f"p{a}" for a in "xyz"), *(f"pq{a}" for a in "xyzw")]
-    yield "fit", _panda(folder), _panda_files(folder / "board", head, columns, rows)
+    return _panda_files(folder, head, columns, rows)
 
 
 def sockets(data: Path, folder: Path, draws: int) -> Iterator[Case]:

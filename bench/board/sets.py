@@ -18,6 +18,7 @@ import stiffmap as sm
 from board.peers import beside_arm, plain_places
 from board.row import Row
 from board.sources import SOURCES, absent
+from stiffmap.experiment import Experiment
 from stiffmap.experiment.files.load import load_experiment
 from stiffmap.identification.calibration import Calibration
 from stiffmap.identification.numbers import Tolerances
@@ -155,6 +156,51 @@ def ur10(data: Path, asked: Asked) -> Iterator[dict[str, Any]]:
             }
 
 
+def board(data: Path, asked: Asked) -> Iterator[dict[str, Any]]:
+    """A camera at the wrist over a board: every fourth pose is unseen, frame and tool fitted to what is judged."""
+    import measured
+
+    with _scratch() as folder:
+        (_, machine, fit) = next(measured.board(data, folder, 1))
+        unseen = measured.board_poses(data, folder / "unseen", "unseen")
+        yield _fitted(machine, fit, unseen, "every fourth pose, its frame and tool fitted")
+
+
+def sockets(data: Path, asked: Asked) -> Iterator[dict[str, Any]]:
+    """A ball in two sockets: fitted at the first half of the places of the sockets, judged at the others."""
+    import measured
+
+    with _scratch() as folder:
+        for case, machine, e in measured.sockets(data, folder, 1):
+            places = list(dict.fromkeys(e.setup))
+            fit = np.isin(e.setup, places[: len(places) // 2])
+            how = f"other places of the sockets ({len(places) // 2} of {len(places)} fitted), frames and tool fitted"
+            row = _fitted(machine, e.rows(fit), e.rows(~fit), how)
+            yield {"set": f"Franka Panda, a ball in two sockets, {case}", **row}
+
+
+def _fitted(machine: sm.Machine, fit: Experiment, unseen: Experiment, how: str) -> dict[str, Any]:
+    begun = time.process_time()
+    c = sm.calibrate(machine, fit)
+    used = time.process_time() - begun
+    before, after = (
+        1e3
+        * float(
+            np.linalg.norm([v for k, v in sm.residual(m, unseen).summary.per_axis.items() if k[0] == "d"])
+        )
+        for m in (machine, c.machine)
+    )
+    return {
+        "quantity": "rms length of the position error, mm",
+        "before": before,
+        "after": after,
+        "unseen_rows": len(unseen),
+        "unseen_by": how,
+        "cause": _cause(c),
+        "seconds": used,
+    }
+
+
 def delta(data: Path, asked: Asked) -> Iterator[dict[str, Any]]:
     """Heights of a bed; each session is predicted from the other three."""
     import measured_delta_files as example
@@ -222,6 +268,18 @@ SETS = (
         "UR10, laser tracker",
         "no calibrated figure is published with the data",
         ur10,
+    ),
+    MeasuredSet(
+        "franka_board",
+        "Franka Panda, a camera at the wrist over a board",
+        "no calibrated figure is published with the data",
+        board,
+    ),
+    MeasuredSet(
+        "ball_in_socket",
+        "Franka Panda, a ball in two sockets",
+        "0.27 for robot 6, 0.31 for robot 7 (the authors' calibrated files on the same rows)",
+        sockets,
     ),
     MeasuredSet(
         "flsun_v400_delta",

@@ -112,7 +112,7 @@ class Fit:
 
     def is_on(self, name: str) -> bool:
         """Whether the readings ask for a part."""
-        return self.amplitude(name) > np.exp(0.5 * OFF)
+        return bool(self.amplitude(name) > np.exp(0.5 * OFF))
 
     def spread(self, group: str) -> float:
         """Standard deviation of the numbers of a group, in standard uncertainties: its own, or that of all together."""
