@@ -213,3 +213,28 @@ def test_a_perfect_response_is_as_uncertain_as_taps_repeat(tmp_path):
     np.testing.assert_allclose(t.u_flexibility, np.repeat(expected[:, None], 3, axis=1), rtol=0.02)
     np.testing.assert_array_equal(t.hammer, [[0, 0, -1]] * 2)
     np.testing.assert_allclose(t.direction[0], [0.6, -0.8, 0.0], atol=1e-4)
+
+
+@pytest.mark.parametrize("factor", [0.25, 0.5, 0.8, 1.25, 2.0, 3.4, 5.2])
+def test_the_fit_of_a_factor_ends_in_the_deepest_of_two_wells(factor, monkeypatch):
+    """A stiffness that is far off pairs other modes: chi-square then has a well at 1 as well, and a fit begun there stays."""
+    from stiffmap.identification.candidates.candidates import Candidate
+    from stiffmap.identification.taps import explain
+    from stiffmap.model.effects import Parameter
+
+    class Wells:
+        def whitener(self, part):
+            return slice(None), np.eye(2)
+
+        def residual(self, scale):
+            near, at_one = (10 * np.log(scale / v) / np.hypot(1, 10 * np.log(scale / v)) for v in (factor, 1))
+            return np.array([9 * near * np.hypot(at_one, 0.4), near])
+
+        def real(self, term, off):
+            return None, None
+
+    monkeypatch.setattr(explain, "term", lambda c, value: value)
+    scale = Parameter("scale", "", 1e-3, 1e3, 1.0, 0.1, "of a stiffness")
+    found = explain._fitted(Wells(), Candidate("compliance", "a", (), (scale,)))
+    assert found is not None and found.parameters["scale"] == pytest.approx(factor, rel=1e-4)
+    assert found.chi2 < 1e-6 and found.u["scale"] > 0
