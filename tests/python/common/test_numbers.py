@@ -20,6 +20,7 @@ from stiffmap.common.number_text import (
     percent,
     percents,
     vector_text,
+    with_uncertainty,
 )
 from stiffmap.common.tables.cells import Cells
 from stiffmap.common.tables.sheet import read_sheet
@@ -129,3 +130,15 @@ def test_a_deflection_is_in_mm_from_1_mm_on(size: float, text: str) -> None:
 
 def test_round_off_of_a_force_is_zero() -> None:
     assert vector_text([1.83697e-14, -300.0, -0.0]) == "(0, -300, 0)" and vector_text([]) == "()"
+
+
+@pytest.mark.parametrize("u", [0.0012, 0.019, 0.0196, 0.3, 1.94, 1.96, 7.0, 56.0, 140.0])
+@pytest.mark.parametrize("value", [0.30071, -2.0, 1234.5678, 0.0])
+def test_a_value_is_written_as_far_as_its_uncertainty_reaches(value: float, u: float) -> None:
+    """Rounding adds at most a quarter of the uncertainty, and the next digit fewer would add more than a twentieth."""
+    written, uncertain = with_uncertainty(value, u).split(" ± ")
+    assert abs(float(written) - value) <= 0.5001 * u and abs(float(uncertain) - u) <= 0.26 * u
+    decimals = [len(t.partition(".")[2]) for t in (written, uncertain)]
+    assert decimals[0] == decimals[1]
+    step = 10.0 ** -decimals[0] if decimals[0] else 10.0 ** (len(uncertain) - len(uncertain.rstrip("0")))
+    assert 0.05 * u < step < 1.01 * u

@@ -260,5 +260,5 @@ def ripple(job: Setting, state: Equilibrium) -> Floats:
         lowest = 0.0
     if not lowest > SLOW * teeth * force.spindle_frequency:
         return np.full(len(job), np.nan)
-    amplitude = np.einsum("i,mij->mj", force.amplitude[teeth - 1], np.abs(job.axes))
-    return np.asarray(np.abs(np.einsum("mi,mij,mj->m", job.off, state.compliance, amplitude)))
+    line = 2 * np.fft.rfft(force.force, axis=0)[teeth] / len(force.angle)  # with the phases between the axes
+    return np.asarray(np.abs(np.einsum("mi,mij,mkj,k->m", job.off, state.compliance, job.axes, line)))

@@ -152,3 +152,89 @@ def test_information_of_poses_is_that_of_the_inverse_covariance():
     every = np.hstack([A, J])
     assert information_of(both.T @ both, 2, 1.0) == pytest.approx(-np.log(np.linalg.det(joint)), rel=1e-12)
     assert information_of(every.T @ every, 2, 1.0) > information_of(both.T @ both, 2, 1.0)
+
+
+def test_information_of_a_pose_is_that_of_its_own_modes(arm, monkeypatch):
+    """Squares of what each joint's compliance moves the frequencies there by, over their noise; no more directions than modes."""
+    from stiffmap.identification.taps import plan
+
+    seen = []
+
+    def spy(matrices, *rest):
+        seen.append(matrices)
+        return [0]
+
+    monkeypatch.setattr(plan, "exchange", spy)
+    plan.where_to_tap(arm, 1, modes=2, tries=3, seed=1)
+    (found,) = seen
+    assert [np.linalg.matrix_rank(m, tol=1e-9 * np.trace(m)) for m in found] == [2, 2, 2]
+    low, high = arm.workspace
+    p = np.random.default_rng(1).uniform(low, high, (3, 3))
+    before = np.log(tip_modes(arm, p).frequency[:, :2])
+    diagonal = found.diagonal(axis1=1, axis2=2)
+    for joint in ("a1", "a2", "a3"):
+        after = np.log(tip_modes(soft(arm, joint, np.exp(plan.STEP)), p).frequency[:, :2])
+        expected = (((after - before) / plan.STEP / plan.NOISE) ** 2).sum(axis=1)
+        assert np.isclose(diagonal, expected[:, None], rtol=1e-6).all(axis=0).any(), joint
+
+
+@pytest.mark.parametrize("factor", [0.4, 3.0])
+def test_assumed_damping_is_off_as_a_whole_and_from_mode_to_mode(arm, factor):
+    """Where none is declared the level is uncertain by a factor e and each mode by e^0.5: generalised least squares by hand."""
+    from stiffmap.identification.taps.problem import Problem
+    from stiffmap.workspace.vibration.modes import ASSUMED
+
+    plain = tapped(arm)
+    ratio = np.full(len(plain), factor * ASSUMED)
+    problem = Problem(arm, replace(plain, ratio=ratio, u_ratio=0.2 * ratio), None, 0.05)
+    each, n = 0.2**2 + 0.5**2 + ratio[0] ** 2, len(plain)
+    assert problem.settled().chi2 == pytest.approx(np.log(factor) ** 2 / (each / n + 1.0), rel=1e-3)
+
+
+def test_a_perfect_response_is_as_uncertain_as_taps_repeat(tmp_path):
+    """Two modes without noise: frequency 0.2 %, damping 10 %, flexibility 5 % of the mode and 1 % of the largest (root of squares)."""
+    f = np.linspace(20, 60, 400)
+    modes = [(30.0, 0.02, np.array([3e-6, -4e-6, 0.0])), (45.0, 0.03, np.array([0.0, 1e-7, 0.0]))]
+    rows = ["x_mm,y_mm,z_mm,response,along,hammer"]
+    for a in range(3):
+        H = sum(
+            b[a] / (1 - (f / own) ** 2 + 2j * z * f / own) for own, z, b in modes
+        ) + 1e-12 * np.random.default_rng(a).normal(size=f.size)
+        lines = [f"{x},{h.real},{h.imag}" for x, h in zip(f.tolist(), H.tolist(), strict=True)]
+        (tmp_path / f"{a}.csv").write_text("\n".join(["frequency_Hz,real_m/N,imag_m/N", *lines]) + "\n")
+        rows.append(f"1000,0,0,{a}.csv,+{'xyz'[a]},-z")
+    (tmp_path / "taps.csv").write_text("\n".join(rows) + "\n")
+    t = load_taps(tmp_path / "taps.csv")
+    size = [5e-6, 1e-7]
+    assert t.frequency == pytest.approx([30.0, 45.0], rel=1e-4)
+    assert t.u == pytest.approx(0.002 * t.frequency, rel=0.02)
+    assert t.u_ratio == pytest.approx(0.1 * t.ratio, rel=0.02)
+    expected = np.hypot(0.05 * np.array(size), 0.01 * max(size))
+    np.testing.assert_allclose(t.u_flexibility, np.repeat(expected[:, None], 3, axis=1), rtol=0.02)
+    np.testing.assert_array_equal(t.hammer, [[0, 0, -1]] * 2)
+    np.testing.assert_allclose(t.direction[0], [0.6, -0.8, 0.0], atol=1e-4)
+
+
+@pytest.mark.parametrize("factor", [0.25, 0.5, 0.8, 1.25, 2.0, 3.4, 5.2])
+def test_the_fit_of_a_factor_ends_in_the_deepest_of_two_wells(factor, monkeypatch):
+    """A stiffness that is far off pairs other modes: chi-square then has a well at 1 as well, and a fit begun there stays."""
+    from stiffmap.identification.candidates.candidates import Candidate
+    from stiffmap.identification.taps import explain
+    from stiffmap.model.effects import Parameter
+
+    class Wells:
+        def whitener(self, part):
+            return slice(None), np.eye(2)
+
+        def residual(self, scale):
+            near, at_one = (10 * np.log(scale / v) / np.hypot(1, 10 * np.log(scale / v)) for v in (factor, 1))
+            return np.array([9 * near * np.hypot(at_one, 0.4), near])
+
+        def real(self, term, off):
+            return None, None
+
+    monkeypatch.setattr(explain, "term", lambda c, value: value)
+    scale = Parameter("scale", "", 1e-3, 1e3, 1.0, 0.1, "of a stiffness")
+    found = explain._fitted(Wells(), Candidate("compliance", "a", (), (scale,)))
+    assert found is not None and found.parameters["scale"] == pytest.approx(factor, rel=1e-4)
+    assert found.chi2 < 1e-6 and found.u["scale"] > 0

@@ -14,6 +14,7 @@ import stiffmap as sm
 from stiffmap.common.errors import StiffmapError
 from stiffmap.machining.milling import mill, mill_job
 from stiffmap.machining.milling.equilibrium import equilibrium
+from stiffmap.machining.milling.limits import drive_speeds
 from stiffmap.machining.milling.placement import Search, placements
 from stiffmap.machining.milling.plant import Plant
 from stiffmap.machining.milling.redundancy import Steps, best_sequence, redundancy
@@ -21,6 +22,7 @@ from stiffmap.machining.milling.setting import Setting, setting
 from stiffmap.machining.milling.speed import best_feeds, other_side
 from stiffmap.machining.toolpath import outline, path_of, sampled
 from stiffmap.machining.toolpath.entry import turned_round
+from stiffmap.solve.kinematics import forward_kinematics, inverse_kinematics
 from stiffmap.solve.machine import Machine
 
 ARM = Path(__file__).parents[4] / "examples/ur10-spindle.yaml"
@@ -183,3 +185,16 @@ def test_a_built_in_outline_is_run_at_the_speeds_of_its_process(name: str) -> No
     assert found.job.faster == pytest.approx(1.0)
     assert found.job.path.spindle[-1] == pytest.approx(process.spindle)
     assert found.job.feed == pytest.approx(process.feed)
+
+
+def test_drives_run_as_the_inverse_jacobian_says() -> None:
+    """Slides at right angles run as the tool does, per axis; an arm as its Jacobian has it, whose rows are what one drive moves."""
+    path = outline("washbasin")
+    slides = setting(gantry(), path, PROCESS, sampled(path, 5e-3), path.placed((0, 0, 0), 0.4))
+    assert drive_speeds(slides) == pytest.approx(slides.feed[:, None] * slides.tangent, abs=1e-9)
+    job = arm_job(0.1)
+    joints = inverse_kinematics(job.machine, job.position, job.rotation).actuators
+    found, h = drive_speeds(job), 1e-6
+    for k in range(len(job)):
+        at = [forward_kinematics(job.machine, joints[k] + s * h * found[k]).position for s in (-1, 1)]
+        assert np.ravel(at[1] - at[0]) / (2 * h) == pytest.approx(job.feed[k] * job.tangent[k], abs=1e-6)

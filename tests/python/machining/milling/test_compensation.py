@@ -146,6 +146,25 @@ def test_the_arc_of_a_moved_circle_is_a_circle() -> None:
     assert len(line_pieces(points, 1e-6)) > 10
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_a_bent_line_becomes_its_own_corners(seed: int) -> None:
+    """Many points of a few straight lines, and a turn of the tool with kinks elsewhere: the pieces end there and nowhere else."""
+    from stiffmap.machining.toolpath.pieces import line_pieces
+
+    rng = np.random.default_rng(seed)
+    corners = np.cumsum(rng.uniform(0.01, 0.05, (6, 3)) * rng.choice([-1, 1], (6, 3)), axis=0)
+    at = np.arange(6) * 17  # a corner at every 17th point
+    points = np.stack([np.interp(np.arange(86), at, corners[:, k]) for k in range(3)], axis=1)
+    found = line_pieces(points, 1e-7)
+    assert np.array([p.end for p in found]) == pytest.approx(corners[1:], abs=1e-12)
+    kinks = np.array([0, 9, 40, 71, 85])
+    turn = np.interp(np.arange(86), kinks, rng.uniform(-1, 1, 5))
+    straight = np.linspace(corners[0], corners[1], 86)
+    found = line_pieces(straight, 1e-7, turn)
+    assert np.array([p.end for p in found]) == pytest.approx(straight[kinks[1:]], abs=1e-12)
+    assert [p.turn for p in found] == pytest.approx(turn[kinks[1:]], abs=1e-12)
+
+
 def test_the_band_of_the_force() -> None:
     """20 % more force leaves about a fifth of the error, less what the loop gives back."""
     found = mill_job(

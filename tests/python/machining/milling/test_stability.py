@@ -10,8 +10,13 @@ from tests.python.machining.milling.gantry import gantry
 
 import stiffmap as sm
 from stiffmap.machining.milling import mill_job
+from stiffmap.machining.milling.equilibrium import equilibrium
+from stiffmap.machining.milling.job import ripple
+from stiffmap.machining.milling.plant import Plant
+from stiffmap.machining.milling.setting import setting
 from stiffmap.machining.milling.verdict import verdict
-from stiffmap.machining.toolpath import path_of
+from stiffmap.machining.process.revolution import revolution
+from stiffmap.machining.toolpath import path_of, sampled
 from stiffmap.model.description import Body
 from stiffmap.solve.status import Status
 from stiffmap.ui.report.milling import summary
@@ -86,3 +91,24 @@ def test_no_stable_speed_asks_for_less_depth():
         np.zeros(2), np.array([1.2, 0.9]), np.linspace(50, 150, 5), np.array([1.3, 0.9, 1.2, 0.8, 0.9]), ""
     )
     assert list(s.offered) == [75.0, 125.0, 150.0] and "1 of 2 places" in s.sentence(100.0)
+
+
+@pytest.mark.parametrize("side", ["climb", "conventional"])
+@pytest.mark.parametrize("turn", [0.0, 0.5, np.pi / 4, 2.2, -1.0])
+def test_ripple_is_what_the_force_of_a_revolution_moves_across_the_wall(side, turn):
+    """Slides of two stiffnesses, moved step by step through a revolution; a sine of the teeth's passing fitted to the way."""
+    d = gantry(2e-4, 1e-4, 1e-5).description
+    light = sm.Machine(replace(d, platform=(*d.platform, Body("spindle", 0.05))))
+    p = sm.load_process("slot")
+    p = replace(p, spindle=p.spindle / 4, feed=p.feed / 4, cut=replace(p.cut, side=side, radial=6e-3))
+    path = path_of([[-0.05, 0, 0], [0.05, 0, 0]])
+    job = setting(light, path, p, sampled(path, 5e-2), path.placed((0, 0, 0), turn))
+    feed = np.array([np.cos(turn), np.sin(turn), 0.0])
+    left = np.array([-np.sin(turn), np.cos(turn), 0.0])
+    angle, force = revolution(p)
+    in_base = force[:, :1] * feed + force[:, 1:2] * left - force[:, 2:] * [0, 0, 1]
+    across = in_base * [2e-7, 1e-7, 1e-8] @ left
+    phase = p.tool.teeth * angle
+    wave = np.linalg.lstsq(np.stack([np.cos(phase), np.sin(phase), 1 + 0 * phase], axis=1), across)[0]
+    found = ripple(job, equilibrium(Plant(job), job.position))
+    assert found == pytest.approx(np.full(len(job), np.hypot(*wave[:2])), rel=1e-6)

@@ -97,6 +97,27 @@ def test_runout_from_the_line_at_the_spindle() -> None:
     assert law.process(sm.load_process("slot")).tool.runout == law.runout.offset
 
 
+def test_the_interval_of_no_runout_by_hand() -> None:
+    """A line that changes its sign from one revolution to the next is noise alone: its power A² s is taken off, and varies by itself.
+
+    With A² = k s, s the power of the line per square of run-out, three feeds give -k ± 1.96 k / √3.
+    """
+    p, size, k = sm.load_process("slot"), 5e-6, (8e-6) ** 2
+    table = made(signals=True)
+    keep = np.asarray(table["feed_per_tooth_mm"]) > 0.06
+    table = {n: v[keep] if isinstance(v, np.ndarray) else v for n, v in table.items()}
+    angle = 2 * np.pi * np.arange(400) / 200
+    for chip in (0.075, 0.1, 0.125):
+        cut = replace(p, feed=chip * 1e-3 * 2 * 100, tool=replace(p.tool, runout=size))
+        line = np.fft.rfft(revolution(cut, 200, 30)[1][:, :2], axis=0)[1] * 2 / 200
+        power = (np.abs(line) ** 2).sum() / size**2
+        rows = np.asarray(table["feed_per_tooth_mm"]) == chip
+        table["Fx_N"][rows] += np.sqrt(k * power) * np.cos(angle) * np.repeat([1, -1], 200)
+    found = sm.identify_process(table).runout
+    assert found is not None and found.offset < 0.2e-6
+    assert found.interval == pytest.approx((0.0, np.sqrt(k * (1.96 / np.sqrt(3) - 1))), rel=0.06)
+
+
 def test_side_cuts_and_a_file(tmp_path: Path) -> None:
     p = sm.load_process("slot")
     lines = ["feed_per_tooth_mm,Fx_N,Fy_N,Fz_N,teeth,axial_mm,side,radial_mm,diameter_mm"]

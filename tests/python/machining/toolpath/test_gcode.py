@@ -338,3 +338,33 @@ def test_the_quick_way_reads_the_same(line: str, before: str) -> None:
                 )
             )
     assert found[0] == found[1]
+
+
+#: G words of LinuxCNC's quick reference: those that need nothing with them, those that are refused and the word for it.
+STANDARD = {
+    "": "G0 G1 G17 G18 G19 G20 G21 G40 G49 G54 G55 G56 G57 G58 G59 G59.1 G59.2 G59.3 G61 G61.1 G64 G80 G90 G90.1 G91 G91.1 "
+    "G94 G97 G98 G99",
+    "drilling cycles": "G73 G76 G81 G82 G83 G84 G85 G86 G87 G88 G89",
+    "cutter radius compensation": "G41 G42",
+    "reference points": "G28.1 G30.1",
+    "set by the program": "G10 G92",
+    "splines": "G5 G5.1",
+    "NURBS": "G5.2",
+    "threads": "G33",
+    "probing": "G38.2",
+    "feed per revolution": "G95",
+    "constant surface speed": "G96",
+    "unknown word": "G6 G22 G44 G60 G100 G118 G118.6 G146",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("why", "word"), [(why, w) for why, words in STANDARD.items() for w in words.split()]
+)
+def test_every_word_of_the_standard_is_read_or_refused_by_its_name(why: str, word: str) -> None:
+    if not why:
+        p = read(f"G0 X1 Y1 Z1\n{word}\nG21 G90 G0 X2 Y1\n")
+        assert 1e3 * p.end[-1] == pytest.approx([2, 1, 1])
+        return
+    with pytest.raises(FileError, match=why):
+        read(f"{word}\nX1 Y1 Z1 F600\n")

@@ -1,11 +1,13 @@
 """How many of a sample of small changes to the sources do the fast tests notice?
 
 usage: python -m tests.python.project.mutation.run python|cpp [--count 150] [--seed 26] [--wide] [--out build/mutation]
+       [--among FOLDER ...]
 
 C++: the mutants that compile, all built at once (base kernels); the C++ tests first, then pytest. Python: one at a
 time in a copy of the package. Fast tests only, those of the mutant's room, with --wide all others for what these miss;
-each run ends at the first failure. Prints every survivor; results stand in OUT/python.jsonl and cpp.jsonl, and a run
-that was stopped goes on where it was.
+each run ends at the first failure. `--among` takes the mutants in Python of these folders or files below
+python/stiffmap only, as `machining/toolpath common/number_text.py`. Prints every survivor; results stand in
+OUT/python.jsonl and cpp.jsonl, and a run that was stopped goes on where it was.
 """
 
 from __future__ import annotations
@@ -17,7 +19,7 @@ import resource
 import shutil
 import subprocess
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
 
@@ -27,6 +29,7 @@ from .mutant import Mutant, shuffled
 from .table import all_folders, folders, test_files
 
 ROOT = Path(__file__).parents[4]
+PACKAGE = Path("python/stiffmap")
 CPU_SECONDS = 400
 
 
@@ -42,6 +45,7 @@ def main() -> int:
     options.add_argument(
         "--again", action="store_true", help="survivors of the last run, and those not yet run, only"
     )
+    options.add_argument("--among", nargs="+", metavar="FOLDER", default=[""], help="below python/stiffmap")
     options.add_argument("--out", type=Path, default=ROOT / "build/mutation")
     given = options.parse_args()
     out = given.out.resolve()
@@ -51,7 +55,7 @@ def main() -> int:
     results = out / f"{given.language}.jsonl"
     known = read(results)
     caught = 0
-    chosen = list(sample(given.language, given.count, given.seed, out))
+    chosen = list(sample(given.language, given.count, given.seed, out, given.among))
     if given.language == "cpp":
         install(out / "cpp", package / "stiffmap")
     with results.open("a", encoding="utf-8") as file:
@@ -75,10 +79,14 @@ def main() -> int:
     return int(caught < 0.9 * len(chosen))
 
 
-def sample(language: str, count: int, seed: int, out: Path) -> Iterator[tuple[int, Mutant]]:
-    """The mutants of a run with their numbers."""
+def sample(
+    language: str, count: int, seed: int, out: Path, among: Sequence[str]
+) -> Iterator[tuple[int, Mutant]]:
+    """The mutants of a run with their numbers; those in Python below the folders `among` only."""
     if language == "python":
-        yield from enumerate(shuffled(python_sites.mutants_of(ROOT), seed)[:count], 1)
+        places = [PACKAGE / folder for folder in among]
+        chosen = [m for m in python_sites.mutants_of(ROOT) if any(map(Path(m.file).is_relative_to, places))]
+        yield from enumerate(shuffled(chosen, seed)[:count], 1)
         return
     yield from build(ROOT, out / "cpp", shuffled(cpp_sites.mutants_of(ROOT), seed), count).items()
 

@@ -79,5 +79,7 @@ def run(
 
 
 def failures(log: Path) -> list[str]:
-    """Names of the tests that failed."""
-    return re.findall(r"^(?:FAILED|ERROR) (\S+)", log.read_text(errors="replace"), flags=re.MULTILINE)
+    """Names of the tests that failed, with their parameters, which may hold blanks."""
+    return re.findall(
+        r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", log.read_text(errors="replace"), flags=re.MULTILINE
+    )
