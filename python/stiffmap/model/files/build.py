@@ -44,7 +44,7 @@ def build(
     templates = {name: t for name, t in model.templates.items() if isinstance(t, list)}
     legs = [tried(partial(build_leg, *leg, templates, context)) for leg in model.legs.items()]
     springs = [
-        tried(partial(_external_spring, name, s, context.at("external_springs", name).inside(name)))
+        tried(partial(_external_spring, name, s, context.at("external_springs", name).named(name, s)))
         for name, s in model.external_springs.items()
     ]
     home = tried(partial(build_pose, model.home, context.at("home"), "home.")) or Pose()
@@ -140,8 +140,6 @@ def _ratios(given: Number | list[Number] | None, context: Context) -> tuple[floa
 
 
 def _external_spring(name: str, model: ExternalSpringModel, context: Context) -> ExternalSpring:
-    context.note(model.note)
-    context.mark(model.source)
     numbers = build_numbers(model, ExternalSpring, False, context)
     return ExternalSpring(name, model.point, **numbers, tension_only=model.tension_only)
 

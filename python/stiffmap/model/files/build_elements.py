@@ -43,6 +43,7 @@ from stiffmap.model.files.schema.elements import (
     OffsetModel,
     PointModel,
     SpringModel,
+    sort_of,
 )
 
 ZERO = Number(value=0.0)
@@ -78,33 +79,23 @@ def build_element(
     model: ElementModel, context: Context, among: tuple[int, Sequence[ElementModel]] = (0, ())
 ) -> Element:
     """One element; `among`: its number and the sequence it is in."""
+    here = context.named(getattr(model, str(sort_of(model))), model)
     match model:
         case OffsetModel():
-            return _offset(model, _named(model.offset, model, context))
+            return _offset(model, here)
         case JointModel():
-            return _joint(model, _named(model.joint, model, context))
+            return _joint(model, here)
         case ActuatorModel():
-            return _actuator(model, _named(model.actuator, model, context))
+            return _actuator(model, here)
         case CableModel():
-            return _cable(model, _named(model.cable, model, context))
+            return _cable(model, here)
         case SpringModel():
-            return build_spring(model, _named(model.spring, model, context))
+            return build_spring(model, here)
         case BodyModel():
-            return _body(model, _named(model.body, model, context), *among)
+            return _body(model, here, *among)
         case PointModel():
-            return Point(
-                model.point,
-                **build_numbers(model, Point, False, _named(model.point, model, context)),
-            )
-        case BlockModel():
-            return _block(model, context)
-
-
-def _named(name: str, model: ElementModel, context: Context) -> Context:
-    inside = context.inside(name)
-    inside.note(model.note)
-    inside.mark(model.source)
-    return inside
+            return Point(model.point, **build_numbers(model, Point, False, here))
+    return _block(model, context)  # a full name holds the branch, not the block
 
 
 def _offset(model: OffsetModel, context: Context) -> Offset:
@@ -272,10 +263,7 @@ def _rows(matrix: NDArray[np.float64]) -> Rows:
 
 
 def _block(model: BlockModel, context: Context) -> Block:
-    context.inside(model.block).note(model.note)
-    context.inside(model.block).mark(model.source)
     branches = tuple(
-        # a full name holds the branch, not the block
         Branch(name, build_elements(models, context.at("branches", name).inside(name)))
         for name, models in model.branches.items()
     )

@@ -169,7 +169,7 @@ def load_link(name: str, context: Context) -> Matrix6:
     link = read_link(path)
     matrix = np.asarray(link.compliance, dtype=float)
     _check(matrix, "compliance", context)
-    context.note(name, "link")
+    context.gathered.notes[f"{context.full}/link"] = name
     _keep_covariance(name, np.asarray(link.covariance, dtype=float), context)
     return as_rows(matrix)
 
