@@ -6,7 +6,7 @@ be left out: ``x.bar`` then stands for the bars of both sides of a parallelogram
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 from stiffmap.common.errors import StiffmapError
@@ -14,6 +14,7 @@ from stiffmap.model.addresses.fields import Field, declared, fields, vector_fiel
 from stiffmap.model.description import (
     Block,
     Body,
+    Element,
     MachineDescription,
     Offset,
     Point,
@@ -39,6 +40,22 @@ def all_fields(description: MachineDescription) -> Iterator[tuple[str, Field]]:
             yield f"{full}/{key}", field
 
 
+def number_at(
+    description: MachineDescription, full: str, of: Callable[[Element], Field | None]
+) -> Field | None:
+    """A number of the elements of a full name; what its `Field.put` makes is a description. None: they have none."""
+    found = next((f for f in map(of, tree.find(description, full)) if f is not None), None)
+
+    def put(value: float) -> MachineDescription | None:
+        def change(element: Element) -> Element | None:
+            own = of(element)
+            return None if own is None else own.put(value)
+
+        return tree.edit(description, full, change)
+
+    return None if found is None else found._replace(put=put)
+
+
 def full_names(description: MachineDescription, name: str) -> list[str]:
     """Full names of the elements that a name stands for, each once; none: there is no such element."""
     every = list(
@@ -51,19 +68,6 @@ def full_names(description: MachineDescription, name: str) -> list[str]:
     legs = [parts[0]] if len(parts) > 1 and parts[0] in chains else chains
     rest = parts[1:] if len(parts) > 1 and parts[0] in chains else parts
     return [full for full in every if _stands_for(full.split("."), legs, rest)]
-
-
-def single_addresses(description: MachineDescription, address: str) -> list[str]:
-    """The addresses of single elements that one address stands for."""
-    if address in dict(machine_fields(description)):
-        return [address]
-    name, field = split(address)
-    return [
-        f"{full}/{field}"
-        for full in full_names(description, name)
-        if any(field in fields(e) for e in tree.find(description, full))
-        or (field == "length" and bar_offset(description, full))
-    ]
 
 
 def _stands_for(full: list[str], legs: list[str], rest: list[str]) -> bool:
