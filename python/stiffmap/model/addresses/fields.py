@@ -10,13 +10,27 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.units import INERTIA, Dimension
+from stiffmap.common.units import INERTIA, MODULUS, Dimension
 from stiffmap.model import beams
-from stiffmap.model.addresses.units import unit_text
 from stiffmap.model.description import Body, Cable, Element, Joint, Law, Offset, Pose, Spring
 from stiffmap.model.description.numbers import DIRECTIONS, numbers_of, with_part
 from stiffmap.model.description.pose import Vector
 from stiffmap.model.description.strokes import Matrix6, entry_dimension
+
+SHORT = {MODULUS: "Pa", Dimension(force=-1, angle=1): "1/N"}
+POWERS = {1: "", 2: "²", 3: "³"}
+
+
+def unit_text(d: Dimension, time: int = 0) -> str:
+    """``N·m/rad``; dimensionless: empty."""
+    if d in SHORT:
+        return SHORT[d]
+    units = (("N", d.force), ("kg", d.mass), ("m", d.length), ("rad", d.angle), ("s", time))
+    above = "·".join(name + POWERS[power] for name, power in units if power > 0)
+    below = [name + POWERS[-power] for name, power in units if power < 0]
+    if not below:
+        return above
+    return f"{above or '1'}/{below[0]}" if len(below) == 1 else f"{above or '1'}/({'·'.join(below)})"
 
 
 class Field(NamedTuple):

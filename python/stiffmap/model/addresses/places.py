@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from typing import NamedTuple
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.addresses.fields import Field, declared, fields, vector_fields
@@ -32,7 +33,34 @@ def split(address: str) -> tuple[str, str]:
     return name, field
 
 
-def all_fields(description: MachineDescription) -> Iterator[tuple[str, Field]]:
+class Listed(NamedTuple):
+    """A number (SI): its address, value and unit; its standard uncertainty, where it comes from, and what is said of it."""
+
+    address: str
+    value: float
+    unit: str
+    u: float | None
+    source: str
+    note: str
+
+
+def listed(description: MachineDescription) -> list[Listed]:
+    """Every number under the address by which files keep its uncertainty."""
+    uncertainty, notes, sources = (
+        dict(description.uncertainty),
+        dict(description.notes),
+        dict(description.sources),
+    )
+
+    def row(address: str, field: Field) -> Listed:
+        name = address.partition("/")[0]
+        source, note = (known.get(address, known.get(name, "")) for known in (sources, notes))
+        return Listed(address, float(field.value), field.unit, uncertainty.get(address), source, note)
+
+    return [row(address, field) for address, field in _all_fields(description) if field.listed]
+
+
+def _all_fields(description: MachineDescription) -> Iterator[tuple[str, Field]]:
     """Every number by its address, in the order of the machine's file."""
     yield from machine_fields(description)
     for full, element in tree.all_elements(description):

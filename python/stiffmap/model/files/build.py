@@ -19,6 +19,7 @@ from stiffmap.model.description import (
     MachineDescription,
 )
 from stiffmap.model.description.pose import Pose, Vector
+from stiffmap.model.description.strokes import as_rows
 from stiffmap.model.description.tree import point_names
 from stiffmap.model.files.build_elements import build_elements
 from stiffmap.model.files.build_geometry import build_pose, build_vector
@@ -202,9 +203,7 @@ def _kept(entries: Any, context: Context) -> dict[str, LinkUse]:
         for file, springs, rows in entries:
             if np.array(rows, dtype=float).shape != (21, 21):
                 raise ValueError
-            kept[str(file)] = LinkUse(
-                tuple(tuple(float(v) for v in row) for row in rows), [str(s) for s in springs]
-            )
+            kept[str(file)] = LinkUse(as_rows(rows), [str(s) for s in springs])
     except (TypeError, ValueError):
         context.at("extra", KEY).fail("expected [file, [springs], 21 x 21 numbers] per link file")
     return kept

@@ -6,13 +6,13 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from stiffmap.common.units import ANGLE, FORCE, LENGTH, MOMENT
 from stiffmap.model import beams
 from stiffmap.model.description import BeamNumbers, Law, Spring
 from stiffmap.model.description.numbers import DIRECTIONS
-from stiffmap.model.description.strokes import Matrix6, entry_dimension
+from stiffmap.model.description.strokes import Matrix6, as_rows, entry_dimension
 from stiffmap.model.files.build_numbers import build_numbers
 from stiffmap.model.files.context import Context, LinkUse, StrokeUse
 from stiffmap.model.files.schema.base import FileModel, Number
@@ -179,13 +179,8 @@ def _keep_covariance(name: str, covariance: NDArray[np.float64], context: Contex
     upper = np.ravel_multi_index(np.triu_indices(6), (6, 6))
     rows = covariance[np.ix_(upper, upper)]
     if np.any(rows):
-        use = LinkUse(tuple(tuple(float(v) for v in row) for row in rows))
+        use = LinkUse(as_rows(rows))
         context.gathered.links.setdefault(name, use).springs.append(context.full)
-
-
-def as_rows(matrix: ArrayLike) -> Matrix6:
-    """6x6 as hashable rows."""
-    return tuple(tuple(float(v) for v in row) for row in np.asarray(matrix))
 
 
 SYMMETRY_TOLERANCE = 1e-12
