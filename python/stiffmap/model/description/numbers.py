@@ -29,7 +29,7 @@ class DeclaredNumber:
         Bounds in SI.
     shape
         Empty for one number; an ``interval`` of two, a ``vector``, one for each of six ``directions``, or for each of
-        the joint's ``axes`` (whose keys in a file the schema has).
+        the joint's ``axes`` (whose keys in a file the schema has); ``knots`` are pairs of a coordinate and such a number.
     passive
         Whether joints without a drive have it as well.
     core

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffmap.common.units import ANGLE, INERTIA, LENGTH
+from stiffmap.common.units import INERTIA
 from stiffmap.model.description import (
     Block,
     Body,
@@ -174,14 +174,10 @@ def _command_errors(
 
 
 def _command_error(model: CommandErrorModel, angular: bool, context: Context) -> CommandError:
-    given = build_numbers(model, CommandError, angular, context, "command_errors.")
-    coordinate = ANGLE if angular else LENGTH
-    knots = tuple(
-        (context.si(u, coordinate), context.si(error, coordinate)) for u, error in model.knots or []
-    )
-    if any(b <= a for (a, _), (b, _) in pairwise(knots)):
+    error = CommandError(**build_numbers(model, CommandError, angular, context, "command_errors."))
+    if any(b <= a for (a, _), (b, _) in pairwise(error.knots)):
         context.at("command_errors").at("knots").fail("knots need rising coordinates")
-    return CommandError(**given, knots=knots)
+    return error
 
 
 def _body(model: BodyModel, context: Context, place: int, models: Sequence[ElementModel]) -> Body:

@@ -8,7 +8,6 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffmap.common.units import ANGLE, FORCE, LENGTH, MOMENT
 from stiffmap.model import beams
 from stiffmap.model.description import BeamNumbers, Law, Spring
 from stiffmap.model.description.numbers import DIRECTIONS
@@ -151,12 +150,10 @@ def beam_body(beam: Beam, context: Context) -> tuple[float, float, NDArray[np.fl
 
 def build_law(model: LawModel, angular: bool, context: Context, name: str) -> Law:
     """SI law of a translation or a rotation."""
-    numbers = build_numbers(model, Law, angular, context, f"{name}.")
-    across, along = (ANGLE, MOMENT) if angular else (LENGTH, FORCE)
-    knots = tuple((context.si(a, across), context.si(f, along)) for a, f in model.knots or [])
-    if any(b < a or g < f for (a, f), (b, g) in pairwise(knots)):
+    law = Law(**build_numbers(model, Law, angular, context, f"{name}."))
+    if any(b < a or g < f for (a, f), (b, g) in pairwise(law.knots)):
         context.at("knots").fail("knots must not decrease in deflection or force")
-    return Law(**numbers, knots=knots)
+    return law
 
 
 def load_link(name: str, context: Context) -> Matrix6:

@@ -18,6 +18,7 @@ SHAPES: dict[str, Any] = {
     "": Number,
     "interval": Pair,
     "vector": Vector3,
+    "knots": list[Pair],
     "directions": Annotated[list[Number], Field(min_length=6, max_length=6)],
 }
 AXES_OF = {"revolute": 1, "prismatic": 1, "universal": 2, "spherical": 3}
@@ -96,8 +97,6 @@ class JointModel(_numbers(Joint, passive=True)):  # type: ignore[misc]
 class CommandErrorModel(_numbers(CommandError, base=FileModel)):  # type: ignore[misc]
     """Error added to the commanded coordinate u: offset + slope*(u - reference) + amplitude*sin(...), and the
     axis positioning error at u by ``knots``: [coordinate, error] by rising coordinate."""
-
-    knots: list[Pair] | None = None
 
 
 class ActuatorModel(_numbers(Joint, Drive)):  # type: ignore[misc]
