@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 from stiffmap.common.errors import StiffmapError
@@ -22,6 +23,7 @@ from stiffmap.model.description import (
     Spring,
     tree,
 )
+from stiffmap.model.description.numbers import with_entry
 from stiffmap.model.description.tree import Elements
 
 
@@ -122,12 +124,10 @@ def machine_fields(d: MachineDescription) -> Iterator[tuple[str, Field]]:
         highs = vector_fields(high, "workspace/", "m", lambda v: replace(d, workspace=(low, v)))
         for (axis, least), (_, most) in zip(lows, highs, strict=True):
             yield from ((f"{axis}.low", least), (f"{axis}.high", most))
-    springs = d.external_springs
-    for i, spring in enumerate(springs):
-        around = lambda s, i=i: replace(d, external_springs=(*springs[:i], s, *springs[i + 1 :]))  # noqa: E731
+    for i, spring in enumerate(d.external_springs):
         numbers = declared(spring)
         for key, number in sorted(numbers.items(), key=lambda item: item[0].startswith("anchor")):
-            yield f"{spring.name}/{key}", number.inside(around)
+            yield f"{spring.name}/{key}", number.inside(partial(with_entry, d, "external_springs", i))
 
 
 def bar_offset(d: MachineDescription, full: str) -> str | None:

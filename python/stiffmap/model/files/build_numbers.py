@@ -36,9 +36,7 @@ def build_numbers(
     return out
 
 
-def build_number(
-    n: DeclaredNumber, given: Any, angular: bool, context: Context, prefix: str = ""
-) -> Any:
+def build_number(n: DeclaredNumber, given: Any, angular: bool, context: Context, prefix: str = "") -> Any:
     """SI value of one declared number, as a tuple where it has several parts."""
     if n.shape == "knots":
         units = (COORDINATE.dimension(angular), n.dimension(angular))
