@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.units import BENDING, DENSITY, FORCE, LENGTH, MODULUS, NONE, Dimension
 from stiffmap.model.description import BeamNumbers
-from stiffmap.model.description.strokes import Matrix6
+from stiffmap.model.description.strokes import Matrix6, as_rows
 
 
 class Section(NamedTuple):
@@ -136,8 +136,7 @@ def compliance(beam: BeamNumbers) -> Matrix6:
         e = n["material.E"]
         g = n["material.G"] if "material.G" in n else e / (2 * (1 + n["material.nu"]))
         values = [e * s.area, g * s.torsion, e * s.about_width, e * s.about_height]
-    matrix = cantilever_compliance(n["length"], beam.along, *values)
-    return tuple(tuple(float(v) for v in row) for row in np.asarray(matrix))
+    return as_rows(cantilever_compliance(n["length"], beam.along, *values))
 
 
 def section(sort: str, n: dict[str, float]) -> Section:

@@ -14,9 +14,10 @@ CHANGED = 1e-9  # m, rad
 
 
 class HomeChange(NamedTuple):
-    """A home coordinate as the file declares it and as it closes (m, rad)."""
+    """A home coordinate as the file declares it and as it closes (m, rad), and the address of its number."""
 
     name: str
+    address: str
     declared: float
     closed: float
     angular: bool
@@ -45,7 +46,9 @@ def home_changes(machine: CompiledMachine) -> list[HomeChange]:
         ):
             continue  # a free ball joint in axes of our own
         for i, declared in enumerate(e.home):
-            full = name if len(e.home) == 1 else f"{name}.{i + 1}"
-            if abs(closed[full] - declared) > CHANGED:
-                changes.append(HomeChange(full, declared, closed[full], e.kind != "prismatic"))
+            part = "" if len(e.home) == 1 else f".{i + 1}"
+            now = closed[name + part]
+            if abs(now - declared) > CHANGED:
+                address = f"{full_name}/home{part}"
+                changes.append(HomeChange(name + part, address, declared, now, e.kind != "prismatic"))
     return changes

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import partial
 
 from stiffmap.common.errors import HomeError
-from stiffmap.model.addresses import known_values, listed, with_values
-from stiffmap.model.addresses.places import single_addresses
-from stiffmap.model.description import MachineDescription, tree
-from stiffmap.model.description.elements import Element, Joint
+from stiffmap.model.addresses import Listed, known_values, listed, with_values
+from stiffmap.model.addresses.setting import single_addresses
+from stiffmap.model.description import MachineDescription
 from stiffmap.model.effects import apply_records
 from stiffmap.solve.compiled import CompiledMachine
 from stiffmap.solve.home_changes import home_changes
@@ -42,19 +40,19 @@ def on_branch_of(base: MachineDescription, other: MachineDescription) -> Machine
         return other
     start, end = settled(base.declared or base), other.declared or other
     now = {row.address: row.value for row in listed(start)}
-    new = {
-        row.address: row.value for row in listed(end) if not row.address.partition("/")[2].startswith("home")
+    changes = {
+        row.address: row.value
+        for row in listed(end)
+        if not _of_home(row) and row.address in now and row.value != now[row.address]
     }
-    there = redesigned(start, {a: v for a, v in new.items() if a in now and v != now[a]})
-    for full, e in tree.all_elements(there):
-        if isinstance(e, Joint):
-            end = tree.edit(end, full, partial(_with_home, home=e.home)) or end
-    end = replace(end, search_home=False)
+    there = redesigned(start, changes)
+    homes = {row.address: row.value for row in listed(there) if _of_home(row) and row.address in now}
+    end = replace(with_values(end, homes), search_home=False)
     return apply_records(end, other.effects) if other.effects else end
 
 
-def _with_home(element: Element, home: tuple[float, ...]) -> Element | None:
-    return replace(element, home=home) if isinstance(element, Joint) else None
+def _of_home(row: Listed) -> bool:
+    return row.address.partition("/")[2].startswith("home")
 
 
 def settled(description: MachineDescription) -> MachineDescription:
@@ -90,18 +88,4 @@ def _followed(
 
 def closed(description: MachineDescription, machine: CompiledMachine) -> MachineDescription:
     """The description with the home coordinates that close it."""
-    for change in home_changes(machine):
-        name, _, index = change.name.rpartition(".")
-        for full, e in tree.all_elements(description):
-            core = tree.core_name(full)
-            if not isinstance(e, Joint) or not (core == change.name or (core == name and index.isdigit())):
-                continue
-            i = 0 if core == change.name else int(index) - 1
-
-            def put(element: Element, i: int = i, value: float = change.closed) -> Element | None:
-                if not isinstance(element, Joint):
-                    return None
-                return replace(element, home=(*element.home[:i], value, *element.home[i + 1 :]))
-
-            description = tree.edit(description, full, put) or description
-    return description
+    return with_values(description, {change.address: change.closed for change in home_changes(machine)})

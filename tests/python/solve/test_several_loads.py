@@ -11,7 +11,7 @@ from tests.python.solve import builders as b
 
 import stiffmap as sm
 from stiffmap.model.description import Body, ExternalSpring, Law, Point, Pose
-from stiffmap.model.files.starter import starter_text
+from stiffmap.model.files.shipped import starter_text
 
 DRIVE = 2e3
 

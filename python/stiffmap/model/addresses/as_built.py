@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 from stiffmap.model.addresses.fields import Field, field_of, vector_fields
-from stiffmap.model.addresses.places import machine_fields
+from stiffmap.model.addresses.places import machine_fields, number_at
 from stiffmap.model.description import (
     Body,
     Element,
@@ -15,7 +16,6 @@ from stiffmap.model.description import (
     Point,
     Pose,
     Spring,
-    tree,
 )
 
 COUNTED = {
@@ -35,34 +35,21 @@ def moved(description: MachineDescription, key: str, delta: float) -> MachineDes
     A length of an offset moves the machine as built; the controller keeps the nominal one. None: this
     machine has no such number, or none that is an error of a machine as built (sections of a beam, angles).
     """
-    outside = _outside(description, key)
-    if outside is not None:
-        built: MachineDescription = outside.put(outside.value + delta)
-        return built
-    full, _, field = key.partition("/")
-
-    def change(element: Element) -> Element | None:
-        found = _field(element, field)
-        return None if found is None else found.put(found.value + delta)
-
-    return tree.edit(description, full, change)
+    found = _number(description, key)
+    return None if found is None else found.put(found.value + delta)
 
 
 def number(description: MachineDescription, key: str) -> float | None:
     """The number (SI) under ``full.name/field``; None as in `moved`."""
-    outside = _outside(description, key)
-    if outside is not None:
-        return outside.value
-    full, _, field = key.partition("/")
-    found = (_field(element, field) for element in tree.find(description, full))
-    return next((f.value for f in found if f is not None), None)
+    found = _number(description, key)
+    return None if found is None else found.value
 
 
-def _outside(description: MachineDescription, key: str) -> Field | None:
+def _number(description: MachineDescription, key: str) -> Field | None:
     name, _, field = key.partition("/")
-    if field not in OUTSIDE or name not in [s.name for s in description.external_springs]:
-        return None
-    return dict(machine_fields(description))[key]
+    if field in OUTSIDE and name in [s.name for s in description.external_springs]:
+        return dict(machine_fields(description))[key]
+    return number_at(description, name, partial(_field, field=field))
 
 
 def _field(element: Element, field: str) -> Field | None:

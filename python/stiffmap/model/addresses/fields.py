@@ -10,13 +10,27 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.units import INERTIA, Dimension
+from stiffmap.common.units import INERTIA, MODULUS, Dimension
 from stiffmap.model import beams
-from stiffmap.model.addresses.units import unit_text
 from stiffmap.model.description import Body, Cable, Element, Joint, Law, Offset, Pose, Spring
-from stiffmap.model.description.numbers import DIRECTIONS, numbers_of, with_part
+from stiffmap.model.description.numbers import DIRECTIONS, numbers_of, with_entry, with_part
 from stiffmap.model.description.pose import Vector
 from stiffmap.model.description.strokes import Matrix6, entry_dimension
+
+SHORT = {MODULUS: "Pa", Dimension(force=-1, angle=1): "1/N"}
+POWERS = {1: "", 2: "²", 3: "³"}
+
+
+def unit_text(d: Dimension, time: int = 0) -> str:
+    """``N·m/rad``; dimensionless: empty."""
+    if d in SHORT:
+        return SHORT[d]
+    units = (("N", d.force), ("kg", d.mass), ("m", d.length), ("rad", d.angle), ("s", time))
+    above = "·".join(name + POWERS[power] for name, power in units if power > 0)
+    below = [name + POWERS[-power] for name, power in units if power < 0]
+    if not below:
+        return above
+    return f"{above or '1'}/{below[0]}" if len(below) == 1 else f"{above or '1'}/({'·'.join(below)})"
 
 
 class Field(NamedTuple):
@@ -121,8 +135,7 @@ def _joint(e: Joint) -> Fields:
 def _laws(e: Joint, angular: bool) -> Fields:
     out: Fields = {}
     for i, one in enumerate(e.axis_laws):
-        around = lambda new, i=i: replace(e, axis_laws=(*e.axis_laws[:i], new, *e.axis_laws[i + 1 :]))  # noqa: E731
-        out[f"stiffness.{i + 1}"] = _stiffness(one, angular).inside(around)
+        out[f"stiffness.{i + 1}"] = _stiffness(one, angular).inside(partial(with_entry, e, "axis_laws", i))
     law = e.law
     if law is None:
         return out
@@ -169,7 +182,7 @@ def _spring(e: Spring) -> Fields:
         there = matrix[i][j] != 0.0 or i == j
         out[f"{word}.k{i + 1}{j + 1}"] = field._replace(listed=beam is None and there)
     for at, (i, law) in enumerate(e.laws):
-        around = lambda new, at=at, i=i: replace(e, laws=(*e.laws[:at], (i, new), *e.laws[at + 1 :]))  # noqa: E731
+        around = lambda new, at=at, i=i: with_entry(e, "laws", at, (i, new))  # noqa: E731
         out[f"laws.{DIRECTIONS[i]}.stiffness"] = declared(law, i > 2)["stiffness"].inside(around)
     zero_rest = {f"rest.{d}" for d, value in zip(DIRECTIONS, e.rest, strict=True) if not value}
     return out | {key: field for key, field in declared(e).items() if key not in zero_rest}

@@ -6,20 +6,24 @@ be left out: ``x.bar`` then stands for the bars of both sides of a parallelogram
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
+from typing import NamedTuple
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.addresses.fields import Field, declared, fields, vector_fields
 from stiffmap.model.description import (
     Block,
     Body,
+    Element,
     MachineDescription,
     Offset,
     Point,
     Spring,
     tree,
 )
+from stiffmap.model.description.numbers import with_entry
 from stiffmap.model.description.tree import Elements
 
 
@@ -31,12 +35,55 @@ def split(address: str) -> tuple[str, str]:
     return name, field
 
 
-def all_fields(description: MachineDescription) -> Iterator[tuple[str, Field]]:
+class Listed(NamedTuple):
+    """A number (SI): its address, value and unit; its standard uncertainty, where it comes from, and what is said of it."""
+
+    address: str
+    value: float
+    unit: str
+    u: float | None
+    source: str
+    note: str
+
+
+def listed(description: MachineDescription) -> list[Listed]:
+    """Every number under the address by which files keep its uncertainty."""
+    uncertainty, notes, sources = (
+        dict(description.uncertainty),
+        dict(description.notes),
+        dict(description.sources),
+    )
+
+    def row(address: str, field: Field) -> Listed:
+        name = address.partition("/")[0]
+        source, note = (known.get(address, known.get(name, "")) for known in (sources, notes))
+        return Listed(address, float(field.value), field.unit, uncertainty.get(address), source, note)
+
+    return [row(address, field) for address, field in _all_fields(description) if field.listed]
+
+
+def _all_fields(description: MachineDescription) -> Iterator[tuple[str, Field]]:
     """Every number by its address, in the order of the machine's file."""
     yield from machine_fields(description)
     for full, element in tree.all_elements(description):
         for key, field in fields(element).items():
             yield f"{full}/{key}", field
+
+
+def number_at(
+    description: MachineDescription, full: str, of: Callable[[Element], Field | None]
+) -> Field | None:
+    """A number of the elements of a full name; what its `Field.put` makes is a description. None: they have none."""
+    found = next((f for f in map(of, tree.find(description, full)) if f is not None), None)
+
+    def put(value: float) -> MachineDescription | None:
+        def change(element: Element) -> Element | None:
+            own = of(element)
+            return None if own is None else own.put(value)
+
+        return tree.edit(description, full, change)
+
+    return None if found is None else found._replace(put=put)
 
 
 def full_names(description: MachineDescription, name: str) -> list[str]:
@@ -51,19 +98,6 @@ def full_names(description: MachineDescription, name: str) -> list[str]:
     legs = [parts[0]] if len(parts) > 1 and parts[0] in chains else chains
     rest = parts[1:] if len(parts) > 1 and parts[0] in chains else parts
     return [full for full in every if _stands_for(full.split("."), legs, rest)]
-
-
-def single_addresses(description: MachineDescription, address: str) -> list[str]:
-    """The addresses of single elements that one address stands for."""
-    if address in dict(machine_fields(description)):
-        return [address]
-    name, field = split(address)
-    return [
-        f"{full}/{field}"
-        for full in full_names(description, name)
-        if any(field in fields(e) for e in tree.find(description, full))
-        or (field == "length" and bar_offset(description, full))
-    ]
 
 
 def _stands_for(full: list[str], legs: list[str], rest: list[str]) -> bool:
@@ -90,12 +124,10 @@ def machine_fields(d: MachineDescription) -> Iterator[tuple[str, Field]]:
         highs = vector_fields(high, "workspace/", "m", lambda v: replace(d, workspace=(low, v)))
         for (axis, least), (_, most) in zip(lows, highs, strict=True):
             yield from ((f"{axis}.low", least), (f"{axis}.high", most))
-    springs = d.external_springs
-    for i, spring in enumerate(springs):
-        around = lambda s, i=i: replace(d, external_springs=(*springs[:i], s, *springs[i + 1 :]))  # noqa: E731
+    for i, spring in enumerate(d.external_springs):
         numbers = declared(spring)
         for key, number in sorted(numbers.items(), key=lambda item: item[0].startswith("anchor")):
-            yield f"{spring.name}/{key}", number.inside(around)
+            yield f"{spring.name}/{key}", number.inside(partial(with_entry, d, "external_springs", i))
 
 
 def bar_offset(d: MachineDescription, full: str) -> str | None:

@@ -5,12 +5,13 @@ from __future__ import annotations
 import difflib
 import math
 from collections.abc import Mapping
+from functools import partial
 
 from stiffmap.common.broadcasting import real_number
 from stiffmap.common.errors import StiffmapError
-from stiffmap.model.addresses.fields import field_of, fields
-from stiffmap.model.addresses.places import bar_offset, full_names, machine_fields, split
-from stiffmap.model.description import Block, Element, MachineDescription, Spring, tree
+from stiffmap.model.addresses.fields import Field, field_of, fields
+from stiffmap.model.addresses.places import bar_offset, full_names, machine_fields, number_at, split
+from stiffmap.model.description import Block, MachineDescription, Spring, tree
 
 LENGTH = "length"
 MOST_NAMED = 6
@@ -38,7 +39,18 @@ def known_values(description: MachineDescription, address: str) -> list[float]:
     whole = dict(machine_fields(description))
     if address in whole:
         return [whole[address].value]
-    return [_values(description, full, split(address)[1]) for full in _named(description, address)]
+    field = split(address)[1]
+    found = (
+        _number(description, _place(description, full, field), field) for full in _named(description, address)
+    )
+    return [f.value for f in found if f is not None]
+
+
+def single_addresses(description: MachineDescription, address: str) -> list[str]:
+    """The addresses of single elements that one address stands for; StiffmapError where there are none."""
+    if address in dict(machine_fields(description)):
+        return [address]
+    return [f"{full}/{split(address)[1]}" for full in _named(description, address)]
 
 
 def _with_value(description: MachineDescription, address: str, value: float) -> MachineDescription:
@@ -49,47 +61,37 @@ def _with_value(description: MachineDescription, address: str, value: float) -> 
     field = split(address)[1]
     changed: set[str] = set()
     for full in _named(description, address):
-        offset = bar_offset(description, full) if field == LENGTH else None
-        if offset is not None:  # a bar: the offset that it spans and, where there is one, its beam
-            if _has(description, full, f"beam.{LENGTH}"):
-                description = _edited(description, full, f"beam.{LENGTH}", value)
-            full = offset
-        if full not in changed:
-            description = _edited(description, full, field, value)
-            changed.add(full)
+        place = _place(description, full, field)
+        beam = _number(description, full, f"beam.{LENGTH}") if place != full else None
+        if beam is not None:
+            description = beam.put(value)
+        number = _number(description, place, field)
+        if place not in changed and number is not None:
+            description = number.put(value)
+            changed.add(place)
     return description
 
 
-def _values(description: MachineDescription, full: str, field: str) -> float:
-    offset = bar_offset(description, full) if field == LENGTH else None
-    full = offset or full
-    found = (field_of(e, field) for e in tree.find(description, full))
-    return next(f.value for f in found if f is not None)
+def _place(description: MachineDescription, full: str, field: str) -> str:
+    """Full name of what holds a number: of the length of a bar, the offset that it spans."""
+    return (bar_offset(description, full) if field == LENGTH else None) or full
 
 
-def _edited(description: MachineDescription, full: str, field: str, value: float) -> MachineDescription:
-    def change(element: Element) -> Element | None:
-        found = field_of(element, field)
-        return None if found is None else found.put(value)
-
-    out = tree.edit(description, full, change)
-    assert out is not None  # `_named` has looked
-    return out
+def _number(description: MachineDescription, full: str, field: str) -> Field | None:
+    return number_at(description, full, partial(field_of, key=field))
 
 
 def _named(description: MachineDescription, address: str) -> list[str]:
     """Full names of the elements under an address that have its field."""
     name, field = split(address)
-    there = [full for full in full_names(description, name) if _has(description, full, field)]
+    there = [
+        full
+        for full in full_names(description, name)
+        if _number(description, _place(description, full, field), field) is not None
+    ]
     if not there:
         raise StiffmapError(_unknown(description, address, name, field))
     return there
-
-
-def _has(description: MachineDescription, full: str, field: str) -> bool:
-    if field == LENGTH and bar_offset(description, full) is not None:
-        return True
-    return any(field_of(e, field) is not None for e in tree.find(description, full))
 
 
 def _unknown(description: MachineDescription, address: str, name: str, field: str) -> str:

@@ -1,7 +1,7 @@
 """The immutable description of a machine: what it is made of, in SI units, with no numerics."""
 
-from stiffmap.model.description.beam import BeamNumbers
 from stiffmap.model.description.elements import (
+    BeamNumbers,
     Block,
     Body,
     Branch,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from dataclasses import replace
 
 from stiffmap.model.description.elements import Block, Body, Cable, Element, Joint, Offset, Point, Spring
@@ -34,78 +35,50 @@ def _whole(d: MachineDescription) -> tuple[object, ...]:
 
 
 def _sequence(one: Elements, other: Elements, heavy: bool) -> bool:
-    if one is other:
-        return True
-    a, b = _solid(one), _solid(other)
-    return len(a) == len(b) and all(_element(x, y, heavy) for x, y in zip(a, b, strict=True))
+    return one is other or _solid(one, heavy) == _solid(other, heavy)
+
+
+def _solid(elements: Elements, heavy: bool) -> list[Hashable]:
+    return [_fixed(e, heavy) for e in elements if not isinstance(e, (Offset, Point))]
 
 
 def _still(one: Elements, other: Elements, heavy: bool) -> bool:
     """The same geometry, errors included."""
-    if one is other or one == other:
-        return True
-    if heavy or len(one) != len(other):
-        return False
-    return all(
-        _element(x, y, heavy)
-        and not (isinstance(x, Joint) and isinstance(y, Joint) and _frame(x) != _frame(y))
-        for x, y in zip(one, other, strict=True)
-    )
+    return one is other or _standing(one, heavy) == _standing(other, heavy)
 
 
-def _solid(elements: Elements) -> Elements:
-    return tuple(e for e in elements if not isinstance(e, (Offset, Point)))
+def _standing(elements: Elements, heavy: bool) -> Hashable:
+    return elements if heavy else tuple((_fixed(e, heavy), _frame(e)) for e in elements)
 
 
-def _element(one: Element, other: Element, heavy: bool) -> bool:
-    if one is other:
-        return True
-    match one, other:
-        case Joint(), Joint():
-            return _joint(one, other)
-        case Spring(), Spring():
-            same = (one.laws, one.stroke) == (other.laws, other.stroke)
-            return same and _rigid(one) == _rigid(other)
-        case Body(), Body():
-            return (one.mass > 0.0) == (other.mass > 0.0)
-        case Block(), Block():
-            pairs = zip(one.branches, other.branches, strict=False)
-            same = len(one.branches) == len(other.branches)
-            return same and all(_still(a.elements, b.elements, heavy) for a, b in pairs)
-    return one == other
-
-
-def _joint(one: Joint, other: Joint) -> bool:
-    if isinstance(one, Cable) or isinstance(other, Cable):
-        return one == other
-    if (one.kind, one.axes, one.home, one.actuated, one.friction, len(one.guide_errors)) != (
-        other.kind,
-        other.axes,
-        other.home,
-        other.actuated,
-        other.friction,
-        len(other.guide_errors),
-    ):
-        return False
-    return all(_law(a, b) for a, b in zip(one.laws, other.laws, strict=True))
-
-
-def _law(one: Law | None, other: Law | None) -> bool:
-    if one is None or other is None:
-        return one is other
-    return one == other if _bends(one) or _bends(other) else True
+def _fixed(e: Element, heavy: bool) -> Hashable:
+    """What one step must find as it is."""
+    match e:
+        case Joint() if not isinstance(e, Cable):
+            laws = tuple(law if law is None or _bends(law) else "straight" for law in e.laws)
+            return e.kind, e.axes, e.home, e.actuated, e.friction, len(e.guide_errors), laws
+        case Spring():
+            return e.laws, e.stroke, e.compliance is None, _zeros(e)
+        case Body():
+            return e.mass > 0.0
+        case Block():
+            return tuple(_standing(branch.elements, heavy) for branch in e.branches)
+    return e
 
 
 def _bends(law: Law) -> bool:
     return bool(law.cubic or law.knots or law.friction)
 
 
-def _frame(e: Joint) -> Joint:
+def _frame(e: Element) -> Element | None:
+    """A joint without what gives way."""
+    if not isinstance(e, Joint):
+        return None
     return replace(e, law=None, axis_laws=(), compliance_slope=0.0, drive=None, rest=None)
 
 
-def _rigid(e: Spring) -> tuple[bool, ...]:
+def _zeros(e: Spring) -> tuple[bool, ...]:
     """Entries of the matrix that are zero."""
     matrix = e.compliance if e.compliance is not None else e.stiffness
     assert matrix is not None
-    return (e.compliance is None, *(v == 0.0 for row in matrix for v in row))
+    return tuple(v == 0.0 for row in matrix for v in row)

@@ -9,10 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from stiffmap.common.units import LENGTH, MASS
-from stiffmap.model.description.beam import BeamNumbers
 from stiffmap.model.description.laws import CommandError, GuideError, JointFriction, Law
 from stiffmap.model.description.numbers import interval, number, required
-from stiffmap.model.description.pose import IDENTITY, Pose, Rows, Vector
+from stiffmap.model.description.pose import Pose, Rows, Vector
 from stiffmap.model.description.strokes import BeamStroke, Matrix6, TableStroke
 
 ORIGIN: Vector = (0.0, 0.0, 0.0)
@@ -180,6 +179,14 @@ class Cable(Joint):
 
 
 @dataclass(frozen=True)
+class BeamNumbers:
+    """Numbers (SI) of a beam along a local axis by their keys in a machine file: ``length``, ``tube.outer``, ``material.E``, ``EA`` …"""
+
+    along: str
+    numbers: tuple[tuple[str, float], ...]
+
+
+@dataclass(frozen=True)
 class Spring:
     """Virtual spring of a link: translations t then rotations phi, the frame behind it being
     ``p + R t``, ``R Rx(phi1) Ry(phi2) Rz(phi3)``.
@@ -242,20 +249,3 @@ class Block:
 
 
 Element = Offset | Joint | Cable | Spring | Body | Point | Block
-
-__all__ = [
-    "IDENTITY",
-    "BeamStroke",
-    "Block",
-    "Body",
-    "Branch",
-    "Cable",
-    "Drive",
-    "Element",
-    "Joint",
-    "Matrix6",
-    "Offset",
-    "Point",
-    "Spring",
-    "TableStroke",
-]

@@ -27,7 +27,7 @@ class Law:
 
     stiffness: float = required("stiffness", coordinate=-1, effort=1)
     cubic: float = number("cubic", default=0.0, coordinate=-3, effort=1)
-    knots: tuple[Knot, ...] = ()
+    knots: tuple[Knot, ...] = number("knots", default=(), effort=1, shape="knots", address=False)
     friction: float = 0.0
 
 
@@ -60,7 +60,7 @@ class CommandError:
     period: float = number("period", default=1.0, coordinate=1)
     phase: float = number("phase", default=0.0, fixed=ANGLE)
     reference: float | None = number("reference", default=0.0, coordinate=1)
-    knots: tuple[tuple[float, float], ...] = ()
+    knots: tuple[Knot, ...] = number("knots", default=(), coordinate=1, shape="knots", address=False)
 
 
 @dataclass(frozen=True)

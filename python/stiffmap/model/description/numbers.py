@@ -29,7 +29,7 @@ class DeclaredNumber:
         Bounds in SI.
     shape
         Empty for one number; an ``interval`` of two, a ``vector``, one for each of six ``directions``, or for each of
-        the joint's ``axes`` (whose keys in a file the schema has).
+        the joint's ``axes`` (whose keys in a file the schema has); ``knots`` are pairs of a coordinate and such a number.
     passive
         Whether joints without a drive have it as well.
     core
@@ -101,7 +101,12 @@ def _numbers(holder: Any) -> tuple[DeclaredNumber, ...]:
     return tuple(replace(f.metadata["number"], name=f.name) for f in fields(holder) if "number" in f.metadata)
 
 
+def with_entry(holder: Any, name: str, i: int, value: Any) -> Any:
+    """The holder of several values, in a field of this name, with another one of them."""
+    old = getattr(holder, name)
+    return replace(holder, **{name: (*old[:i], value, *old[i + 1 :])})
+
+
 def with_part(holder: Any, n: DeclaredNumber, part: int, value: float) -> Any:
     """The holder of a number with another value in one of its parts."""
-    old = getattr(holder, n.name)
-    return replace(holder, **{n.name: (*old[:part], value, *old[part + 1 :]) if n.shape else value})
+    return with_entry(holder, n.name, part, value) if n.shape else replace(holder, **{n.name: value})

@@ -20,6 +20,12 @@ def vector(values: ArrayLike) -> Vector:
     return (x, y, z)
 
 
+def rows(matrix: ArrayLike) -> Rows:
+    """Three rows (3, 3) as such tuples."""
+    a, b, c = map(vector, np.asarray(matrix, dtype=float).reshape(3, 3))
+    return (a, b, c)
+
+
 @dataclass(frozen=True)
 class Pose:
     """Frame b in frame a: ``p_a = translation + rotation @ p_b`` (m; rotation as three rows)."""
@@ -30,8 +36,7 @@ class Pose:
     @staticmethod
     def of(translation: ArrayLike = (0.0, 0.0, 0.0), rotation: ArrayLike = IDENTITY) -> Pose:
         """Build from arrays of shapes (3,) and (3, 3)."""
-        r = np.asarray(rotation, dtype=float).reshape(3, 3)
-        return Pose(vector(translation), (vector(r[0]), vector(r[1]), vector(r[2])))
+        return Pose(vector(translation), rows(rotation))
 
     @property
     def p(self) -> NDArray[np.float64]:

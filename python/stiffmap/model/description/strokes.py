@@ -5,6 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import ArrayLike
+
 from stiffmap.common.units import Dimension
 
 Matrix6 = tuple[tuple[float, ...], ...]
@@ -14,6 +17,11 @@ COMPLIANCE = (
     Dimension(length=-1, force=-1, angle=1),
 )
 """By the number of rotations among the two directions of an entry."""
+
+
+def as_rows(matrix: ArrayLike) -> Matrix6:
+    """A matrix (6, 6) as hashable rows."""
+    return tuple(tuple(float(v) for v in row) for row in np.asarray(matrix, dtype=float))
 
 
 def entry_dimension(word: str, i: int, j: int) -> Dimension:

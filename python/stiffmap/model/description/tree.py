@@ -8,15 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from typing import TypeVar
 
-from stiffmap.model.description.elements import Block, Element, Joint, Point
-from stiffmap.model.description.machine import MachineDescription
+from stiffmap.model.description.elements import Block, Branch, Element, Joint, Point
+from stiffmap.model.description.machine import Leg, MachineDescription
 
 Elements = tuple[Element, ...]
 Edit = Callable[[Elements], Elements]
 Change = Callable[[Element], Element | None]
 """None: the element stays as it is."""
 ENDS = ("base", "platform")
+Holder = TypeVar("Holder", Leg, Branch)
 
 
 def walk(elements: Elements, name: str) -> Iterator[tuple[str, Element]]:
@@ -94,19 +96,19 @@ def edit_path(elements: Elements, path: str, change: Change) -> Elements | None:
         if element.name == path:
             new = change(element)
         elif rest and isinstance(element, Block):
-            new = _edit_branch(element, first, rest, change)
+            branches = _edit_one(element.branches, first, rest, change)
+            new = None if branches is None else replace(element, branches=branches)
         if new is not None:
             out[i], hit = new, True
     return tuple(out) if hit else None
 
 
-def _edit_branch(block: Block, name: str, path: str, change: Change) -> Block | None:
-    edited = {b.name: edit_path(b.elements, path, change) for b in block.branches if b.name == name}
+def _edit_one(among: tuple[Holder, ...], name: str, path: str, change: Change) -> tuple[Holder, ...] | None:
+    """Legs, or branches, with the elements of a name in one of them changed; None: nothing was."""
+    edited = {one.name: edit_path(one.elements, path, change) for one in among if one.name == name}
     if not any(edited.values()):
         return None
-    return replace(
-        block, branches=tuple(replace(b, elements=edited.get(b.name) or b.elements) for b in block.branches)
-    )
+    return tuple(replace(one, elements=edited.get(one.name) or one.elements) for one in among)
 
 
 def edit(description: MachineDescription, full: str, change: Change) -> MachineDescription | None:
@@ -117,10 +119,5 @@ def edit(description: MachineDescription, full: str, change: Change) -> MachineD
         if end is None:
             return None
         return replace(description, base=end) if sequence == "base" else replace(description, platform=end)
-    edited = {
-        leg.name: edit_path(leg.elements, path, change) for leg in description.legs if leg.name == sequence
-    }
-    if not any(edited.values()):
-        return None
-    legs = (replace(leg, elements=edited.get(leg.name) or leg.elements) for leg in description.legs)
-    return replace(description, legs=tuple(legs))
+    legs = _edit_one(description.legs, sequence, path, change)
+    return None if legs is None else replace(description, legs=legs)

@@ -19,6 +19,7 @@ from stiffmap.model.description import (
     MachineDescription,
 )
 from stiffmap.model.description.pose import Pose, Vector
+from stiffmap.model.description.strokes import as_rows
 from stiffmap.model.description.tree import point_names
 from stiffmap.model.files.build_elements import build_elements
 from stiffmap.model.files.build_geometry import build_pose, build_vector
@@ -44,7 +45,7 @@ def build(
     templates = {name: t for name, t in model.templates.items() if isinstance(t, list)}
     legs = [tried(partial(build_leg, *leg, templates, context)) for leg in model.legs.items()]
     springs = [
-        tried(partial(_external_spring, name, s, context.at("external_springs", name).inside(name)))
+        tried(partial(_external_spring, name, s, context.at("external_springs", name).named(name, s)))
         for name, s in model.external_springs.items()
     ]
     home = tried(partial(build_pose, model.home, context.at("home"), "home.")) or Pose()
@@ -140,8 +141,6 @@ def _ratios(given: Number | list[Number] | None, context: Context) -> tuple[floa
 
 
 def _external_spring(name: str, model: ExternalSpringModel, context: Context) -> ExternalSpring:
-    context.note(model.note)
-    context.mark(model.source)
     numbers = build_numbers(model, ExternalSpring, False, context)
     return ExternalSpring(name, model.point, **numbers, tension_only=model.tension_only)
 
@@ -204,9 +203,7 @@ def _kept(entries: Any, context: Context) -> dict[str, LinkUse]:
         for file, springs, rows in entries:
             if np.array(rows, dtype=float).shape != (21, 21):
                 raise ValueError
-            kept[str(file)] = LinkUse(
-                tuple(tuple(float(v) for v in row) for row in rows), [str(s) for s in springs]
-            )
+            kept[str(file)] = LinkUse(as_rows(rows), [str(s) for s in springs])
     except (TypeError, ValueError):
         context.at("extra", KEY).fail("expected [file, [springs], 21 x 21 numbers] per link file")
     return kept

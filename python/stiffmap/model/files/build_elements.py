@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffmap.common.units import ANGLE, INERTIA, LENGTH
+from stiffmap.common.units import INERTIA
 from stiffmap.model.description import (
     Block,
     Body,
@@ -25,7 +25,7 @@ from stiffmap.model.description import (
     Point,
 )
 from stiffmap.model.description.numbers import numbers_of
-from stiffmap.model.description.pose import Rows, Vector, vector
+from stiffmap.model.description.pose import Rows, Vector, rows, vector
 from stiffmap.model.description.strokes import entry_dimension
 from stiffmap.model.files.build_geometry import build_pose
 from stiffmap.model.files.build_numbers import build_number, build_numbers
@@ -43,6 +43,7 @@ from stiffmap.model.files.schema.elements import (
     OffsetModel,
     PointModel,
     SpringModel,
+    sort_of,
 )
 
 ZERO = Number(value=0.0)
@@ -78,33 +79,23 @@ def build_element(
     model: ElementModel, context: Context, among: tuple[int, Sequence[ElementModel]] = (0, ())
 ) -> Element:
     """One element; `among`: its number and the sequence it is in."""
+    here = context.named(getattr(model, str(sort_of(model))), model)
     match model:
         case OffsetModel():
-            return _offset(model, _named(model.offset, model, context))
+            return _offset(model, here)
         case JointModel():
-            return _joint(model, _named(model.joint, model, context))
+            return _joint(model, here)
         case ActuatorModel():
-            return _actuator(model, _named(model.actuator, model, context))
+            return _actuator(model, here)
         case CableModel():
-            return _cable(model, _named(model.cable, model, context))
+            return _cable(model, here)
         case SpringModel():
-            return build_spring(model, _named(model.spring, model, context))
+            return build_spring(model, here)
         case BodyModel():
-            return _body(model, _named(model.body, model, context), *among)
+            return _body(model, here, *among)
         case PointModel():
-            return Point(
-                model.point,
-                **build_numbers(model, Point, False, _named(model.point, model, context)),
-            )
-        case BlockModel():
-            return _block(model, context)
-
-
-def _named(name: str, model: ElementModel, context: Context) -> Context:
-    inside = context.inside(name)
-    inside.note(model.note)
-    inside.mark(model.source)
-    return inside
+            return Point(model.point, **build_numbers(model, Point, False, here))
+    return _block(model, context)  # a full name holds the branch, not the block
 
 
 def _offset(model: OffsetModel, context: Context) -> Offset:
@@ -129,27 +120,16 @@ def _joint(model: JointModel, context: Context) -> Joint:
     )
 
 
-def _laws(model: JointModel, angular: bool, context: Context) -> dict[str, Any]:
-    """``law``, or ``axis_laws`` where there is a list."""
+def _laws(model: JointModel | ActuatorModel, angular: bool, context: Context) -> dict[str, Any]:
+    """``law``, or ``axis_laws`` where there are several numbers."""
     for key in ("stiffness", "compliance"):
-        given = getattr(model, key)
+        given, here = getattr(model, key), context.at(key)
         if isinstance(given, list):
-            one = [
-                _linear_law(key, number, angular, context.at(key, i), f".{i + 1}")
-                for i, number in enumerate(given)
-            ]
-            return {"law": one[0]} if len(one) == 1 else {"axis_laws": tuple(one)}
-    return {"law": _law(model, angular, context)}
-
-
-def _law(model: JointModel | ActuatorModel, angular: bool, context: Context) -> Law | None:
-    for key in ("stiffness", "compliance"):
-        number = getattr(model, key)
-        if number is not None:
-            return _linear_law(key, number, angular, context.at(key))
-    if model.law is not None:
-        return build_law(model.law, angular, context.at("law"), "law")
-    return None
+            each = [_linear_law(key, n, angular, here.at(i), f".{i + 1}") for i, n in enumerate(given)]
+            return {"law": each[0]} if len(each) == 1 else {"axis_laws": tuple(each)}
+        if given is not None:
+            return {"law": _linear_law(key, given, angular, here)}
+    return {"law": model.law and build_law(model.law, angular, context.at("law"), "law")}
 
 
 def _linear_law(key: str, number: Number, angular: bool, context: Context, axis: str = "") -> Law:
@@ -171,7 +151,7 @@ def _actuator(model: ActuatorModel, context: Context) -> Joint:
         (model.axis,),
         build_number(HOME, model.home or ZERO, angular, context),
         actuated=True,
-        law=_law(model, angular, context),
+        **_laws(model, angular, context),
         command_errors=_command_errors(model, angular, context),
         **build_numbers(model, Joint, angular, context),
         drive=drive,
@@ -194,14 +174,10 @@ def _command_errors(
 
 
 def _command_error(model: CommandErrorModel, angular: bool, context: Context) -> CommandError:
-    given = build_numbers(model, CommandError, angular, context, "command_errors.")
-    coordinate = ANGLE if angular else LENGTH
-    knots = tuple(
-        (context.si(u, coordinate), context.si(error, coordinate)) for u, error in model.knots or []
-    )
-    if any(b <= a for (a, _), (b, _) in pairwise(knots)):
+    error = CommandError(**build_numbers(model, CommandError, angular, context, "command_errors."))
+    if any(b <= a for (a, _), (b, _) in pairwise(error.knots)):
         context.at("command_errors").at("knots").fail("knots need rising coordinates")
-    return CommandError(**given, knots=knots)
+    return error
 
 
 def _body(model: BodyModel, context: Context, place: int, models: Sequence[ElementModel]) -> Body:
@@ -212,7 +188,7 @@ def _body(model: BodyModel, context: Context, place: int, models: Sequence[Eleme
         of = {"mass": mass, "com": com}
     numbers = {**of, **build_numbers(model, Body, False, context)}
     if inertia is not None:  # a link as heavy as declared, spread as its section says
-        numbers["inertia"] = _rows(inertia * (numbers["mass"] / of["mass"]))
+        numbers["inertia"] = rows(inertia * (numbers["mass"] / of["mass"]))
     if model.inertia is not None:
         numbers["inertia"] = _inertia(model.inertia, context)
     return Body(model.body, **numbers)
@@ -241,21 +217,21 @@ def _of_beam(
 
 def _inertia(terms: list[Number | list[Number]], context: Context) -> Rows:
     here = context.at("inertia")
-    rows = [[ZERO] * 3 for _ in range(3)]
+    given = [[ZERO] * 3 for _ in range(3)]
     for i, term in enumerate(terms):
         if len(terms) != 3 or isinstance(term, list) != isinstance(terms[0], list):
             here.fail("expected three moments about x, y, z, or three rows of three")
         if isinstance(term, list):
-            rows[i] = term
+            given[i] = term
         else:
-            rows[i][i] = term
+            given[i][i] = term
     matrix = np.array(
         [
             [
                 context.si(n, INERTIA, f"inertia.{'xyz'[min(i, j)]}{'xyz'[max(i, j)]}")
                 for j, n in enumerate(row)
             ]
-            for i, row in enumerate(rows)
+            for i, row in enumerate(given)
         ]
     )
     if np.any(matrix != matrix.T):
@@ -263,19 +239,11 @@ def _inertia(terms: list[Number | list[Number]], context: Context) -> Rows:
     principal = np.linalg.eigvalsh(matrix)
     if principal[0] < -1e-12 * principal[2]:
         here.fail(f"the inertia has a negative principal moment ({principal[0]:.3g} kg m^2)")
-    return _rows(matrix)
-
-
-def _rows(matrix: NDArray[np.float64]) -> Rows:
-    a, b, c = (vector(row) for row in matrix)
-    return (a, b, c)
+    return rows(matrix)
 
 
 def _block(model: BlockModel, context: Context) -> Block:
-    context.inside(model.block).note(model.note)
-    context.inside(model.block).mark(model.source)
     branches = tuple(
-        # a full name holds the branch, not the block
         Branch(name, build_elements(models, context.at("branches", name).inside(name)))
         for name, models in model.branches.items()
     )

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from stiffmap.common.rotations import rotation_about
 from stiffmap.common.units import ANGLE, LENGTH, NONE, Dimension
-from stiffmap.model.description.pose import IDENTITY, Pose, Rows, Vector, vector
+from stiffmap.model.description.pose import IDENTITY, Pose, Rows, Vector, rows
 from stiffmap.model.files.context import Context
 from stiffmap.model.files.schema.base import Number
 from stiffmap.model.files.schema.geometry import NAMED, Frame, Turn
@@ -48,12 +48,11 @@ def build_rotation(frame: Frame, context: Context) -> Rows:
 
 
 def _rows(matrix: NDArray[np.float64]) -> Rows:
-    a, b, c = (vector(row + 0.0) for row in matrix)  # + 0.0 removes the sign of zeros
-    return (a, b, c)
+    return rows(matrix + 0.0)  # which removes the sign of zeros
 
 
-def _checked_rows(rows: list[list[Number]], context: Context) -> Rows:
-    matrix = np.array([[context.si(n, NONE) for n in row] for row in rows])
+def _checked_rows(given: list[list[Number]], context: Context) -> Rows:
+    matrix = np.array([[context.si(n, NONE) for n in row] for row in given])
     error = float(np.abs(matrix @ matrix.T - np.eye(3)).max())
     if error > ROTATION_TOLERANCE:
         context.fail(

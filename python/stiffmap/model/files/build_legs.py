@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from stiffmap.common.errors import FileError
 from stiffmap.model.description import Element, Joint, Leg, Offset, Pose
-from stiffmap.model.description.tree import Elements, edit_path, walk
+from stiffmap.model.description.tree import ENDS, Elements, edit_path, walk
 from stiffmap.model.files.build_elements import HOME, build_elements
 from stiffmap.model.files.build_geometry import build_pose
 from stiffmap.model.files.build_numbers import build_number
@@ -15,16 +15,12 @@ from stiffmap.model.files.schema.base import Number, suggestion
 from stiffmap.model.files.schema.elements import ElementModel
 from stiffmap.model.files.schema.machine import LegModel
 
-RESERVED = ("base", "platform")
-
 
 def build_leg(name: str, leg: LegModel, templates: dict[str, list[ElementModel]], context: Context) -> Leg:
     """A leg placed in the base; raises `FileError`."""
-    here = context.at("legs", name).inside(name)
-    if name in RESERVED:
+    here = context.at("legs", name).named(name, leg)
+    if name in ENDS:
         here.fail(f"'{name}' cannot be a leg's name: full names use it")
-    here.note(leg.note)
-    here.mark(leg.source)
     problems = len(context.gathered.problems)
     if leg.template is not None:
         if leg.template not in templates:

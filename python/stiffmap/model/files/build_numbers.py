@@ -9,6 +9,8 @@ from stiffmap.model.description.numbers import PARTS, DeclaredNumber, numbers_of
 from stiffmap.model.files.context import Context
 from stiffmap.model.files.schema.base import FileModel, Number
 
+COORDINATE = DeclaredNumber("coordinate", coordinate=1)
+
 
 def build_range(pair: list[Number], dimension: Dimension, context: Context, name: str) -> tuple[float, float]:
     """SI interval; raises `FileError` where it is empty."""
@@ -34,10 +36,11 @@ def build_numbers(
     return out
 
 
-def build_number(
-    n: DeclaredNumber, given: Number | list[Number], angular: bool, context: Context, prefix: str = ""
-) -> Any:
+def build_number(n: DeclaredNumber, given: Any, angular: bool, context: Context, prefix: str = "") -> Any:
     """SI value of one declared number, as a tuple where it has several parts."""
+    if n.shape == "knots":
+        units = (COORDINATE.dimension(angular), n.dimension(angular))
+        return tuple(tuple(map(context.si, pair, units)) for pair in given)
     parts = given if isinstance(given, list) else [given]
     if n.shape == "interval":
         return build_range(parts, n.dimension(angular), context, n.key)

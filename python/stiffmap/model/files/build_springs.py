@@ -6,13 +6,12 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from stiffmap.common.units import ANGLE, FORCE, LENGTH, MOMENT
 from stiffmap.model import beams
 from stiffmap.model.description import BeamNumbers, Law, Spring
 from stiffmap.model.description.numbers import DIRECTIONS
-from stiffmap.model.description.strokes import Matrix6, entry_dimension
+from stiffmap.model.description.strokes import Matrix6, as_rows, entry_dimension
 from stiffmap.model.files.build_numbers import build_numbers
 from stiffmap.model.files.context import Context, LinkUse, StrokeUse
 from stiffmap.model.files.schema.base import FileModel, Number
@@ -151,12 +150,10 @@ def beam_body(beam: Beam, context: Context) -> tuple[float, float, NDArray[np.fl
 
 def build_law(model: LawModel, angular: bool, context: Context, name: str) -> Law:
     """SI law of a translation or a rotation."""
-    numbers = build_numbers(model, Law, angular, context, f"{name}.")
-    across, along = (ANGLE, MOMENT) if angular else (LENGTH, FORCE)
-    knots = tuple((context.si(a, across), context.si(f, along)) for a, f in model.knots or [])
-    if any(b < a or g < f for (a, f), (b, g) in pairwise(knots)):
+    law = Law(**build_numbers(model, Law, angular, context, f"{name}."))
+    if any(b < a or g < f for (a, f), (b, g) in pairwise(law.knots)):
         context.at("knots").fail("knots must not decrease in deflection or force")
-    return Law(**numbers, knots=knots)
+    return law
 
 
 def load_link(name: str, context: Context) -> Matrix6:
@@ -169,7 +166,7 @@ def load_link(name: str, context: Context) -> Matrix6:
     link = read_link(path)
     matrix = np.asarray(link.compliance, dtype=float)
     _check(matrix, "compliance", context)
-    context.note(name, "link")
+    context.gathered.notes[f"{context.full}/link"] = name
     _keep_covariance(name, np.asarray(link.covariance, dtype=float), context)
     return as_rows(matrix)
 
@@ -179,13 +176,8 @@ def _keep_covariance(name: str, covariance: NDArray[np.float64], context: Contex
     upper = np.ravel_multi_index(np.triu_indices(6), (6, 6))
     rows = covariance[np.ix_(upper, upper)]
     if np.any(rows):
-        use = LinkUse(tuple(tuple(float(v) for v in row) for row in rows))
+        use = LinkUse(as_rows(rows))
         context.gathered.links.setdefault(name, use).springs.append(context.full)
-
-
-def as_rows(matrix: ArrayLike) -> Matrix6:
-    """6x6 as hashable rows."""
-    return tuple(tuple(float(v) for v in row) for row in np.asarray(matrix))
 
 
 SYMMETRY_TOLERANCE = 1e-12

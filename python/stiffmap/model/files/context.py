@@ -13,7 +13,7 @@ from stiffmap.common.number_text import LARGEST, SMALLEST
 from stiffmap.common.units import Dimension, UnitSystem
 from stiffmap.common.yaml_text import Document, KeyPath
 from stiffmap.model.files.report import key_text
-from stiffmap.model.files.schema.base import Number
+from stiffmap.model.files.schema.base import Noted, Number
 from stiffmap.model.files.schema.elements import SpringModel
 from stiffmap.model.files.schema.springs import Material
 
@@ -92,15 +92,19 @@ class Context:
         if self.gathered.problems:
             raise together(self.gathered.problems)
 
-    def mark(self, source: str | None, field_name: str = "") -> None:
-        """Keep where the numbers of the element, or one of them, come from."""
-        if source:
-            self.gathered.sources[f"{self.full}/{field_name}" if field_name else self.full or "/"] = source
+    def named(self, name: str, said: Noted) -> Context:
+        """An element or sequence of the machine, with what the file says of its numbers kept."""
+        inside = self.inside(name)
+        inside.keep(said)
+        return inside
 
-    def note(self, text: str, field_name: str = "") -> None:
-        """Keep a note about the element, or about one of its fields."""
-        if text:
-            self.gathered.notes[f"{self.full}/{field_name}" if field_name else self.full or "/"] = text
+    def keep(self, said: Noted | Number, field_name: str = "") -> None:
+        """Keep the note about the element, or one of its numbers, and where it comes from."""
+        key = f"{self.full}/{field_name}" if field_name else self.full
+        if said.note:
+            self.gathered.notes[key] = said.note
+        if said.source:
+            self.gathered.sources[key] = said.source
 
     def si(self, number: Number, dimension: Dimension, field_name: str = "") -> float:
         """SI value; its uncertainty and note are kept under ``field_name`` of the element."""
@@ -119,8 +123,7 @@ class Context:
         """What a file says of a number of the element; its uncertainty divided by ``over``."""
         if not field_name:
             return
-        self.note(number.note, field_name)
-        self.mark(number.source, field_name)
+        self.keep(number, field_name)
         if number.u is not None:
             self.gathered.uncertainty[f"{self.full}/{field_name}"] = (
                 self._converted(number.u, dimension) / over

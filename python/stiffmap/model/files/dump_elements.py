@@ -12,7 +12,6 @@ from stiffmap.model.description import (
     Block,
     Body,
     Cable,
-    CommandError,
     Element,
     Joint,
     Law,
@@ -104,7 +103,7 @@ def _joint(joint: Joint) -> Plain:
 def _axis_laws(joint: Joint) -> Plain:
     if not joint.axis_laws:
         return {}
-    if any(set(_law_terms(one)) != {"stiffness"} for one in joint.axis_laws):
+    if any(set(dump_numbers(one)) != {"stiffness"} for one in joint.axis_laws):
         raise StiffmapError(f"{joint.name}: a file holds one stiffness per axis, no other laws")
     return {"stiffness": [float(one.stiffness) for one in joint.axis_laws]}
 
@@ -135,7 +134,7 @@ def _drive(joint: Joint) -> Plain:
     """Numbers of the motor, and errors of its commands."""
     plain = {} if joint.drive is None else dump_numbers(joint.drive)
     if joint.command_errors:
-        plain["command_errors"] = [_command_error(error) for error in joint.command_errors]
+        plain["command_errors"] = [dump_numbers(error) for error in joint.command_errors]
     return plain
 
 
@@ -154,19 +153,11 @@ def dump_numbers(holder: Any) -> Plain:
     return plain
 
 
-def _command_error(error: CommandError) -> Plain:
-    return {**dump_numbers(error), **({"knots": floats(error.knots)} if error.knots else {})}
-
-
 def _law(law: Law | None) -> Plain:
     if law is None:
         return {}
-    plain = _law_terms(law)
+    plain = dump_numbers(law)
     return plain if len(plain) == 1 and law.stiffness > 0.0 else {"law": plain}
-
-
-def _law_terms(law: Law) -> Plain:
-    return {**dump_numbers(law), **({"knots": floats(law.knots)} if law.knots else {})}
 
 
 def _spring(spring: Spring) -> Plain:
@@ -175,7 +166,7 @@ def _spring(spring: Spring) -> Plain:
         if getattr(spring, word) is not None and not isinstance(spring.stroke, TableStroke):
             plain[word] = dump_matrix(getattr(spring, word))
     if spring.laws:
-        plain["laws"] = {DIRECTIONS[i]: _law_terms(law) for i, law in spring.laws}
+        plain["laws"] = {DIRECTIONS[i]: dump_numbers(law) for i, law in spring.laws}
     return {**plain, **dump_numbers(spring), **_stroke(spring)}
 
 

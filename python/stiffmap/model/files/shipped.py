@@ -1,4 +1,4 @@
-"""The machines that come with stiffmap."""
+"""The machines that come with stiffmap, and the template of ``stiffmap new``."""
 
 from __future__ import annotations
 
@@ -54,3 +54,9 @@ def find(name_or_path: str | PathLike[str]) -> Path:
     what = f"no file '{text}'" if looks_like_file else f"unknown machine '{text}'"
     near = suggestion(path.stem if looks_like_file else text, names)
     raise UnknownMachineError(f"{what}{near}; shipped machines: {', '.join(names)}")
+
+
+def starter_text(name: str) -> str:
+    """Text of a small machine file that loads, with every key explained; ``name`` is the machine's."""
+    text = (Path(__file__).parent / "starter.yaml").read_text(encoding="utf-8")
+    return text.replace("name: my-machine", f"name: {name}", 1)

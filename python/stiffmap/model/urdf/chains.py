@@ -12,6 +12,7 @@ from stiffmap.common.errors import FileError
 from stiffmap.common.rotations import rotation_about
 from stiffmap.model.description import Body, Drive, Element, Joint, Law, Offset, Pose, Spring
 from stiffmap.model.description.pose import Vector
+from stiffmap.model.description.strokes import as_rows
 from stiffmap.model.urdf.model import DUST, UrdfJoint, UrdfModel, tensor
 from stiffmap.model.urdf.sidecar import Elasticity, LinkSpring, Sidecar
 
@@ -128,7 +129,7 @@ def link_spring(name: str, given: LinkSpring) -> Spring:
     """Six diagonal terms or six rows."""
     values = given.stiffness if given.stiffness is not None else given.compliance
     array = np.array(values, dtype=float)
-    rows = tuple(tuple(float(v) for v in row) for row in (np.diag(array) if array.ndim == 1 else array))
+    rows = as_rows(np.diag(array) if array.ndim == 1 else array)
     return Spring(name, stiffness=rows) if given.stiffness is not None else Spring(name, compliance=rows)
 
 

@@ -11,7 +11,7 @@ from rich.text import Text
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs import new_file, write_text
-from stiffmap.model.files.starter import starter_text
+from stiffmap.model.files.shipped import starter_text
 from stiffmap.solve.starters import CLASSES, class_of, machine_text
 from stiffmap.ui.cli.inputs import OverwriteOption
 from stiffmap.ui.cli.output import JsonOption, print_json, show

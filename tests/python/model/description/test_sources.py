@@ -8,7 +8,7 @@ import pytest
 
 import stiffmap as sm
 from stiffmap.model.description.sources import UNMARKED, in_words, source_of
-from stiffmap.model.files.starter import starter_text
+from stiffmap.model.files.shipped import starter_text
 
 STARTER = starter_text("m")
 

@@ -10,7 +10,7 @@ import pytest
 
 from stiffmap.model.files import description_from_text
 from stiffmap.model.files.json_schema import machine_schema, schema_text
-from stiffmap.model.files.starter import starter_text
+from stiffmap.model.files.shipped import starter_text
 from stiffmap.solve.compiled.lowering import home_gaps
 
 DOCS = Path(__file__).parents[4] / "docs"

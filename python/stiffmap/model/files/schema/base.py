@@ -74,7 +74,10 @@ class FileModel(BaseModel):
 
 @cache
 def _keys_of(model: type[FileModel]) -> list[str]:
-    return [f.alias or name for name, f in model.model_fields.items()]
+    """Keys of a mapping, what is said of its numbers last."""
+    said = Noted.model_fields if issubclass(model, Noted) else {}
+    fields = sorted(model.model_fields.items(), key=lambda item: item[0] in said)
+    return [f.alias or name for name, f in fields]
 
 
 def _unknown_key(key: str, known: list[str], data: Any) -> InitErrorDetails:
@@ -113,6 +116,13 @@ Source = Annotated[
     Literal["assumed", "measured", "computed", "catalogue"],
     Field(description="Where numbers come from: reports say how much of an answer rests on those assumed."),
 ]
+
+
+class Noted(FileModel):
+    """A mapping that may say where its numbers come from, and more in a note."""
+
+    source: Source | None = None
+    note: str = ""
 
 
 class Number(FileModel):

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, Tag, create_model, model_validator
 from pydantic_core import PydanticCustomError
 
 from stiffmap.model.description import Body, Cable, CommandError, Drive, Joint, Point, Spring
 from stiffmap.model.description.numbers import DIRECTIONS, DeclaredNumber, numbers_of
-from stiffmap.model.files.schema.base import FileModel, Name, Number, Numbers, Pair, Source, Vector3
+from stiffmap.model.files.schema.base import FileModel, Name, Noted, Number, Numbers, Pair, Vector3
 from stiffmap.model.files.schema.geometry import Axis, Frame
 from stiffmap.model.files.schema.springs import Beam, LawModel, Matrix, Stroke
 
@@ -18,13 +18,16 @@ SHAPES: dict[str, Any] = {
     "": Number,
     "interval": Pair,
     "vector": Vector3,
+    "knots": list[Pair],
     "directions": Annotated[list[Number], Field(min_length=6, max_length=6)],
 }
 AXES_OF = {"revolute": 1, "prismatic": 1, "universal": 2, "spherical": 3}
 
 
-def _model(name: str, numbers: dict[str, DeclaredNumber]) -> type[FileModel]:
-    """Keys of these numbers; those with a dot in their key in mappings of their own."""
+def _keys(
+    name: str, numbers: dict[str, DeclaredNumber], base: type[FileModel] = FileModel
+) -> type[FileModel]:
+    """A mapping with keys of these numbers; those with a dot in their key in mappings of their own."""
     keys: dict[str, Any] = {}
     inner: dict[str, dict[str, DeclaredNumber]] = {}
     for key, n in numbers.items():
@@ -33,45 +36,25 @@ def _model(name: str, numbers: dict[str, DeclaredNumber]) -> type[FileModel]:
             inner.setdefault(outer, {})[rest] = n
         else:
             keys[key] = (SHAPES[n.shape] | None, Field(default=None, description=n.doc or None))
-    keys |= {k: (_model(k.capitalize(), v) | None, None) for k, v in inner.items()}
-    return create_model(name, __base__=FileModel, **keys)
+    keys |= {k: (_keys(k.capitalize(), v) | None, None) for k, v in inner.items()}
+    return create_model(name, __base__=base, **keys)
 
 
-def _numbers(name: str, *holders: type, passive: bool = False) -> type[FileModel]:
+def _numbers(*holders: type, passive: bool = False, base: type[FileModel] = Noted) -> type[FileModel]:
     """Keys of the numbers that these declare, all or those that a passive joint has; those that a file must have and
     those of each axis have rules of their own, below."""
     found = [n for holder in holders for n in numbers_of(holder) if n.passive or not passive]
-    return _model(name, {n.key: n for n in found if not n.needed and n.shape != "axes"})
+    return _keys("Numbers", {n.key: n for n in found if not n.needed and n.shape != "axes"}, base)
 
 
-if TYPE_CHECKING:  # the keys are made from the numbers that the elements declare
-    from stiffmap.model.files.schema.base import FileModel as BodyNumbers
-    from stiffmap.model.files.schema.base import FileModel as CableNumbers
-    from stiffmap.model.files.schema.base import FileModel as CommandErrorNumbers
-    from stiffmap.model.files.schema.base import FileModel as DriveNumbers
-    from stiffmap.model.files.schema.base import FileModel as PassiveNumbers
-    from stiffmap.model.files.schema.base import FileModel as PointNumbers
-    from stiffmap.model.files.schema.base import FileModel as SpringNumbers
-else:
-    PassiveNumbers = _numbers("PassiveNumbers", Joint, passive=True)
-    DriveNumbers = _numbers("DriveNumbers", Joint, Drive)
-    CableNumbers = _numbers("CableNumbers", Cable, Drive)
-    CommandErrorNumbers = _numbers("CommandErrorNumbers", CommandError)
-    SpringNumbers = _numbers("SpringNumbers", Spring)
-    BodyNumbers = _numbers("BodyNumbers", Body)
-    PointNumbers = _numbers("PointNumbers", Point)
-
-
-class OffsetModel(Frame):
+class OffsetModel(Frame, Noted):
     """Constant transform; ``actual`` is what the machine was built with, if not the nominal."""
 
     offset: Name
     actual: Frame | None = None
-    source: Source | None = None
-    note: str = ""
 
 
-class JointModel(PassiveNumbers):
+class JointModel(_numbers(Joint, passive=True)):  # type: ignore[misc]
     """Passive joint; it turns or slides freely unless it has a stiffness or a law, for all axes or a list with
     one per axis. ``rest`` is the coordinate at which these are free of force (left out: as at home)."""
 
@@ -84,8 +67,6 @@ class JointModel(PassiveNumbers):
     compliance: Number | Numbers | None = None
     law: LawModel | None = None
     rest: Number | Numbers | None = None
-    source: Source | None = None
-    note: str = ""
 
     @model_validator(mode="after")
     def _axes(self) -> JointModel:
@@ -113,14 +94,12 @@ class JointModel(PassiveNumbers):
         return self
 
 
-class CommandErrorModel(CommandErrorNumbers):
+class CommandErrorModel(_numbers(CommandError, base=FileModel)):  # type: ignore[misc]
     """Error added to the commanded coordinate u: offset + slope*(u - reference) + amplitude*sin(...), and the
     axis positioning error at u by ``knots``: [coordinate, error] by rising coordinate."""
 
-    knots: list[Pair] | None = None
 
-
-class ActuatorModel(DriveNumbers):
+class ActuatorModel(_numbers(Joint, Drive)):  # type: ignore[misc]
     """Actuated joint, one axis; give its stiffness, its compliance, a law, or ``rigid: true``."""
 
     actuator: Name
@@ -132,8 +111,6 @@ class ActuatorModel(DriveNumbers):
     law: LawModel | None = None
     rigid: Literal[True] | None = None
     command_errors: list[CommandErrorModel] | None = None
-    source: Source | None = None
-    note: str = ""
 
     @model_validator(mode="after")
     def _one_law(self) -> ActuatorModel:
@@ -141,7 +118,7 @@ class ActuatorModel(DriveNumbers):
         return self
 
 
-class CableModel(CableNumbers):
+class CableModel(_numbers(Cable, Drive)):  # type: ignore[misc]
     """Cable or belt from the current frame to an anchor in the base; its winch commands its free length. Give its
     elasticity (EA), a stiffness, or both. ``force`` is the largest tension."""
 
@@ -149,8 +126,6 @@ class CableModel(CableNumbers):
     anchor: Annotated[Vector3, Field(description="Where it enters its guide, base axes.")]
     guide: Annotated[Axis | None, Field(description="Axis about which the pulley turns, base axes.")] = None
     command_errors: list[CommandErrorModel] | None = None
-    source: Source | None = None
-    note: str = ""
 
     @model_validator(mode="after")
     def _yields(self) -> CableModel:
@@ -159,7 +134,7 @@ class CableModel(CableNumbers):
         return self
 
 
-class SpringModel(SpringNumbers):
+class SpringModel(_numbers(Spring)):  # type: ignore[misc]
     """Virtual spring of a link, at the place where its compliance holds."""
 
     spring: Name
@@ -169,8 +144,6 @@ class SpringModel(SpringNumbers):
     link: Annotated[str, Field(description="Identified link file, relative to this file.")] | None = None
     laws: dict[Literal[DIRECTIONS], LawModel] | None = None  # type: ignore[valid-type]
     stroke: Stroke | None = None
-    source: Source | None = None
-    note: str = ""
 
     @model_validator(mode="after")
     def _one_form(self) -> SpringModel:
@@ -193,15 +166,13 @@ class SpringModel(SpringNumbers):
         return self
 
 
-class BodyModel(BodyNumbers):
+class BodyModel(_numbers(Body)):  # type: ignore[misc]
     """Rigid body that moves with the current frame; of a link with a section, mass, centre and inertia follow from it
     where they are not given."""
 
     body: Name
     of: Annotated[Name | None, Field(description="Spring of the same sequence whose beam it is.")] = None
     inertia: list[Number | Vector3] | None = None
-    source: Source | None = None
-    note: str = ""
 
     @model_validator(mode="after")
     def _mass(self) -> BodyModel:
@@ -210,21 +181,17 @@ class BodyModel(BodyNumbers):
         return self
 
 
-class PointModel(PointNumbers):
+class PointModel(_numbers(Point)):  # type: ignore[misc]
     """Named point that moves with the current frame."""
 
     point: Name
-    source: Source | None = None
-    note: str = ""
 
 
-class BlockModel(FileModel):
+class BlockModel(Noted):
     """Two or more branches between the same two frames."""
 
     block: Name
     branches: Annotated[dict[Name, list[ElementModel]], Field(min_length=2)]
-    source: Source | None = None
-    note: str = ""
 
 
 def one_of(model: FileModel, keys: tuple[str, ...], *, required: bool = False) -> None:
@@ -242,7 +209,8 @@ def one_of(model: FileModel, keys: tuple[str, ...], *, required: bool = False) -
         )
 
 
-def _sort(data: Any) -> str | None:
+def sort_of(data: Any) -> str | None:
+    """Sort of an element, as plain data or read; None where it has no key that says it, or several."""
     found = [k for k in SORTS if (k in data if isinstance(data, dict) else hasattr(data, k))]
     return found[0] if len(found) == 1 else None
 
@@ -257,7 +225,7 @@ ElementModel = Annotated[
     | Annotated[BlockModel, Tag("block")]
     | Annotated[CableModel, Tag("cable")],
     Discriminator(
-        _sort,
+        sort_of,
         custom_error_type="element",
         custom_error_message="an element needs exactly one of the keys " + ", ".join(SORTS),
     ),

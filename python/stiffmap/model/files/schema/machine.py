@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal, get_args
 from pydantic import Discriminator, Field, Tag, model_validator
 from pydantic_core import PydanticCustomError
 
-from stiffmap.model.files.schema.base import FileModel, Name, Number, Numbers, Source, Vector3
+from stiffmap.model.files.schema.base import FileModel, Name, Noted, Number, Numbers, Source, Vector3
 from stiffmap.model.files.schema.elements import BodyModel, CableModel, ElementModel, OffsetModel, PointModel
 from stiffmap.model.files.schema.geometry import Box, Frame, HomeModel
 from stiffmap.model.files.schema.springs import Material
@@ -25,7 +25,7 @@ class UnitsModel(FileModel):
     mass: Literal["kg", "g", "t"] = "kg"
 
 
-class LegModel(FileModel):
+class LegModel(Noted):
     """A chain from the base to the platform, from a template or written out.
 
     ``frame`` places the leg's first frame in the base. ``attach`` is the platform frame seen from
@@ -41,8 +41,6 @@ class LegModel(FileModel):
     parameters: dict[str, Number] | None = Field(
         default=None, alias="with", description="Parameters of the template."
     )
-    source: Source | None = None
-    note: str = ""
 
     @model_validator(mode="after")
     def _one_chain(self) -> LegModel:
@@ -68,7 +66,7 @@ AnyTemplate = Annotated[
 ]
 
 
-class ExternalSpringModel(FileModel):
+class ExternalSpringModel(Noted):
     """Straight spring from a point of the machine to an anchor fixed in base axes."""
 
     point: str
@@ -76,8 +74,6 @@ class ExternalSpringModel(FileModel):
     stiffness: Number
     length: Number
     tension_only: bool = False
-    source: Source | None = None
-    note: str = ""
 
 
 class EffectModel(FileModel):
