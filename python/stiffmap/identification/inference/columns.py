@@ -26,8 +26,7 @@ from stiffmap.identification.inference.constants import STANDS_OUT
 from stiffmap.identification.inference.kernels import Kernel, Points, gaps
 from stiffmap.identification.inference.places import NULL, Place, places
 from stiffmap.identification.inference.travel import drives_of
-from stiffmap.identification.numbers.homing import zeros_anew
-from stiffmap.identification.numbers.sensitivity import Sensitivity, sensitivity
+from stiffmap.identification.numbers.sensitivity import Sensitivity, sensitivity, zeros_anew
 from stiffmap.identification.numbers.unknowns import Unknown
 
 MOST_READINGS = 600
@@ -159,8 +158,7 @@ def columns(
     q = basis(frames) if frames.shape[1] else frames
     free = mean @ complement(q) if q.shape[1] else mean
     within = raw - mean @ (mean.T @ raw)
-    s = sensitivity(predictor, unknowns)
-    s = zeros_anew(s, e) or s
+    s = zeros_anew(sensitivity(predictor, unknowns), e)
     numbers = free.T @ (s.columns[index] / noise[:, None])
     seen = np.linalg.norm(numbers, axis=0) > NULL
     points = Points(rows, channel, noise)

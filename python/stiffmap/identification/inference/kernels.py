@@ -9,7 +9,6 @@ import numpy as np
 from scipy.spatial.distance import cdist
 
 from stiffmap.experiment.experiment import Experiment, Floats, Integers, Mask
-from stiffmap.experiment.noise.field import free_position, unit
 from stiffmap.experiment.poses.configuration import coordinates_of
 from stiffmap.solve.machine import Machine
 
@@ -19,6 +18,8 @@ SESSIONS = (0.07, 1.0)
 """Correlation times, in sessions."""
 FEW_DRIVES = 3
 """Drives up to which the place of the tool says what their coordinates do."""
+TOUCHED = 0.1
+"""Share of a height's spread that its sum with the commanded height keeps where the command was the reading."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,3 +140,24 @@ def _sessions(when: Floats, session: Integers) -> tuple[Floats, Integers]:
     """Times in shares of the longest session."""
     longest = max((float(np.ptp(when[session == k])) for k in np.unique(session)), default=0.0)
     return np.asarray(when / (longest or 1.0)), session
+
+
+def free_position(e: Experiment) -> Floats:
+    """(n, 3) m, commanded positions; where a surface was touched, without the coordinate that was the reading."""
+    names = [c.name for c in e.channels]
+    if "hh" not in names:
+        return e.position
+    normal = np.array(e.normal)
+    height = e.position @ normal
+    reading = e.reading[:, names.index("hh")]
+    if not np.nanstd(reading + height) < TOUCHED * np.nanstd(reading):
+        return e.position
+    along = np.abs(normal) == np.abs(normal).max()
+    return np.asarray(np.where(along, 0.0, e.position - np.outer(height, normal)))
+
+
+def unit(x: Floats) -> Floats:
+    """Columns mapped to [-1, 1]; constant ones to 0."""
+    low, high = x.min(axis=0), x.max(axis=0)
+    span = np.where(high > low, high - low, 1.0)
+    return np.asarray(np.where(high > low, 2 * (x - low) / span - 1, 0.0))

@@ -11,9 +11,8 @@ from scipy.linalg import cholesky, solve_triangular
 from stiffmap.experiment.channels import metres
 from stiffmap.experiment.comparison.summary import Summary, summary
 from stiffmap.experiment.experiment import Experiment, Floats, Integers, Mask
-from stiffmap.experiment.noise.folds import folds
+from stiffmap.experiment.noise.held_out import folds, left_unseen
 from stiffmap.experiment.noise.outliers import GROSS
-from stiffmap.experiment.noise.unseen import left_unseen
 from stiffmap.experiment.noise.whitening import Problem, nuisance_part
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.identification.inference.amplitudes import Fit

@@ -8,12 +8,12 @@ import numpy as np
 
 from stiffmap.experiment.experiment import Floats, Integers
 from stiffmap.identification.candidates.candidates import Candidate
-from stiffmap.identification.candidates.coarseness import coarseness
 from stiffmap.identification.candidates.plan import Plan
 from stiffmap.identification.candidates.sensitivity import Variant
 from stiffmap.identification.inference.constants import LARGEST_ERROR
-from stiffmap.model.description import MachineDescription
-from stiffmap.model.effects import Parameter
+from stiffmap.model.description import Joint, MachineDescription
+from stiffmap.model.description.tree import sequences
+from stiffmap.model.effects import Parameter, registry
 
 VISIBLE = 3.0
 """Noise: a candidate whose largest plausible size shows less is left out."""
@@ -129,3 +129,23 @@ def _alike(directions: Floats, sign: int, other: Shape, tolerance: float) -> boo
     if sign and other.sign and float(across[0, 0]) * sign * other.sign < 0.0:
         return False
     return bool(np.sum(other.directions**2) - np.sum(across**2) < tolerance**2)
+
+
+def coarseness(
+    candidate: Candidate, rank: int, description: MachineDescription
+) -> tuple[int, bool, int, int]:
+    """Sort key: fewest directions, constant before what a reversal of load would show, then drive, whole
+    link or body, joint, offset, single entry; then kind."""
+    kind = candidate.kind
+    part = _part(candidate.element, description)
+    return (rank, registry.get(kind).reverses, part, registry.kinds().index(kind))
+
+
+def _part(element: str, description: MachineDescription) -> int:
+    if "." in element:
+        return 4
+    found = [e for g in description.legs for s in sequences(g.elements) for e in s if e.name == element]
+    if any(isinstance(e, Joint) and e.actuated for e in found):
+        return 0
+    kinds = {type(e).__name__ for e in found}
+    return 1 if "Spring" in kinds or not found else 2 if "Joint" in kinds else 3

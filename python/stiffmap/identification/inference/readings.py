@@ -18,8 +18,7 @@ from stiffmap.identification.inference.columns import Columns, drawn, zeros
 from stiffmap.identification.inference.covariance import Covariance, covariance
 from stiffmap.identification.inference.kernels import Points, gaps
 from stiffmap.identification.inference.travel import Drive, Profile, drives_of, knots_of
-from stiffmap.identification.numbers.homing import zeros_anew
-from stiffmap.identification.numbers.sensitivity import Sensitivity, predicted, sensitivity
+from stiffmap.identification.numbers.sensitivity import Sensitivity, predicted, sensitivity, zeros_anew
 from stiffmap.identification.numbers.unknowns import Unknown, joint_name
 from stiffmap.model.description import AppliedEffect
 from stiffmap.model.description.tree import joints
@@ -154,8 +153,7 @@ def readings(
     size = {k: fit.spread(group) for group, index in columns.groups.items() for k in index}
     known = [(u, size[k]) for k, u in enumerate(columns.unknowns) if u not in exact]
     unknowns = tuple(u for u, s in known if s > 0.0)
-    s = sensitivity(predictor, uncertain)
-    s = zeros_anew(s, e) or s
+    s = zeros_anew(sensitivity(predictor, uncertain), e)
     drives = tuple(_erring(predictor, s, columns, amplitude)) if columns.travel else ()
     index = [s.unknowns.index(u) for u in unknowns]
     s = replace(s, unknowns=unknowns, columns=s.columns[..., index])

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections import OrderedDict
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.experiment.experiment import Floats
+from stiffmap.common.kept import Kept
+from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.prediction.fingerprint import fingerprint
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.identification.numbers.certificate import INSTRUMENT, SCALE, frame_columns, scaled
@@ -43,8 +43,7 @@ class Sensitivity:
 
 BENT = 0.05
 """Share of a fit's whole change that a straight line misses, beyond which columns are taken anew at the fit."""
-MOST_KEPT = 4
-_KEPT: OrderedDict[tuple[str, tuple[Unknown, ...]], Sensitivity] = OrderedDict()
+_KEPT: Kept[tuple[str, tuple[Unknown, ...]], Sensitivity] = Kept(4)
 
 
 def predicted(
@@ -102,15 +101,11 @@ def sensitivity(
     The last few are kept: they do not depend on the readings.
     """
     key = (fingerprint(predictor), tuple(unknowns))
-    if key not in _KEPT:
-        found = _differences(predictor, unknowns, until, progress)
-        if found.stopped:
-            return found
-        _KEPT[key] = found
-        if len(_KEPT) > MOST_KEPT:
-            _KEPT.popitem(last=False)
-    _KEPT.move_to_end(key)
-    return _KEPT[key]
+    known = _KEPT.get(key)
+    if known is not None:
+        return known
+    found = _differences(predictor, unknowns, until, progress)
+    return found if found.stopped else _KEPT.put(key, found, 1)
 
 
 def bends(
@@ -190,3 +185,23 @@ def _differences(
     stack = np.stack([c for _, c in shown], axis=-1) if shown else np.zeros((*base.shape, 0))
     failed = tuple((unknowns[k].name, why) for k, c, why in each if c is None)
     return Sensitivity(tuple(u for u, _ in shown), stack, base, failed, len(each) < len(unknowns))
+
+
+def zeros_anew(s: Sensitivity, experiment: Experiment) -> Sensitivity:
+    """The same unknowns, and where there are several set-ups a zero of each drive in each, with the zero's own standard uncertainty: a
+    machine is homed or adjusted between two sessions, which nobody writes down."""
+    names = np.unique(experiment.setup)
+    zeros = [i for i, u in enumerate(s.unknowns) if u.group == "zeros" and not u.setup]
+    if len(names) < 2 or not zeros or experiment.quantity != "position":
+        return s
+    more: list[Unknown] = []
+    columns: list[Floats] = []
+    for name in names:
+        here = np.array(experiment.setup) == name
+        for i in zeros:
+            u = s.unknowns[i]
+            more.append(replace(u, name=f"{u.name} in set-up {name}", setup=str(name)))
+            columns.append(np.where(here[:, None], s.columns[..., i], 0.0))
+    at = None if s.at is None else np.append(s.at, np.zeros(len(more)))
+    stack = np.concatenate([s.columns, np.stack(columns, axis=-1)], axis=-1)
+    return replace(s, unknowns=(*s.unknowns, *more), columns=stack, at=at)

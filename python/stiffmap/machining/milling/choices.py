@@ -12,19 +12,32 @@ from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
-from stiffmap.machining.milling.entry import Entry, best_entry
+from stiffmap.machining.milling.equilibrium import equilibrium
 from stiffmap.machining.milling.placement import Placements, placements
+from stiffmap.machining.milling.plant import Plant
 from stiffmap.machining.milling.redundancy import Redundancy
 from stiffmap.machining.milling.redundancy import redundancy as best_turns
 from stiffmap.machining.milling.setting import Setting, setting
 from stiffmap.machining.milling.speed import other_side
 from stiffmap.machining.process import Process, load_process
 from stiffmap.machining.toolpath import Box, Placement, Toolpath, box, load_path, sampled
-from stiffmap.machining.toolpath.entry import entered_at, turned_round
+from stiffmap.machining.toolpath.entry import entered_at, outline_of, turned_round
 from stiffmap.solve.machine import Machine
 
 OFFSETS = tuple(f"G{n}" for n in range(54, 60))
 """Work offsets that a program can name."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """Where to enter a closed outline: the tool that enters is not yet pushed, so that it leaves a step as high as the error there."""
+
+    way: float
+    """m along the cuts, from where the path enters now."""
+    step: float | None = None
+    """m: size of the error across the wall there, before compensation, which is the step that the entry leaves; None: not searched for."""
+    given: float | None = None
+    """m: the same where the path enters now."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,3 +145,14 @@ def choices(
     return Choices(
         p, cut, p.placed(origin, turn), stock, angle if turns is None else turns.angle, tried, here, turns
     )
+
+
+def best_entry(job: Setting, threads: int | None = None) -> Entry:
+    """The point of a closed outline with the least error across the wall; inside corners are none. Raises StiffmapError for other paths."""
+    outline_of(job.path)
+    e = equilibrium(Plant(job, threads=threads), job.position)
+    size = np.abs(np.where(np.isfinite(e.error), e.error, np.inf) * job.off).sum(axis=1)
+    normal = np.abs((np.nan_to_num(e.error) * job.off).sum(axis=1))
+    normal = np.where(np.isfinite(size) & (job.engaged.corner == 0) & job.engaged.wall, normal, np.inf)
+    k = int(np.argmin(normal))
+    return Entry(float(job.points.way[k]), float(normal[k]), float(normal[0]))

@@ -9,9 +9,9 @@ import pytest
 
 import stiffmap as sm
 from stiffmap.experiment import Experiment, Predictor, random_plan
-from stiffmap.experiment.comparison.prediction_error import left_by
 from stiffmap.identification.numbers import unknowns
 from stiffmap.identification.numbers.sensitivity import predicted
+from stiffmap.machining.compensation.check import prediction_error
 from stiffmap.model.description import AppliedEffect
 from stiffmap.ui.cli.diagnose import write
 
@@ -59,13 +59,13 @@ def test_the_file_does_on_new_readings_what_the_headline_says(tmp_path: Path) ->
     file = sm.load_machine(tmp_path / "machine.yaml")
     assert not (tmp_path / "calibrated.yaml").exists()
     _, fresh = twin(5, LEAD, poses=200)
-    after = left_by(file, fresh)[1]
+    after = prediction_error(file, fresh)[1]
     assert after.rms == pytest.approx(d.after.rms, rel=0.15)
     # the effect alone, on the declared numbers, is not the machine
     bare = machine.with_effect(
         "lead_error", element="carriage", legs=["a"], slope=d.effects[0].parameters["slope"][0]
     )
-    assert left_by(bare, fresh)[1].rms > 3.0 * after.rms
+    assert prediction_error(bare, fresh)[1].rms > 3.0 * after.rms
 
 
 @pytest.mark.slow

@@ -11,7 +11,6 @@ from scipy.spatial.transform import Rotation
 
 import stiffmap as sm
 from stiffmap.experiment import Predictor, random_plan, save_experiment
-from stiffmap.experiment.comparison.prediction_error import left_by
 from stiffmap.machining.compensation import (
     axis_errors,
     check_compensation,
@@ -20,6 +19,7 @@ from stiffmap.machining.compensation import (
     dh_list,
     write_dh,
 )
+from stiffmap.machining.compensation.check import prediction_error
 from stiffmap.ui.cli.app import main
 
 MACHINES = (
@@ -181,7 +181,7 @@ def test_what_compensation_leaves_of_held_out_readings(
     assert said["verdict"].startswith("worse")
     assert said["rms left by compensation, mm"] > 1.9 * said["rms as measured, mm"]
     assert not check_compensation(both, tmp_path / "held_out").worse
-    before, after = left_by(both, data)
+    before, after = prediction_error(both, data)
     assert (before.n, after.rms * 1e3) == (24, pytest.approx(expected, rel=1e-3))
 
 

@@ -11,7 +11,7 @@ from tests.python.machining.milling.gantry import gantry
 import stiffmap as sm
 from stiffmap.common.errors import StiffmapError
 from stiffmap.machining.milling import mill_job, sizes
-from stiffmap.machining.milling.entry import best_entry
+from stiffmap.machining.milling.choices import best_entry
 from stiffmap.machining.milling.equilibrium import equilibrium
 from stiffmap.machining.milling.plant import Plant
 from stiffmap.machining.milling.setting import setting

@@ -1,12 +1,24 @@
-"""Unknown frames, tools and zeros of readings that a fit has not seen."""
+"""Readings that a fit has not seen: which are held out together, and their unknown frames, tools and zeros."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from stiffmap.experiment.experiment import Experiment, Floats, Mask
+from stiffmap.common.broadcasting import random_numbers
+from stiffmap.experiment.experiment import Experiment, Floats, Integers, Mask
 from stiffmap.experiment.noise.nuisance import nuisance_columns
 from stiffmap.experiment.noise.whitening import Problem, best_fit
+
+FOLDS = 5
+
+
+def folds(experiment: Experiment, seed: int) -> tuple[Integers, str]:
+    """(n,) fold of every row: whole set-ups where there are several, else whole poses."""
+    if experiment.runs.max() > 0:
+        return experiment.runs, "set-ups"
+    number = int(experiment.groups.max()) + 1
+    label = random_numbers(seed).permutation(number) % min(FOLDS, number)
+    return label[experiment.groups], "poses"
 
 
 def left_unseen(e: Experiment, sigma: Floats, prediction: Floats, seen: Mask, unseen: Mask) -> Floats:
