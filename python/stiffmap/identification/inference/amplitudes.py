@@ -110,9 +110,10 @@ class Fit:
             0.0,
         )
 
-    def is_on(self, name: str) -> bool:
-        """Whether the readings ask for a part."""
-        return bool(self.amplitude(name) > np.exp(0.5 * OFF))
+    @property
+    def on(self) -> list[tuple[Part, float]]:
+        """Parts that the readings ask for, with their ln variances."""
+        return [(p, float(self.t[k])) for k, p in _on(self.parts, self.t).items()]
 
     def spread(self, group: str) -> float:
         """Standard deviation of the numbers of a group, in standard uncertainties: its own, or that of all together."""

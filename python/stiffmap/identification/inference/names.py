@@ -251,7 +251,7 @@ class _World:
         if id(model) in self.anchors:
             return self.anchors[id(model)][1]
         gaps = [g.name for g in self.gaps]
-        if any(fit.is_on(name) for name in gaps):
+        if any(p.name in gaps for p, _ in fit.on):
             effects = tuple(c.part for c in model.chosen)
             bare = fitted(fit.columns, (*self.numbers, *effects), amplitudes(fit), fit.weights)
         else:

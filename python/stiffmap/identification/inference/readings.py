@@ -13,7 +13,7 @@ from stiffmap.experiment.experiment import Floats, Integers, Mask
 from stiffmap.experiment.noise.nuisance import nuisance_columns
 from stiffmap.experiment.noise.whitening import basis, readings_of
 from stiffmap.experiment.prediction.predict import Predictor
-from stiffmap.identification.inference.amplitudes import NOTHING, OFF, Fit
+from stiffmap.identification.inference.amplitudes import NOTHING, Fit
 from stiffmap.identification.inference.columns import Columns, drawn, zeros
 from stiffmap.identification.inference.covariance import Covariance, covariance
 from stiffmap.identification.inference.kernels import Points, gaps
@@ -138,7 +138,7 @@ def readings(
     own = sigma[rows, channel]
     points = Points(rows, channel, own)
     some = Points(columns.rows, columns.channel, columns.sigma)
-    amplitude = {p.name: float(np.exp(t)) for p, t in zip(fit.parts, fit.t[1:], strict=True) if t > OFF}
+    amplitude = {p.name: float(np.exp(t)) for p, t in fit.on}
     kernels = [
         (k, amplitude[k.name] * scale)
         for k in gaps(predictor.machine, e, some)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from stiffmap.experiment.experiment import Floats
-from stiffmap.identification.inference.amplitudes import GAPS, NOISE, OFF, Fit, noise_part
+from stiffmap.identification.inference.amplitudes import GAPS, NOISE, Fit, noise_part
 from stiffmap.identification.inference.columns import Columns
 from stiffmap.identification.inference.constants import STANDS_OUT
 
@@ -14,7 +14,7 @@ def shares(columns: Columns, fit: Fit) -> dict[str, float]:
     """Share of each part: |E[part | r]|² over the sum of all of them, r the readings' difference from the declared machine; readings
     that stand alone are not counted."""
     kept = columns.free[fit.weights >= 1.0 / STANDS_OUT]
-    means = {p.name: fit.mean(p) for p, t in zip(fit.parts, fit.t[1:], strict=True) if t > OFF}
+    means = {p.name: fit.mean(p) for p, _ in fit.on}
     squares = {name: float(np.sum((kept @ m) ** 2)) for name, m in means.items()}
     squares[NOISE] = float(np.sum(noise_part(fit)[0][fit.weights >= 1.0 / STANDS_OUT] ** 2))
     whole = max(sum(squares.values()), 1e-300)
@@ -42,8 +42,8 @@ def gap_of(columns: Columns, fit: Fit) -> Floats:
     """(n, c) m, rad: what nobody can name, at the readings that were compared; NaN elsewhere."""
     out = np.full(columns.experiment.reading.shape, np.nan)
     whole = np.zeros(len(columns))
-    for p, t in zip(fit.parts, fit.t[1:], strict=True):
-        if p.kind in GAPS and t > OFF:
+    for p, _ in fit.on:
+        if p.kind in GAPS:
             whole = whole + fit.mean(p)
     out[columns.rows, columns.channel] = columns.sigma * (columns.free @ whole)
     return out
