@@ -17,19 +17,18 @@ extern "C" void stiffmap_passes_v4(stiffmap::bench::PassTable*);
 namespace stiffmap::bench {
 namespace {
 
+/// A level's code, the filling of its table too, runs only where the processor has the level.
 std::vector<PassTable> tables() {
-  std::vector<void (*)(PassTable*)> entries{&stiffmap_passes_base};
-#ifdef STIFFMAP_X86_LEVELS
-  entries.push_back(&stiffmap_passes_v3);
-  entries.push_back(&stiffmap_passes_v4);
-#endif
-  std::vector<PassTable> out;
   const std::vector<std::string> usable = kernel_levels();
-  for (auto* entry : entries) {
-    PassTable t{};
-    entry(&t);
-    if (std::count(usable.begin(), usable.end(), t.level)) out.push_back(t);
-  }
+  std::vector<PassTable> out;
+  const auto add = [&](const char* level, void (*entry)(PassTable*)) {
+    if (std::count(usable.begin(), usable.end(), level)) entry(&out.emplace_back());
+  };
+  add("base", &stiffmap_passes_base);
+#ifdef STIFFMAP_X86_LEVELS
+  add("v3", &stiffmap_passes_v3);
+  add("v4", &stiffmap_passes_v4);
+#endif
   return out;
 }
 

@@ -44,7 +44,7 @@ bool has_v4() { return __builtin_cpu_supports("x86-64-v4"); }
 #endif
 #endif
 
-/// Usable levels, lowest first. Filling a table runs no vector code.
+/// Usable levels, lowest first. A level is asked for its table only where the processor has it.
 const std::vector<Level>& levels() {
   static const std::vector<Level> all = [] {
     const KernelTable base = table_of(&stiffmap_kernel_base);
