@@ -162,6 +162,10 @@ def test_modes_couple_where_eigenvalues_turn_complex():
     a = depths[found[0]]
     assert not mode_coupling(rows, cut, 0.995 * a).unstable and mode_coupling(rows, cut, 1.005 * a).unstable
     assert coupling_depth(rows, cut) > a  # damping holds a little longer
+    depth = coupling_depth(rows, cut)
+    for softer in (1e-2, 1e-5):  # masses and springs: below the first depth that is tried, too
+        soft = [(f, z, softer * m, way) for f, z, m, way in rows]
+        assert coupling_depth(soft, cut) == pytest.approx(softer * depth, rel=1e-5)
 
 
 def time_domain(modes, p, speed, depth, steps, periods=60):

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.optimize import curve_fit
 
 import stiffmap as sm
 from stiffmap.workspace.vibration import tip_modes
-from stiffmap.workspace.vibration.extraction import extract_modes
+from stiffmap.workspace.vibration.extraction import _noise, extract_modes
 from stiffmap.workspace.vibration.files import MeasuredResponse
 
 
@@ -61,3 +62,24 @@ def test_uncertainties_are_the_scatter_of_many_measurements():
         promised = np.array([getattr(m, f"u_{name}").reshape(2) for m in found])
         ratio = values.std(axis=0, ddof=1) / np.sqrt((promised**2).mean(axis=0))
         assert ((ratio > 0.6) & (ratio < 1.5)).all(), (name, ratio)
+
+
+def test_uncertainties_are_those_of_a_curve_fit():
+    """One mode between masses below and stiffnesses above, few readings: scipy's covariance, scaled by the misfit per degree of freedom."""
+    f, rng = np.linspace(20, 40, 40), np.random.default_rng(6)
+    H = 1e-6 * 28**2 / (28**2 - f**2 + 2j * 0.05 * 28 * f) + 2e-7
+    H = H + 2e-7 * (rng.normal(size=(len(f), 2)) @ [1, 1j])
+    one = MeasuredResponse("", f, H, np.full(len(f), np.nan))
+    found, s = extract_modes([one]), _noise(one, np.full(len(f), True))
+
+    def model(_, frequency, ratio, real, turned, above, below):
+        q = (real + 1j * turned * f / frequency) / (1 - (f / frequency) ** 2 + 2j * ratio * f / frequency)
+        q = 1e-6 * (q + above + 400 * below / f**2)
+        return np.r_[q.real, q.imag]
+
+    best, C = curve_fit(model, None, np.r_[H.real, H.imag], [28, 0.05, 1, 0, 0.2, 0], np.r_[s, s])
+    u = np.sqrt(np.diag(C))
+    np.testing.assert_allclose([found.frequency[0], found.ratio[0]], best[:2], rtol=1e-4)
+    np.testing.assert_allclose(
+        [found.u_frequency[0], found.u_ratio[0], found.u_flexibility[0, 0] / 1e-6], u[:3], rtol=5e-3
+    )
