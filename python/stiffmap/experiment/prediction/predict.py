@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -27,8 +27,8 @@ from stiffmap.model.effects import apply_records
 from stiffmap.solve.machine import Machine
 
 Terms = tuple[AppliedEffect, ...]
-MACHINES = 4
-"""Machines with terms that are kept."""
+MACHINES, OTHERS = 4, 32
+"""Machines with terms, and predictors of machines and rows beside these, that are kept."""
 
 
 class Predictor:
@@ -48,6 +48,7 @@ class Predictor:
         self._memory: Kept[tuple[Terms, Terms], Floats] = Kept()
         self._changes: Kept[tuple[Terms, Terms], Floats] = Kept()
         self._machines: Recent[Machine] = Recent(MACHINES)
+        self._others: Recent[Predictor] = Recent(OTHERS)
         self._drives: dict[tuple[Terms, Terms], Drives] = {}
         self._set_aside()
         self._close_from_here()
@@ -132,8 +133,12 @@ class Predictor:
         out.machine = machine or self.machine
         out.experiment = self.experiment if rows is None else self.experiment.rows(rows)
         out._memory, out._changes, out._machines = Kept(), Kept(), Recent(MACHINES)
-        out._drives = {}
+        out._others, out._drives = Recent(OTHERS), {}
         return out
+
+    def kept(self, key: Hashable, make: Callable[[], Predictor]) -> Predictor:
+        """One beside this that was made for the key, or is made now; the last few are kept."""
+        return self._others.get(key, make)
 
     def under(self, wrench: Floats) -> Floats:
         """(n, c) m, rad: the same readings under other wrenches (n, 6); NaN where the machine fails under them."""

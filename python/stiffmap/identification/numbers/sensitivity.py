@@ -5,16 +5,17 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.kept import Kept
-from stiffmap.experiment.experiment import Experiment, Floats
+from stiffmap.experiment.experiment import Experiment, Floats, Mask
 from stiffmap.experiment.prediction.fingerprint import fingerprint
-from stiffmap.experiment.prediction.predict import Predictor
+from stiffmap.experiment.prediction.predict import Predictor, Terms
 from stiffmap.identification.numbers.certificate import INSTRUMENT, SCALE, frame_columns, scaled
-from stiffmap.identification.numbers.slopes import Slopes, built, moves_of
+from stiffmap.identification.numbers.slopes import Moves, Slopes, built, moves_of
 from stiffmap.identification.numbers.unknowns import Unknown
 from stiffmap.model.description import AppliedEffect
 
@@ -51,21 +52,35 @@ def predicted(
 ) -> Floats:
     """(n, c) readings of the machine with unknowns at `values` (p,), in standard uncertainties, and with effects."""
     pairs = [(u, float(v)) for u, v in zip(unknowns, values, strict=True) if v != 0.0]
-    frame = _frame_part(predictor, pairs)
-    own = list(dict.fromkeys(u.setup for u, _ in pairs if u.setup))
-    if not own:
-        return np.asarray(_predicted(predictor, pairs, terms) + frame)
-    label = np.array(predictor.experiment.setup)
-    others = ~np.isin(label, own)
     out = np.full(predictor.experiment.reading.shape, np.nan)
-    if others.any():
-        shared = [(u, v) for u, v in pairs if not u.setup]
-        out[others] = _predicted(predictor.beside(rows=others), shared, terms)
-    for name in own:
-        here = label == name
-        mine = [(u, v) for u, v in pairs if u.setup in ("", name)]
-        out[here] = _predicted(predictor.beside(rows=here), mine, terms)
-    return np.asarray(out + frame)
+    for here, built_so, scale in _standing(predictor, pairs):
+        out[here] = built_so([*terms, *scale])
+    return np.asarray(out + _frame_part(predictor, pairs))
+
+
+def _standing(
+    predictor: Predictor, pairs: Sequence[tuple[Unknown, float]]
+) -> Iterator[tuple[Mask, Predictor, Terms]]:
+    """The rows of each set-up that has unknowns of its own, then all others: what predicts them, and the scale of the instrument."""
+    label = np.array(predictor.experiment.setup or ("",) * len(predictor.experiment))
+    own = list(dict.fromkeys(u.setup for u, _ in pairs if u.setup))
+    for name in (*own, ""):
+        here = label == name if name else ~np.isin(label, own)
+        if not here.any():
+            continue
+        moves = moves_of((u, v) for u, v in pairs if u.setup in ("", name))
+        scale = moves.pop((INSTRUMENT, SCALE), 0.0)
+        moved = tuple((at, by) for at, by in moves.items() if at[0] != INSTRUMENT)
+        yield (
+            here,
+            predictor.kept((name, here.tobytes(), moved), partial(_beside, predictor, here, dict(moved))),
+            (scaled(predictor.machine.description, scale),) if scale else (),
+        )
+
+
+def _beside(predictor: Predictor, here: Mask, moves: Moves) -> Predictor:
+    of_rows = predictor if here.all() else predictor.beside(rows=here)
+    return of_rows.beside(machine=built(predictor, moves)) if moves else of_rows
 
 
 def _frame_part(predictor: Predictor, pairs: Sequence[tuple[Unknown, float]]) -> Floats | float:
@@ -76,17 +91,6 @@ def _frame_part(predictor: Predictor, pairs: Sequence[tuple[Unknown, float]]) ->
         return 0.0
     columns = frame_columns(predictor.experiment, predictor())
     return np.asarray(sum(columns[what] * by for what, by in moved))
-
-
-def _predicted(
-    predictor: Predictor, pairs: Sequence[tuple[Unknown, float]], terms: Sequence[AppliedEffect]
-) -> Floats:
-    moves = moves_of(pairs)
-    scale = moves.pop((INSTRUMENT, SCALE), 0.0)
-    beside = predictor
-    if any(at != INSTRUMENT for at, _ in moves):
-        beside = predictor.beside(machine=built(predictor, moves))
-    return beside([*terms, scaled(predictor.machine.description, scale)] if scale else terms)
 
 
 def sensitivity(
