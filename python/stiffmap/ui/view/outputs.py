@@ -42,10 +42,14 @@ from stiffmap.ui.view.state import State, as_plain, permalink
 
 SHOWN = 51
 """Poses along each edge of the plane in a picture."""
-BOX = (
-    "position:fixed;z-index:1000;background:rgba(255,255,255,.92);color:#111;font:13px system-ui,sans-serif;"
-    "border-radius:4px;padding:.3em .6em;left:.6em;width:min(24em,45vw)"
-)
+STYLE = """<style>
+#said { position: fixed; z-index: 1000; left: .6em; top: .6em; width: min(24em, 45vw); max-height: 90vh; overflow: auto;
+  background: rgba(255,255,255,.92); color: #111; font: 13px system-ui,sans-serif; border-radius: 4px; padding: .3em .6em; }
+@media (max-width: 36em) {
+  #root { height: 55vh !important; }
+  #said { box-sizing: border-box; left: 0; top: 55vh; width: 100%; max-height: 45vh; }
+}</style>"""
+"""What is said stands next to the scene, or below it on narrow screens."""
 
 
 class Outputs:
@@ -158,10 +162,9 @@ def page_of(moment: Moment, data: Data | None = None) -> str:
         finally:
             server.stop()
     title = escape(f"{moment.machine.name}: stiffness view")
-    box = f'<div style="{BOX};top:.6em;max-height:90vh;overflow:auto">{said}</div>'
     text = text.replace("<title>", f"<title>{title} - ", 1)
     head, _, tail = text.rpartition("</body>")
-    return f"{head}{box}</body>{tail}"
+    return f'{head}{STYLE}<div id="said">{said}</div></body>{tail}'
 
 
 def draw(server: Any, moment: Moment, data: Data | None = None) -> str:
