@@ -25,6 +25,7 @@ from stiffmap.ui.plot.scene import draw_box, draw_force, draw_skeleton, finish
 from stiffmap.ui.plot.style import COLOURS, MM, ORANGE, TOLERANCE, headline, leg_colours, paper
 from stiffmap.ui.view.colours import plane_image
 from stiffmap.ui.view.data import Data
+from stiffmap.ui.view.legend import legend
 from stiffmap.ui.view.moment import Moment
 from stiffmap.ui.view.panels import (
     colour_bar,
@@ -184,9 +185,9 @@ def draw(server: Any, moment: Moment, data: Data | None = None) -> str:
         shares = shares_panel(moment.shares())
     except StiffmapError:
         shares = ""
-    words = f"force {vector_text(moment.state.force)} N; deflected machine (orange) magnified × {factor:g}"
     return (
-        f"{status_line(moment, solution, '', '')}<div>{escape(words)}</div>"
+        f"{status_line(moment, solution, '', '')}"
+        f"<details open><summary>legend</summary>{legend(moment, rest, factor)}</details>"
         f"{colour_bar(found, found.range, moment.state.tolerance)}"
         f"<details open><summary>where it comes from</summary>{shares}{compliance_panel(solution)}"
         f"{efforts_panel(moment, solution)}</details>{data.html if data is not None else ''}"

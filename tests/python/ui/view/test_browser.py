@@ -54,7 +54,9 @@ def test_drag_probe_and_colours_equal_solve(browser: Any) -> None:
         assert found is not None
         at = [1e-3 * float(v) for v in found.groups()[:3]]
         assert np.linalg.norm(np.array(at) - spot) < 0.01
-        there = 1e6 * np.linalg.norm(machine.solve(view._viewer._probe, view.state.wrench).displacement[:3])
+        there = 1e6 * np.linalg.norm(
+            machine.solve(view._viewer.probe.point, view.state.wrench).displacement[:3]
+        )
         assert found[4] == f"{there:.5g}"
         # the colours on the screen are those of the values
         plane = view._viewer._plane
@@ -136,7 +138,7 @@ def test_decimals_are_taken_and_shown_in_every_field(browser: Any) -> None:
                 assert until(shown, 10), (name, box.input_value())
         page.get_by_role("tab", name="Numbers").click()
         page.get_by_role("button", name="All as in the file").click()
-        own = next(iter(view._viewer.controls._all.values()))
+        own = next(iter(view._viewer.controls.numbers.all.values()))
         shown = page.get_by_role("textbox", name="Value, SI")
         assert until(lambda: float(shown.input_value()) == pytest.approx(own, rel=1e-9)), (
             own,
@@ -147,7 +149,9 @@ def test_decimals_are_taken_and_shown_in_every_field(browser: Any) -> None:
 def test_every_field_of_a_number_has_decimals() -> None:
     pytest.importorskip("viser", reason="viser is not installed (pip install stiffmap[view])")
     with View(model_of(sm.load_machine("orthoglide-revised"))) as view:
-        fields = [h for h in vars(view._viewer.controls).values() if hasattr(h, "precision")]
+        controls = view._viewer.controls
+        found = [*vars(controls).values(), *vars(controls.numbers).values()]
+        fields = [h for h in found if hasattr(h, "precision")]
         assert len(fields) >= 12
         assert {h.precision for h in fields} == {DECIMALS}
 
