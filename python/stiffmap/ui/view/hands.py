@@ -38,7 +38,7 @@ class Probe:
 
 
 def listen(viewer: Any) -> None:
-    """Clicks beside all nodes, and pages that are closed."""
+    """Clicks in the scene, and pages that are closed."""
     viewer.server.scene.on_click()(lambda e: viewer.probe.along(e.ray_origin, e.ray_direction))
 
     def left(client: Any) -> None:
