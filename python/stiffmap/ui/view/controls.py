@@ -9,14 +9,15 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.ui.view.changes import addresses, units
+from stiffmap.ui.view.legend import hint, legend
 from stiffmap.ui.view.moment import Moment
+from stiffmap.ui.view.numbers import Numbers, write
 from stiffmap.ui.view.outputs import Outputs
 from stiffmap.ui.view.place import first_plane, moves, rotation_of, turns
 from stiffmap.ui.view.quantities import QUANTITIES
 from stiffmap.ui.view.state import PLANES
 
-MOST_FORCE, MOST_GRAVITY, DECADE = 5000.0, 20.0, 1.0
+MOST_FORCE, MOST_GRAVITY = 5000.0, 20.0
 HOME = "as at home"
 NONE = "none"
 DECIMALS = 15  # of numbers that are shown and typed: compliances are as small as 1e-10 m/N
@@ -44,9 +45,13 @@ class Controls:
         with tabs.add_tab("Why"):
             self._why_tab(gui)
         with tabs.add_tab("Numbers"):
-            self._numbers(gui, moment)
+            self.numbers = Numbers(self, gui, moment)
         with tabs.add_tab("Out"):
             self.outputs = Outputs(viewer, gui)
+        panel = gui.add_panel()
+        with panel.add_tab("Legend"):
+            self._legend = gui.add_html("")
+        panel.float(x=12, y=-12, width=230)
         self.map_on, self.hold, self.isolines, self.cloud = True, False, True, False
         self.surface, self.lit = NONE, ""
 
@@ -56,34 +61,34 @@ class Controls:
         self._position = gui.add_vector3(
             "Tool, mm", (0, 0, 0), step=1.0, hint="commanded position in base axes"
         )
-        self._typed(self._position, lambda m, v: m.put(position=tuple(1e-3 * np.array(v))))
+        self.typed(self._position, lambda m, v: m.put(position=tuple(1e-3 * np.array(v))))
         self._turn = gui.add_vector3(
             "Rotation, deg", (0, 0, 0), step=1.0, hint="rotation vector of the commanded orientation",
             visible=any(turns(moment.machine)),
         )  # fmt: skip
-        self._typed(self._turn, lambda m, v: m.put(rotation=tuple(np.deg2rad(v))))
+        self.typed(self._turn, lambda m, v: m.put(rotation=tuple(np.deg2rad(v))))
         self._force = gui.add_vector3("Force, N", (0, 0, 0), step=10.0, hint="on the tool, base axes")
-        self._typed(self._force, lambda m, v: m.put(force=tuple(v)))
+        self.typed(self._force, lambda m, v: m.put(force=tuple(v)))
         self._size = gui.add_slider("Size of the force, N", 0.0, MOST_FORCE, 10.0, 0.0)
-        self._typed(self._size, _sized, keep=False)
+        self.typed(self._size, _sized, keep=False)
         self._around = gui.add_slider("Force around z, deg", -180.0, 180.0, 1.0, 0.0)
-        self._typed(self._around, _turned, keep=False)
+        self.typed(self._around, _turned, keep=False)
         self._moment = gui.add_vector3("Moment, N·m", (0, 0, 0), step=1.0)
-        self._typed(self._moment, lambda m, v: m.put(moment=tuple(v)))
+        self.typed(self._moment, lambda m, v: m.put(moment=tuple(v)))
         self._gravity = gui.add_slider("Gravity downwards, m/s²", 0.0, MOST_GRAVITY, 0.01, 0.0)
-        self._typed(self._gravity, lambda m, v: m.put(gravity=(0.0, 0.0, -float(v)), keep=False), keep=False)
+        self.typed(self._gravity, lambda m, v: m.put(gravity=(0.0, 0.0, -float(v)), keep=False), keep=False)
         self._factor = gui.add_number(
             "Magnification", 1.0, min=0.0, hint="of the deflected machine; 0 hides it"
         )
-        self._typed(self._factor, lambda m, v: m.put(magnification=float(v)))
-        self._pressed(gui.add_button("Round magnification"), lambda m: m.put(magnification=None))
+        self.typed(self._factor, lambda m, v: m.put(magnification=float(v)))
+        self.pressed(gui.add_button("Round magnification"), lambda m: m.put(magnification=None))
         self._mode = gui.add_dropdown(
             "Assembly mode", (HOME,), hint="ways in which the machine takes this pose"
         )
-        self._typed(self._mode, lambda m, v: m.put(start=self._modes.get(v)))
+        self.typed(self._mode, lambda m, v: m.put(start=self._modes.get(v)))
         gui.add_button("Search assembly modes").on_click(lambda _: self._search())
-        self._pressed(gui.add_button("Undo"), lambda m: m.undo())
-        self._pressed(gui.add_button("Reset"), lambda m: m.reset())
+        self.pressed(gui.add_button("Undo"), lambda m: m.undo())
+        self.pressed(gui.add_button("Reset"), lambda m: m.reset())
         gui.add_command("Undo", hotkey="Z", modifier="cmd/ctrl").on_trigger(
             lambda _: self.viewer.act(lambda m: m.undo())
         )
@@ -95,15 +100,15 @@ class Controls:
         self._quantity = gui.add_dropdown(
             "Colour", tuple(TITLES), initial_value=QUANTITIES["deflection"].title
         )
-        self._typed(self._quantity, lambda m, v: m.put(quantity=TITLES[v]))
+        self.typed(self._quantity, lambda m, v: m.put(quantity=TITLES[v]))
         self._plane = gui.add_dropdown("Plane across", PLANES, initial_value=first_plane(moment.machine))
-        self._typed(self._plane, lambda m, v: m.put(plane=v))
+        self.typed(self._plane, lambda m, v: m.put(plane=v))
         self._normal = gui.add_vector3("Normal of a free plane", (0.0, 0.0, 1.0), step=0.05)
-        self._typed(self._normal, lambda m, v: m.put(normal=tuple(v), plane="free"))
+        self.typed(self._normal, lambda m, v: m.put(normal=tuple(v), plane="free"))
         self._tolerance = gui.add_number("Tolerance, µm", 250.0, min=0.001)
-        self._typed(self._tolerance, lambda m, v: m.put(tolerance=1e-6 * float(v)))
+        self.typed(self._tolerance, lambda m, v: m.put(tolerance=1e-6 * float(v)))
         self._frequency = gui.add_number("Frequency, Hz", 0.0, min=0.0, hint="of the dynamic stiffness")
-        self._typed(self._frequency, lambda m, v: m.put(frequency=float(v)))
+        self.typed(self._frequency, lambda m, v: m.put(frequency=float(v)))
         for label, name, on in (
             ("Isolines", "isolines", True),
             ("Hold the scale", "hold", False),
@@ -136,36 +141,9 @@ class Controls:
             lambda e: self.viewer.swing.play(bool(e.target.value))
         )
 
-    def _numbers(self, gui: Any, moment: Moment) -> None:
-        names = self._list(moment)
-        self._find = gui.add_text("Find", "", hint="part of an address")
-        self._address = gui.add_dropdown("Number", names, initial_value=names[0])
-        self._value = gui.add_number("Value, SI", 0.0)
-        self._scale = gui.add_slider("Power of ten on the file's value", -DECADE, DECADE, 0.01, 0.0)
-        self._typed(self._value, lambda m, v: m.change(self._address.value, float(v)))
-        self._typed(
-            self._scale,
-            lambda m, v: m.change(
-                self._address.value, self._all[self._address.value] * 10 ** float(v), keep=False
-            ),
-            keep=False,
-        )
-        self._pressed(gui.add_button("As in the file"), lambda m: m.change(self._address.value, None))
-        self._pressed(gui.add_button("All as in the file"), lambda m: m.put(changes=()))
-        self._changed = gui.add_text("Changed", "nothing", multiline=True, disabled=True)
-
-        def changed(event: Any) -> None:
-            if event.client_id is not None:
-                found = tuple(a for a in self._all if event.target.value.lower() in a.lower())
-                self._address.options = found or names
-
-        self._find.on_update(changed)
-
-        self._address.on_update(lambda e: self.viewer.worker.ask())
-
     # -- plumbing -----------------------------------------------------------------------------------------------
 
-    def _typed(self, handle: Any, deed: Callable[[Any, Any], object], keep: bool = True) -> None:
+    def typed(self, handle: Any, deed: Callable[[Any, Any], object], keep: bool = True) -> None:
         """A control whose value goes to the model; what the program itself writes into it does not."""
 
         def changed(event: Any) -> None:
@@ -179,7 +157,7 @@ class Controls:
             handle.precision = DECIMALS
         handle.on_update(changed)
 
-    def _pressed(self, handle: Any, deed: Callable[[Any], object]) -> None:
+    def pressed(self, handle: Any, deed: Callable[[Any], object]) -> None:
         handle.on_click(lambda _: self.viewer.act(deed))
 
     def _set(self, name: str, event: Any) -> None:
@@ -202,16 +180,16 @@ class Controls:
 
     def say(self, html: str) -> None:
         """The line on top."""
-        self._write(self._status, "content", html)
+        write(self._status, "content", html)
 
     def bar(self, html: str) -> None:
         """The colour bar."""
-        self._write(self._bar, "content", html)
+        write(self._bar, "content", html)
 
     def why(self, html: str, surface: str) -> None:
         """The panels, and what the size of the surface at the tool means."""
-        self._write(self._why, "content", html)
-        self._write(self._surface_text, "content", f'<div style="padding:.3em .6em">{surface}</div>')
+        write(self._why, "content", html)
+        write(self._surface_text, "content", f'<div style="padding:.3em .6em">{surface}</div>')
 
     def elements(self, names: Sequence[str]) -> None:
         """What may be lit, by rank."""
@@ -227,53 +205,27 @@ class Controls:
         turn = Rotation.from_matrix(rotation_of(m, s)).as_rotvec()
         size = float(np.linalg.norm(s.force))
         gravity = m.compiled.gravity(s.gravity)
-        self._write(self._position, "value", _round(1e3 * np.array(s.position)))
-        self._write(self._turn, "value", _round(np.rad2deg(turn)))
-        self._write(self._force, "value", _round(s.force))
-        self._write(self._moment, "value", _round(s.moment))
-        self._write(self._size, "value", min(size, MOST_FORCE))
-        self._write(self._around, "value", round(float(np.rad2deg(np.arctan2(s.force[1], s.force[0]))), 3))
-        self._write(self._gravity, "value", min(max(-float(gravity[2]), 0.0), MOST_GRAVITY))
-        if self.viewer._solution is not None:
-            self._write(
-                self._factor, "value", moment.magnification(self.viewer.scene.rest, self.viewer._solution)
-            )
-        self._write(self._quantity, "value", QUANTITIES[s.quantity].title)
-        self._write(self._plane, "value", s.plane)
-        self._write(self._normal, "value", _round(s.normal))
-        self._write(self._tolerance, "value", round(1e6 * s.tolerance, 6))
-        self._write(self._frequency, "value", s.frequency)
+        write(self._position, "value", _round(1e3 * np.array(s.position)))
+        write(self._turn, "value", _round(np.rad2deg(turn)))
+        write(self._force, "value", _round(s.force))
+        write(self._moment, "value", _round(s.moment))
+        write(self._size, "value", min(size, MOST_FORCE))
+        write(self._around, "value", round(float(np.rad2deg(np.arctan2(s.force[1], s.force[0]))), 3))
+        write(self._gravity, "value", min(max(-float(gravity[2]), 0.0), MOST_GRAVITY))
+        rest, solution = self.viewer.scene.rest, self.viewer._solution
+        if solution is not None:
+            factor = moment.magnification(rest, solution)
+            write(self._factor, "value", factor)
+            write(self._legend, "content", legend(moment, rest, factor) + hint(moment))
+        write(self._quantity, "value", QUANTITIES[s.quantity].title)
+        write(self._plane, "value", s.plane)
+        write(self._normal, "value", _round(s.normal))
+        write(self._tolerance, "value", round(1e6 * s.tolerance, 6))
+        write(self._frequency, "value", s.frequency)
         chosen = next((n for n, x in self._modes.items() if x == s.start), HOME)
-        self._write(self._mode, "value", chosen)
-        address = self._address.value
-        given = dict(s.changes)
-        plain = self._all.get(address, 0.0)
-        now = given.get(address, plain)
-        self._write(self._value, "value", now)
-        power = float(np.log10(now / plain)) if plain and now / plain > 0 else 0.0
-        self._write(self._scale, "value", round(float(np.clip(power, -DECADE, DECADE)), 2))
-        lines = [
-            f"{a} = {v:.6g} {self._units.get(a, 'SI')}"
-            + (f", file: {self._all[a]:.6g}" if a in self._all else "")
-            for a, v in given.items()
-        ]
-        self._write(self._changed, "value", "\n".join(lines) or "nothing")
+        write(self._mode, "value", chosen)
+        self.numbers.show(s)
         self.outputs.show(moment)
-
-    def renew(self, moment: Moment) -> None:
-        """The machine's file has changed."""
-        self._address.options = self._list(moment)
-
-    def _list(self, moment: Moment) -> tuple[str, ...]:
-        """Addresses that may be changed; what the file says of each is kept."""
-        d = moment.machine.description
-        self._all, self._units = addresses(d), units(d)
-        return tuple(self._all)
-
-    def _write(self, handle: Any, field: str, value: Any) -> None:
-        """Only what differs is sent."""
-        if getattr(handle, field) != value:
-            setattr(handle, field, value)
 
 
 def _round(values: Any) -> tuple[float, float, float]:

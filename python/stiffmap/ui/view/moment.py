@@ -88,6 +88,16 @@ class Moment:
             self.machine, s.position, s.wrench, rotation=orientation(s), gravity=s.gravity
         )
 
+    def map_key(self, *, anywhere: bool = False) -> object:
+        """What the colours of a plane (or, `anywhere`, of the box) depend on."""
+        m, s = self.machine, self.state
+        along = s.position if s.plane == "free" else s.position["xyz".index(s.plane)]
+        place = () if anywhere else (along, s.plane, s.normal if s.plane == "free" else None)
+        idle = tuple(s.position[i] for i, a in enumerate("xyz") if a not in m.description.task)
+        return (
+            id(m), place, idle, s.rotation, s.wrench, s.gravity, s.quantity, s.frequency, s.start, s.tolerance,
+        )  # fmt: skip
+
     def assembly_modes(self, seed: int = 0) -> list[tuple[float, ...]]:
         """All coordinates of the ways to take this pose that a search from random joints finds, that of home first."""
         m, s = self.machine, self.state

@@ -25,6 +25,7 @@ from stiffmap.ui.plot.scene import draw_box, draw_force, draw_skeleton, finish
 from stiffmap.ui.plot.style import COLOURS, MM, ORANGE, TOLERANCE, headline, leg_colours, paper
 from stiffmap.ui.view.colours import plane_image
 from stiffmap.ui.view.data import Data
+from stiffmap.ui.view.legend import legend
 from stiffmap.ui.view.moment import Moment
 from stiffmap.ui.view.panels import (
     colour_bar,
@@ -42,10 +43,14 @@ from stiffmap.ui.view.state import State, as_plain, permalink
 
 SHOWN = 51
 """Poses along each edge of the plane in a picture."""
-BOX = (
-    "position:fixed;z-index:1000;background:rgba(255,255,255,.92);color:#111;font:13px system-ui,sans-serif;"
-    "border-radius:4px;padding:.3em .6em;left:.6em;width:min(24em,45vw)"
-)
+STYLE = """<style>
+#said { position: fixed; z-index: 1000; left: .6em; top: .6em; width: min(24em, 45vw); max-height: 90vh; overflow: auto;
+  background: rgba(255,255,255,.92); color: #111; font: 13px system-ui,sans-serif; border-radius: 4px; padding: .3em .6em; }
+@media (max-width: 36em) {
+  #root { height: 55vh !important; }
+  #said { box-sizing: border-box; left: 0; top: 55vh; width: 100%; max-height: 45vh; }
+}</style>"""
+"""What is said stands next to the scene, or below it on narrow screens."""
 
 
 class Outputs:
@@ -158,10 +163,9 @@ def page_of(moment: Moment, data: Data | None = None) -> str:
         finally:
             server.stop()
     title = escape(f"{moment.machine.name}: stiffness view")
-    box = f'<div style="{BOX};top:.6em;max-height:90vh;overflow:auto">{said}</div>'
     text = text.replace("<title>", f"<title>{title} - ", 1)
     head, _, tail = text.rpartition("</body>")
-    return f"{head}{box}</body>{tail}"
+    return f'{head}{STYLE}<div id="said">{said}</div></body>{tail}'
 
 
 def draw(server: Any, moment: Moment, data: Data | None = None) -> str:
@@ -181,9 +185,9 @@ def draw(server: Any, moment: Moment, data: Data | None = None) -> str:
         shares = shares_panel(moment.shares())
     except StiffmapError:
         shares = ""
-    words = f"force {vector_text(moment.state.force)} N; deflected machine (orange) magnified × {factor:g}"
     return (
-        f"{status_line(moment, solution, '', '')}<div>{escape(words)}</div>"
+        f"{status_line(moment, solution, '', '')}"
+        f"<details open><summary>legend</summary>{legend(moment, rest, factor)}</details>"
         f"{colour_bar(found, found.range, moment.state.tolerance)}"
         f"<details open><summary>where it comes from</summary>{shares}{compliance_panel(solution)}"
         f"{efforts_panel(moment, solution)}</details>{data.html if data is not None else ''}"

@@ -69,6 +69,8 @@ class Scene:
         self.force_handle = api.add_transform_controls(
             "/force_handle", scale=0.06 * self.extent, disable_rotations=True, depth_test=False,
         )  # fmt: skip
+        self.probe = api.add_icosphere("/probe", 0.01 * self.extent, rgb(FORCE), visible=False)
+        self._said = api.add_label("/probe/label", "", anchor="bottom-left")
 
     def lines(self, name: str, points: Floats, colour: str, thick: float, units: str = "world") -> None:
         """Pieces of lines (n, 2, 3); none hide the node."""
@@ -199,8 +201,7 @@ class Scene:
 
     def marker(self, point: Floats, text: str) -> None:
         """What the probe says, at its place."""
-        self.api.add_icosphere("/probe", 0.006 * self.extent, rgb(FORCE), position=tuple(point))
-        self.api.add_label("/probe/label", text, anchor="bottom-left")
+        self.probe.position, self._said.text, self.probe.visible = tuple(point), text, True
 
 
 def _groups(moment: Moment, rest: Skeleton) -> list[tuple[str, str, float, list[int]]]:

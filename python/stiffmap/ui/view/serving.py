@@ -193,12 +193,19 @@ SCRIPT = """<script>(() => {
   }).observe(document, {childList: true, subtree: true});
 })();</script>"""
 """Names for screen readers: viser's client labels the first field of a row at best, and no button with a picture."""
+STYLE = """<style>@media (max-width: 36em) {
+  div:has(> .mantine-Paper-root):has(canvas) { flex-direction: column; }
+  div:has(> .mantine-Paper-root) > div:has(canvas) { height: 0 !important; }
+  div:has(canvas) ~ .mantine-Paper-root { position: relative !important; width: 100% !important; max-height: 50% !important; flex: none; }
+  div:has(canvas) ~ .mantine-Paper-root .mantine-ScrollArea-content > div { width: 100% !important; }
+}</style>"""
+"""Where viser's client lays its panel over the scene, on narrow screens, the panel stands below the scene instead."""
 
 
 @lru_cache(maxsize=4)
 def named(body: bytes, packed: bool) -> bytes:
-    """The page with the script in its head; `packed`: as it is sent, by gzip."""
+    """The page with script and style in its head; `packed`: as it is sent, by gzip."""
     text = gzip.decompress(body) if packed else body
     head, end, tail = text.partition(b"</head>")
-    out = head + SCRIPT.encode() + end + tail if end else text
+    out = head + (SCRIPT + STYLE).encode() + end + tail if end else text
     return gzip.compress(out, mtime=0) if packed else out

@@ -16,6 +16,7 @@ from stiffmap.ui.view.animation import Swing
 from stiffmap.ui.view.colours import colours_of
 from stiffmap.ui.view.controls import Controls
 from stiffmap.ui.view.data import Data
+from stiffmap.ui.view.hands import Probe, listen, listen_to_nodes
 from stiffmap.ui.view.model import Model
 from stiffmap.ui.view.moment import Moment
 from stiffmap.ui.view.panels import (
@@ -23,7 +24,6 @@ from stiffmap.ui.view.panels import (
     compliance_panel,
     efforts_panel,
     frequencies_panel,
-    probe_text,
     shares_panel,
     status_line,
 )
@@ -51,7 +51,6 @@ class Viewer:
         self._plane_key: object = None
         self._held: tuple[float, float] | None = None
         self._solution: Solution | None = None
-        self._probe: np.ndarray[Any, Any] | None = None
         self._cloud_key: object = None
         self._renewed = False
         self.dragging, self.pulling = False, 0.0
@@ -60,18 +59,9 @@ class Viewer:
         self.controls = Controls(self)
         self.swing = Swing(self)
         self.worker = Worker([self.quick, self.fine, self.panels, self.cloud], self._fail)
-        self._hands()
-
-        def clicked(event: Any) -> None:
-            self.probe_along(np.array(event.ray_origin), np.array(event.ray_direction))
-
-        server.scene.on_click()(clicked)
-
-        def left(client: Any) -> None:
-            self.dragging, self.pulling = False, 0.0  # a tab that is closed in the middle of a drag
-
-        server.on_client_disconnect(left)
-
+        self.probe = Probe(self)
+        listen(self)
+        listen_to_nodes(self)
         if data is not None:
             data(self.scene, model.moment)
         look_at_machine(server, self.scene.rest)
@@ -90,34 +80,6 @@ class Viewer:
         self.worker.ask()
         return not self.error
 
-    def _hands(self) -> None:
-        gizmo = self.scene.gizmo
-
-        def changed(event: Any) -> None:
-            if event.phase == "start":
-                with self.lock:
-                    self.dragging = True
-                    self.model.history.mark()
-            self.drag(np.array(gizmo.position), np.array(gizmo.wxyz))
-            if event.phase == "end":
-                self.dragging = False
-                self.worker.ask()
-
-        gizmo.on_update(changed)
-        handle = self.scene.force_handle
-
-        def pulled(event: Any) -> None:
-            if event.phase == "start":
-                with self.lock:
-                    self.pulling = max(float(np.linalg.norm(self.model.state.force)), 1.0)
-                    self.model.history.mark()
-            self.pull(np.array(handle.position))
-            if event.phase == "end":
-                self.pulling = 0.0
-                self.worker.ask()
-
-        handle.on_update(pulled)
-
     def pull(self, tail: Any) -> None:
         """The tail of the arrow was moved (m): the force points from there to the tool, as much larger as the arrow is longer."""
         with self.lock:
@@ -135,23 +97,6 @@ class Viewer:
             model.drag(position, None if same else turned)
 
         self.act(deed)
-
-    def probe_along(self, origin: Any, direction: Any) -> None:
-        """Solve where a ray meets the plane."""
-        if self._plane is None:
-            return
-        point = self._plane.frame.under_ray(origin, direction)
-        if point is not None:
-            self.probe_at(point)
-
-    def probe_at(self, point: Any) -> None:
-        """Solve at a point (m) and show the number."""
-        with self.lock:
-            moment = self.model.moment
-        self._probe = np.array(point)
-        text = probe_text(moment, [float(v) for v in point])
-        self.scene.marker(self._probe, text)
-        self.controls.probe.value = text
 
     # -- what is drawn, the quick part first --------------------------------------------------------------------
 
@@ -193,8 +138,7 @@ class Viewer:
             self._plane = found
             with self.server.atomic():
                 self._show(found, moment.state)
-        if self._probe is not None:
-            self.probe_at(self._probe)
+        self.probe.again()
 
     def _count(self) -> int:
         return next((n for n in COUNTS if n * n * self._per_pose <= BUDGET), COUNTS[-1])
@@ -209,7 +153,7 @@ class Viewer:
             self._plane_key = self._plane = None
             self.scene.no_plane()
             return None
-        key = map_key(moment)
+        key = moment.map_key()
         if key == self._plane_key:
             return None
         found = moment.plane(count)
@@ -256,7 +200,7 @@ class Viewer:
     def cloud(self) -> None:
         """The quantity over the whole box."""
         moment = self.now()
-        key = (map_key(moment, anywhere=True), self.controls.cloud)
+        key = (moment.map_key(anywhere=True), self.controls.cloud)
         if key == self._cloud_key:
             return
         self._cloud_key = key
@@ -286,8 +230,8 @@ class Viewer:
         moment = self.now()
         self.server.scene.reset()
         self.scene = Scene(self.server.scene, moment)
-        self._hands()
-        self.controls.renew(moment)
+        listen_to_nodes(self)
+        self.controls.numbers.renew(moment)
         self._plane_key = self._cloud_key = None
 
     def close(self) -> None:
@@ -299,15 +243,3 @@ class Viewer:
         with silent():
             self.server.stop()
             time.sleep(0.01)
-
-
-def map_key(moment: Moment, *, anywhere: bool = False) -> object:
-    """What the colours of a plane (or, `anywhere`, of the box) depend on."""
-    s = moment.state
-    along = s.position if s.plane == "free" else s.position["xyz".index(s.plane)]
-    place = () if anywhere else (along, s.plane, s.normal if s.plane == "free" else None)
-    idle = [s.position[i] for i, a in enumerate("xyz") if a not in moment.machine.description.task]
-    return (
-        id(moment.machine), place, tuple(idle), s.rotation, s.wrench, s.gravity, s.quantity, s.frequency, s.start,
-        s.tolerance,
-    )  # fmt: skip

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.python.ui.view.pages import client_of, on_screen, opened, pixels, pull, until
 
 import stiffmap as sm
 from stiffmap.ui.cli import main
@@ -25,67 +26,18 @@ UNNAMED = """() => [...document.querySelectorAll("input:not([type=hidden]), text
 """Visible fields and buttons without a name for screen readers."""
 
 
-def until(true: Callable[[], object], seconds: float = 60.0) -> bool:
-    end = time.monotonic() + seconds
-    while not true() and time.monotonic() < end:
-        time.sleep(0.1)
-    return bool(true())
-
-
-def opened(browser: Any, view: View) -> Any:
-    """A page on which the panel has arrived."""
-    page = browser.new_page()
-    page.goto(view.url)
-    page.get_by_role("tab", name="Tool and load").wait_for()
-    return page
-
-
-def pixels(page: Any) -> np.ndarray[Any, Any]:
-    import io
-
-    import matplotlib.image
-
-    return np.rint(
-        255 * matplotlib.image.imread(io.BytesIO(page.screenshot()), format="png")[..., :3]
-    ).astype(int)
-
-
-def on_screen(view: View, page: Any, point: Any) -> tuple[float, float]:
-    """Where a point (m) is on the page, by the camera of the server's side."""
-    camera = next(iter(view._server.get_clients().values())).camera
-    forward = np.asarray(camera.look_at) - camera.position
-    forward /= np.linalg.norm(forward)
-    right = np.cross(forward, camera.up_direction)
-    right /= np.linalg.norm(right)
-    up = np.cross(right, forward)
-    d = np.asarray(point) - camera.position
-    depth = d @ forward
-    box = page.locator("canvas").first.bounding_box()
-    half = np.tan(camera.fov / 2)
-    x = box["x"] + box["width"] / 2 + d @ right / depth / half * box["height"] / 2
-    y = box["y"] + box["height"] / 2 - d @ up / depth / half * box["height"] / 2
-    return float(x), float(y)
-
-
 def test_drag_probe_and_colours_equal_solve(browser: Any) -> None:
     machine = sm.load_machine("orthoglide-revised")
     with View(model_of(machine, force=(200.0, 0.0, -100.0))) as view:
         page = opened(browser, view)
-        view._server.get_clients()
-        assert until(lambda: view._server.get_clients())
-        client = next(iter(view._server.get_clients().values()))
-        client.camera.position = (0.6, -0.8, 0.9)  # this moves what is looked at as well
-        client.camera.look_at = (0.05, 0.05, 0.0)
+        camera = client_of(view).camera
+        camera.position = (0.6, -0.8, 0.9)  # this moves what is looked at as well
+        camera.look_at = (0.05, 0.05, 0.0)
         page.wait_for_timeout(2000)
         # the gizmo is dragged with the mouse by the handle of its z axis
         length = 0.14 * view._viewer.scene.extent
         a, b = (on_screen(view, page, (0, 0, z)) for z in (0.8 * length, 0.8 * length + 0.1))
-        page.mouse.move(*a)
-        page.mouse.down()
-        for k in range(1, 9):
-            page.mouse.move(a[0] + (b[0] - a[0]) * k / 8, a[1] + (b[1] - a[1]) * k / 8)
-            page.wait_for_timeout(60)
-        page.mouse.up()
+        pull(page, a, b)
         assert until(lambda: view.state.position[2] > 0.05), view.state.position
         x, y, z = view.state.position
         assert abs(x) < 1e-9 and abs(y) < 1e-9 and 0.05 < z < 0.2
@@ -102,7 +54,9 @@ def test_drag_probe_and_colours_equal_solve(browser: Any) -> None:
         assert found is not None
         at = [1e-3 * float(v) for v in found.groups()[:3]]
         assert np.linalg.norm(np.array(at) - spot) < 0.01
-        there = 1e6 * np.linalg.norm(machine.solve(view._viewer._probe, view.state.wrench).displacement[:3])
+        there = 1e6 * np.linalg.norm(
+            machine.solve(view._viewer.probe.point, view.state.wrench).displacement[:3]
+        )
         assert found[4] == f"{there:.5g}"
         # the colours on the screen are those of the values
         plane = view._viewer._plane
@@ -184,7 +138,7 @@ def test_decimals_are_taken_and_shown_in_every_field(browser: Any) -> None:
                 assert until(shown, 10), (name, box.input_value())
         page.get_by_role("tab", name="Numbers").click()
         page.get_by_role("button", name="All as in the file").click()
-        own = next(iter(view._viewer.controls._all.values()))
+        own = next(iter(view._viewer.controls.numbers.all.values()))
         shown = page.get_by_role("textbox", name="Value, SI")
         assert until(lambda: float(shown.input_value()) == pytest.approx(own, rel=1e-9)), (
             own,
@@ -195,7 +149,9 @@ def test_decimals_are_taken_and_shown_in_every_field(browser: Any) -> None:
 def test_every_field_of_a_number_has_decimals() -> None:
     pytest.importorskip("viser", reason="viser is not installed (pip install stiffmap[view])")
     with View(model_of(sm.load_machine("orthoglide-revised"))) as view:
-        fields = [h for h in vars(view._viewer.controls).values() if hasattr(h, "precision")]
+        controls = view._viewer.controls
+        found = [*vars(controls).values(), *vars(controls.numbers).values()]
+        fields = [h for h in found if hasattr(h, "precision")]
         assert len(fields) >= 12
         assert {h.precision for h in fields} == {DECIMALS}
 

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import pytest
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.ui.view.serving import COOKIE, FIRST_PORT, SCRIPT, Guard, free_port, in_one_line, named
+from stiffmap.ui.view.serving import COOKIE, FIRST_PORT, SCRIPT, STYLE, Guard, free_port, in_one_line, named
 
 HERE = {"Host": "127.0.0.1:8080"}
 
@@ -80,11 +80,12 @@ def test_beyond_this_computer_a_token_is_asked_for() -> None:
 
 
 @pytest.mark.parametrize("packed", [False, True])
-def test_the_page_names_its_fields(packed: bool) -> None:
+def test_the_page_gets_names_and_style(packed: bool) -> None:
     page = b"<html><head><title>t</title></head><body></body></html>"
     out = named(gzip.compress(page) if packed else page, packed)
     text = gzip.decompress(out) if packed else out
-    assert text.replace(SCRIPT.encode(), b"") == page and SCRIPT.encode() in text
+    added = (SCRIPT + STYLE).encode()
+    assert text.replace(added, b"") == page and added in text
     assert named(b"no page", False) == b"no page"
 
 

@@ -59,7 +59,7 @@ def test_a_drag_is_drawn_as_solved(view: View, machine: sm.Machine) -> None:
     want = 1e6 * np.linalg.norm(machine.solve(p, view.state.wrench).displacement[..., :3], axis=-1)
     np.testing.assert_allclose(found.shown, want, rtol=1e-12)
     np.testing.assert_array_equal(viewer.scene._image.image, plane_image(found, (want.min(), want.max())))
-    viewer.probe_at(p[30, 70])
+    viewer.probe.at(p[30, 70])
     assert viewer.controls.probe.value.endswith(f"{want[30, 70]:.5g} µm")
     np.testing.assert_allclose(viewer.scene.gizmo.position, view.state.position)
 

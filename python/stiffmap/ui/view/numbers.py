@@ -1,0 +1,74 @@
+"""The numbers of a machine as controls: found by a part of their address, typed, scaled, put back."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from stiffmap.ui.view.changes import addresses, units
+from stiffmap.ui.view.moment import Moment
+from stiffmap.ui.view.state import State
+
+DECADE = 1.0
+
+
+class Numbers:
+    """One number at a time, and a list of those that are changed."""
+
+    def __init__(self, controls: Any, gui: Any, moment: Moment) -> None:
+        names = self._list(moment)
+        self._find = gui.add_text("Find", "", hint="part of an address")
+        self._address = gui.add_dropdown("Number", names, initial_value=names[0])
+        self._value = gui.add_number("Value, SI", 0.0)
+        self._scale = gui.add_slider("Power of ten on the file's value", -DECADE, DECADE, 0.01, 0.0)
+        controls.typed(self._value, lambda m, v: m.change(self._address.value, float(v)))
+        controls.typed(
+            self._scale,
+            lambda m, v: m.change(
+                self._address.value, self.all[self._address.value] * 10 ** float(v), keep=False
+            ),
+            keep=False,
+        )
+        controls.pressed(gui.add_button("As in the file"), lambda m: m.change(self._address.value, None))
+        controls.pressed(gui.add_button("All as in the file"), lambda m: m.put(changes=()))
+        self._changed = gui.add_text("Changed", "nothing", multiline=True, disabled=True)
+
+        def changed(event: Any) -> None:
+            if event.client_id is not None:
+                found = tuple(a for a in self.all if event.target.value.lower() in a.lower())
+                self._address.options = found or names
+
+        self._find.on_update(changed)
+        self._address.on_update(lambda e: controls.viewer.worker.ask())
+
+    def show(self, state: State) -> None:
+        """The chosen number as it is now, and all that are changed."""
+        address, given = self._address.value, dict(state.changes)
+        plain = self.all.get(address, 0.0)
+        now = given.get(address, plain)
+        write(self._value, "value", now)
+        power = float(np.log10(now / plain)) if plain and now / plain > 0 else 0.0
+        write(self._scale, "value", round(float(np.clip(power, -DECADE, DECADE)), 2))
+        lines = [
+            f"{a} = {v:.6g} {self._units.get(a, 'SI')}"
+            + (f", file: {self.all[a]:.6g}" if a in self.all else "")
+            for a, v in given.items()
+        ]
+        write(self._changed, "value", "\n".join(lines) or "nothing")
+
+    def renew(self, moment: Moment) -> None:
+        """The machine's file has changed."""
+        self._address.options = self._list(moment)
+
+    def _list(self, moment: Moment) -> tuple[str, ...]:
+        """Addresses that may be changed; what the file says of each is kept."""
+        d = moment.machine.description
+        self.all, self._units = addresses(d), units(d)
+        return tuple(self.all)
+
+
+def write(handle: Any, field: str, value: Any) -> None:
+    """Only what differs is sent."""
+    if getattr(handle, field) != value:
+        setattr(handle, field, value)
