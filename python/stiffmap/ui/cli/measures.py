@@ -19,6 +19,7 @@ from stiffmap.ui.cli.inputs import (
     FolderOption,
     GravityOption,
     MachineArgument,
+    SchedulerOption,
     ThreadsOption,
     finish,
     gravity,
@@ -75,6 +76,7 @@ def command(
     gravity_: GravityOption = None,
     output: FolderOption = None,
     threads: ThreadsOption = None,
+    scheduler: SchedulerOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """All performance measures of a machine over a box: worst and best pose, requirement, margin.
@@ -100,7 +102,7 @@ def command(
     table = all_of(
         m, box=limits, force=force, plane=plane, requirements=requirements,
         only=words(only), nodes=nodes, coarse=coarse,
-        length=in_si(length), gravity=gravity(gravity_), threads=threads,
+        length=in_si(length), gravity=gravity(gravity_), threads=threads, scheduler=scheduler,
         toolpath=toolpath, clearance=in_si(clearance),
         deflection=in_si(deflection),
     )  # fmt: skip

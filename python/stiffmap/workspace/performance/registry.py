@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property, lru_cache
 from typing import Any
 
@@ -12,10 +12,16 @@ import numpy as np
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.library import modules_of
+from stiffmap.common.tasks import workers
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.solution import Solution
 from stiffmap.workspace.performance import kinds
-from stiffmap.workspace.performance.motion.closing import DriveKinematics, drive_kinematics, kernel_starts
+from stiffmap.workspace.performance.motion.closing import (
+    CHUNK,
+    DriveKinematics,
+    drive_kinematics,
+    kernel_starts,
+)
 from stiffmap.workspace.performance.motion.motion_files import Motion
 from stiffmap.workspace.performance.motion.velocity import VelocityTransmission, transmission_of
 from stiffmap.workspace.performance.motion.zonotopes import inverse_rows
@@ -48,6 +54,8 @@ class Case:
     """m, least distance between members of different legs in the workspace; None: not asked for."""
     deflection: float | None = None
     """m, largest deflection under `force` in `plane` in the workspace; None: not asked for."""
+    scheduler: Any = None
+    """`distributed.Client` whose workers close `positions` and prove the largest box; None: here."""
 
     @property
     def limits(self) -> dict[str, Any]:
@@ -89,11 +97,16 @@ class Case:
         """At `positions`."""
         if self.quick:
             start = None if self.machine.fast else self.still.coordinates
-        else:
-            start = kernel_starts(self.machine, self.positions, self.rotation, self.threads)
-        return drive_kinematics(
-            self.machine, self.positions, self.rotation, start=start, threads=self.threads
-        )
+            return drive_kinematics(
+                self.machine, self.positions, self.rotation, start=start, threads=self.threads
+            )
+        if self.scheduler is None:
+            return _closed((self.machine, self.rotation, self.threads), self.positions)
+        with workers(_closed, (self.machine, self.rotation, 1), scheduler=self.scheduler) as hands:
+            p = self.positions
+            parts = hands.in_order(p[k : k + CHUNK] for k in range(0, len(p), CHUNK))
+        names = [f.name for f in fields(DriveKinematics)]
+        return DriveKinematics(**{n: np.concatenate([getattr(k, n) for k in parts]) for n in names})
 
     @cached_property
     def still(self) -> Solution:
@@ -116,6 +129,13 @@ class Case:
     def coarse_kinematics(self) -> DriveKinematics:
         """At `coarse_positions`."""
         return drive_kinematics(self.machine, self.coarse_positions, self.rotation, threads=self.threads)
+
+
+def _closed(shared: tuple[Machine, Floats | None, int | None], position: Floats) -> DriveKinematics:
+    """Poses (n, 3) m closed from the unloaded equilibria, as a task."""
+    machine, rotation, threads = shared
+    start = kernel_starts(machine, position, rotation, threads)
+    return drive_kinematics(machine, position, rotation, start=start, threads=threads)
 
 
 @dataclass(frozen=True, eq=False)

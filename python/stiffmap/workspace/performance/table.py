@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
 from dataclasses import dataclass
 from os import PathLike
 from typing import Any, NamedTuple
@@ -14,6 +15,7 @@ from numpy.typing import ArrayLike
 from stiffmap.common.broadcasting import Floats, real_array, thread_count
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.short import short_repr
+from stiffmap.common.tasks import client_of
 from stiffmap.solve.machine import Machine, takes_machine
 from stiffmap.solve.status import Status
 from stiffmap.workspace.maps.inputs import magnitude
@@ -122,6 +124,7 @@ def measures(
     clearance: float | None = None,
     deflection: float | None = None,
     threads: int | None = None,
+    scheduler: Any = None,
 ) -> MeasuresTable:
     """Table of all measures of §3: worst and best pose, requirement, margin, pass or fail.
 
@@ -149,6 +152,9 @@ def measures(
     clearance, deflection
         m, what poses of the workspace and of the largest box keep: least distance between members of different
         legs, largest deflection under `force` in `plane`; None: the requirement's, else not asked for.
+    scheduler
+        Address of a dask scheduler, or a `distributed.Client`: its workers close the poses of the kinematic measures
+        and prove the cells of the largest box, with the same answer.
 
     Raises
     ------
@@ -179,7 +185,10 @@ def measures(
         clearance=_positive("clearance", task.clearance if clearance is None else clearance),
         deflection=_positive("deflection", task.deflection if deflection is None else deflection),
     )  # fmt: skip
-    return MeasuresTable(machine, case, task, _rows(chosen, case, task), notes)
+    with nullcontext() if scheduler is None else client_of(scheduler) as case.scheduler:
+        found = _rows(chosen, case, task)
+    case.scheduler = None
+    return MeasuresTable(machine, case, task, found, notes)
 
 
 def _rows(chosen: Sequence[Measure], case: Case, task: Requirements) -> tuple[Row, ...]:

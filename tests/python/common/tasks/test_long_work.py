@@ -69,6 +69,19 @@ def workspace(scheduler: Any) -> dict[str, Any]:
     return {"volume": found.volume, "proven": found.proven}
 
 
+def measures(scheduler: Any) -> dict[str, Any]:
+    only = ["largest_box", "transmission_min", "condition", "singularity", "accuracy"]
+    table = sm.measures(GLIDE, only=only, nodes=33, box_tolerance=1e-3, threads=1, scheduler=scheduler)
+    k = table.case.kinematics
+    assert table.case.scheduler is None  # the client does not outlive the call
+    return {
+        "plain": table.as_plain(),
+        "jacobian": k.jacobian,
+        "coordinates": k.coordinates,
+        "status": k.status,
+    }
+
+
 def monte_carlo(scheduler: Any) -> dict[str, Any]:
     from bench.link_monte_carlo import run
 
@@ -102,7 +115,7 @@ def cluster() -> Iterator[Any]:
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize(
     "work",
-    [lobes, vibration, placing, turning, box, workspace, monte_carlo, oracle],
+    [lobes, vibration, placing, turning, box, workspace, measures, monte_carlo, oracle],
 )
 def test_a_worker_is_killed(work: Work, cluster: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     here = work(None)
@@ -124,7 +137,7 @@ def test_a_worker_is_killed(work: Work, cluster: Any, monkeypatch: pytest.Monkey
         np.testing.assert_equal(there[name], value, err_msg=name)
 
 
-@pytest.mark.parametrize("work", [lobes, placing, turning, box, workspace])
+@pytest.mark.parametrize("work", [lobes, placing, turning, box, workspace, measures])
 def test_a_scheduler_that_is_none_is_said(work: Work) -> None:
     pytest.importorskip("distributed")
     with pytest.raises(sm.StiffmapError, match="expected the address of a running dask scheduler"):
@@ -135,6 +148,7 @@ def test_a_scheduler_that_is_none_is_said(work: Work) -> None:
     "command",
     [
         ["lobes", GLIDE, "--process", "slot", "--points", "4,3"],
+        ["measures", GLIDE, "--only", "condition", "--nodes", "3"],
         ["mill", GLIDE, "rectangle", "--process", "trimming", "--place", "4"],
     ],
     ids=lambda c: c[0],

@@ -14,7 +14,9 @@ def compute(case: Case) -> Found:
     """Anywhere; drive ranges, joint limits, the transmission range and the case's limits count."""
     if case.quick:
         return concentric(case)
-    b = largest_box(case.machine, case.proportions, tolerance=case.gap, **case.limits)
+    b = largest_box(
+        case.machine, case.proportions, tolerance=case.gap, scheduler=case.scheduler, **case.limits
+    )
     note = f"no box of {1e3 * b.edge_upper:.2f} mm; limited by {', '.join(b.limited_by) or 'nothing found'}; {b.guarantee}"
     return Found(b.edge, b.centre, b.edge, b.centre, note, extra={"box": b})
 
