@@ -28,7 +28,7 @@ from stiffmap.solve.machine import Machine
 
 Terms = tuple[AppliedEffect, ...]
 MACHINES, OTHERS = 4, 32
-"""Machines with terms, and predictors of machines and rows beside these, that are kept."""
+"""Machines with terms, and predictors of other machines and of some rows, that are kept."""
 
 
 class Predictor:
@@ -137,7 +137,7 @@ class Predictor:
         return out
 
     def kept(self, key: Hashable, make: Callable[[], Predictor]) -> Predictor:
-        """One beside this that was made for the key, or is made now; the last few are kept."""
+        """That of another machine or of some rows that was made for the key, or is made now; the last few are kept."""
         return self._others.get(key, make)
 
     def under(self, wrench: Floats) -> Floats:

@@ -159,3 +159,18 @@ def test_refused_without_a_file() -> None:
         engagement(sampled(p), p, sm.load_process("trimming"), thickness=1.0)
     with pytest.raises(StiffmapError, match="lower first"):
         box([0, 0, 0], [1, 1, -1])
+
+
+@pytest.mark.parametrize("downwards", [True, False])
+def test_across_a_curve_that_dives_is_its_own_side(downwards: bool, tmp_path: Path) -> None:
+    """An arc in a vertical plane between two lines across it: where it goes along the tool its side is not that of a line."""
+    arc = "G2 X10 Z-10 I10" if downwards else "G2 X10 Z10 K10"
+    text = f"G21 G90 G17 F1000 S10000 M3\nG0 X0 Y-20 Z0\nG1 Y0\nG18 {arc}\nG1 Y20\n"
+    path = load_path(write(tmp_path, "dive.ngc", text))
+    points = sampled(path)
+    on_arc = np.isin(points.move, np.flatnonzero(path.sweep))
+    assert abs(path.sweep[path.sweep != 0]) == pytest.approx(pi / 2)
+    assert points.along[on_arc].any()
+    np.testing.assert_allclose(
+        np.abs(points.normal[on_arc]), np.tile([0.0, 1.0, 0.0], (on_arc.sum(), 1)), atol=1e-9
+    )
