@@ -392,13 +392,10 @@ class _World:
             bounds = sorted(self._bounds(fewer), key=lambda b: -b[0])[:SINGLES]
             if len(bounds) < 2:
                 continue
-            least = model.score - SHORT - (fewer.score - fewer.fit.score)
             for anchor in self._anchors(fewer):
                 shapes = [p.shapes[_best_shape(anchor, p)] for _, p, _ in bounds]
                 gain = np.tril(of_pairs(anchor, shapes), -1)
                 for k in np.argsort(gain, axis=None)[::-1][:REFITS]:
-                    if anchor.score + gain.flat[k] < least:
-                        break
                     places = [bounds[int(i)][1] for i in np.unravel_index(int(k), gain.shape)]
                     if clash(places[0].candidate, [places[1].candidate]):
                         continue
