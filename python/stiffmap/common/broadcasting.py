@@ -69,10 +69,10 @@ def real_array(values: object, name: str, what: str = "numbers") -> Floats:
         raise _refused(name, what, f"{type(values).__name__} ({problem})") from None
 
 
-def given_path(value: object, name: str, what: str = "a file") -> Path:
+def given_path(value: Any, name: str, what: str = "a file") -> Path:
     """A path; StiffmapError with the argument's name for what is none."""
     try:
-        return Path(value)  # type: ignore[arg-type]
+        return Path(value)
     except TypeError:
         raise _refused(name, what, type(value).__name__) from None
 
@@ -103,13 +103,13 @@ def real_number(value: object, name: str, what: str = "a number") -> float:
     return float(out)
 
 
-def whole_number(value: object, name: str, least: int, most: int | None = None, what: str = "") -> int:
+def whole_number(value: Any, name: str, least: int, most: int | None = None, what: str = "") -> int:
     """An integer between bounds; StiffmapError with the argument's name for anything else, 1.5 and True included; `what` says
     what is expected in other words."""
     try:
         if isinstance(value, bool | np.bool_):
             raise TypeError
-        out = index(value)  # type: ignore[arg-type]
+        out = index(value)
     except TypeError:
         raise _refused(name, what or f"a whole number, {least} or more", repr(value)) from None
     if out < least or (most is not None and out > most):

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from stiffmap.common.broadcasting import Floats, batch, rows, thread_count, trailing
 from stiffmap.common.rotations import as_rotations
@@ -31,8 +32,8 @@ class Kinematics(OverPoses):
     coordinates: Floats
     """(..., coordinates) all coordinates, springs at zero."""
 
-    def __array__(self, dtype: object = None, copy: bool | None = None) -> Floats:
-        return np.asarray(self.actuators, dtype=dtype)  # type: ignore[call-overload, no-any-return]
+    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> Floats:
+        return np.asarray(self.actuators, dtype=dtype)
 
 
 def commanded(
@@ -74,7 +75,7 @@ def close_actuators(
     return _kinematics(machine, out, shape)
 
 
-def _kinematics(machine: CompiledMachine, out: tuple[Floats, ...], shape: tuple[int, ...]) -> Kinematics:
+def _kinematics(machine: CompiledMachine, out: tuple[Any, ...], shape: tuple[int, ...]) -> Kinematics:
     x, p, r, status, flags = out
     names = machine.names
     index = [names.joints[a] for a in names.actuators]
@@ -82,7 +83,7 @@ def _kinematics(machine: CompiledMachine, out: tuple[Floats, ...], shape: tuple[
         actuators=x[:, index].reshape((*shape, len(index))),
         position=p.reshape((*shape, 3)),
         rotation=r.reshape((*shape, 3, 3)),
-        status=status.reshape(shape),  # type: ignore[arg-type]
-        flags=flags.reshape(shape),  # type: ignore[arg-type]
+        status=status.reshape(shape),
+        flags=flags.reshape(shape),
         coordinates=x.reshape((*shape, x.shape[1])),
     )

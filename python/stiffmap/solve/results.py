@@ -27,12 +27,13 @@ class OverPoses:
     """What a result with a ``status`` per pose (leading batch axes (...)) can be converted to; SI."""
 
     __slots__ = ()
+    status: Any
 
     def to_xarray(self) -> xr.Dataset:
         """Every array as a variable: dimension ``pose``, or ``pose_0``, ``pose_1`` … for several batch axes, then its own."""
         import xarray as xr
 
-        shape = np.shape(self.status)  # type: ignore[attr-defined]
+        shape = np.shape(self.status)
         batch = ["pose"] if len(shape) == 1 else [f"pose_{i}" for i in range(len(shape))]
         variables: dict[str, Any] = {}
         coordinates: dict[str, Any] = {}

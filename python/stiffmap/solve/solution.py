@@ -61,12 +61,12 @@ class Solution(OverPoses):
         self._shape = shape
         self._names = names
         self._order = order
-        self._made: dict[str, Any] | None = None
+        self._made: dict[str, NDArray[Any]] | None = None
         self.point = point
         self._slopes: Slopes = slopes or {}
         self.unloaded = unloaded
 
-    def _array(self, name: str) -> Any:
+    def _array(self, name: str) -> NDArray[Any]:
         if self._made is None:
             self._made = {}
         made = self._made.get(name)
@@ -74,8 +74,8 @@ class Solution(OverPoses):
             made = self._made[name] = self._make(name)
         return made
 
-    def _make(self, name: str) -> Any:
-        a: Any = getattr(self._answer, name)
+    def _make(self, name: str) -> NDArray[Any]:
+        a: NDArray[Any] = getattr(self._answer, name)
         if a.shape[0] != self._answer.status.shape[0]:  # not asked for
             fill = np.nan if a.dtype.kind == "f" else 0
             return np.broadcast_to(np.asarray(fill, a.dtype), self._shape + a.shape[1:])
@@ -105,37 +105,37 @@ class Solution(OverPoses):
     @property
     def stiffness(self) -> Floats:
         """(..., 6, 6) N/m, N·m/rad: small extra twist to small extra dead wrench, both at `point`."""
-        return self._array("stiffness")  # type: ignore[no-any-return]
+        return self._array("stiffness")
 
     @property
     def compliance(self) -> Floats:
         """(..., 6, 6) m/N, rad/(N·m): small extra dead wrench to small extra twist, both at `point`."""
-        return self._array("compliance")  # type: ignore[no-any-return]
+        return self._array("compliance")
 
     @property
     def status(self) -> NDArray[np.uint8]:
         """(...) of `Status`."""
-        return self._array("status")  # type: ignore[no-any-return]
+        return self._array("status")
 
     @property
     def flags(self) -> NDArray[np.uint32]:
         """(...) bits of `Flag`."""
-        return self._array("flags")  # type: ignore[no-any-return]
+        return self._array("flags")
 
     @property
     def free_twists(self) -> Floats:
         """(..., 6, 6) m, rad; columns: twists without stiffness where the platform is singular, else NaN."""
-        return self._array("free_twists")  # type: ignore[no-any-return]
+        return self._array("free_twists")
 
     @property
     def iterations(self) -> NDArray[np.int32]:
         """(...) number of Newton iterations."""
-        return self._array("iterations")  # type: ignore[no-any-return]
+        return self._array("iterations")
 
     @property
     def actuator_effort(self) -> Floats:
         """(..., actuators) N or N·m: drive on the leg, positive along the coordinate."""
-        return self._array("actuator_effort")  # type: ignore[no-any-return]
+        return self._array("actuator_effort")
 
     @property
     def tension(self) -> Floats:
@@ -146,17 +146,17 @@ class Solution(OverPoses):
     @property
     def leg_wrench(self) -> Floats:
         """(..., legs, 6) N, N·m: leg on platform at `point`."""
-        return self._array("leg_wrench")  # type: ignore[no-any-return]
+        return self._array("leg_wrench")
 
     @property
     def coordinates(self) -> Floats:
         """(..., coordinates) m or rad: all coordinates, in the order of `coordinate_names`."""
-        return self._array("coordinates")  # type: ignore[no-any-return]
+        return self._array("coordinates")
 
     @property
     def indeterminate_mask(self) -> NDArray[np.uint8]:
         """(..., coordinates) 1 where a pose leaves the coordinate open."""
-        return self._array("indeterminate")  # type: ignore[no-any-return]
+        return self._array("indeterminate")
 
     @property
     def actuators(self) -> tuple[str, ...]:

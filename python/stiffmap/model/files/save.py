@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import fields, replace
 from os import PathLike
-from typing import Any
+from typing import Any, TypeGuard
 
 import yaml
 
@@ -141,13 +141,13 @@ def _placed(leg: Leg) -> tuple[Plain, Elements, Plain]:
     frame: Plain = {}
     attach: Plain = {}
     if middle and _is_plain_offset(middle[0], "frame"):
-        frame, middle = {"frame": dump_pose(middle[0].nominal)}, middle[1:]  # type: ignore[union-attr]
+        frame, middle = {"frame": dump_pose(middle[0].nominal)}, middle[1:]
     if middle and _is_plain_offset(middle[-1], "attach"):
-        attach, middle = {"attach": dump_pose(middle[-1].nominal)}, middle[:-1]  # type: ignore[union-attr]
+        attach, middle = {"attach": dump_pose(middle[-1].nominal)}, middle[:-1]
     return frame, middle, attach
 
 
-def _is_plain_offset(element: Element, name: str) -> bool:
+def _is_plain_offset(element: Element, name: str) -> TypeGuard[Offset]:
     return isinstance(element, Offset) and element.name == name and element.actual is None
 
 

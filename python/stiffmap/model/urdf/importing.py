@@ -64,14 +64,14 @@ def import_urdf(
     legs, platform = _legs(model, side, chains, end, file)
     home = end_pose(legs[0].elements) @ end_pose(platform)
     box = side.workspace
+    corners = box and [(float(box["x"][k]), float(box["y"][k]), float(box["z"][k])) for k in (0, 1)]
     description = MachineDescription(
         name=plain_name(model.name),
         legs=legs,
         platform=platform,
         home=home,
         task=TASK if side.task is None else tuple(c for c in TASK if c in side.task),
-        workspace=None if box is None else tuple(  # type: ignore[arg-type]
-            tuple(float(box[a][k]) for a in "xyz") for k in (0, 1)),  # type: ignore[index]
+        workspace=(corners[0], corners[1]) if corners else None,
         title=f"{model.name}, imported",
         source=f"imported from {Path(urdf).name}" + (f" with {Path(file).name}" if sidecar else "") + f" to {end}",
     )  # fmt: skip

@@ -39,7 +39,8 @@ class MachineClass:
     @property
     def defaults(self) -> Mapping[str, float]:
         """Its dimensions."""
-        return self.file["dimensions"]  # type: ignore[no-any-return]
+        found: Mapping[str, float] = self.file["dimensions"]
+        return found
 
     def values(self, given: Mapping[str, float | None]) -> dict[str, float]:
         """The defaults with what is given; StiffmapError for a dimension that this class has not, or that is not positive."""

@@ -56,7 +56,7 @@ def transmission_figure(machine: Machine, position: ArrayLike, plane: str = "xy"
     return figure
 
 
-def _ellipsoid(axes, j: Floats) -> None:  # type: ignore[no-untyped-def]
+def _ellipsoid(axes: Any, j: Floats) -> None:
     u, s, _ = np.linalg.svd(j, full_matrices=False)
     a, b = np.meshgrid(np.linspace(0, 2 * np.pi, 49), np.linspace(0, np.pi, 25))
     ball = np.stack([np.cos(a) * np.sin(b), np.sin(a) * np.sin(b), np.cos(b)])[: len(s)]
@@ -65,7 +65,7 @@ def _ellipsoid(axes, j: Floats) -> None:  # type: ignore[no-untyped-def]
     axes.plot_wireframe(x, y, z, rstride=6, cstride=6, color=BLUE, linewidth=0.4)
 
 
-def _parallelepiped(axes, j: Floats) -> None:  # type: ignore[no-untyped-def]
+def _parallelepiped(axes: Any, j: Floats) -> None:
     n = j.shape[1]
     if n > 6:
         return
@@ -77,7 +77,7 @@ def _parallelepiped(axes, j: Floats) -> None:  # type: ignore[no-untyped-def]
                 axes.plot(*np.stack([p, q]).T, color=BLUE, linewidth=1.0 if n == 3 else 0.3)
 
 
-def _hexagon(axes, vertices: Floats, inner: float, outer: float) -> None:  # type: ignore[no-untyped-def]
+def _hexagon(axes: Axes, vertices: Floats, inner: float, outer: float) -> None:
     turn = np.linspace(0, 2 * np.pi, 181)
     closed = np.concatenate([vertices, vertices[:1]])
     axes.fill(*closed.T, color=SKY, alpha=0.35)

@@ -97,7 +97,8 @@ def skeleton(machine: Machine, coordinates: Floats) -> Skeleton:
     # home decides, so that the pieces are the same at all coordinates
     order = around(core.frames(core.home_coordinates())[0][held])
     body = beyond(core, set(held) if len(order) else set())
-    legs, links, guides, ends, marks = [], [], [], [], {Role.ACTUATOR: [], Role.PASSIVE: []}  # type: ignore[var-annotated]
+    legs, links, guides, ends = [], [], [], []
+    marks: dict[Role | None, list[Floats]] = {Role.ACTUATOR: [], Role.PASSIVE: []}
     for i, (parent, c) in enumerate(core.nodes):
         role = core.names.roles[c] if c >= 0 else None
         if role in marks:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -176,17 +177,18 @@ def _digests(found: Milled) -> dict[str, str]:
 
 
 def _sheet(found: Milled) -> Sheet:
-    job, s = found.job, summary(found)
+    job = found.job
+    s: dict[str, Any] = summary(found)
     force, u = cutting_force(job.process), force_uncertainty(job.process)
     mean = ", ".join(f"{v:.1f} ± {e:.1f}" for v, e in zip(force.mean, u, strict=True))
     p = job.process
     lines = [
         f"{job.path.name} on {job.machine.name}: {s['length_mm']:.0f} mm of cut, {s['time_s']:.1f} s, part at "
-        f"({', '.join(f'{v:.1f}' for v in s['at_mm'])}) mm, turned by {s['turn_deg']:.1f} deg.",  # type: ignore[attr-defined]
+        f"({', '.join(f'{v:.1f}' for v in s['at_mm'])}) mm, turned by {s['turn_deg']:.1f} deg.",
         f"Process {p.name}: {p.cut.side} cut, {1e3 * p.cut.axial:g} mm deep, {60 * p.feed:.3g} m/min; mean force {mean} N along the "
         f"feed, to its left, along the tool; {force.power:.0f} W at the spindle.",
-        f"Error across the wall: positive where material stays on the part. Loop gain kp/k up to {abs(s['loop_gain']['largest']) if abs(s['loop_gain']['largest']) < 1e-9 else s['loop_gain']['largest']:.3g}: "  # type: ignore[index]
-        f"one mirrored program would leave {s['mirror_leaves_mm']['largest']:.4f} mm.",  # type: ignore[index]
+        f"Error across the wall: positive where material stays on the part. Loop gain kp/k up to {abs(s['loop_gain']['largest']) if abs(s['loop_gain']['largest']) < 1e-9 else s['loop_gain']['largest']:.3g}: "
+        f"one mirrored program would leave {s['mirror_leaves_mm']['largest']:.4f} mm.",
         f"The compensated program has {found.program.pieces} cutting moves; it was read back and simulated with the force "
         "evaluated anew at the true distance from the wall.",
     ]
@@ -201,10 +203,10 @@ def _sheet(found: Milled) -> Sheet:
             )
         )
     if not any(w.name == "chatter" for w in found.warnings):
-        lines.append(str(s["stability"]["sentence"]))  # type: ignore[index]
-    lines += [f"Note: {n}" for n in s["notes"]]  # type: ignore[attr-defined]
+        lines.append(str(s["stability"]["sentence"]))
+    lines += [f"Note: {n}" for n in s["notes"]]
     rows = [
-        [label, f"{s[key]['rms']:.5f}", f"{s[key]['largest']:.5f}"]  # type: ignore[index]
+        [label, f"{s[key]['rms']:.5f}", f"{s[key]['largest']:.5f}"]
         for label, key in (
             ("across the wall, as it is", "error_normal_mm"), ("across the wall, compensated", "error_normal_after_mm"),
             ("across the wall, mirrored once", "mirror_leaves_mm"), ("along the path, as it is", "error_along_mm"),
@@ -219,7 +221,7 @@ def _sheet(found: Milled) -> Sheet:
         band = s.get("error_normal_after_band_mm")
         if isinstance(band, dict):
             rows.append([label, f"{band[key]['rms']:.5f}", f"{band[key]['largest']:.5f}"])
-    for k, one in enumerate(s.get("error_normal_passes_mm", []), 1):  # type: ignore[arg-type, var-annotated]
+    for k, one in enumerate(s.get("error_normal_passes_mm", []), 1):
         rows.append([f"after pass {k}", f"{one['rms']:.5f}", f"{one['largest']:.5f}"])
     return Sheet(
         f"Milling: {job.path.name}",

@@ -79,12 +79,14 @@ def turns(machine: Machine) -> tuple[bool, bool, bool]:
     named = [f"r{a}" in machine.description.task for a in "xyz"]
     k = inverse_kinematics(machine, home.p, np.array([home.r @ s for s in steps]))
     good = np.asarray(k.status) == Status.CONVERGED
-    return tuple(bool(n and g) for n, g in zip(named, good, strict=True))  # type: ignore[return-value]
+    x, y, z = (bool(n and g) for n, g in zip(named, good, strict=True))
+    return x, y, z
 
 
 def moves(machine: Machine) -> tuple[bool, bool, bool]:
     """Along which base axes the tool is commanded."""
-    return tuple(a in machine.description.task for a in "xyz")  # type: ignore[return-value]
+    x, y, z = (a in machine.description.task for a in "xyz")
+    return x, y, z
 
 
 def first_plane(machine: Machine) -> str:

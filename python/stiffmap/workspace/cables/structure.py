@@ -11,6 +11,7 @@ from stiffmap.common.broadcasting import Floats, wrench_array
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.description import Body, Cable, MachineDescription, Offset, Pose
 from stiffmap.model.description.machine import TASK
+from stiffmap.model.description.pose import Vector
 from stiffmap.solve.closing import commanded
 from stiffmap.solve.machine import Machine, takes_machine
 
@@ -61,9 +62,13 @@ def hanging(machine: Machine) -> Hanging:
     )
 
 
-def _walk(d: MachineDescription):  # type: ignore[no-untyped-def]
+def _walk(
+    d: MachineDescription,
+) -> tuple[list[tuple[Cable, Vector]], list[tuple[Body, Vector]], Pose]:
     """Cables and bodies with their points in the platform's first frame, and the tcp there."""
-    frame, found, bodies = Pose(), [], []
+    frame = Pose()
+    found: list[tuple[Cable, Vector]] = []
+    bodies: list[tuple[Body, Vector]] = []
     for e in d.platform:
         match e:
             case Offset():

@@ -260,9 +260,9 @@ def _without_padding(s: dict[str, Any], values: Any) -> Any:
     return values[: s["num_pts"]] if padded else values
 
 
-def _ends(s: dict[str, object]) -> tuple[str, str]:
+def _ends(s: dict[str, Any]) -> tuple[str, str]:
     def end(prefix: str) -> str:
-        return f"{s.get(prefix + '_node', 0)} {WAYS.get(int(s.get(prefix + '_dir', 0)), '')}".strip()  # type: ignore[call-overload]
+        return f"{s.get(prefix + '_node', 0)} {WAYS.get(int(s.get(prefix + '_dir', 0)), '')}".strip()
 
     return end("rsp"), end("ref")
 

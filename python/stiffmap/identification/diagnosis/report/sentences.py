@@ -43,7 +43,8 @@ def interval(value: float, low: float, high: float, unit: str) -> tuple[str, str
         texts = [f"{factor * v:.4g}" for v in (value, low, high)]
     else:
         texts = [within(factor * v, half) for v in (value, low, high)]
-    return tuple(f"{text} {name}".rstrip() for text in texts)  # type: ignore[return-value]
+    own, least, most = (f"{text} {name}".rstrip() for text in texts)
+    return own, least, most
 
 
 def place(e: Effect) -> str:

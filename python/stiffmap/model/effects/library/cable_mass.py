@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from stiffmap.model.description import Body, Cable, MachineDescription
+from stiffmap.model.description import Body, Cable, Element, MachineDescription
 from stiffmap.model.effects.edit import edit_legs, fresh
 from stiffmap.model.effects.sites import at_sites, cables
 from stiffmap.model.effects.types import EffectType, Parameter, Placed
@@ -14,7 +14,7 @@ def apply(description: MachineDescription, placed: Placed) -> MachineDescription
     """Half of the length at home hangs at the fixing point."""
     home = description.home
 
-    def edit(elements: tuple) -> tuple:  # type: ignore[type-arg]  # elements
+    def edit(elements: tuple[Element, ...]) -> tuple[Element, ...]:
         out = elements
         for i in reversed(cables(elements).get(placed.element, ())):
             e = elements[i]

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from stiffmap.common.broadcasting import (
     Floats,
@@ -183,8 +183,8 @@ class NaturalFrequencies(OverPoses):
     status: NDArray[np.uint8]
     flags: NDArray[np.uint32]
 
-    def __array__(self, dtype: object = None, copy: bool | None = None) -> Floats:
-        return np.asarray(self.frequency, dtype=dtype)  # type: ignore[call-overload, no-any-return]
+    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> Floats:
+        return np.asarray(self.frequency, dtype=dtype)
 
 
 @takes_machine
