@@ -25,7 +25,7 @@ from stiffmap.ui.view.open import View, model_of
 FLAGS = ["--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
          "--disable-component-update", "--disable-sync", "--use-gl=angle", "--use-angle=swiftshader",
          "--enable-unsafe-swiftshader", "--disable-dev-shm-usage"]  # fmt: skip
-FRAMES, COLOURS = 16, 64
+FRAMES, COLOURS = 16, 256
 START, CORNER = np.array([0.0, 0.0, 0.0]), np.array([0.28, 0.28, 0.28])
 LOAD = {"force": (300.0, 0.0, 0.0), "quantity": "deflection", "magnification": 200.0}
 
