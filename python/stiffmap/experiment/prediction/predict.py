@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.kept import Kept, Recent
+from stiffmap.common.kept import MOST_BYTES, Kept, Recent
 from stiffmap.experiment.experiment import Experiment, Floats, Mask
 from stiffmap.experiment.poses.against_command import resolved
 from stiffmap.experiment.poses.commanded import OUT_OF_REACH, located, without
@@ -132,7 +132,8 @@ class Predictor:
         out = copy.copy(self)
         out.machine = machine or self.machine
         out.experiment = self.experiment if rows is None else self.experiment.rows(rows)
-        out._memory, out._changes, out._machines = Kept(), Kept(), Recent(MACHINES)
+        room = MOST_BYTES // OTHERS  # all that are kept together need no more than one predictor may
+        out._memory, out._changes, out._machines = Kept(room), Kept(room), Recent(MACHINES)
         out._others, out._drives = Recent(OTHERS), {}
         return out
 

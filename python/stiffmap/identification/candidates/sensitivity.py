@@ -80,14 +80,14 @@ def variants(
     tried = Tried(candidate.element, candidate.legs, candidate.parameters)
     linear = candidate.linear
     index = readings_of(predictor.experiment, base)
-    solved, finite = np.isfinite(base), dict[int, bool]()
+    solved, last, finite = np.isfinite(base), None, False
     for s in (get(candidate.kind).signature or signatures_on_a_grid)(PlanProbe(predictor, base), tried):
         shape = tuple(s.values.items())
         if s.period is not None:
             periods, k = s.period
-            if id(periods) not in finite:  # once for all of its frequencies
-                finite[id(periods)] = all(np.isfinite(c[solved]).all() for c in periods.changes)
-            wave = Wave(periods, k, index) if finite[id(periods)] else None
+            if periods is not last:  # once for all of its frequencies
+                last, finite = periods, all(np.isfinite(c[solved]).all() for c in periods.changes)
+            wave = Wave(periods, k, index) if finite else None
             yield _variant(candidate, wave, np.full(2, float(s.grows)), shape, s.start)
         elif s.columns is not None:
             sign = np.full(s.columns.shape[-1], float(s.grows))
