@@ -128,3 +128,19 @@ def test_known_frame_is_found_within_its_uncertainty() -> None:
     assert got[3:] == pytest.approx(turn, abs=2e-5)
     one = predicted(predictor, frame, np.eye(6)[4]) - predictor()
     assert one[:, :3] == pytest.approx(np.cross([0.0, 3e-4, 0.0], e.position))
+
+
+def test_a_set_up_has_its_own_zeros_and_the_numbers_of_all(delta: sm.Machine) -> None:
+    """Rows of each set-up as of a plan of theirs alone, where both values of one number add up."""
+    e = plan(delta)
+    half = np.arange(len(e)) < len(e) // 2
+    e = replace(e, setup=tuple(np.where(half, "a", "b")))
+    p = Predictor(delta, e)
+    shared = next(u for u in unknowns(delta.description, e) if u.group == "zeros")
+    own = replace(shared, setup="a")
+    found = predicted(p, [shared, own], np.array([1.0, 0.5]))
+    for rows, value in ((half, 1.5), (~half, 1.0)):
+        np.testing.assert_allclose(
+            found[rows], predicted(p, [shared], np.array([value]))[rows], rtol=0, atol=1e-12
+        )
+    assert not np.allclose(found[half], predicted(p, [shared], np.array([1.0]))[half], rtol=0, atol=1e-8)
