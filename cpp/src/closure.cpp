@@ -174,6 +174,16 @@ void stop(const Mechanism& m, ClosureWorkspace& ws, VecX& x) {
   ws.renumber = false;
 }
 
+/// From anywhere, in as many steps as it takes: of which configuration the end is then is not known.
+bool all_at_once(const Mechanism& m, const Target& target, const VecX& from, ClosureWorkspace& ws, VecX& x,
+                 ClosureResult& out) {
+  x = from;
+  start(m, ws, x);
+  const bool ok = close(m, target, Pace::damped, ws, x, out.iterations);
+  if (ok) out.flags |= flag::branch_unverified;
+  return ok;
+}
+
 void finish(const Mechanism& m, const Target& target, bool ok, ClosureWorkspace& ws, VecX& x, ClosureResult& out) {
   if (ok && ws.redundant && target.tip && !is_nearest(m, x, target, ws)) out.flags |= flag::branch_unverified;
   const double error = residual(m, x, target, ws);
@@ -205,13 +215,6 @@ ClosureWorkspace::ClosureWorkspace(const Mechanism& m)
       start(VecX::Zero(m.size())),
       wanted(m.home_coordinates) {}
 
-/// Where all else is closed.
-static void wind_up(const Mechanism& m, ClosureWorkspace& ws, VecX& x) {
-  if (m.cables.empty()) return;
-  forward(m, Geometry::nominal, x, ws.frames, &ws.charts);
-  wind(m, ws.frames, x);
-}
-
 ClosureResult inverse_closure(const Mechanism& m, const Pose& pose, ClosureWorkspace& ws, VecX& x) {
   return inverse_closure(m, pose, ws, x, m.home_coordinates, m.home);
 }
@@ -236,15 +239,12 @@ ClosureResult inverse_closure(const Mechanism& m, const Pose& pose, ClosureWorks
     ok = continuation(m, target, [&](double s, VecX&) { way = on_the_way(beside, pose, s); }, ws, x, out);
     if (ok) out.flags |= flag::branch_unverified;
   }
-  if (!ok) {  // the straight way may leave the workspace although its end lies inside
-    x = m.home_coordinates;
-    start(m, ws, x);
-    way = pose;
-    ok = close(m, target, Pace::damped, ws, x, out.iterations);
-    if (ok) out.flags |= flag::branch_unverified;
+  way = pose;  // the straight way may leave the workspace although its end lies inside
+  ok = ok || all_at_once(m, target, m.home_coordinates, ws, x, out);
+  if (!m.cables.empty()) {  // where all else is closed
+    forward(m, Geometry::nominal, x, ws.frames, &ws.charts);
+    wind(m, ws.frames, x);
   }
-  way = pose;
-  wind_up(m, ws, x);
   finish(m, target, ok, ws, x, out);
   return out;
 }
@@ -261,6 +261,29 @@ VecX joints_only(const Mechanism& m, const VecX& given) {
   return x;
 }
 
+/// More drives than freedoms: commands may agree although those on the way to them contradict each other. Looked for to
+/// both sides of the nearest closure, where it yields most (theory C9).
+bool across_fold(const Mechanism& m, ClosureWorkspace& ws, VecX& x, int& iterations) {
+  select_unknowns(m, true, ws);
+  residual(m, m.home_coordinates, Target{}, ws);
+  equations(m, Target{}, ws);
+  ws.qr.compute(ws.A, rank_threshold);
+  const Index freedoms = ws.A.cols() - ws.qr.rank();
+  select_unknowns(m, false, ws);
+  if (static_cast<Index>(m.drives.size()) <= freedoms) return false;
+  close(m, Target{}, Pace::damped, ws, x, iterations);
+  const VecX nearest = x;
+  equations(m, Target{}, ws);
+  const VecX softest = symmetric_eigen(MatX(ws.A.transpose() * ws.A)).vectors.col(0);
+  for (double away = 0.01; std::abs(away) < 1; away *= -1.25) {
+    x = nearest;
+    for (std::size_t k = 0; k < ws.unknown.size(); ++k)
+      x[ws.unknown[k]] += away * m.length / m.unit(ws.unknown[k]) * softest[static_cast<Index>(k)];
+    if (close(m, Target{}, Pace::damped, ws, x, iterations)) return true;
+  }
+  return false;
+}
+
 /// From closed coordinates `x` to given actuators.
 ClosureResult follow_actuators(const Mechanism& m, const VecX& actuators, ClosureWorkspace& ws, VecX& x) {
   ClosureResult out;
@@ -273,7 +296,12 @@ ClosureResult follow_actuators(const Mechanism& m, const VecX& actuators, Closur
       trial[j] = from[j] + s * (actuators[static_cast<Index>(i)] - from[j]);
     }
   };
-  const bool ok = continuation(m, Target{}, set, ws, x, out);
+  bool ok = continuation(m, Target{}, set, ws, x, out);
+  if (!ok) {
+    set(1.0, x);
+    ok = across_fold(m, ws, x, out.iterations);
+    if (ok) out.flags |= flag::branch_unverified;
+  }
   finish(m, Target{}, ok, ws, x, out);
   return out;
 }
@@ -283,14 +311,7 @@ ClosureResult follow_actuators(const Mechanism& m, const VecX& actuators, Closur
 ClosureResult forward_closure(const Mechanism& m, const VecX& actuators, ClosureWorkspace& ws, VecX& x) {
   if (!actuators.allFinite()) return {};
   x = m.home_coordinates;
-  if (!m.loops.empty() || !m.cables.empty()) return follow_actuators(m, actuators, ws, x);
-  ClosureResult out;  // nothing to close: the joints are where the actuators put them
-  for (std::size_t i = 0; i < m.drives.size(); ++i) {
-    const Index j = m.drives[i].coordinate;
-    x[j] += actuators[static_cast<Index>(i)] - x[j];
-  }
-  finish(m, Target{}, true, ws, x, out);
-  return out;
+  return follow_actuators(m, actuators, ws, x);
 }
 
 ClosureResult forward_closure(const Mechanism& m, const VecX& actuators, ClosureWorkspace& ws, VecX& x,
@@ -302,16 +323,13 @@ ClosureResult forward_closure(const Mechanism& m, const VecX& actuators, Closure
   int iterations = 0;
   const bool ok = close(m, Target{}, Pace::damped, ws, x, iterations);
   stop(m, ws, x);
-  if (!ok) return {};
-  return follow_actuators(m, actuators, ws, x);
+  return ok ? follow_actuators(m, actuators, ws, x) : ClosureResult{};
 }
 
 ClosureResult branch_closure(const Mechanism& m, const Pose& pose, ClosureWorkspace& ws, VecX& x, const VecX& from) {
   ClosureResult out;
   if (!pose.p.allFinite() || !pose.R.allFinite() || !from.allFinite()) return out;
-  const VecX given = joints_only(m, from);
-  ws.wanted = given;
-  x = given;
+  x = ws.wanted = joints_only(m, from);
   start(m, ws, x);
   select_unknowns(m, false, ws);
   Pose way;
@@ -322,13 +340,8 @@ ClosureResult branch_closure(const Mechanism& m, const Pose& pose, ClosureWorksp
     const Pose first = ws.frames.at(m.tip);
     ok = continuation(m, target, [&](double s, VecX&) { way = on_the_way(first, pose, s); }, ws, x, out);
   }
-  way = pose;
-  if (!ok) {  // actuators and the others may belong to different configurations: all move at once
-    x = given;
-    start(m, ws, x);
-    ok = close(m, target, Pace::damped, ws, x, out.iterations);
-    if (ok) out.flags |= flag::branch_unverified;
-  }
+  way = pose;  // actuators and the others may belong to different configurations: all move at once
+  ok = ok || all_at_once(m, target, ws.wanted, ws, x, out);
   finish(m, target, ok, ws, x, out);
   return out;
 }

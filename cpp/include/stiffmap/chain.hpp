@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "stiffmap/command_error.hpp"
-#include "stiffmap/drive_numbers.hpp"
 #include "stiffmap/law.hpp"
 #include "stiffmap/se3.hpp"
 #include "stiffmap/spring.hpp"
@@ -36,6 +35,22 @@ enum class BallChart : std::uint8_t {
   none,   ///< no ball joint
   free,   ///< any three axes would do: no force, friction or limit refers to these
   meant,  ///< laws, friction or limits about these axes
+};
+
+/// Numbers of a drive, declared once: bindings, chains and mechanism hold them as they stand here.
+struct DriveNumbers {
+  double compliance_slope = 0;  ///< relative change of the drive's compliance per unit of travel from home
+  double force_limit = 1e300;
+};
+
+/// Every one by its name, as Python gives it.
+struct DriveNumber {
+  const char* name;
+  double DriveNumbers::* value;
+};
+inline constexpr DriveNumber drive_numbers[] = {
+    {"compliance_slope", &DriveNumbers::compliance_slope},
+    {"force_limit", &DriveNumbers::force_limit},
 };
 
 /// One-axis joint. Actuated: `law` is the drive's compliance (none: rigid).

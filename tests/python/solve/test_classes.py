@@ -93,10 +93,26 @@ PAST_A_FORK = (
         20025,  # rigid
         *OF_THE_ORACLE,
         *PAST_A_FORK,
+        107557,  # commands of too many drives agree, those on the way to them do not
+        402753,
+        701389,
     ],
 )
 def test_seeds_that_once_disagreed(seed: int) -> None:
     assert not judge(seed)["wrong"]
+
+
+@pytest.mark.parametrize("seed", [751, 1240, 1581, 4389, 8729, 14046])
+def test_commands_that_agree_are_reached_past_those_that_do_not(seed: int) -> None:
+    task = Classes(seed).over_actuated()
+    machine = sm.Machine(task.description)
+    commands = sm.inverse_kinematics(machine, task.pose.p, task.pose.r).actuators
+    found = sm.forward_kinematics(machine, commands)
+    assert found.status == sm.Status.CONVERGED and found.flags & sm.Flag.BRANCH_UNVERIFIED
+    np.testing.assert_allclose(found.position, task.pose.p, atol=1e-12)
+    np.testing.assert_allclose(found.rotation, task.pose.r, atol=1e-12)
+    apart = sm.forward_kinematics(machine, commands + [1e-3, *np.zeros(len(commands) - 1)])
+    assert apart.status == sm.Status.UNREACHABLE and np.isnan(apart.position).all()
 
 
 def test_a_fork_next_to_a_corner_is_not_passed_in_one_step() -> None:
