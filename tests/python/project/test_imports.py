@@ -29,7 +29,7 @@ INNER = {
     ),
     "identification.inference": (
         "constants",
-        ("kernels", "places", "optimum"),
+        ("free", "kernels", "places", "optimum"),
         ("travel", "covariance"),
         "columns",
         "amplitudes",

@@ -132,11 +132,6 @@ def basis(columns: Floats, tolerance: float = 1e-9) -> Floats:
     return np.asarray(u[:, s > tolerance])
 
 
-def complement(columns: Floats) -> Floats:
-    """(N, N - p) orthonormal directions across orthonormal columns (N, p)."""
-    return np.asarray(np.linalg.qr(columns, mode="complete")[0][:, columns.shape[1] :])
-
-
 def _blocks(
     experiment: Experiment, sigma: Floats, index: tuple[NDArray[np.intp], NDArray[np.intp]]
 ) -> tuple[tuple[NDArray[np.intp], Floats], ...]:

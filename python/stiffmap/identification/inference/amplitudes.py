@@ -13,13 +13,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 
 import numpy as np
 from numpy.linalg import LinAlgError
 from scipy.linalg import cho_solve, cholesky, solve_triangular
 from scipy.linalg.blas import dsyrk
-from scipy.linalg.lapack import dpotri, dtrtri
+from scipy.linalg.lapack import dpotri
 from scipy.special import gammaln
 
 from stiffmap.experiment.experiment import Floats
@@ -130,10 +129,9 @@ class Fit:
         """(m, ...) L⁻¹ values."""
         return np.asarray(solve_triangular(self.root, values, lower=True, check_finite=False))
 
-    @cached_property
-    def of_readings(self) -> Floats:
-        """(N,) diagonal of B V⁻¹ Bᵀ: information of each reading."""
-        return np.asarray(np.sum(self.white(self.columns.free.T) ** 2, axis=0))
+    def inverse(self) -> Floats:
+        """(m, m) V⁻¹, its lower half; zero above the diagonal."""
+        return np.asarray(dpotri(self.root, lower=1)[0])
 
     def without(self, names: Sequence[str], noise: float | None = None) -> Fit:
         """The same with some parts taken away, nothing fitted anew; `noise`: κ of the result."""
@@ -225,19 +223,18 @@ def noise_prior(columns: Columns) -> tuple[float, float]:
     return float(np.log(squares / freedom)), 2.0 / float(np.sqrt(2.0 * freedom))
 
 
-def noise_part(f: Fit) -> tuple[Floats, Floats]:
-    """(N,) posterior mean and standard deviation of the noise of each reading."""
+def noise_part(f: Fit, inverse: Floats | None = None) -> tuple[Floats, Floats]:
+    """(N,) posterior mean and standard deviation of the noise of each reading; `inverse`: that of the fit, where it is known."""
     c = f.columns
     variance = f.noise**2 / f.weights
+    information = c.spared.at_readings(f.inverse() if inverse is None else inverse)
     back = c.free @ f.solved
-    return variance * back, np.sqrt(np.maximum(variance - variance**2 * f.of_readings, 0.0))
+    return variance * back, np.sqrt(np.maximum(variance - variance**2 * information, 0.0))
 
 
 def _noise_matrix(columns: Columns, weights: Floats) -> Floats:
-    """(m, m) lower half of N(w)."""
-    if np.all(weights == 1.0):
-        return np.eye(len(columns), order="F")
-    return np.asarray(dsyrk(1.0, (columns.free / np.sqrt(weights)[:, None]).T, lower=1))
+    """(m, m) N(w)."""
+    return columns.spared.of_noise(1.0 / weights)
 
 
 def _evaluate(
@@ -274,23 +271,18 @@ def _on(parts: tuple[Part, ...], t: Floats) -> dict[int, Part]:
     return {k: p for k, p in enumerate(parts, 1) if t[k] > OFF}
 
 
-def _gradient(fit: Fit, along: Floats) -> Floats:
+def _gradient(fit: Fit, along: Floats, inverse: Floats) -> Floats:
     """(1 + k,) slope of the score, priced without."""
     trace, on = np.zeros(len(fit.t)), _on(fit.parts, fit.t)
     short = {k: p.factor for k, p in on.items() if p.factor is not None}
-    full = {k: p.full for k, p in on.items() if p.full is not None}
     if short:
         squares = np.sum(fit.white(np.hstack(list(short.values()))) ** 2, axis=0)
         ends = np.cumsum([f.shape[1] for f in short.values()])
         trace[list(short)] = [x.sum() for x in np.split(squares, ends[:-1])]
-    if full:
-        inverse = dpotri(fit.root, lower=1)[0]  # below the diagonal; above it zero, as the root is
-        for k, matrix in full.items():
-            trace[k] = 2.0 * np.vdot(inverse.T, matrix) - np.diag(inverse) @ np.diag(matrix)
-    if np.any(fit.weights != 1.0):
-        trace[0] = np.sum(fit.of_readings / fit.weights)
-    else:
-        trace[0] = np.trace(inverse) if full else np.sum(dtrtri(fit.root, lower=1)[0] ** 2)
+    for k, p in on.items():
+        if p.full is not None:
+            trace[k] = 2.0 * np.vdot(inverse.T, p.full) - np.diag(inverse) @ np.diag(p.full)
+    trace[0] = np.sum(fit.columns.spared.at_readings(inverse) / fit.weights)
     centre, sd = _prior(fit.columns, fit.parts)
     slope = along.T @ fit.solved - np.exp(fit.t) * trace
     return np.asarray(0.5 * slope - (fit.t - centre) / sd**2)
@@ -392,9 +384,10 @@ def _optimum(
     gradient, information = None, _information(fit, along)
     for _ in range(WEIGHINGS if heavy else STEPS):
         if gradient is None:
-            gradient = _gradient(fit, along)
+            inverse = fit.inverse()
+            gradient = _gradient(fit, along, inverse)
             if heavy:
-                weights = _heavy(fit, *noise_part(fit))
+                weights = _heavy(fit, *noise_part(fit, inverse))
                 noise = _noise_matrix(columns, weights)
         scale = np.maximum(np.diag(information), 1e-2)
         step = np.linalg.solve(information + damping * np.diag(scale), gradient)

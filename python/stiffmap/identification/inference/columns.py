@@ -18,11 +18,12 @@ from stiffmap.experiment.experiment import Experiment, Floats, Integers
 from stiffmap.experiment.noise.nuisance import nuisance_columns
 from stiffmap.experiment.noise.outliers import GROSS, MANY
 from stiffmap.experiment.noise.robust import fitted
-from stiffmap.experiment.noise.whitening import basis, complement, readings_of
+from stiffmap.experiment.noise.whitening import basis, readings_of
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.identification.candidates.plan import Plan
 from stiffmap.identification.candidates.sensitivity import Variant
 from stiffmap.identification.inference.constants import STANDS_OUT
+from stiffmap.identification.inference.free import Free
 from stiffmap.identification.inference.kernels import Kernel, Points, gaps
 from stiffmap.identification.inference.places import NULL, Place, places
 from stiffmap.identification.inference.travel import drives_of
@@ -46,8 +47,8 @@ class Columns:
     """(N,) channel of each reading."""
     sigma: Floats
     """(N,) m, rad: declared standard deviation of each reading."""
-    free: Floats
-    """(N, m) orthonormal directions that averaging over repeats and unknown frames, tools and zeros leave."""
+    spared: Free
+    """Directions that averaging over repeats and unknown frames, tools and zeros leave."""
     frames: Floats
     """(N, q) orthonormal directions of unknown frames, tools and zeros."""
     residual: Floats
@@ -68,6 +69,11 @@ class Columns:
     repeats: tuple[float, float]
     """Sum of squares within repeats that were averaged, in noise, and its degrees of freedom."""
 
+    @property
+    def free(self) -> Floats:
+        """(N, m) orthonormal."""
+        return self.spared.matrix
+
     def scale_of(self, kernel: Kernel) -> float:
         """Variance of a kernel in a part of mean variance one."""
         points = Points(self.rows, self.channel, self.sigma)
@@ -75,9 +81,9 @@ class Columns:
         return len(self) / size if size > 0.0 else 0.0
 
     @staticmethod
-    def bare(e: Experiment, rows: Integers, channel: Integers, free: Floats, residual: Floats) -> Columns:
-        """Of N readings in noise and a residual (m,) in what is free of them, (N, m): without numbers, gaps and effects."""
-        n, m = free.shape
+    def bare(e: Experiment, rows: Integers, channel: Integers, spared: Free, residual: Floats) -> Columns:
+        """Of N readings in noise and a residual (m,) in what is free of them: without numbers, gaps and effects."""
+        n, m = spared.matrix.shape
         zero, none = np.zeros((m, m)), np.zeros((m, 0))
         empty = np.zeros((n, 0))
         return Columns(
@@ -85,7 +91,7 @@ class Columns:
             rows,
             channel,
             np.ones(n),
-            free,
+            spared,
             empty,
             residual,
             zero,
@@ -156,7 +162,8 @@ def columns(
     mean = _averages(e, rows, channel, noise, raw)
     frames = mean.T @ (nuisance_columns(e, base)[index] / noise[:, None])
     q = basis(frames) if frames.shape[1] else frames
-    free = mean @ complement(q) if q.shape[1] else mean
+    spared = Free.across(q, mean)
+    free = spared.matrix
     within = raw - mean @ (mean.T @ raw)
     s = zeros_anew(sensitivity(predictor, unknowns), e)
     numbers = free.T @ (s.columns[index] / noise[:, None])
@@ -171,7 +178,7 @@ def columns(
         rows,
         channel,
         noise,
-        free,
+        spared,
         mean @ q,
         free.T @ raw,
         _square(free.T @ zeros(e, points)),

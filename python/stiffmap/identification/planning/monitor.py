@@ -13,9 +13,10 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.common.number_text import with_uncertainty, within
 from stiffmap.common.short import short_repr
 from stiffmap.experiment.experiment import Experiment
-from stiffmap.experiment.noise.whitening import basis, complement, readings_of
+from stiffmap.experiment.noise.whitening import basis, readings_of
 from stiffmap.identification.inference.amplitudes import Fit, Part, fitted
 from stiffmap.identification.inference.columns import Columns, drawn
+from stiffmap.identification.inference.free import Free
 from stiffmap.identification.inference.kernels import Points, gaps
 from stiffmap.identification.planning.design import joined
 from stiffmap.identification.planning.estimate import Estimate, estimate
@@ -144,7 +145,8 @@ def _gaps(
     channel = np.concatenate([read[0][1], read[1][1]])
     white = block_diag(*(x.problem.white_lines(np.eye(len(r[0]))) for x, r in zip((a, b), read, strict=True)))
     frames = block_diag(a.problem.nuisance, b.problem.nuisance)
-    free = complement(basis(np.hstack([frames, numbers])))
+    spared = Free.across(basis(np.hstack([frames, numbers])), np.eye(len(frames)))
+    free = spared.matrix
     kernels, parts = {}, []
     points = Points(rows, channel, np.ones(len(rows)))
     for kernel in gaps(machine, e, points):
@@ -153,7 +155,7 @@ def _gaps(
         if size > 0.0:
             kernels[kernel.name] = shown / size
             parts.append(Part(kernel.name, kernel.kind, full=free.T @ kernels[kernel.name] @ free))
-    columns = Columns.bare(e, rows, channel, free, free.T @ residual)
+    columns = Columns.bare(e, rows, channel, spared, free.T @ residual)
     return fitted(columns, parts), kernels
 
 

@@ -8,13 +8,14 @@ import numpy as np
 
 from stiffmap.identification.inference.amplitudes import Part
 from stiffmap.identification.inference.columns import Columns
+from stiffmap.identification.inference.free import Free
 
 READINGS, FREE = 40, 3
 
 
 def columns(rng: np.random.Generator, residual: np.ndarray | None = None, repeats: float = 0.0) -> Columns:
     """40 readings of which three directions are unknown frames."""
-    free = np.linalg.qr(rng.normal(size=(READINGS, READINGS)))[0][:, FREE:]
+    taken = np.linalg.qr(rng.normal(size=(READINGS, READINGS)))[0][:, :FREE]
     m = READINGS - FREE
     zero = rng.normal(size=(m, 2))
     none: Any = None
@@ -23,7 +24,7 @@ def columns(rng: np.random.Generator, residual: np.ndarray | None = None, repeat
         rows=np.arange(READINGS),
         channel=np.zeros(READINGS, dtype=np.intp),
         sigma=np.ones(READINGS),
-        free=free,
+        spared=Free.across(taken, np.eye(READINGS)),
         frames=np.zeros((READINGS, 0)),
         residual=rng.normal(size=m) * 2.0 if residual is None else residual,
         zero=0.1 * zero @ zero.T,
