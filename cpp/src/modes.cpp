@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "stiffmap/stability.hpp"
+
 namespace stiffmap {
 namespace {
 
@@ -18,42 +20,6 @@ struct Reduced {
   MatX K, S, M;       ///< tangent, its symmetric part, mass
   Cholesky cholesky;  ///< of S
 };
-
-/// Columns: motions that springs, laws and joints allow before the loops are closed, as lengths.
-MatX allowed(const Mechanism& m, const Linearization& lin) {
-  const Index n = m.size();
-  MatX out = MatX::Zero(n, n);
-  Index used = 0;
-  std::vector<bool> done(at(n), false);
-  for (const SpringGroup& g : m.groups) {
-    if (!g.matrix.rotated) continue;
-    for (int i = 0; i < 6; ++i) {
-      done[at(g.first + i)] = true;
-      if (g.matrix.rigid[i]) continue;
-      out.col(used++).segment<6>(g.first) = g.matrix.basis.col(i);
-    }
-  }
-  for (Index j = 0; j < n; ++j)
-    if (!done[at(j)] && lin.kind[at(j)] != Kind::fixed) out(j, used++) = 1 / m.unit(j);
-  return out.leftCols(used);
-}
-
-/// Of those, the motions that keep every loop closed.
-MatX closed_motions(const Mechanism& m, const Linearization& lin) {
-  const MatX P = allowed(m, lin);
-  if (m.closures() == 0) return P;
-  MatX C = lin.J * P;
-  scale_angles(m, C);
-  return P * left_null_vectors(C.transpose(), rank_threshold);
-}
-
-/// Stiffness of springs and laws alone, in coordinates: the tangent without the loads.
-MatX springs_only(const Mechanism& m, const Linearization& lin) {
-  MatX out = lin.K;
-  for (Index j = 0; j < m.size(); ++j)
-    if (m.coordinates[at(j)].law >= 0 && lin.da[j] != 0) out(j, j) += lin.dtau[j] / lin.da[j];
-  return out;
-}
 
 /// False where there is no equilibrium, or none that a small motion comes back to.
 bool reduced_pose(const Mechanism& m, const Inertias& inertias, const PoseInput& in, SolveWorkspace& ws, Reduced& out,
@@ -69,7 +35,7 @@ bool reduced_pose(const Mechanism& m, const Inertias& inertias, const PoseInput&
   const Linearization& lin = ws.equilibrium.lin;
   found.x = lin.x;
   out.Z = closed_motions(m, lin);
-  out.K = out.Z.transpose() * (springs_only(m, lin) - lin.H) * out.Z;
+  out.K = reduced_tangent(m, lin, out.Z);
   out.M = out.Z.transpose() * coordinate_mass(m, inertias, lin.frames) * out.Z;
   out.S = 0.5 * (out.K + out.K.transpose());
   if (out.K.rows() == 0) return true;

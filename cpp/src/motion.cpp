@@ -94,28 +94,6 @@ double LoopRates::fill_normal() {
   return smallest;
 }
 
-/// A x, over the columns that each loop has.
-MatX LoopRates::product(const MatX& x) const {
-  MatX out = MatX::Zero(A_.rows(), x.cols());
-  for (std::size_t l = 0; l < columns_.size(); ++l) {
-    const Index row = 6 * static_cast<Index>(l);
-    for (Index k : columns_[l])
-      for (Index c = 0; c < x.cols(); ++c) out.col(c).segment<6>(row) += x(k, c) * A_.col(k).segment<6>(row);
-  }
-  return out;
-}
-
-/// A' e.
-MatX LoopRates::transposed_product(const MatX& e) const {
-  MatX out = MatX::Zero(A_.cols(), e.cols());
-  for (std::size_t l = 0; l < columns_.size(); ++l) {
-    const Index row = 6 * static_cast<Index>(l);
-    for (Index k : columns_[l])
-      for (Index c = 0; c < e.cols(); ++c) out(k, c) += A_.col(k).segment<6>(row).dot(e.col(c).segment<6>(row));
-  }
-  return out;
-}
-
 /// Least squares; one correction with the residual makes up for the squared condition of the normal matrix.
 MatX LoopRates::solve_scaled(const MatX& e) const {
   MatX x, correction;
@@ -123,8 +101,8 @@ MatX LoopRates::solve_scaled(const MatX& e) const {
     orthogonal_.solve(e, x);
     return x;
   }
-  cholesky_.solve(transposed_product(e), x);
-  cholesky_.solve(transposed_product(e - product(x)), correction);
+  cholesky_.solve(A_.transpose().lazyProduct(e), x);
+  cholesky_.solve(A_.transpose().lazyProduct(e - A_.lazyProduct(x)), correction);
   x += correction;
   return x;
 }
@@ -137,12 +115,12 @@ void LoopRates::solve(const Mechanism& m, const MatX& e, Eigen::Ref<MatX> out) c
   MatX x = MatX::Zero(A_.cols(), e.cols()), left = scaled;
   if (!passive_.empty()) {
     x = solve_scaled(scaled);
-    left -= product(x);
+    left -= A_.lazyProduct(x);
   }
   if (!m.drives.empty() && left.norm() > not_together * scaled.norm()) {  // drives that go together move along
     const MatX B = driven(m);
     MatX open = B, y;
-    if (!passive_.empty()) open += product(solve_scaled(-B));
+    if (!passive_.empty()) open += A_ * solve_scaled(-B);
     Orthogonal rates;
     rates.compute(open, not_together);
     rates.solve(left, y);
@@ -204,7 +182,7 @@ void LoopRates::motion(const Mechanism& m, const Frames& frames, Motion& out, co
     share(m, B, weights, out);
   } else {
     MatX x = solve_scaled(-B);
-    share(m, B + product(x), weights, out);
+    share(m, B + A_ * x, weights, out);
     for (Index d = 0; d < drives; ++d) x.col(d) *= m.unit(m.drives[at(d)].coordinate);
     for (std::size_t k = 0; k < passive_.size(); ++k)
       out.rates.row(passive_[k]) = x.row(static_cast<Index>(k)) / m.unit(passive_[k]) * out.sharing;

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "stiffmap/pull.hpp"
+#include "stiffmap/stability.hpp"
 #include "unloaded.hpp"
 
 namespace stiffmap {
@@ -278,7 +279,7 @@ void conclude_pose(const Mechanism& m, const PoseInput& in, const EquilibriumRes
   const bool nonconservative = ws.problem.is_nonconservative();
   if (nonconservative) out.flags |= flag::nonconservative;
   // No falling direction is enough under any load; a moment may leave some without harm.
-  if (eq.falling > 0 && (!nonconservative || eq.sign_changes > 0)) out.status = Status::unstable;
+  if (eq.falling > 0 && (!nonconservative || eq.sign_changes > 0 || grows(m, done.lin))) out.status = Status::unstable;
   if (out.point.free > 0 && out.status == Status::converged) {
     out.status = Status::singular;
     bool gap = false;

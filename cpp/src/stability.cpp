@@ -5,8 +5,52 @@ namespace stiffmap {
 namespace {
 
 constexpr double tangent_round_off = 1e-11;  // of the scaled tangent
+constexpr double negligible = 1e-9;          // of the eigenvalues of a reduced tangent
+
+/// Columns: motions that springs, laws and joints allow before the loops are closed, as lengths.
+MatX allowed(const Mechanism& m, const Linearization& lin) {
+  const Index n = m.size();
+  MatX out = MatX::Zero(n, n);
+  Index used = 0;
+  std::vector<bool> done(at(n), false);
+  for (const SpringGroup& g : m.groups) {
+    if (!g.matrix.rotated) continue;
+    for (int i = 0; i < 6; ++i) {
+      done[at(g.first + i)] = true;
+      if (g.matrix.rigid[i]) continue;
+      out.col(used++).segment<6>(g.first) = g.matrix.basis.col(i);
+    }
+  }
+  for (Index j = 0; j < n; ++j)
+    if (!done[at(j)] && lin.kind[at(j)] != Kind::fixed) out(j, used++) = 1 / m.unit(j);
+  return out.leftCols(used);
+}
 
 }  // namespace
+
+MatX closed_motions(const Mechanism& m, const Linearization& lin) {
+  const MatX P = allowed(m, lin);
+  if (m.closures() == 0) return P;
+  MatX C = lin.J * P;
+  scale_angles(m, C);
+  return P * left_null_vectors(C.transpose(), rank_threshold);
+}
+
+MatX springs_only(const Mechanism& m, const Linearization& lin) {
+  MatX out = lin.K;
+  for (Index j = 0; j < m.size(); ++j)
+    if (m.coordinates[at(j)].law >= 0 && lin.da[j] != 0) out(j, j) += lin.dtau[j] / lin.da[j];
+  return out;
+}
+
+MatX reduced_tangent(const Mechanism& m, const Linearization& lin, const MatX& Z) {
+  return Z.transpose() * (springs_only(m, lin) - lin.H) * Z;
+}
+
+bool grows(const Mechanism& m, const Linearization& lin) {
+  const VecX real = general_eigen(reduced_tangent(m, lin, closed_motions(m, lin))).values.real();
+  return real.minCoeff() < -negligible * real.maxCoeff();
+}
 
 /// Elastic coordinates first, where they are stable by themselves: what is left has their signs taken out
 /// (Haynsworth). False where they are not, or nearly not.

@@ -168,8 +168,8 @@ class Oracle:
         if not self._hold_what_spins():
             return nothing("singular")
         start = self._newton(np.zeros(self.size), np.zeros(self.closures), 0.0, ITERATIONS)
-        if start is None:
-            return nothing("ends")
+        if start is None:  # no path has begun that could end
+            return nothing("given up")
         at, done, share, crossed = self._point(*start, 0.0), 0.0, 1.0, False
         for _ in range(MOST):
             if done == 1:

@@ -42,8 +42,6 @@ class LoopRates {
  private:
   MatX driven(const Mechanism& m) const;
   MatX solve_scaled(const MatX& e) const;
-  MatX product(const MatX& x) const;
-  MatX transposed_product(const MatX& e) const;
   double fill_normal();
   void share(const Mechanism& m, const MatX& open, const VecX& weights, Motion& out) const;
 

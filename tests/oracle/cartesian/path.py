@@ -30,8 +30,7 @@ class Point:
     slope: Array
     """Motion (6 n,) per share of the load."""
     falling: int
-    """Negative eigenvalues over the closed motions; of a moment that is not conservative: 1 where the determinant has
-    changed its sign."""
+    """Negative eigenvalues over the closed motions; of a moment that is not conservative see `Path.falling`."""
 
 
 @dataclass
@@ -87,13 +86,20 @@ class Path:
         return x[:n], scale * x[n : n + m]
 
     def falling(self, t: Tangent) -> int:
+        """Falling directions; without a potential one where the determinant says so, else those of the energy's Hessian where some
+        motion in a medium that damps all alike grows."""
         a, _ = self.matrix(t)
-        if self.conservative:
-            return max(0, negative(a) - (len(a) - len(t.slope)))
-        lu, piv, _ = lapack.dgetrf(a)
         n = len(t.slope)
+        down = max(0, negative(a) - (len(a) - n))
+        if self.conservative or not down:
+            return down
+        lu, piv, _ = lapack.dgetrf(a)
         sign = np.sign(np.diag(lu)).prod() * (-1) ** int((piv != np.arange(len(piv))).sum())
-        return int(sign * (-1) ** (len(a) - n) < 0)
+        if sign * (-1) ** (len(a) - n) < 0:
+            return 1
+        z = closed(a[n:, :n])
+        growth = np.linalg.eigvals(z.T @ a[:n, :n] @ z).real
+        return down if growth.min() < -1e-9 * growth.max() else 0
 
     def tangent(self, at: State, multipliers: Array, near: Array, share: float) -> Tangent:
         t = self.system.at_state(at, multipliers, near, share)
@@ -212,11 +218,7 @@ class Path:
             return np.nan, 0
         t = found[3]
         step, _ = self.solve(t, -(t.slope + t.load), t.gap)
-        falling = self.falling(t)
-        if not self.conservative and not falling:
-            a, _ = self.matrix(t)
-            falling = -1 if negative(a) - (len(a) - len(t.slope)) > 1 else 0
-        return float(np.abs(step[6 * i : 6 * i + 6]).max()), falling
+        return float(np.abs(step[6 * i : 6 * i + 6]).max()), self.falling(t)
 
     def step(self, at: Point, done: float, share: float) -> Point | None:
         guess = at.state.moved(share * at.slope)

@@ -93,6 +93,8 @@ PAST_A_FORK = (
         20025,  # rigid
         *OF_THE_ORACLE,
         *PAST_A_FORK,
+        704982,  # two falling directions beside a moment, which the determinant does not show
+        705672,  # far from its commands without any load
         107557,  # commands of too many drives agree, those on the way to them do not
         402753,
         701389,
@@ -113,6 +115,17 @@ def test_commands_that_agree_are_reached_past_those_that_do_not(seed: int) -> No
     np.testing.assert_allclose(found.rotation, task.pose.r, atol=1e-12)
     apart = sm.forward_kinematics(machine, commands + [1e-3, *np.zeros(len(commands) - 1)])
     assert apart.status == sm.Status.UNREACHABLE and np.isnan(apart.position).all()
+
+
+@pytest.mark.parametrize("method", ["fast", "reference"])
+def test_a_moment_however_small_does_not_hold_what_falls(method: str) -> None:
+    """Leaves that a payload buckles in two directions; a dead moment has no potential, and the determinant is as in a minimum."""
+    task, _ = with_one_effect(Classes(704982).task(), np.random.default_rng((704982, 2)))
+    machine = sm.Machine(task.description)
+    for share in (0.0, 1e-9, 1e-3, 1.0):
+        wrench = share * np.array([*task.loads.force, *task.loads.moment])
+        s = machine.solve(task.pose.p, wrench, rotation=task.pose.r, gravity=(0, 0, 0), method=method)
+        assert s.status == sm.Status.UNSTABLE, share
 
 
 def test_a_fork_next_to_a_corner_is_not_passed_in_one_step() -> None:
