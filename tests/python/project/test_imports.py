@@ -34,6 +34,7 @@ INNER = {
         "columns",
         "amplitudes",
         "candidates",
+        "chosen",
         ("names", "shares"),
         ("verdict", "readings"),
         "corrected",

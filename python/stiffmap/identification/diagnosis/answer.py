@@ -25,6 +25,7 @@ from stiffmap.identification.diagnosis.report.findings import Effect, NoiseRepor
 from stiffmap.identification.diagnosis.report.result import Diagnosis
 from stiffmap.identification.diagnosis.report.separation import separation
 from stiffmap.identification.inference.amplitudes import GAPS, Fit
+from stiffmap.identification.inference.chosen import Chosen
 from stiffmap.identification.inference.columns import Columns
 from stiffmap.identification.inference.constants import RARE
 from stiffmap.identification.inference.corrected import Corrected, Term, corrected
@@ -38,7 +39,7 @@ from stiffmap.identification.inference.machines import (
     vouched,
     written,
 )
-from stiffmap.identification.inference.names import Chosen, put_instead
+from stiffmap.identification.inference.names import put_instead
 from stiffmap.identification.inference.places import Place
 from stiffmap.identification.inference.readings import Readings, readings
 from stiffmap.identification.inference.shares import gap_of, of_numbers, shares

@@ -15,8 +15,9 @@ from stiffmap.experiment.noise.outliers import without_suspects
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.identification.candidates.plan import Plan, plan_of
 from stiffmap.identification.clock import Clock
+from stiffmap.identification.inference.chosen import Chosen
 from stiffmap.identification.inference.columns import Columns, columns
-from stiffmap.identification.inference.names import Chosen, Search, searched
+from stiffmap.identification.inference.names import Search, searched
 from stiffmap.identification.numbers.certificate import certified
 from stiffmap.identification.numbers.tolerances import Tolerances
 from stiffmap.identification.numbers.unknowns import Unknown, unknowns

@@ -15,7 +15,6 @@ from scipy.optimize import least_squares
 
 from stiffmap.experiment.experiment import Floats
 from stiffmap.identification.candidates.candidates import clash
-from stiffmap.identification.candidates.sensitivity import Variant
 from stiffmap.identification.inference.amplitudes import (
     NOISE,
     Fit,
@@ -29,10 +28,10 @@ from stiffmap.identification.inference.amplitudes import (
     spectrum,
 )
 from stiffmap.identification.inference.candidates import evidence, of_pairs
+from stiffmap.identification.inference.chosen import Chosen, all_moved
 from stiffmap.identification.inference.columns import Columns
 from stiffmap.identification.inference.constants import MOST_EFFECTS, ODDS, REFITS, SIZES
-from stiffmap.identification.inference.places import Place, possible
-from stiffmap.model.effects import Parameter
+from stiffmap.identification.inference.places import Place
 
 EXACT = "exact"
 QUIET = -6.0
@@ -55,52 +54,8 @@ AT_MOST, FAR = 25, 1e6
 """Steps to the optimum of effects that bend; the misfit of a machine that fails."""
 Bound = tuple[float, Place, Fit]
 """Evidence with a place, from below, and the amplitudes that give it."""
-Predict = Callable[[Sequence["Chosen"]], Floats]
+Predict = Callable[[Sequence[Chosen]], Floats]
 """(m,) what effects of given strengths add to the readings, by the machine itself; NaN where it fails."""
-
-
-@dataclass(frozen=True, eq=False)
-class Chosen:
-    """A place that is in the model, at one of its shapes."""
-
-    place: Place
-    shape: int
-    part: Part
-    values: Floats
-    """(p,) strengths, in the scales of the linear parameters."""
-    refined: tuple[tuple[str, float], ...] = ()
-    """Values (SI) of parameters of the shape, where an optimum has others than the grid."""
-
-    @staticmethod
-    def at(place: Place, shape: int) -> Chosen:
-        """At one of the shapes, of no strength yet."""
-        part = Part(str(place.candidate), "effect", factor=place.shapes[shape].factor)
-        return Chosen(place, shape, part, np.zeros(0))
-
-    @property
-    def variant(self) -> Variant:
-        """Its columns."""
-        return self.place.shapes[self.shape].variant
-
-    @property
-    def shaped(self) -> tuple[tuple[Parameter, float], ...]:
-        """Parameters of the shape with their values on the grid, SI."""
-        given = dict(self.variant.shape)
-        return tuple((p, given[p.name]) for p in self.place.candidate.shape if p.name in given)
-
-    @property
-    def strengths(self) -> tuple[tuple[Parameter, float], ...]:
-        """Linear parameters with their values, SI; nothing where the strengths are not theirs."""
-        linear = self.place.candidate.linear
-        if len(linear) != len(self.values):
-            return ()
-        return tuple(
-            (p, float(p.null or 0.0) + float(v) * p.scale) for p, v in zip(linear, self.values, strict=True)
-        )
-
-    def lines(self, columns: Columns) -> Floats:
-        """(N, p) m, rad: its columns, per scale of each linear parameter."""
-        return columns.lines(self.variant)
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,7 +120,7 @@ def put_instead(fit: Fit, c: Chosen, place: Place) -> Chosen:
     bare = Chosen.at(place, _best_shape(anchor, place))
     t = np.append(anchor.t, _size(anchor, bare.part))
     found = evaluated(anchor.columns, (*anchor.parts, bare.part), t, anchor.weights)
-    return replace(bare, values=_values(found, bare))
+    return bare.by_posterior(found)
 
 
 def _without(c: Chosen, best: Search, others: Sequence[_World], found: Mapping[str, Search]) -> Model | None:
@@ -288,13 +243,13 @@ class _World:
         fit = fitted(columns, parts, start, weights)
         if self.predict and chosen:
             fit, chosen = self._corrected(fit, chosen)
-        chosen = tuple(c if len(c.values) else replace(c, values=_values(fit, c)) for c in chosen)
+        chosen = tuple(c if len(c.values) else c.by_posterior(fit) for c in chosen)
         shapes = 0.0
         for c in chosen:
             if len(c.place.shapes) > 1:
                 each = evidence(fit.without([c.part.name]), (c.place,))[0]
                 shapes += float(log_mean(each) - each[c.shape])
-        possible = all(map(is_possible, chosen))
+        possible = all(c.is_possible for c in chosen)
         return Model(self.name, chosen, fit, fit.score + shapes if possible else -np.inf)
 
     def _corrected(self, fit: Fit, chosen: tuple[Chosen, ...]) -> tuple[Fit, tuple[Chosen, ...]]:
@@ -303,7 +258,7 @@ class _World:
         assert self.predict
         now, shown = fit, None
         for _ in range(CORRECTIONS + 1):
-            at = tuple(replace(c, values=_values(now, c)) for c in chosen)
+            at = tuple(c.by_posterior(now) for c in chosen)
             line = self._line(at)
             if shown is not None and _near(line, shown):
                 return now, chosen
@@ -325,7 +280,7 @@ class _World:
         shown = self.predict(at)
         if not np.isfinite(shown).all():
             return None
-        lines = np.hstack([_columns(self.columns, c) for c in at])
+        lines = np.hstack([c.rotated(self.columns) for c in at])
         return self._less(shown - lines @ np.linalg.lstsq(lines, shown, rcond=1e-9)[0], fit), at
 
     def _refined(self, model: Model) -> Model:
@@ -337,12 +292,12 @@ class _World:
             return model
         fit, at = found
         gain = fit.score - model.fit.score
-        if gain <= PROGRESS or not all(map(is_possible, at)):
+        if gain <= PROGRESS or not all(c.is_possible for c in at):
             return model
         return replace(model, chosen=at, fit=fit, score=model.score + gain)
 
     def _line(self, chosen: Sequence[Chosen]) -> Floats:
-        return np.asarray(np.sum([_columns(self.columns, c) @ c.values for c in chosen], axis=0))
+        return np.asarray(np.sum([c.rotated(self.columns) @ c.values for c in chosen], axis=0))
 
     def _less(self, missed: Floats, fit: Fit) -> Fit:
         """The fit on a residual less something."""
@@ -354,19 +309,19 @@ class _World:
         predict, key = self.predict, tuple((id(c.place), c.shape) for c in chosen)
         if key not in self.optima:
             rest = fit.without([c.part.name for c in chosen])
-            begin = np.concatenate([_whole(replace(c, values=_values(fit, c))) for c in chosen])
-            low, high = (np.concatenate([_limits(c)[k] for c in chosen]) for k in (0, 1))
+            begin = np.concatenate([c.by_posterior(fit).whole for c in chosen])
+            low, high = (np.concatenate([c.limits[k] for c in chosen]) for k in (0, 1))
             inside = 1e-6 * np.minimum(np.nan_to_num(high - low, posinf=1.0), 1.0)
 
             def residual(x: Floats) -> Floats:
-                left = rest.white(self.columns.residual - predict(_at(chosen, x)))
+                left = rest.white(self.columns.residual - predict(all_moved(chosen, x)))
                 return np.where(np.isfinite(left), left, FAR)
 
             begin = np.clip(begin, low + inside, high - inside)
             self.optima[key] = least_squares(
                 residual, begin, "2-point", (low, high), x_scale="jac", diff_step=1e-3, max_nfev=AT_MOST
             ).x
-        return _at(chosen, self.optima[key])
+        return all_moved(chosen, self.optima[key])
 
     def _exchanged(self, model: Model) -> Model:
         """Each effect in turn left out where that costs less than odds, or given up for a better one."""
@@ -460,46 +415,6 @@ def _near(one: Floats, other: Floats) -> bool:
     return float(np.linalg.norm(one - other)) < max(SETTLED, 0.1 * float(np.linalg.norm(one)))
 
 
-def is_possible(c: Chosen) -> bool:
-    """Whether all strengths lie within what their parameters can be."""
-    return all(low <= x <= high for p, x in c.strengths for low, high in [possible(p)])
-
-
-def _limits(c: Chosen) -> tuple[Floats, Floats]:
-    """(p + q,) least and largest values of strengths, in scales, and of the shape; infinite for strengths that are no parameters."""
-    number = len(c.variant.sign)
-    low, high = np.full(number, -np.inf), np.full(number, np.inf)
-    if len(c.place.candidate.linear) == number:
-        both = [(*possible(p), float(p.null or 0.0), p.scale) for p in c.place.candidate.linear]
-        low = np.array([(a - null) / scale for a, _, null, scale in both])
-        high = np.array([(b - null) / scale for _, b, null, scale in both])
-    shape = [p for p, _ in c.shaped]
-    return (
-        np.append(low, [p.lower / p.scale for p in shape]),
-        np.append(high, [p.upper / p.scale for p in shape]),
-    )
-
-
-def _whole(c: Chosen) -> Floats:
-    """(p + q,) strengths and shape, in scales."""
-    return np.append(c.values, [v / p.scale for p, v in c.shaped])
-
-
-def _at(chosen: Sequence[Chosen], x: Floats) -> tuple[Chosen, ...]:
-    """The effects with strengths and shapes x, one after the other."""
-    out, k = [], 0
-    for c in chosen:
-        number, shape = len(c.variant.sign), [p for p, _ in c.shaped]
-        refined = zip(shape, x[k + number :], strict=False)
-        out.append(
-            replace(
-                c, values=x[k : k + number], refined=tuple((p.name, float(v) * p.scale) for p, v in refined)
-            )
-        )
-        k += number + len(shape)
-    return tuple(out)
-
-
 def amplitudes(fit: Fit) -> dict[str, float]:
     """ln variances of a fit, by the names of its parts."""
     return {NOISE: float(fit.t[0]), **{p.name: float(t) for p, t in zip(fit.parts, fit.t[1:], strict=True)}}
@@ -515,13 +430,3 @@ def _size(anchor: Fit, part: Part) -> float:
     assert part.factor is not None
     best = int(np.argmax(gains(*spectrum(anchor.root, anchor.solved, part.factor))))
     return float(2.0 * np.log(SIZES[best]))
-
-
-def _columns(columns: Columns, c: Chosen) -> Floats:
-    """(m, p) change of the readings per scale of each linear parameter."""
-    return columns.rotated(c.lines(columns))
-
-
-def _values(fit: Fit, c: Chosen) -> Floats:
-    """(p,) strengths of the posterior mean of an effect."""
-    return np.asarray(np.linalg.lstsq(_columns(fit.columns, c), fit.mean(c.part), rcond=1e-9)[0])

@@ -10,9 +10,10 @@ from scipy.stats import chi2, norm
 
 from stiffmap.experiment.experiment import Experiment, Floats, Integers
 from stiffmap.identification.inference.amplitudes import GAPS, OFF, Fit, noise_prior
+from stiffmap.identification.inference.chosen import Chosen
 from stiffmap.identification.inference.columns import Columns
 from stiffmap.identification.inference.constants import ALIKE, EQUAL_SHARE, ODDS, RARE, TOLERANCES
-from stiffmap.identification.inference.names import EXACT, Chosen, Model, Search, is_possible
+from stiffmap.identification.inference.names import EXACT, Model, Search
 from stiffmap.identification.inference.places import Place
 from stiffmap.identification.inference.shares import of_numbers
 from stiffmap.identification.numbers.unknowns import Unknown
@@ -120,9 +121,9 @@ def effect_of(columns: Columns, b: Beyond, taken: Sequence[Chosen]) -> Chosen | 
         if any(c.place is place for c in taken) or id(place.candidate) in within:
             return None
         bare = Chosen.at(place, 0)
-        values = np.linalg.lstsq(columns.rotated(bare.lines(columns)), b.value * d, rcond=1e-9)[0]
+        values = np.linalg.lstsq(bare.rotated(columns), b.value * d, rcond=1e-9)[0]
         found = replace(bare, values=np.asarray(values, dtype=float))
-        return found if is_possible(found) else None
+        return found if found.is_possible else None
     return None
 
 

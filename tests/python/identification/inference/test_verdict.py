@@ -14,8 +14,8 @@ from tests.python.identification.inference.synthetic import READINGS, columns
 from stiffmap.experiment.channels import Channel
 from stiffmap.identification.inference import amplitudes, verdict
 from stiffmap.identification.inference.amplitudes import Part
+from stiffmap.identification.inference.chosen import Chosen
 from stiffmap.identification.inference.free import Free
-from stiffmap.identification.inference.names import Chosen
 from stiffmap.identification.inference.places import Place, Shape
 from stiffmap.identification.numbers.unknowns import Unknown
 
