@@ -32,6 +32,7 @@ INNER = {
         ("free", "kernels", "places", "optimum"),
         ("travel", "covariance"),
         "columns",
+        ("parts", "sizes"),
         "amplitudes",
         "candidates",
         "chosen",

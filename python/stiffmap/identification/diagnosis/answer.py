@@ -24,7 +24,7 @@ from stiffmap.identification.diagnosis.report.effects import effects_of
 from stiffmap.identification.diagnosis.report.findings import Effect, NoiseReport, Number, Numbers, Rest
 from stiffmap.identification.diagnosis.report.result import Diagnosis
 from stiffmap.identification.diagnosis.report.separation import separation
-from stiffmap.identification.inference.amplitudes import GAPS, Fit
+from stiffmap.identification.inference.amplitudes import Fit
 from stiffmap.identification.inference.chosen import Chosen
 from stiffmap.identification.inference.columns import Columns
 from stiffmap.identification.inference.constants import RARE
@@ -40,6 +40,7 @@ from stiffmap.identification.inference.machines import (
     written,
 )
 from stiffmap.identification.inference.names import put_instead
+from stiffmap.identification.inference.parts import GAPS
 from stiffmap.identification.inference.places import Place
 from stiffmap.identification.inference.readings import Readings, readings
 from stiffmap.identification.inference.shares import gap_of, of_numbers, shares

@@ -27,12 +27,12 @@ from stiffmap.identification.inference.constants import (
     DEGREES,
     FEWEST_REPEATS,
     NOISE_SD,
-    NUMBERS_SD,
     SHRINK,
-    SIZES,
     STANDS_OUT,
     WIDEST,
 )
+from stiffmap.identification.inference.parts import ALL_NUMBERS, NOISE, Part
+from stiffmap.identification.inference.sizes import of_size
 
 STEPS, LARGEST_STEP, ENOUGH = 30, 2.0, 0.01
 """Newton steps, their length in ln variance, and the gain of evidence that ends them."""
@@ -48,32 +48,6 @@ ROUND_OFF = 1e-13
 """Of the largest variance: what is added to the diagonal where a covariance cannot be factorised."""
 BEGIN = -2.0
 """ln variance with which a part begins."""
-GAPS = ("field", "pose")
-"""Kinds of parts that nobody can name."""
-NOISE, ALL_NUMBERS = "noise", "declared numbers"
-
-
-@dataclass(frozen=True, eq=False)
-class Part:
-    """A part of the covariance with an amplitude: a factor F (m, p) of F Fᵀ; the whole matrix (m, m) where it has no short one."""
-
-    name: str
-    kind: str
-    """``number``, ``field``, ``pose``, ``time``, ``travel``, ``effect``."""
-    factor: Floats | None = None
-    full: Floats | None = None
-
-    def times(self, values: Floats) -> Floats:
-        """(m,) product with values (m,)."""
-        if self.factor is not None:
-            return np.asarray(self.factor @ (self.factor.T @ values))
-        assert self.full is not None
-        return np.asarray(self.full @ values)
-
-    @property
-    def sd(self) -> float:
-        """Prior standard deviation of ln variance; infinite where it is flat."""
-        return 2.0 * NUMBERS_SD if self.kind == "number" else np.inf
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,27 +113,6 @@ class Fit:
         parts = tuple(self.parts[k] for k in kept)
         t = np.array([self.t[0] if noise is None else 2.0 * np.log(noise), *self.t[1:][kept]])
         return evaluated(self.columns, parts, t, self.weights)
-
-
-@dataclass(eq=False)
-class Parts:
-    """The parts that every model of some columns can have; matrices are made once."""
-
-    columns: Columns
-    numbers: tuple[Part, ...] = field(init=False)
-    """One for each group."""
-    together: tuple[Part, ...] = field(init=False)
-    """One for all groups, and one for each that a set-up has for itself."""
-    gaps: tuple[Part, ...] = field(init=False)
-
-    def __post_init__(self) -> None:
-        c = self.columns
-        self.numbers = tuple(Part(name, "number", c.numbers[:, index]) for name, index in c.groups.items())
-        shared = c.numbers[:, [not u.setup for u in c.unknowns]]
-        alone = [p for p, i in zip(self.numbers, c.groups.values(), strict=True) if c.unknowns[i[0]].setup]
-        self.together = (Part(ALL_NUMBERS, "number", shared), *alone) if c.unknowns else ()
-        along = (Part(name, "travel", f) for name, f, _ in c.travel)
-        self.gaps = (*(Part(name, kind, full=k) for kind, name, k in c.gaps), *along)
 
 
 def fitted(
@@ -311,7 +264,8 @@ def _priced(fit: Fit, information: Floats) -> Fit:
     score = fit.score - 0.5 * float(np.linalg.slogdet(np.eye(int(counted.sum())) + some)[1])
     for p, x in zip(fit.parts, fit.t[1:], strict=True):
         if p.kind == "effect":
-            score += _of_size(p, fit.root, fit.solved, float(x))
+            assert p.factor is not None
+            score += of_size(p.factor, fit.root, fit.solved, float(x))
     return replace(fit, score=score)
 
 
@@ -324,37 +278,6 @@ def _root(v: Floats) -> Floats:
         except LinAlgError:
             more = max(9.0 * more, ROUND_OFF * float(np.diag(v).max()))
             v = v + more * np.eye(len(v))
-
-
-def _of_size(part: Part, root: Floats, solved: Floats, t: float) -> float:
-    """ln of the mean over sizes of an effect, of the likelihood relative to that at its amplitude in the model."""
-    assert part.factor is not None
-    inside, z = spectrum(root, solved, part.factor)
-    # without the effect (Woodbury): 1/λ grows by the variance that the model gives it
-    b2 = np.exp(t)
-    share = np.maximum(1.0 - b2 * inside, 1e-12)
-    return float(
-        log_mean(gains(inside / share, z / share)) - gains(inside / share, z / share, np.array([b2]))[0]
-    )
-
-
-def spectrum(root: Floats, solved: Floats, factor: Floats) -> tuple[Floats, Floats]:
-    """(p,) information of a covariance about the directions of a factor (m, p), and (p,) what the readings say along them."""
-    white = solve_triangular(root, factor, lower=True, check_finite=False)
-    inside, vectors = np.linalg.eigh(white.T @ white)
-    return inside, np.asarray(vectors.T @ (factor.T @ solved))
-
-
-def gains(inside: Floats, z: Floats, squared: Floats = SIZES**2) -> Floats:
-    """(..., B) gain of ln likelihood by an effect of size b along directions (..., p) of information `inside`."""
-    a, s = inside[..., None], z[..., None] ** 2
-    return np.asarray((0.5 * s * squared / (1.0 + a * squared) - 0.5 * np.log1p(a * squared)).sum(axis=-2))
-
-
-def log_mean(values: Floats) -> Floats:
-    """ln of the mean of exponentials over the last axis."""
-    top = values.max(axis=-1, keepdims=True)
-    return np.asarray(top[..., 0] + np.log(np.mean(np.exp(values - top), axis=-1)))
 
 
 def _bound(w: Floats) -> float:

@@ -9,8 +9,9 @@ import numpy as np
 
 from stiffmap.experiment.experiment import Floats
 from stiffmap.identification.candidates.sensitivity import Variant
-from stiffmap.identification.inference.amplitudes import Fit, Part
+from stiffmap.identification.inference.amplitudes import Fit
 from stiffmap.identification.inference.columns import Columns
+from stiffmap.identification.inference.parts import Part
 from stiffmap.identification.inference.places import Place, possible
 from stiffmap.model.effects import Parameter
 

@@ -15,23 +15,14 @@ from scipy.optimize import least_squares
 
 from stiffmap.experiment.experiment import Floats
 from stiffmap.identification.candidates.candidates import clash
-from stiffmap.identification.inference.amplitudes import (
-    NOISE,
-    Fit,
-    Part,
-    Parts,
-    evaluated,
-    fitted,
-    gains,
-    log_mean,
-    refitted,
-    spectrum,
-)
+from stiffmap.identification.inference.amplitudes import Fit, evaluated, fitted, refitted
 from stiffmap.identification.inference.candidates import evidence, of_pairs
 from stiffmap.identification.inference.chosen import Chosen, all_moved
 from stiffmap.identification.inference.columns import Columns
 from stiffmap.identification.inference.constants import MOST_EFFECTS, ODDS, REFITS, SIZES
+from stiffmap.identification.inference.parts import NOISE, Part, Parts
 from stiffmap.identification.inference.places import Place
+from stiffmap.identification.inference.sizes import gains, log_mean, spectrum
 
 EXACT = "exact"
 QUIET = -6.0

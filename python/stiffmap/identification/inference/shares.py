@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from stiffmap.experiment.experiment import Floats
-from stiffmap.identification.inference.amplitudes import GAPS, NOISE, Fit, noise_part
+from stiffmap.identification.inference.amplitudes import Fit, noise_part
 from stiffmap.identification.inference.columns import Columns
 from stiffmap.identification.inference.constants import STANDS_OUT
+from stiffmap.identification.inference.parts import GAPS, NOISE
 
 
 def shares(columns: Columns, fit: Fit) -> dict[str, float]:

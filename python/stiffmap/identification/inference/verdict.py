@@ -9,11 +9,12 @@ import numpy as np
 from scipy.stats import chi2, norm
 
 from stiffmap.experiment.experiment import Experiment, Floats, Integers
-from stiffmap.identification.inference.amplitudes import GAPS, OFF, Fit, noise_prior
+from stiffmap.identification.inference.amplitudes import OFF, Fit, noise_prior
 from stiffmap.identification.inference.chosen import Chosen
 from stiffmap.identification.inference.columns import Columns
 from stiffmap.identification.inference.constants import ALIKE, EQUAL_SHARE, ODDS, RARE, TOLERANCES
 from stiffmap.identification.inference.names import EXACT, Model, Search
+from stiffmap.identification.inference.parts import GAPS
 from stiffmap.identification.inference.places import Place
 from stiffmap.identification.inference.shares import of_numbers
 from stiffmap.identification.numbers.unknowns import Unknown

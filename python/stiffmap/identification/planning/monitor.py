@@ -14,10 +14,11 @@ from stiffmap.common.number_text import with_uncertainty, within
 from stiffmap.common.short import short_repr
 from stiffmap.experiment.experiment import Experiment
 from stiffmap.experiment.noise.whitening import basis, readings_of
-from stiffmap.identification.inference.amplitudes import Fit, Part, fitted
+from stiffmap.identification.inference.amplitudes import Fit, fitted
 from stiffmap.identification.inference.columns import Columns, drawn
 from stiffmap.identification.inference.free import Free
 from stiffmap.identification.inference.kernels import Points, gaps
+from stiffmap.identification.inference.parts import Part
 from stiffmap.identification.planning.design import joined
 from stiffmap.identification.planning.estimate import Estimate, estimate
 from stiffmap.model.description import AppliedEffect

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from stiffmap.identification.inference.amplitudes import Part
 from stiffmap.identification.inference.columns import Columns
 from stiffmap.identification.inference.free import Free
+from stiffmap.identification.inference.parts import Part
 
 READINGS, FREE = 40, 3
 

@@ -8,7 +8,7 @@ from scipy.stats import multivariate_normal, norm, t
 from tests.python.identification.inference.synthetic import READINGS, columns, parts
 
 from stiffmap.identification.inference import amplitudes
-from stiffmap.identification.inference.constants import DEGREES, NOISE_SD, NUMBERS_SD
+from stiffmap.identification.inference.constants import DEGREES, NOISE_SD, NUMBERS_SD, SIZES
 from stiffmap.identification.inference.shares import shares
 
 
@@ -90,7 +90,7 @@ def test_the_price_of_an_effect_is_the_mean_over_its_sizes():
     at, w = np.array([0.1, -1.0, -0.5, 1.2]), np.ones(READINGS)
     fit = amplitudes.evaluated(c, some[2:], at[[0, 3]], w)
     bare = amplitudes._information(*amplitudes._evaluate(c, some[2:], at[[0, 3]], w, np.eye(len(c))))
-    sizes = [np.array([at[0], 2 * np.log(b)]) for b in amplitudes.SIZES]
+    sizes = [np.array([at[0], 2 * np.log(b)]) for b in SIZES]
     each = [multivariate_normal(cov=dense(c, some[2:], x, w)).logpdf(c.residual) for x in sizes]
     price = np.logaddexp.reduce(each) - np.log(len(each)) - fit.likelihood
     kappa = -0.5 * np.log1p((2 * NOISE_SD) ** 2 * (bare[0, 0] - 1 / (2 * NOISE_SD) ** 2))

@@ -14,11 +14,12 @@ from tests.python.identification.inference.synthetic import READINGS, columns
 import stiffmap as sm
 from stiffmap.experiment import load_experiment, random_plan, simulate
 from stiffmap.identification.candidates.candidates import Candidate
-from stiffmap.identification.inference.amplitudes import Parts, fitted
+from stiffmap.identification.inference.amplitudes import fitted
 from stiffmap.identification.inference.chosen import Chosen
 from stiffmap.identification.inference.constants import ODDS
 from stiffmap.identification.inference.inference import inferred, terms
 from stiffmap.identification.inference.names import Model, searched
+from stiffmap.identification.inference.parts import Parts
 from stiffmap.identification.inference.places import Place, Shape
 from stiffmap.identification.inference.verdict import TOLERABLE, Beyond, effect_of, judged
 from stiffmap.identification.numbers.unknowns import Unknown

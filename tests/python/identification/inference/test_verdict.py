@@ -13,9 +13,9 @@ from tests.python.identification.inference.synthetic import READINGS, columns
 
 from stiffmap.experiment.channels import Channel
 from stiffmap.identification.inference import amplitudes, verdict
-from stiffmap.identification.inference.amplitudes import Part
 from stiffmap.identification.inference.chosen import Chosen
 from stiffmap.identification.inference.free import Free
+from stiffmap.identification.inference.parts import Part, Parts
 from stiffmap.identification.inference.places import Place, Shape
 from stiffmap.identification.numbers.unknowns import Unknown
 
@@ -112,7 +112,7 @@ def numbers(values: tuple[float, ...], seed: int = 0) -> Any:
 
 def test_a_number_far_off_is_out_of_tolerance_and_others_are_not():
     c = numbers((0.5, -8.0, 0.3, 1.2, -0.7))
-    fit = amplitudes.fitted(c, amplitudes.Parts(c).numbers)
+    fit = amplitudes.fitted(c, Parts(c).numbers)
     (one,) = verdict.out_of_tolerance(c, fit)
     assert one.unknown.name == "number 1" and one.value == pytest.approx(-8.0, abs=0.5) and one.sd < 0.2
 
@@ -122,7 +122,7 @@ def test_out_of_tolerance_is_what_one_machine_in_a_thousand_is(value, beyond):
     """Of one number: beyond 3.29 of its standard uncertainties."""
     c = numbers((value,))
     c = replace(c, numbers=20.0 * c.numbers, residual=20.0 * value * c.numbers[:, 0])
-    fit = amplitudes.fitted(c, amplitudes.Parts(c).numbers)
+    fit = amplitudes.fitted(c, Parts(c).numbers)
     assert len(list(verdict.out_of_tolerance(c, fit))) == beyond
 
 
@@ -132,7 +132,7 @@ def test_a_number_that_only_a_part_of_the_experiment_shows_is_not_out_of_toleran
     third = c.free.T @ np.where(np.arange(READINGS) < READINGS // 3, -24.0 * shown, 0.0)
     for residual, beyond in ((c.residual, 1), (c.residual + 8.0 * c.numbers[:, 1] + third, 0)):
         part = replace(c, residual=residual)
-        fit = amplitudes.fitted(part, amplitudes.Parts(part).numbers)
+        fit = amplitudes.fitted(part, Parts(part).numbers)
         assert len(list(verdict.out_of_tolerance(part, fit))) == beyond
 
 
@@ -140,7 +140,7 @@ def test_the_largest_of_many_numbers_within_tolerance_is_not_out_of_it():
     for seed in range(5):
         rng = np.random.default_rng(100 + seed)
         c = numbers(tuple(rng.normal(size=20)), seed)
-        assert not list(verdict.out_of_tolerance(c, amplitudes.fitted(c, amplitudes.Parts(c).numbers)))
+        assert not list(verdict.out_of_tolerance(c, amplitudes.fitted(c, Parts(c).numbers)))
 
 
 def test_noise_far_beyond_its_declaration_is_a_rest():
@@ -173,7 +173,7 @@ def test_gaps_take_a_name_only_as_far_as_they_would_show_its_pattern_by_chance(w
 def test_the_largest_share_of_the_readings_comes_first():
     c = numbers((-9.0, 7.0))
     c = replace(c, numbers=c.numbers * [1.0, 10.0], residual=c.numbers @ [-9.0, 70.0])
-    found = list(verdict.out_of_tolerance(c, amplitudes.fitted(c, amplitudes.Parts(c).numbers)))
+    found = list(verdict.out_of_tolerance(c, amplitudes.fitted(c, Parts(c).numbers)))
     assert [b.unknown.name for b in found] == ["number 1", "number 0"]
     assert found[0].share == pytest.approx(700.0 / np.sqrt(len(c)), rel=0.02)
 
@@ -185,5 +185,5 @@ def test_one_of_many_weakly_determined_numbers_is_not_out_of_tolerance(many, bey
     d = c.numbers / 12.0
     c = replace(c, numbers=d, residual=5.0 * d[:, 0])
     t = np.array([0.0, 2 * np.log(50.0)])
-    fit = amplitudes.evaluated(c, amplitudes.Parts(c).numbers, t, np.ones(READINGS))
+    fit = amplitudes.evaluated(c, Parts(c).numbers, t, np.ones(READINGS))
     assert len(list(verdict.out_of_tolerance(c, fit))) == beyond

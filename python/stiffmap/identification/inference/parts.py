@@ -1,0 +1,59 @@
+"""Parts of the covariance of the readings that have an amplitude of their own."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from stiffmap.experiment.experiment import Floats
+from stiffmap.identification.inference.columns import Columns
+from stiffmap.identification.inference.constants import NUMBERS_SD
+
+GAPS = ("field", "pose")
+"""Kinds of parts that nobody can name."""
+NOISE, ALL_NUMBERS = "noise", "declared numbers"
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """A part of the covariance with an amplitude: a factor F (m, p) of F Fᵀ; the whole matrix (m, m) where it has no short one."""
+
+    name: str
+    kind: str
+    """``number``, ``field``, ``pose``, ``time``, ``travel``, ``effect``."""
+    factor: Floats | None = None
+    full: Floats | None = None
+
+    def times(self, values: Floats) -> Floats:
+        """(m,) product with values (m,)."""
+        if self.factor is not None:
+            return np.asarray(self.factor @ (self.factor.T @ values))
+        assert self.full is not None
+        return np.asarray(self.full @ values)
+
+    @property
+    def sd(self) -> float:
+        """Prior standard deviation of ln variance; infinite where it is flat."""
+        return 2.0 * NUMBERS_SD if self.kind == "number" else np.inf
+
+
+@dataclass(eq=False)
+class Parts:
+    """The parts that every model of some columns can have; matrices are made once."""
+
+    columns: Columns
+    numbers: tuple[Part, ...] = field(init=False)
+    """One for each group."""
+    together: tuple[Part, ...] = field(init=False)
+    """One for all groups, and one for each that a set-up has for itself."""
+    gaps: tuple[Part, ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        c = self.columns
+        self.numbers = tuple(Part(name, "number", c.numbers[:, index]) for name, index in c.groups.items())
+        shared = c.numbers[:, [not u.setup for u in c.unknowns]]
+        alone = [p for p, i in zip(self.numbers, c.groups.values(), strict=True) if c.unknowns[i[0]].setup]
+        self.together = (Part(ALL_NUMBERS, "number", shared), *alone) if c.unknowns else ()
+        along = (Part(name, "travel", f) for name, f, _ in c.travel)
+        self.gaps = (*(Part(name, kind, full=k) for kind, name, k in c.gaps), *along)
