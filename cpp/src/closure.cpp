@@ -270,7 +270,7 @@ bool across_fold(const Mechanism& m, ClosureWorkspace& ws, VecX& x, int& iterati
   ws.qr.compute(ws.A, rank_threshold);
   const Index freedoms = ws.A.cols() - ws.qr.rank();
   select_unknowns(m, false, ws);
-  if (static_cast<Index>(m.drives.size()) <= freedoms) return false;
+  if (ws.unknown.empty() || static_cast<Index>(m.drives.size()) <= freedoms) return false;
   close(m, Target{}, Pace::damped, ws, x, iterations);
   const VecX nearest = x;
   equations(m, Target{}, ws);

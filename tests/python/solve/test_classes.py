@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,6 +18,13 @@ from tests.oracle.unseen import UNSEEN
 
 import stiffmap as sm
 from stiffmap.model.description import Pose
+
+
+def names_of(elements: Iterable[Any]) -> Iterator[str]:
+    for e in elements:
+        yield e.name
+        for branch in getattr(e, "branches", ()):
+            yield from names_of(branch.elements)
 
 
 def objections(task: Task) -> list[str]:
@@ -115,6 +124,19 @@ def test_commands_that_agree_are_reached_past_those_that_do_not(seed: int) -> No
     np.testing.assert_allclose(found.rotation, task.pose.r, atol=1e-12)
     apart = sm.forward_kinematics(machine, commands + [1e-3, *np.zeros(len(commands) - 1)])
     assert apart.status == sm.Status.UNREACHABLE and np.isnan(apart.position).all()
+
+
+def test_two_drives_of_a_beam_without_a_pivot_contradict_each_other() -> None:
+    """No passive joint closes the loop."""
+    d = next(
+        d
+        for d in (Classes(seed).gantry().description for seed in range(60))
+        if not {"pivot", "float"} & {j for leg in d.legs for j in names_of(leg.elements)}
+    )
+    machine = sm.Machine(d)
+    commands = sm.inverse_kinematics(machine, d.home.p, d.home.r).actuators
+    np.testing.assert_allclose(sm.forward_kinematics(machine, commands).position, d.home.p, atol=1e-12)
+    assert sm.forward_kinematics(machine, commands + [1e-3, 0, 0, 0]).status == sm.Status.UNREACHABLE
 
 
 @pytest.mark.parametrize("method", ["fast", "reference"])
