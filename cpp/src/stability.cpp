@@ -5,7 +5,7 @@ namespace stiffmap {
 namespace {
 
 constexpr double tangent_round_off = 1e-11;  // of the scaled tangent
-constexpr double negligible = 1e-9;          // of the eigenvalues of a reduced tangent
+constexpr double no_growth = 1e-9;           // of the eigenvalues of a reduced tangent
 
 /// Columns: motions that springs, laws and joints allow before the loops are closed, as lengths.
 MatX allowed(const Mechanism& m, const Linearization& lin) {
@@ -49,7 +49,7 @@ MatX reduced_tangent(const Mechanism& m, const Linearization& lin, const MatX& Z
 
 bool grows(const Mechanism& m, const Linearization& lin) {
   const VecX real = general_eigen(reduced_tangent(m, lin, closed_motions(m, lin))).values.real();
-  return real.minCoeff() < -negligible * real.maxCoeff();
+  return real.minCoeff() < -no_growth * real.maxCoeff();
 }
 
 /// Elastic coordinates first, where they are stable by themselves: what is left has their signs taken out
