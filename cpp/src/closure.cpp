@@ -268,9 +268,8 @@ bool across_fold(const Mechanism& m, ClosureWorkspace& ws, VecX& x, int& iterati
   residual(m, m.home_coordinates, Target{}, ws);
   equations(m, Target{}, ws);
   ws.qr.compute(ws.A, rank_threshold);
-  const Index freedoms = ws.A.cols() - ws.qr.rank();
-  select_unknowns(m, false, ws);
-  if (ws.unknown.empty() || static_cast<Index>(m.drives.size()) <= freedoms) return false;
+  select_unknowns(m, false, ws);  // A and its rank are still those with the drives
+  if (ws.unknown.empty() || static_cast<Index>(m.drives.size()) <= ws.A.cols() - ws.qr.rank()) return false;
   close(m, Target{}, Pace::damped, ws, x, iterations);
   const VecX nearest = x;
   equations(m, Target{}, ws);
@@ -281,6 +280,7 @@ bool across_fold(const Mechanism& m, ClosureWorkspace& ws, VecX& x, int& iterati
       x[ws.unknown[k]] += away * m.length / m.unit(ws.unknown[k]) * softest[static_cast<Index>(k)];
     if (close(m, Target{}, Pace::damped, ws, x, iterations)) return true;
   }
+  x = nearest;
   return false;
 }
 

@@ -164,7 +164,7 @@ def _heavy(fit: Fit, mean: Floats, sd: Floats) -> Floats:
 
 def evaluated(columns: Columns, parts: Sequence[Part], t: Floats, weights: Floats) -> Fit:
     """The evidence at given amplitudes."""
-    fit, along = _evaluate(columns, tuple(parts), t, weights, _noise_matrix(columns, weights))
+    fit, along = _evaluate(columns, tuple(parts), t, weights, columns.spared.of_noise(1.0 / weights))
     return _priced(fit, _information(fit, along))
 
 
@@ -176,18 +176,14 @@ def noise_prior(columns: Columns) -> tuple[float, float]:
     return float(np.log(squares / freedom)), 2.0 / float(np.sqrt(2.0 * freedom))
 
 
-def noise_part(f: Fit, inverse: Floats | None = None) -> tuple[Floats, Floats]:
-    """(N,) posterior mean and standard deviation of the noise of each reading; `inverse`: that of the fit, where it is known."""
+def noise_part(f: Fit, information: Floats | None = None) -> tuple[Floats, Floats]:
+    """(N,) posterior mean and standard deviation of the noise of each reading; `information` (N,) of each, where it is known."""
     c = f.columns
     variance = f.noise**2 / f.weights
-    information = c.spared.at_readings(f.inverse() if inverse is None else inverse)
+    if information is None:
+        information = c.spared.at_readings(f.inverse())
     back = c.free @ f.solved
     return variance * back, np.sqrt(np.maximum(variance - variance**2 * information, 0.0))
-
-
-def _noise_matrix(columns: Columns, weights: Floats) -> Floats:
-    """(m, m) N(w)."""
-    return columns.spared.of_noise(1.0 / weights)
 
 
 def _evaluate(
@@ -224,8 +220,8 @@ def _on(parts: tuple[Part, ...], t: Floats) -> dict[int, Part]:
     return {k: p for k, p in enumerate(parts, 1) if t[k] > OFF}
 
 
-def _gradient(fit: Fit, along: Floats, inverse: Floats) -> Floats:
-    """(1 + k,) slope of the score, priced without."""
+def _gradient(fit: Fit, along: Floats, inverse: Floats, information: Floats) -> Floats:
+    """(1 + k,) slope of the score, priced without; `information` (N,) of each reading."""
     trace, on = np.zeros(len(fit.t)), _on(fit.parts, fit.t)
     short = {k: p.factor for k, p in on.items() if p.factor is not None}
     if short:
@@ -235,7 +231,7 @@ def _gradient(fit: Fit, along: Floats, inverse: Floats) -> Floats:
     for k, p in on.items():
         if p.full is not None:
             trace[k] = 2.0 * np.vdot(inverse.T, p.full) - np.diag(inverse) @ np.diag(p.full)
-    trace[0] = np.sum(fit.columns.spared.at_readings(inverse) / fit.weights)
+    trace[0] = np.sum(information / fit.weights)
     centre, sd = _prior(fit.columns, fit.parts)
     slope = along.T @ fit.solved - np.exp(fit.t) * trace
     return np.asarray(0.5 * slope - (fit.t - centre) / sd**2)
@@ -302,16 +298,17 @@ def _optimum(
     if heavy:
         begun = _optimum(columns, parts, t, weights)
         t, weights = begun.t, _heavy(begun, *noise_part(begun))
-    damping, noise = SHRINK, _noise_matrix(columns, weights)
+    damping, noise = SHRINK, columns.spared.of_noise(1.0 / weights)
     fit, along = _evaluate(columns, parts, t, weights, noise)
     gradient, information = None, _information(fit, along)
     for _ in range(WEIGHINGS if heavy else STEPS):
         if gradient is None:
             inverse = fit.inverse()
-            gradient = _gradient(fit, along, inverse)
+            at_readings = columns.spared.at_readings(inverse)
+            gradient = _gradient(fit, along, inverse, at_readings)
             if heavy:
-                weights = _heavy(fit, *noise_part(fit, inverse))
-                noise = _noise_matrix(columns, weights)
+                weights = _heavy(fit, *noise_part(fit, at_readings))
+                noise = columns.spared.of_noise(1.0 / weights)
         scale = np.maximum(np.diag(information), 1e-2)
         step = np.linalg.solve(information + damping * np.diag(scale), gradient)
         step = np.clip(step, -LARGEST_STEP, LARGEST_STEP)
