@@ -92,15 +92,12 @@ def _quarter(at: dict[str, Point]) -> Statement:
 def _seven(p: Point) -> Statement:
     return of_section_5_3(
         "For the work point x=y=z=-200, the manipulator is 7 times stronger in the direction 135/-45 deg "
-        "than "
-        "in the direction 45/-135 deg",
+        "than in the direction 45/-135 deg",
         f"{p.ratio:.2f} times; worst {_axis(p.worst_angle)}, best {_axis(p.best_angle)}",
         judge(rounds_to(p.ratio, "7")),
         "the directions agree. With foot and actuators, which the paper leaves open, scaled from rigid to "
-        "ten "
-        f"times softer the ratio stays within {p.spread}. And on x=y=z the planar "
-        "compliance is aI + b·ones, so that 7 would force max/Fx = 1.40, against the 20 % of the next "
-        "sentence",
+        f"ten times softer the ratio stays within {p.spread}. And on x=y=z the planar compliance is aI + "
+        "b·ones, so that 7 would force max/Fx = 1.40, against the 20 % of the next sentence",
         {"ratio": p.ratio, "worst_deg": p.worst_angle % 180, "best_deg": p.best_angle % 180},
         printed="7 times; worst 45/-135 deg, best 135/-45 deg",
     )
@@ -113,8 +110,7 @@ def _twenty_more(p: Point) -> Statement:
         f"{more:.1f} % higher",
         judge(rounds_to(more, "20")),
         f"our ratio of {p.ratio:.2f} forces {100 * (over_fx(p.ratio) - 1):.0f} %, and the paper's own 7 "
-        f"forces "
-        f"{100 * (over_fx(7.0) - 1):.0f} %; 20 % belongs to a ratio of {ratio_of(1.2):.2f}",
+        f"forces {100 * (over_fx(7.0) - 1):.0f} %; 20 % belongs to a ratio of {ratio_of(1.2):.2f}",
         {"percent": more, "Fx_mm": p.fx, "worst_mm": p.worst},
         printed="20 % higher",
     )
@@ -151,8 +147,7 @@ def _fifty_more(p: Point) -> Statement:
         judge(rounds_to(more, "50")),
         f"20 % less than the worst forces max/min = {theirs:.2f} and {100 * (0.8 * theirs - 1):.0f} % more "
         f"than the best: the paper agrees with itself. Ours is {p.ratio:.2f}, and stays within {p.spread} "
-        f"with "
-        "foot and actuators scaled from rigid to ten times softer",
+        "with foot and actuators scaled from rigid to ten times softer",
         {"percent": more, "ratio": p.ratio, "best_mm": p.best},
         printed="50 % more",
     )
@@ -177,8 +172,7 @@ def _close(p: Point) -> Statement:
         f"Fx at {x:.0f} %, Fy at {y:.0f} % of the way from minimum to maximum",
         judge(x < 20 and y > 80),
         f"the order agrees, but the ellipse's axes lie at {p.best_angle % 180:.0f} and "
-        f"{p.worst_angle % 180:.0f} deg, "
-        "not near x and y; close is taken as within a fifth",
+        f"{p.worst_angle % 180:.0f} deg, not near x and y; close is taken as within a fifth",
         {"Fx_percent": x, "Fy_percent": y},
         printed="Fx close to the minimum, Fy to the maximum",
     )
@@ -192,10 +186,9 @@ def _seven_again(p: Point, results: Results) -> Statement:
         "The rate between the maximal and minimal deformations is about 7",
         f"{p.ratio:.2f}",
         judge(rounds_to(p.ratio, "7")),
-        f"the machine is nearly isotropic there, for any foot and actuators ({p.spread}). Ratios of 7 "
-        f"occur elsewhere: the largest in the three "
-        f"planes is "
-        f"{float(ratio.max()):.1f} at {place} mm; the number occurs, though not at the stated point",
+        f"the machine is nearly isotropic there, for any foot and actuators ({p.spread}). Ratios of 7 occur "
+        f"elsewhere: the largest in the three planes is {float(ratio.max()):.1f} at {place} mm; the number "
+        "occurs, though not at the stated point",
         {"ratio": p.ratio, "largest_ratio_in_planes": float(ratio.max())},
         printed="about 7",
     )

@@ -83,8 +83,7 @@ def _100(limits: dict[str, dict[str, float]]) -> Statement:
         text,
         judge(all(v["worst"] < 100 for v in others.values())),
         "true of x=y=z=300 in the worst direction only; at (-200, 300, 0) the machine is nearly as stiff "
-        "as at the "
-        "isotropic point",
+        "as at the isotropic point",
         {
             f"{k}_N_{n.replace(' ', '_')}": x
             for n, v in others.items()

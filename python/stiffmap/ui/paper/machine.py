@@ -11,6 +11,8 @@ from stiffmap.solve.kinematics import inverse_kinematics
 from stiffmap.solve.machine import Machine
 from stiffmap.ui.paper.results import Results
 from stiffmap.ui.paper.statement import Statement, Verdict, judge, of_section_5_3, rounds_to
+from stiffmap.workspace.performance.motion.closing import drive_kinematics
+from stiffmap.workspace.performance.motion.velocity import singular_values
 
 LOW, HIGH = 0.5, 2.0
 
@@ -58,9 +60,8 @@ def workspace_size(edge: float) -> Statement:
         "cubic Cartesian workspace of size 200×200×200 mm³",
         f"{edge:.2f} mm",
         judge(edge >= 200),
-        f"the largest cube with transmission factors within 0.5–2 has this edge (0.64395 L); it misses "
-        f"200 mm by "
-        f"{200 - edge:.2f} mm",
+        "the largest cube with transmission factors within 0.5–2 has this edge (0.64395 L); it misses 200 "
+        f"mm by {200 - edge:.2f} mm",
         {"edge_mm": edge},
         printed="200 mm",
     )
@@ -74,8 +75,7 @@ def wanted_size(edge: float) -> Statement:
         f"{edge:.2f} mm (revised)",
         Verdict.DIFFERS,
         "§5.1 requires 0.5 m × 0.5 m × 0.5 m, and §5.3 says that the original's 200 mm are too small; 200 "
-        "is a "
-        "misprint. The revised machine reaches the factors 0.5–2 in a cube of this edge, "
+        "is a misprint. The revised machine reaches the factors 0.5–2 in a cube of this edge, "
         f"{500 - edge:.2f} mm short of 500 (L = 776.5 mm would do)",
         {"edge_mm": edge},
         printed="200 mm",
@@ -90,9 +90,8 @@ def speed(original: Machine) -> Statement:
         "Cartesian velocity … in the isotropic point of 1.2 m/s",
         f"{f[0]:.6f} … {f[-1]:.6f} times the drive's speed",
         judge(bool(np.allclose(f, 1, atol=1e-6))),
-        "there every drive moves the tool at its own speed; the drives' 1.2 m/s are our declaration, "
-        "taken from "
-        "this sentence",
+        "there every drive moves the tool at its own speed; the drives' 1.2 m/s are our declaration, taken "
+        "from this sentence",
         {"largest_factor": float(f[0]), "smallest_factor": float(f[-1])},
         printed="1.2 m/s",
         own_input=True,
@@ -108,9 +107,8 @@ def transmission(original: Machine) -> Statement:
         "transmission factor range 0.5–2.0",
         f"{low:.3f} … {high:.3f}",
         judge(low >= LOW and high <= HIGH),
-        f"singular values of the Jacobian over the workspace box; the largest is at x = y = z = "
-        f"{corner:g} mm. "
-        "Within 0.5–2 the box must end at -L/√18 and L/√6",
+        f"singular values of the Jacobian over the workspace box; the largest is at x = y = z = {corner:g} "
+        "mm. Within 0.5–2 the box must end at -L/√18 and L/√6",
         {"smallest_factor": low, "largest_factor": high},
         printed="0.5 … 2.0",
     )
@@ -148,21 +146,9 @@ def too_small(edge: float) -> Statement:
     )
 
 
-STEP = 1e-5
-"""m; the central difference then errs by about 1e-9."""
-
-
-def jacobian(machine: Machine, position: Floats) -> Floats:
-    """TCP velocity per drive velocity, (..., 3, 3), by central differences of the inverse kinematics."""
-    p = np.asarray(position)[..., None, :]
-    shift = STEP * np.eye(3)
-    ahead, behind = (inverse_kinematics(machine, p + s).actuators for s in (shift, -shift))
-    return np.asarray(np.linalg.inv(np.swapaxes((ahead - behind) / (2 * STEP), -1, -2)))
-
-
 def factors(machine: Machine, position: Floats) -> Floats:
-    """Singular values (..., 3) of the Jacobian, descending."""
-    return np.asarray(np.linalg.svd(jacobian(machine, position), compute_uv=False))
+    """Singular values (..., 3) of the Jacobian (TCP velocity per drive velocity), descending."""
+    return singular_values(drive_kinematics(machine, position).jacobian[..., :3, :])
 
 
 def diagonal_limits(machine: Machine, low: float, high: float, reach: float) -> tuple[float, float]:
@@ -207,9 +193,9 @@ def bar(machine: Machine) -> Floats:
     """Compliance (6, 6) of a bar in the units of Table 1."""
     block = next(e for e in machine.description.legs[0].elements if isinstance(e, Block))
     spring = next(e for e in block.branches[0].elements if isinstance(e, Spring))
-    if spring.compliance is None:
-        return np.linalg.inv(np.array(spring.stiffness)) * np.sqrt(np.outer(TO_PRINTED, TO_PRINTED))
-    return np.array(spring.compliance) * np.sqrt(np.outer(TO_PRINTED, TO_PRINTED))
+    given = spring.compliance
+    compliance = np.linalg.inv(np.array(spring.stiffness)) if given is None else np.array(given)
+    return np.asarray(compliance * np.sqrt(np.outer(TO_PRINTED, TO_PRINTED)))
 
 
 def _row(name: str, compliance: Floats) -> Statement:
@@ -220,9 +206,8 @@ def _row(name: str, compliance: Floats) -> Statement:
         f"Table 1, {name} bar: k11 … k66 = {', '.join(PRINTED[name])}",
         text,
         judge(same),
-        "The table is headed Stiffness but holds compliances (its units say so), and "
-        "only "
-        "their diagonal; our model adds k26 and k35 of beam theory",
+        "The table is headed Stiffness but holds compliances (its units say so), and only their diagonal; "
+        "our model adds k26 and k35 of beam theory",
         {f"k{i}{i}": float(v) for i, v in enumerate(ours, 1)},
         printed=", ".join(PRINTED[name]),
         own_input=True,
@@ -250,8 +235,7 @@ def _length(c: Floats) -> Statement:
         f"L = {y:.0f} and {z:.0f} mm",
         judge(rounds_to(y, "780") and rounds_to(z, "790")),
         "lengths of the beam whose k22/k66 and k33/k55 the table holds; our 775 mm (2.5 times 310) is "
-        "within 2.5 % "
-        "of both",
+        "within 2.5 % of both",
         {"L_from_k22_k66_mm": float(y), "L_from_k33_k55_mm": float(z)},
         printed="not stated",
         own_input=True,

@@ -66,8 +66,7 @@ def _zero_plane(ranges: Ranges) -> Statement:
         _text(ranges, 0.0),
         judge(set(satisfied) >= {"Fx", "Fy"}),
         "0.25 mm holds everywhere in the best direction only; the corner x = y = 300 exceeds it under Fx, "
-        "Fy and the "
-        "worst direction",
+        "Fy and the worst direction",
         _numbers(ranges, 0.0),
         printed="at most 0.25 mm (required)",
     )
@@ -79,9 +78,8 @@ def _guaranteed(ranges: Ranges, z: float, words: str, printed: str) -> Statement
         words,
         f"at most {', '.join(f'{r} {ranges[r][z][1]:.2f}' for r in READINGS)} mm",
         judge(bool(fitting)),
-        f"no reading of the force's direction gives {printed} mm; the printed sentence before this one "
-        f"says more than "
-        "0.5 mm for the same plane"
+        f"no reading of the force's direction gives {printed} mm; the printed sentence before this one says "
+        "more than 0.5 mm for the same plane"
         if not fitting
         else f"for the reading: {', '.join(fitting)}",
         _numbers(ranges, z),
@@ -108,13 +106,11 @@ def _three_times(maps: xr.Dataset) -> Statement:
     ends = [float(maps[f"{w}_deflection_xy"].max()) for w in ("worst", "best")]
     return of_section_5_3(
         "optimizing the milling process for the specialized Orthoglide manipulator may improve the "
-        "accuracy more "
-        "than 3 times",
+        "accuracy more than 3 times",
         f"up to {float(ratio.max()):.1f} times, {float(np.median(ratio)):.2f} in the median",
         judge(float(ratio.max()) > 3),
         f"worst over best direction at the same position; more than 3 in {share:.0f} % of the positions. "
-        f"The largest "
-        f"error of all falls {ends[0] / ends[1]:.2f} times",
+        f"The largest error of all falls {ends[0] / ends[1]:.2f} times",
         {
             "largest": float(ratio.max()),
             "median": float(np.median(ratio)),
