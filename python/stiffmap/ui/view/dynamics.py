@@ -9,13 +9,12 @@ from stiffmap.solve.machine import Machine
 from stiffmap.ui.view.place import orientation
 from stiffmap.ui.view.state import State
 from stiffmap.workspace.performance.motion.inertia import NaturalFrequencies, natural_frequencies
+from stiffmap.workspace.vibration import frequency_response
 
 MODES = 40
 """As parallel machines have dozens of modes of their bars below those that move the tool."""
 DAMPING = 0.02
 """Modal damping ratio of every mode."""
-STEP = 1e-7
-"""m or rad, of the coordinate that moves most, in the difference that gives the tool's motion in a mode."""
 
 
 def modes_at(
@@ -35,35 +34,12 @@ def lowest_frequency(machine: Machine, state: State, position: Floats) -> tuple[
 
 
 def dynamic_stiffness(machine: Machine, state: State, position: Floats) -> tuple[Floats, Floats]:
-    """(...) N/m of the softest direction at the state's frequency, and statuses.
-
-    Compliance of the tool = the static one, in which all modes are, plus what the lowest modes add at the frequency:
-    C + sum phi phiᵀ (1/(w² - W² + 2 i z w W) - 1/w²), with the damping ratio z = 0.02 of every mode.
-    """
-    w = modes_at(machine, state, position, MODES)
-    static = machine.solve(position, state.wrench, rotation=orientation(state), gravity=state.gravity)
-    shape = w.frequency.shape[:-1]
-    c = static.compliance[..., :3, :3].reshape(-1, 3, 3)
-    out = np.full(len(c), np.nan)
-    frequency = w.frequency.reshape(len(c), -1)
-    shapes, at = w.shape.reshape(len(c), frequency.shape[1], -1), w.coordinates.reshape(len(c), -1)
-    for i in range(len(c)):
-        if np.isfinite(c[i]).all() and np.isfinite(frequency[i]).any():
-            out[i] = 1.0 / _compliance(machine, c[i], frequency[i], shapes[i], at[i], state.frequency)
-    return out.reshape(shape), np.asarray(w.status, dtype=float)
-
-
-def _compliance(
-    machine: Machine, static: Floats, frequency: Floats, shapes: Floats, at: Floats, excited: float
-) -> float:
-    """m/N, greatest over directions of the complex compliance of the tool's translations."""
-    omega, big = 2 * np.pi * frequency, 2 * np.pi * excited
-    total = static.astype(complex)
-    rest = machine.compiled.frames(at)[0][-1]
-    for w, shape in zip(omega, shapes, strict=True):
-        if not np.isfinite(w) or w <= 0:
-            continue
-        step = STEP / max(float(np.abs(shape).max()), 1e-300)
-        phi = (machine.compiled.frames(at + step * shape)[0][-1] - rest) / step
-        total = total + np.outer(phi, phi) * (1 / (w**2 - big**2 + 2j * DAMPING * w * big) - 1 / w**2)
-    return float(np.linalg.svd(total, compute_uv=False)[0])
+    """(...) N/m of the softest direction at the state's frequency, and statuses; modes beyond the lowest count as statics."""
+    found = frequency_response(
+        machine, position, [state.frequency], state.wrench, rotation=orientation(state), gravity=state.gravity,
+        damping=DAMPING, modes=MODES, symmetrise=True,
+    )  # fmt: skip
+    c = found.values[..., 0, :3, :3]
+    good = np.isfinite(c).all(axis=(-2, -1))
+    softest = np.linalg.norm(np.where(good[..., None, None], c, np.eye(3)), 2, axis=(-2, -1))
+    return np.where(good, 1.0 / softest, np.nan), np.asarray(found.status, dtype=float)
