@@ -12,8 +12,7 @@ import numpy as np
 import typer
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.ui.cli.output import JsonOption, show
-from stiffmap.ui.cli.table_text import table
+from stiffmap.ui.cli.output import JsonOption, show, table
 
 if TYPE_CHECKING:
     from stiffmap import Machine

@@ -16,7 +16,7 @@ from stiffmap.common.number_text import number_in
 from stiffmap.common.outputs.option import written
 from stiffmap.ui.cli.inputs import DhConventionOption, OverwriteOption, pairs
 from stiffmap.ui.cli.output import JsonOption, show
-from stiffmap.ui.cli.table_text import table as table_of
+from stiffmap.ui.cli.output import table as table_of
 
 if TYPE_CHECKING:
     from stiffmap.experiment.spreadsheet.from_table import FromTable

@@ -32,11 +32,17 @@ from stiffmap.ui.cli.inputs import (
 )
 from stiffmap.ui.cli.map_big import print_estimate, print_statistics
 from stiffmap.ui.cli.map_files import Wanted, write_map_files
-from stiffmap.ui.cli.map_summary import as_table, beyond, failures, summary
-from stiffmap.ui.cli.map_uncertainty import uncertainty_data, uncertainty_told
-from stiffmap.ui.cli.map_worst import in_words, worst_pose
-from stiffmap.ui.cli.output import JsonOption, show
-from stiffmap.ui.cli.statuses import failed_in_words
+from stiffmap.ui.cli.map_summary import (
+    as_table,
+    beyond,
+    failures,
+    in_words,
+    summary,
+    uncertainty_data,
+    uncertainty_told,
+    worst_pose,
+)
+from stiffmap.ui.cli.output import JsonOption, failed_in_words, show
 from stiffmap.workspace.maps.inputs import magnitude, plane_axes
 
 

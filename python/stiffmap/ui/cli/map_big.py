@@ -10,9 +10,7 @@ from rich.table import Table
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.status import Status
 from stiffmap.ui.cli.inputs import finish
-from stiffmap.ui.cli.output import show
-from stiffmap.ui.cli.statuses import failed_in_words
-from stiffmap.ui.cli.table_text import table
+from stiffmap.ui.cli.output import failed_in_words, show, table
 
 
 def print_estimate(machine: Machine, call: dict[str, Any], as_json: bool) -> None:

@@ -15,11 +15,8 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.status import Status
 from stiffmap.ui.cli.inputs import MM
-from stiffmap.ui.cli.map_summary import readings
-from stiffmap.ui.cli.map_uncertainty import deviation_figures
-from stiffmap.ui.cli.map_worst import in_words
-from stiffmap.ui.cli.output import write_files
-from stiffmap.ui.cli.table_text import as_text
+from stiffmap.ui.cli.map_summary import deviation_figures, in_words, readings
+from stiffmap.ui.cli.output import as_text, write_files
 from stiffmap.workspace.maps.table import write_map_table
 
 if TYPE_CHECKING:

@@ -28,9 +28,8 @@ from stiffmap.ui.cli.inputs import (
     numbers,
     words,
 )
-from stiffmap.ui.cli.output import JsonOption, show, write_files
-from stiffmap.ui.cli.table_text import as_text
-from stiffmap.ui.cli.table_text import table as table_of
+from stiffmap.ui.cli.output import JsonOption, as_text, show, write_files
+from stiffmap.ui.cli.output import table as table_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

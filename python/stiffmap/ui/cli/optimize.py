@@ -17,8 +17,7 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs import make_folder
 from stiffmap.common.outputs.option import written
 from stiffmap.ui.cli.inputs import SchedulerOption, finish
-from stiffmap.ui.cli.output import JsonOption, show, write_files
-from stiffmap.ui.cli.table_text import table
+from stiffmap.ui.cli.output import JsonOption, show, table, write_files
 
 if TYPE_CHECKING:
     from stiffmap.ui.report.design import Chosen, Report

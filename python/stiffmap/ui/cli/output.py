@@ -1,18 +1,32 @@
-"""How every command shows what it found and writes its files."""
+"""How every command shows what it found, in lines, tables and JSON, and writes its files."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from rich import box
 from rich.console import Console
+from rich.table import Table
 from rich.text import Text
 from rich.tree import Tree
 
 from stiffmap.common.json_text import json_text
 from stiffmap.common.outputs import make_folder, write_text
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+MEANINGS = {
+    "UNREACHABLE": "the joints cannot get there, or a limit forbids it",
+    "SINGULAR": "the machine can move freely there",
+    "UNSTABLE": "it gives way before the whole load acts; a slender rod between balls in one piece does so "
+    "early: docs/machine_files.md",
+    "NOT_CONVERGED": "no equilibrium was found under the whole load",
+}
 
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON instead of text (SI units).")]
 
@@ -64,3 +78,38 @@ def _written(path: Path, content: Any) -> Path:
     from stiffmap.ui.plot import save
 
     return save(content, path)
+
+
+def table(
+    title: str | None,
+    heads: Sequence[str],
+    rows: Iterable[Sequence[str]] = (),
+    left: Sequence[str] = (),
+    no_wrap: bool = False,
+    **how: Any,
+) -> Table:
+    """Columns under their heads: numbers to the right, the words of the columns `left` to the left."""
+    out = Table(box=box.SIMPLE_HEAD, title=title, **how)
+    for head in heads:
+        out.add_column(head, justify="left" if head in left else "right", no_wrap=no_wrap)
+    for row in rows:
+        out.add_row(*row)
+    return out
+
+
+def as_text(table: Table) -> tuple[list[str], list[tuple[str, ...]]]:
+    """Headers and rows of a table without the terminal's colours."""
+    columns = [[Text.from_markup(str(cell)).plain for cell in c.cells] for c in table.columns]
+    return [str(c.header) for c in table.columns], list(zip(*columns, strict=True))
+
+
+def failed(status: NDArray[np.uint8]) -> dict[str, int]:
+    """Number of poses per status but CONVERGED."""
+    from stiffmap.solve.compiled import Status, counted
+
+    return {name: n for name, n in counted(status).items() if name != Status.CONVERGED.name}
+
+
+def failed_in_words(failed: Mapping[str, int], what: str = "poses") -> list[Text]:
+    """``12 poses: UNSTABLE (…)``, a line per status."""
+    return [Text(f"{count} {what}: {name} ({MEANINGS[name]})", "yellow") for name, count in failed.items()]

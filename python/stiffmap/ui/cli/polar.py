@@ -27,9 +27,7 @@ from stiffmap.ui.cli.inputs import (
     machine_with,
     position,
 )
-from stiffmap.ui.cli.output import JsonOption, show, write_files
-from stiffmap.ui.cli.statuses import failed, failed_in_words
-from stiffmap.ui.cli.table_text import table
+from stiffmap.ui.cli.output import JsonOption, failed, failed_in_words, show, table, write_files
 
 
 def command(

@@ -34,9 +34,8 @@ from stiffmap.ui.cli.inputs import (
     numbers,
     position_words,
 )
-from stiffmap.ui.cli.output import JsonOption, show
-from stiffmap.ui.cli.statuses import MEANINGS
-from stiffmap.ui.cli.table_text import table as table_of
+from stiffmap.ui.cli.output import MEANINGS, JsonOption, show
+from stiffmap.ui.cli.output import table as table_of
 
 SCALE = [1e3] * 3 + [1.0] * 3
 NAMES = ("dx", "dy", "dz", "rx", "ry", "rz")

@@ -19,8 +19,7 @@ from stiffmap.ui.cli.inputs import (
     finish,
     machine_at,
 )
-from stiffmap.ui.cli.output import JsonOption, show, write_files
-from stiffmap.ui.cli.table_text import table
+from stiffmap.ui.cli.output import JsonOption, show, table, write_files
 
 
 def command(

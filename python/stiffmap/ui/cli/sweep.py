@@ -25,8 +25,7 @@ from stiffmap.ui.cli.inputs import (
     machine_at,
     numbers,
 )
-from stiffmap.ui.cli.output import JsonOption, show, write_files
-from stiffmap.ui.cli.table_text import table
+from stiffmap.ui.cli.output import JsonOption, show, table, write_files
 
 
 def command(

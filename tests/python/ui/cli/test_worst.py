@@ -10,8 +10,7 @@ import pytest
 import stiffmap as sm
 from stiffmap.common.errors import StiffmapError
 from stiffmap.ui.cli import main
-from stiffmap.ui.cli.map_summary import name_of, summary
-from stiffmap.ui.cli.map_worst import in_words, worst_pose
+from stiffmap.ui.cli.map_summary import in_words, name_of, summary, worst_pose
 from stiffmap.ui.plot import map_figure
 from stiffmap.ui.plot.error_maps import component
 
