@@ -143,26 +143,16 @@ def _summary(command: Command) -> Callable[[], None]:
 
 def _version(wanted: bool) -> None:
     if wanted:
-        from importlib.metadata import PackageNotFoundError, version
+        from stiffmap.common.version import __version__
 
-        try:
-            print(f"stiffmap {version('stiffmap')}")
-        except PackageNotFoundError:
-            print("stiffmap (not installed: version unknown)")
+        known = __version__ != "0"
+        print(f"stiffmap {__version__}" if known else "stiffmap (not installed: version unknown)")
         raise typer.Exit
 
 
 def _without_effects(arguments: Sequence[str]) -> list[str]:
     """The arguments less the files of ``--effects-from``."""
     return [a for before, a in zip(["", *arguments], arguments, strict=False) if before != "--effects-from"]
-
-
-def _register(files: list[str]) -> None:
-    if files:
-        from stiffmap.model.effects import load_effects
-
-        for file in files:
-            load_effects(file)
 
 
 def _root(
@@ -174,7 +164,11 @@ def _root(
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
     ] = False,
 ) -> None:
-    _register(effects_from)
+    if effects_from:
+        from stiffmap.model.effects import load_effects
+
+        for file in effects_from:
+            load_effects(file)
 
 
 _root.__doc__ = HELP

@@ -147,20 +147,16 @@ def _told(table: FromTable) -> Iterator[Any]:
     commands = table.commanded.columns if table.commanded else {}
     for c in found.columns:
         if c.meaning in commands:
-            yield f"'{header[c.index]}': command of {', '.join(commands[c.meaning])}"
-            continue
-        told = f"repeat {c.repeat} of {c.meaning}" if c.repeat else c.meaning
-        where = (
-            "kept in notes.csv"
-            if c.meaning == "note"
-            else f"{told}, {found.units.get(c.meaning, 'no unit')}"
-            + (
-                f" ({c.unit or 'one'} of the sheet: {found.factors[c.meaning]:.9g} {found.units[c.meaning]})"
-                if c.meaning in found.factors
-                else ""
-            )
-        )
-        yield f"'{header[c.index]}': {where}"
+            said = f"command of {', '.join(commands[c.meaning])}"
+        elif c.meaning == "note":
+            said = "kept in notes.csv"
+        else:
+            said = f"repeat {c.repeat} of {c.meaning}" if c.repeat else c.meaning
+            said += f", {found.units.get(c.meaning, 'no unit')}"
+            if c.meaning in found.factors:
+                factor = f"{found.factors[c.meaning]:.9g} {found.units[c.meaning]}"
+                said += f" ({c.unit or 'one'} of the sheet: {factor})"
+        yield f"'{header[c.index]}': {said}"
     for name, value in found.constants.items():
         yield f"{name} = {value:g} in every row"
     if (
@@ -179,11 +175,8 @@ def _told(table: FromTable) -> Iterator[Any]:
     poses = int(made.groups.max()) + 1
     yield f"{table.folder}: {len(made)} rows of {made.quantity} at {poses} poses; reads {', '.join(made.axes)}"
     declared = np.all(~made.read | (made.sigma > 0), axis=0)
-    silent = [
-        c.name
-        for c, known, read in zip(made.channels, declared, made.axis_read, strict=True)
-        if read and not known
-    ]
+    each = zip(made.channels, declared, made.axis_read, strict=True)
+    silent = [c.name for c, known, read in each if read and not known]
     if silent:
         yield f"no noise of {', '.join(silent)} is declared: repeats must show it (five or more), or say --noise {silent[0]}=…"
     yield Text.assemble("next: ", (f"stiffmap residual {table.machine} {table.folder}", "cyan"))

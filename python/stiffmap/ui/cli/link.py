@@ -17,7 +17,7 @@ from stiffmap.model.link.gmshmesh import CAD, MESH, mesh_file
 from stiffmap.model.link.identify import identify_link
 from stiffmap.model.link.inputs import UNIT_WRENCHES, read_cases, read_material, read_part
 from stiffmap.model.link.linkfile import LinkFile, save_link
-from stiffmap.model.link.mesh import SolidMesh, face_area_centre
+from stiffmap.model.link.mesh import face_area_centre
 from stiffmap.model.link.pipeline import PartLink, Solver, Support, link_from_part
 from stiffmap.model.link.readers import read_field
 from stiffmap.model.link.result import Link
@@ -115,7 +115,7 @@ def _part(
         shape, own, name = read_part(path)
         mesher, material, centre = shape.mesh, material or own, shape.reference()
     elif suffix in CAD | MESH:
-        mesher, name, centre = partial(_mesh_file, path, unit), path.stem, None
+        mesher, name, centre = partial(mesh_file, path, unit=unit), path.stem, None
     else:
         known = ", ".join(sorted({".yaml"} | CAD | MESH | FIELDS))
         raise StiffmapError(f"{path}: expected one of {known}, got {suffix!r}")
@@ -124,10 +124,6 @@ def _part(
             f"{path}: the part has no material; give --material, for example --material steel"
         )
     return mesher, material, name, centre
-
-
-def _mesh_file(path: Path, unit: str | None, size: float | None) -> SolidMesh:
-    return mesh_file(path, size, unit)
 
 
 def _reference(
@@ -144,23 +140,17 @@ def _reference(
 def _finish(
     link: Link, part: PartLink | None, name: str, out: Path | None, picture: Path | None, as_json: bool
 ) -> None:
-    file = (
-        LinkFile(
-            (link.compliance + link.compliance.T) / 2,
-            link.covariance,
-            link.reference,
-            {"source": "field"},
-            name,
-        )
-        if part is None
-        else part.file(name)
-    )
+    if part is None:
+        even = (link.compliance + link.compliance.T) / 2
+        file = LinkFile(even, link.covariance, link.reference, {"source": "field"}, name)
+    else:
+        file = part.file(name)
     if out is not None:
         save_link(file, out)
     if picture is not None:
-        from stiffmap.ui.plot.link import draw_link, draw_part_link
+        from stiffmap.ui.plot.link import draw_link
 
-        draw_link(link, picture) if part is None else draw_part_link(part, picture)
+        draw_link(link, picture, part)
     told = [link.report(), *([] if part is None else _of_part(part, link))]
     told += [f"wrote {path}" for path in (out, picture) if path is not None]
     show(as_json, as_data(link, part, file), told)

@@ -12,7 +12,7 @@ from rich import get_console
 from rich.table import Table
 from rich.text import Text
 
-from stiffmap.common.outputs import make_folder, writing
+from stiffmap.common.outputs import make_folder
 from stiffmap.ui.cli.inputs import (
     MM,
     EffectsOption,
@@ -168,18 +168,12 @@ def write(table: MeasuresTable, output: Path) -> list[Path]:
     from stiffmap.ui.plot.measures import measure_figures, moving_modes
     from stiffmap.ui.report.sheet import animation
 
-    figures = measure_figures(table)
-    named = {f"{name}.png": f for name, f in figures.items()}
-    files = write_files(output, {"measures.json": table.as_plain(), **named}.items())
-    shown: dict[str, Figure | bytes] = {**figures}
+    figures: dict[str, Figure | bytes] = {**measure_figures(table)}
+    contents = {"measures.json": table.as_plain(), **{f"{name}.png": f for name, f in figures.items()}}
     if "modes" in figures:
-        swinging = animation(moving_modes(table))
-        shown["modes"] = swinging
-        moving = output / "modes.gif"
-        with writing(moving) as fresh:
-            fresh.write_bytes(swinging)
-        files.append(moving)
-    return [*files, write_report(table, output / "report.html", shown)]
+        contents["modes.gif"] = figures["modes"] = animation(moving_modes(table))
+    files = write_files(output, contents.items())
+    return [*files, write_report(table, output / "report.html", figures)]
 
 
 def write_report(table: MeasuresTable, path: Path, figures: dict[str, Figure | bytes]) -> Path:

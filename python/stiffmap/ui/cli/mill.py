@@ -20,7 +20,6 @@ from stiffmap.ui.cli.inputs import (
     finish,
     in_si,
     machine_with,
-    numbers,
     pairs,
 )
 from stiffmap.ui.cli.output import JsonOption, show
@@ -129,12 +128,8 @@ def _read(count: int) -> None:
 
 
 def _offsets(given: list[str] | None) -> dict[str, list[float]] | None:
-    if not given:
-        return None
-    out = {}
-    for name, values in pairs(given, "offset").items():
-        out[name.upper()] = [float(v) * MM for v in numbers(values, "offset", 3)]
-    return out
+    found = pairs(given, "offset")
+    return {name.upper(): in_si(values, "offset", 3).tolist() for name, values in found.items()} or None
 
 
 def _lines(out: dict[str, object]) -> Iterator[str]:
@@ -147,11 +142,8 @@ def _lines(out: dict[str, object]) -> Iterator[str]:
         elif isinstance(value, dict):
             numbers = {k: v for k, v in value.items() if k != "sentence" and v != []}
             text = ", ".join(f"{k} {_text(v)}" for k, v in numbers.items())
-            text = (
-                " ".join([value["sentence"], *([f"({text})"] if text else [])])
-                if "sentence" in value
-                else text
-            )
+            if "sentence" in value:
+                text = f"{value['sentence']} ({text})" if text else value["sentence"]
         else:
             text = _text(value)
         yield f"{key}: {text}"

@@ -55,16 +55,10 @@ def _of(path: Path) -> list[AppliedEffect]:
     """Effects that a diagnosis named."""
     try:
         data: Any = parse_json(path.read_text(encoding="utf-8"))
-        effects = data["effects"]
-        terms = [
-            AppliedEffect(
-                e["kind"],
-                e["element"],
-                tuple(e["legs"]),
-                tuple((n, float(v[0])) for n, v in e["parameters"].items()),
-            )
-            for e in effects
-        ]
+        terms = []
+        for e in data["effects"]:
+            values = tuple((n, float(v[0])) for n, v in e["parameters"].items())
+            terms.append(AppliedEffect(e["kind"], e["element"], tuple(e["legs"]), values))
     except OSError as error:
         raise FileError(f"cannot be read: {error.strerror}", file=str(path)) from error
     except (ValueError, KeyError, TypeError, IndexError, AttributeError, OverflowError):

@@ -123,19 +123,17 @@ def as_table(found: ParetoSet, report: Report) -> Table:
             r = t.rows[i]
             mark = {"pass": "[green]", "fail": "[red]"}.get(r.verdict, "")
             text = "–" if r.reason else f"{m.factor * r.found.worst:.4g}"
-            robust = report.chosen[name].robust if name in report.chosen else None
-            spread = robust.first_order.get(m.name, 0.0) if robust is not None else 0.0
+            chosen = report.chosen.get(name)
+            robust = None if chosen is None else chosen.robust
+            spread = 0.0 if robust is None else robust.first_order.get(m.name, 0.0)
             if spread > NOTHING * abs(r.found.worst):
                 text += f" ± {m.factor * spread:.2g}"
             cells.append(f"{mark}{text}[/]" if mark else text)
         out.add_row(f"{m.name} {m.shown}".strip(), *cells)
-    if any(c.robust is not None for c in report.chosen.values()):
-        shares = [c.robust for c in report.chosen.values()]
-        out.add_row(
-            "meets all (drawn) %",
-            *[""] * len(report.beside),
-            *("" if r is None else f"{100 * r.meets:.0f}" for r in shares),
-        )
+    shares = [c.robust for c in report.chosen.values()]
+    if any(r is not None for r in shares):
+        met = ("" if r is None else f"{100 * r.meets:.0f}" for r in shares)
+        out.add_row("meets all (drawn) %", *[""] * len(report.beside), *met)
     return out
 
 
@@ -143,23 +141,25 @@ def remarks(report: Report) -> list[str]:
     """What refinement gained, and how random machines differ from first order."""
     from stiffmap.workspace.performance.registry import get_measure
 
+    def shown(name: str, value: float, digits: int) -> str:
+        return f"{get_measure(name).factor * value:.{digits}g}"
+
     out = []
     for name, c in report.chosen.items():
+        before, after = c.found.values, c.judged.values
         gains = [
-            f"{n} {get_measure(n).factor * c.found.values[n]:.4g} → {get_measure(n).factor * c.judged.values[n]:.4g}"
-            for n in c.found.values
-            if abs(c.judged.values[n] - c.found.values[n]) > 1e-4 * abs(c.found.values[n])
+            f"{n} {shown(n, v, 4)} → {shown(n, after[n], 4)}"
+            for n, v in before.items()
+            if abs(after[n] - v) > 1e-4 * abs(v)
         ]
         out.append(f"{name}, refined by gradients: {', '.join(gains) or 'nothing better nearby'}")
-        if c.robust is not None:
+        if (r := c.robust) is not None:
             pairs = [
-                f"{n} {get_measure(n).factor * c.robust.first_order[n]:.2g} ({get_measure(n).factor * s:.2g} drawn)"
-                for n, s in c.robust.drawn.items()
-                if s > NOTHING * abs(c.judged.values[n])
+                f"{n} {shown(n, r.first_order[n], 2)} ({shown(n, s, 2)} drawn)"
+                for n, s in r.drawn.items()
+                if s > NOTHING * abs(after[n])
             ]
-            out.append(
-                f"{name}, standard deviations by {len(c.robust.places)} tolerances: {', '.join(pairs)}"
-            )
+            out.append(f"{name}, standard deviations by {len(r.places)} tolerances: {', '.join(pairs)}")
     return out
 
 

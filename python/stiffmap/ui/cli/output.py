@@ -14,7 +14,7 @@ from rich.text import Text
 from rich.tree import Tree
 
 from stiffmap.common.json_text import json_text
-from stiffmap.common.outputs import make_folder, write_text
+from stiffmap.common.outputs import make_folder, write_text, writing
 
 if TYPE_CHECKING:
     import numpy as np
@@ -59,7 +59,7 @@ def show(
 
 
 def write_files(folder: Path | None, contents: Iterable[tuple[str, Any]]) -> list[Path]:
-    """Write named datasets (.nc), data (.json), machines (.yaml) and figures, each of them made when its turn comes; no folder: nothing."""
+    """Write named datasets (.nc), data (.json), machines (.yaml), bytes and figures, each of them made when its turn comes; no folder: nothing."""
     if folder is None:
         return []
     return [_written(make_folder(folder) / name, content) for name, content in contents]
@@ -68,6 +68,10 @@ def write_files(folder: Path | None, contents: Iterable[tuple[str, Any]]) -> lis
 def _written(path: Path, content: Any) -> Path:
     if path.suffix == ".json":
         return write_text(path, json_text(content))
+    if isinstance(content, bytes):
+        with writing(path) as fresh:
+            fresh.write_bytes(content)
+        return path
     if path.suffix == ".nc":
         from stiffmap.workspace.maps.files import write_dataset
 

@@ -131,7 +131,10 @@ def _lines(m: Machine, counts: Mobility, file: Path | None) -> Iterator[Any]:
     """For the terminal."""
     d = m.description
     tree = Tree(Text.assemble((m.name, "bold"), f"  {d.title}"))
-    for name, elements in _sequences(m):
+    legs = [(f"leg {leg.name}", leg.elements) for leg in d.legs]
+    for name, elements in [("base", d.base), *legs, ("platform", d.platform)]:
+        if not elements:
+            continue
         branch = tree.add(Text(name))
         for e in elements:
             _grow(branch, e)
@@ -147,13 +150,6 @@ def _lines(m: Machine, counts: Mobility, file: Path | None) -> Iterator[Any]:
     yield f"free spins: {', '.join(m.free_spins) or 'none'}"
     if file is not None:
         yield f"wrote {file}"
-
-
-def _sequences(m: Machine) -> Iterator[tuple[str, tuple[Element, ...]]]:
-    d = m.description
-    yield from ((n, e) for n, e in (("base", d.base),) if e)
-    yield from ((f"leg {leg.name}", leg.elements) for leg in d.legs)
-    yield from ((n, e) for n, e in (("platform", d.platform),) if e)
 
 
 def _grow(tree: Tree, e: Element) -> None:
@@ -188,8 +184,5 @@ def _joint(e: Joint) -> str:
     if e.law is None:
         return f"{e.kind} actuator, rigid"
     unit, scale = ("mm/N", 1e3) if e.kind == "prismatic" else ("rad/(N m)", 1.0)
-    return (
-        f"{e.kind} actuator, {scale / e.law.stiffness:.3g} {unit}"
-        if e.law.stiffness
-        else f"{e.kind} actuator"
-    )
+    softness = f", {scale / e.law.stiffness:.3g} {unit}" if e.law.stiffness else ""
+    return f"{e.kind} actuator{softness}"

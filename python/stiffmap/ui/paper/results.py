@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import xarray as xr
@@ -44,28 +45,15 @@ def compute(count: int = 101, *, threads: int | None = None, progress: bool | No
     revised, original = load_machine("orthoglide-revised"), load_machine("orthoglide-original")
     cases = {"Fx": FX, "Fy": FY}
     x, y = (np.linspace(revised.workspace[0, i], revised.workspace[1, i], count) for i in (0, 1))
-    points = {
-        name: error_map(
-            revised,
-            x=p[0],
-            y=p[1],
-            z=p[2],
-            wrench=cases,
-            tolerance=TOLERANCE,
-            threads=threads,
-            progress=False,
-        )
-        for name, p in POINTS.items()
-    }
+    mapped = partial(error_map, revised, wrench=cases, tolerance=TOLERANCE, threads=threads)
+    points = {name: mapped(x=p[0], y=p[1], z=p[2], progress=False) for name, p in POINTS.items()}
     return Results(
         revised=revised,
         original=original,
         polars={n: polar(revised, p, FORCE, threads=threads) for n, p in POINTS.items()},
         points={n: d.squeeze(("z", "y", "x")) for n, d in points.items()},
         sweeps={n: sweeps_at(revised, p, points[n]) for n, p in POINTS.items()},
-        maps=error_map(
-            revised, x=x, y=y, z=PLANES, wrench=cases, tolerance=TOLERANCE, threads=threads, progress=progress
-        ),
+        maps=mapped(x=x, y=y, z=PLANES, progress=progress),
     )
 
 

@@ -123,27 +123,14 @@ def draw_sweeps(ax: Axes, lines: Mapping[str, xr.Dataset], variable: str, tolera
         stable = swp.status == Status.CONVERGED
         force, value = swp.force, MM * swp[variable]
         ax.plot(force, value.where(stable), label=label, **line_look(i))
-        unstable = (swp.status == Status.UNSTABLE) & np.isfinite(value)
-        if unstable.any():
-            ax.plot(
-                force[unstable],
-                value[unstable],
-                "o",
-                mfc="none",
-                ms=3.5,
-                color=colour,
-                label=f"{label}: unstable",
-            )
-        lost = ~np.isfinite(value)
-        if lost.any():
-            ax.plot(
-                force[lost],
-                np.zeros(int(lost.sum())),
-                "x",
-                ms=4,
-                color=colour,
-                label=f"{label}: no equilibrium",
-            )
+        known = np.isfinite(value)
+        for chosen, at, mark, size, words in (
+            ((swp.status == Status.UNSTABLE) & known, value, "o", 3.5, "unstable"),
+            (~known, 0.0 * force, "x", 4.0, "no equilibrium"),
+        ):
+            if chosen.any():
+                told = f"{label}: {words}"
+                ax.plot(force[chosen], at[chosen], mark, mfc="none", ms=size, color=colour, label=told)
     if tolerance is not None:
         ax.axhline(MM * tolerance, color=BLACK, lw=1, ls=":", label=f"tolerance {MM * tolerance:g} mm")
     ax.set_xlabel("force, N")

@@ -18,27 +18,20 @@ GREY = "#999999"
 MOST_TRIANGLES = 6000
 
 
-def draw_part_link(part: PartLink, path: str | Path) -> None:
-    """Write a PNG: a row of deformed shapes, a row of residual fields, the table with error bars."""
-    cases = min(len(part.wrenches), 6)
-    figure = new_figure(17, 13)
-    rows: Any = figure.subfigures(3, 1, height_ratios=(1.0, 0.9, 1.5))
-    shapes, residuals, table = rows
-    triangles = boundary_triangles(part.mesh.tets)
-    for k in range(cases):
-        _draw_shape(shapes.add_subplot(1, cases, k + 1, projection="3d"), part, triangles, k)
-    _draw_residuals(residuals, part.link, cases)
-    _draw_entries(table.add_subplot(), part.link, part.budget.standard_error())
-    write_picture(path, figure, dpi=110)
-
-
-def draw_link(link: Link, path: str | Path) -> None:
-    """Write a PNG of a link identified from a given field: residual fields and the table."""
-    figure = new_figure(17, 9)
-    rows: Any = figure.subfigures(2, 1, height_ratios=(0.9, 1.5))
-    residuals, table = rows
-    _draw_residuals(residuals, link, min(len(link.sigma), 6))
-    _draw_entries(table.add_subplot(), link, link.standard_error)
+def draw_link(link: Link, path: str | Path, part: PartLink | None = None) -> None:
+    """Write a PNG: a row of residual fields and the table with error bars; of a `part` that was computed, a row of deformed
+    shapes above them."""
+    cases = min(len(link.sigma), 6)
+    figure = new_figure(17, 9 if part is None else 13)
+    heights = (0.9, 1.5) if part is None else (1.0, 0.9, 1.5)
+    rows: Any = figure.subfigures(len(heights), 1, height_ratios=heights)
+    if part is not None:
+        triangles = boundary_triangles(part.mesh.tets)
+        for k in range(cases):
+            _draw_shape(rows[0].add_subplot(1, cases, k + 1, projection="3d"), part, triangles, k)
+    _draw_residuals(rows[-2], link, cases)
+    error = link.standard_error if part is None else part.budget.standard_error()
+    _draw_entries(rows[-1].add_subplot(), link, error)
     write_picture(path, figure, dpi=110)
 
 

@@ -61,19 +61,14 @@ def error_figure(ds: xr.Dataset) -> Figure:
     unit, scale = length_unit(float(np.nanmax(np.abs(ds.error_normal.values), initial=0.0)))
     with paper(6.4, 5.0, f"{ds.attrs['machine']}, {ds.attrs['path']}, {ds.attrs['process']}") as figure:
         top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=[2, 1])
-        top.plot(way, scale * ds.error_normal, color=BLUE, label="as it is cut")
-        top.plot(way, scale * ds.error_normal_after, color=GREEN, ls="--", label="compensated")
-        if "true_error_normal" in ds:
-            top.plot(
-                way, scale * ds.true_error_normal, color=BLUE, ls=":", label="true machine, as it is cut"
-            )
-            top.plot(
-                way,
-                scale * ds.true_error_normal_after,
-                color=GREEN,
-                ls=":",
-                label="true machine, compensated",
-            )
+        for name, colour, dashes, words in (
+            ("error_normal", BLUE, "-", "as it is cut"),
+            ("error_normal_after", GREEN, "--", "compensated"),
+            ("true_error_normal", BLUE, ":", "true machine, as it is cut"),
+            ("true_error_normal_after", GREEN, ":", "true machine, compensated"),
+        ):
+            if name in ds:
+                top.plot(way, scale * ds[name], color=colour, ls=dashes, label=words)
         tolerance = ds.attrs.get("tolerance")
         if tolerance is not None:
             for sign in (-1, 1):

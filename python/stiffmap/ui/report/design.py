@@ -51,23 +51,15 @@ class Report:
 def measured(found: ParetoSet, place: Path, nodes: int = 21, draws: int = DRAWS) -> Report:
     """The machine that the search began with and each chosen design, whose machine file is written to `place`."""
     design = found.design
-    names = list(
-        dict.fromkeys(
-            [
-                *(n for n, _ in design.constraints),
-                *design.model.objectives,
-                "force",
-                "acceleration",
-                "frequency",
-            ]
-        )
-    )
-    if design.toolpath is not None:
-        names += [n for n in ("path_compliance", "path_effort") if n not in names]
+    names = [n for n, _ in design.constraints]
+    names += [*design.model.objectives, "force", "acceleration", "frequency"]
+    names += [] if design.toolpath is None else ["path_compliance", "path_effort"]
     task = replace(design.requirements, bounds=design.constraints)
 
     def full(machine: str | Path) -> MeasuresTable:
-        return measures(load_machine(machine), requirements=task, only=names, nodes=nodes)
+        return measures(
+            load_machine(machine), requirements=task, only=list(dict.fromkeys(names)), nodes=nodes
+        )
 
     beside = {"start": full(design.machine_file)}
     for other in design.model.beside:

@@ -181,32 +181,34 @@ def _sheet(found: Milled) -> Sheet:
     s: dict[str, Any] = summary(found)
     force, u = cutting_force(job.process), force_uncertainty(job.process)
     mean = ", ".join(f"{v:.1f} ± {e:.1f}" for v, e in zip(force.mean, u, strict=True))
-    p = job.process
+    p, gain = job.process, s["loop_gain"]["largest"]
+    gain = abs(gain) if abs(gain) < 1e-9 else gain
     lines = [
         f"{job.path.name} on {job.machine.name}: {s['length_mm']:.0f} mm of cut, {s['time_s']:.1f} s, part at "
         f"({', '.join(f'{v:.1f}' for v in s['at_mm'])}) mm, turned by {s['turn_deg']:.1f} deg.",
         f"Process {p.name}: {p.cut.side} cut, {1e3 * p.cut.axial:g} mm deep, {60 * p.feed:.3g} m/min; mean force {mean} N along the "
         f"feed, to its left, along the tool; {force.power:.0f} W at the spindle.",
-        f"Error across the wall: positive where material stays on the part. Loop gain kp/k up to {abs(s['loop_gain']['largest']) if abs(s['loop_gain']['largest']) < 1e-9 else s['loop_gain']['largest']:.3g}: "
+        f"Error across the wall: positive where material stays on the part. Loop gain kp/k up to {gain:.3g}: "
         f"one mirrored program would leave {s['mirror_leaves_mm']['largest']:.4f} mm.",
         f"The compensated program has {found.program.pieces} cutting moves; it was read back and simulated with the force "
         "evaluated anew at the true distance from the wall.",
     ]
     lines += [w.text for w in found.warnings]
-    if found.feeds is not None:
+    if (f := found.feeds) is not None:
+        over = int((~f.held).sum())
+        kept = (
+            f"{over} moves are beyond the tolerance at any feed"
+            if over
+            else "the error stays within the tolerance"
+        )
         lines.append(
-            f"Feed of each move chosen: {found.feeds.time:.1f} s of cutting instead of {found.feeds.before:.1f} s; "
-            + (
-                "the error stays within the tolerance."
-                if found.feeds.held.all()
-                else f"{int((~found.feeds.held).sum())} moves are beyond the tolerance at any feed."
-            )
+            f"Feed of each move chosen: {f.time:.1f} s of cutting instead of {f.before:.1f} s; {kept}."
         )
     if not any(w.name == "chatter" for w in found.warnings):
         lines.append(str(s["stability"]["sentence"]))
     lines += [f"Note: {n}" for n in s["notes"]]
-    rows = [
-        [label, f"{s[key]['rms']:.5f}", f"{s[key]['largest']:.5f}"]
+    measured = [
+        (label, s[key])
         for label, key in (
             ("across the wall, as it is", "error_normal_mm"), ("across the wall, compensated", "error_normal_after_mm"),
             ("across the wall, mirrored once", "mirror_leaves_mm"), ("along the path, as it is", "error_along_mm"),
@@ -214,20 +216,9 @@ def _sheet(found: Milled) -> Sheet:
             ("true machine, compensated", "true_error_normal_after_mm"),
         ) if key in s
     ]  # fmt: skip
-    for label, key in (
-        ("force 80 %, compensated", "force 80 %"),
-        ("force 120 %, compensated", "force 120 %"),
-    ):
-        band = s.get("error_normal_after_band_mm")
-        if isinstance(band, dict):
-            rows.append([label, f"{band[key]['rms']:.5f}", f"{band[key]['largest']:.5f}"])
-    for k, one in enumerate(s.get("error_normal_passes_mm", []), 1):
-        rows.append([f"after pass {k}", f"{one['rms']:.5f}", f"{one['largest']:.5f}"])
-    return Sheet(
-        f"Milling: {job.path.name}",
-        verdict(found.dataset),
-        lines,
-        ["error", "rms, mm", "largest, mm"],
-        rows,
-        (2, 3),
-    )
+    band = s.get("error_normal_after_band_mm", {})
+    measured += [(f"{force}, compensated", v) for force, v in band.items()]
+    measured += [(f"after pass {k}", v) for k, v in enumerate(s.get("error_normal_passes_mm", []), 1)]
+    rows = [[label, f"{v['rms']:.5f}", f"{v['largest']:.5f}"] for label, v in measured]
+    head = ["error", "rms, mm", "largest, mm"]
+    return Sheet(f"Milling: {job.path.name}", verdict(found.dataset), lines, head, rows, (2, 3))

@@ -220,11 +220,7 @@ def residual_arrows(machine: Machine, experiment: Experiment) -> tuple[Floats, F
     """Places (n, 3) m of the rows that read a displacement along an axis, and their residuals (n, 3) m; 0 where an
     axis is not read."""
     r = residual(machine, experiment)
-    values = np.zeros((len(r.values), 3))
-    for i, c in enumerate(r.experiment.channels):
-        for axis, name in enumerate(("dx", "dy", "dz")):
-            if c.name == name:
-                values[:, axis] = r.values[:, i]
+    values = r.values[:, :3]
     read = np.isfinite(values).any(axis=1)
     return np.asarray(r.experiment.position[read]), np.nan_to_num(values[read])
 

@@ -61,9 +61,10 @@ class Scene:
         self.lines("/box", box_edges(*box_of(moment.machine)), GREY, 1.5, "screen")
         if len(rest.guides):
             self.lines("/travel", rest.guides, GREY, 0.006 * self.extent)
+        free = moves(moment.machine)
         self.gizmo = api.add_transform_controls(
-            "/tool", scale=0.14 * self.extent, active_axes=_active(moment), disable_rotations=not any(turns(moment.machine)),
-            disable_sliders=not all(moves(moment.machine)), depth_test=False, position=tuple(rest.tcp),
+            "/tool", scale=0.14 * self.extent, active_axes=free if any(free) else (True, True, True), disable_rotations=not any(turns(moment.machine)),
+            disable_sliders=not all(free), depth_test=False, position=tuple(rest.tcp),
         )  # fmt: skip
 
         self.force_handle = api.add_transform_controls(
@@ -214,12 +215,6 @@ def _groups(moment: Moment, rest: Skeleton) -> list[tuple[str, str, float, list[
         if lengths[i] > 1e-9:
             sets.setdefault((leg, round(float(thick[i]), 5)), []).append(i)
     return [(f"/links/{k}", colours[leg], t, found) for k, ((leg, t), found) in enumerate(sets.items())]
-
-
-def _active(moment: Moment) -> tuple[bool, bool, bool]:
-    """Handles of the gizmo: the axes that are commanded (all, where it may only be turned)."""
-    free = moves(moment.machine)
-    return free if any(free) else (True, True, True)
 
 
 def look_at_machine(server: Any, rest: Skeleton) -> None:

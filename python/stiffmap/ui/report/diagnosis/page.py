@@ -23,7 +23,6 @@ from stiffmap.identification.diagnosis.report.sentences import (
     opening,
 )
 from stiffmap.identification.diagnosis.report.wording import effect_text, five_lines, separation_text
-from stiffmap.identification.diagnosis.slips.slip import Slip
 from stiffmap.model.description.tree import joints
 from stiffmap.model.effects import registry
 from stiffmap.solve.budget import deflection_budget
@@ -70,7 +69,7 @@ def html(d: Findings, *, date: str | None = None, inputs: Iterable[str | PathLik
         pictures=[p for n, p in pictures.items() if n not in (*FIRST, *FOLDED)],
         folded=[pictures[n] for n in FOLDED if n in pictures],
         record=record(d, date, inputs),
-        slips=[_slip(s) for s in d.slips],
+        slips=d.slips,
         budget=_budget(d),
         sizes=[
             (n, *(f"{1e6 * v:.2f}" for v in (s.rms, s.p95, s.max)), f"{s.ratio:.3f}", s.n)
@@ -104,29 +103,20 @@ def record(
 ) -> list[tuple[str, str]]:
     """What the first page says of how the readings were taken; a blank is for the pen."""
     told = dict(d.experiment.record)
-    source = (
-        f"{told['source']}, sha256 {told['sha256'][:16]}"
-        if {"source", "sha256"} <= set(told)
-        else told.get("source", "")
-    )
+    source = told.get("source", "")
+    if "source" in told and "sha256" in told:
+        source = f"{source}, sha256 {told['sha256'][:16]}"
     t = d.experiment.temperature
     measured = "" if t is None or not np.isfinite(t).any() else f"{np.nanmin(t):.1f} to {np.nanmax(t):.1f}"
-    rows = [
+    papers = filter(None, (told.get("instrument"), told.get("certificate")))
+    return [
         ("operator", told.get("operator", "")),
-        (
-            "instrument, certificate",
-            ", ".join(filter(None, (told.get("instrument"), told.get("certificate")))),
-        ),
+        ("instrument, certificate", ", ".join(papers)),
         ("date of the readings", told.get("date", date or "")),
         ("temperature", told.get("temperature", measured)),
         ("source file", source or ", ".join(p.name for p in map(Path, inputs))),
         ("notes", told.get("notes", "")),
     ]
-    return rows
-
-
-def _slip(s: Slip) -> dict[str, Any]:
-    return {"check": s.check, "seen": s.seen, "also": s.also, "evidence": s.evidence, "undone": s.undone}
 
 
 def _effect(e: Effect) -> dict[str, Any]:
@@ -186,14 +176,11 @@ def _or_none(value: float) -> str:
 
 
 def _checks(before: Sequence[Check], after: Sequence[Check]) -> list[tuple[object, ...]]:
-    return [
-        (b.name, b.meaning, b.contrasts, *(("-",) * 4 if not b.contrasts else _pair(b, a)))
-        for b, a in zip(before, after, strict=True)
-    ]
-
-
-def _pair(b: Check, a: Check) -> tuple[str, str, str, str]:
-    return (f"{b.rms:.2f}", f"{b.p:.2g}", f"{a.rms:.2f}", f"{a.p:.2g}")
+    rows: list[tuple[object, ...]] = []
+    for b, a in zip(before, after, strict=True):
+        found = (f"{b.rms:.2f}", f"{b.p:.2g}", f"{a.rms:.2f}", f"{a.p:.2g}") if b.contrasts else ("-",) * 4
+        rows.append((b.name, b.meaning, b.contrasts, *found))
+    return rows
 
 
 def _at(p: Rest) -> str:
@@ -217,9 +204,8 @@ def _one_seen(x: Detectability, turning: set[str]) -> tuple[float, tuple[str, st
         if value is None:
             continue
         p = numbers[name]
-        sizes.append(
-            f"{name.replace('_', ' ')} {in_shop_units(value, p.angular if turns and p.angular else p.unit)}"
-        )
+        shown = in_shop_units(value, p.angular if turns and p.angular else p.unit)
+        sizes.append(f"{name.replace('_', ' ')} {shown}")
         ease = min(ease, abs(value) / p.scale)
     legs = f" of {', '.join(x.legs)}" if x.legs else ""
     return ease, (registry.get(x.kind).title, f"{in_shop_words(x.element)}{legs}", ", ".join(sizes))
