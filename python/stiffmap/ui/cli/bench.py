@@ -12,7 +12,8 @@ import numpy as np
 import typer
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.ui.cli.output import JsonOption, show, table
+from stiffmap.ui.cli import options
+from stiffmap.ui.cli.output import show, table
 
 if TYPE_CHECKING:
     from stiffmap import Machine
@@ -32,7 +33,7 @@ class Line(NamedTuple):
 
 def command(
     rounds: Annotated[int, typer.Option(help="Measurements of each case; the median is shown.")] = 7,
-    as_json: JsonOption = False,
+    as_json: options.Json = False,
 ) -> None:
     """Speed of this installation on this computer, in less than a minute.
 

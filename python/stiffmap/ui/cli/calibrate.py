@@ -14,30 +14,23 @@ from stiffmap.common.outputs.option import written
 from stiffmap.identification.calibration import Calibration, calibrate
 from stiffmap.identification.inference.travel import Profile
 from stiffmap.identification.numbers import Tolerances
-from stiffmap.ui.cli.inputs import (
-    BudgetOption,
-    DeclaredArgument,
-    ExperimentArgument,
-    SpreadOption,
-    ThreadsOption,
-    finish,
-)
-from stiffmap.ui.cli.output import JsonOption
+from stiffmap.ui.cli import options
+from stiffmap.ui.cli.inputs import finish
 
 
 def command(
-    machine: DeclaredArgument,
-    data: ExperimentArgument,
+    machine: options.Declared,
+    data: options.Experiment,
     output: Annotated[Path | None, written(help="Folder for calibration.json and table.txt.")] = None,
-    tolerance: SpreadOption = 1.0,
+    tolerance: options.Spread = 1.0,
     exclude: Annotated[
         list[str] | None, typer.Option(help="Group that is known to be right; may be repeated.")
     ] = None,
-    budget: BudgetOption = None,
+    budget: options.Budget = None,
     rows: Annotated[int, typer.Option(help="Unknowns to list.")] = 20,
     seed: Annotated[int, typer.Option(help="Seed of the folds.")] = 0,
-    threads: ThreadsOption = None,
-    as_json: JsonOption = False,
+    threads: options.Threads = None,
+    as_json: options.Json = False,
 ) -> None:
     """All uncertain numbers of a machine from readings at once, and which of them the readings can determine.
 

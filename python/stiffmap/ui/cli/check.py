@@ -11,7 +11,8 @@ from rich.text import Text
 
 from stiffmap.model.home import gap_text
 from stiffmap.solve.check import FileCheck, check_file
-from stiffmap.ui.cli.output import JsonOption, show
+from stiffmap.ui.cli import options
+from stiffmap.ui.cli.output import show
 
 MOST_CHANGES = 12
 
@@ -19,7 +20,7 @@ MOST_CHANGES = 12
 def command(
     file: Annotated[str, typer.Argument(help="Machine file, or the name of a shipped machine.")],
     strict: Annotated[bool, typer.Option("--strict", help="Exit with 1 where there are warnings.")] = False,
-    as_json: JsonOption = False,
+    as_json: options.Json = False,
 ) -> None:
     """Validate a machine file and look it over: keys, units, home, free motions, reach, odd numbers.
 

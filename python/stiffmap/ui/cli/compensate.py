@@ -24,17 +24,10 @@ from stiffmap.machining.compensation import (
     write_urdf,
 )
 from stiffmap.solve.machine import Machine
-from stiffmap.ui.cli.inputs import (
-    CorrectedArgument,
-    EffectsOption,
-    GravityOption,
-    finish,
-    in_si,
-    machine_with,
-    numbers,
-)
+from stiffmap.ui.cli import options
+from stiffmap.ui.cli.inputs import finish, in_si, machine_with, numbers
 from stiffmap.ui.cli.inputs import gravity as gravity_of
-from stiffmap.ui.cli.output import JsonOption, show
+from stiffmap.ui.cli.output import show
 
 MM = 1e3
 WORSE = "worse: these commands would enlarge the error of these readings; the file does not hold where they were taken"
@@ -45,16 +38,16 @@ NAMED = 12
 
 
 def command(
-    machine: CorrectedArgument,
+    machine: options.Corrected,
     poses: Annotated[
         Path | None, typer.Argument(help="CSV of wanted poses: x,y,z in mm, loads, approach_x …")
     ] = None,
     output: Annotated[Path | None, written(help="CSV of commands, table of --axis, or URDF.")] = None,
-    effect: EffectsOption = None,
+    effect: options.Effects = None,
     force: Annotated[
         str, typer.Option(help="Force at the tool in every pose, N, where the CSV has none.")
     ] = "0,0,0",
-    gravity: GravityOption = None,
+    gravity: options.Gravity = None,
     urdf: Annotated[
         Path | None,
         typer.Option(help="The arm's own URDF: its joints get the corrected origins, all else is kept."),
@@ -83,7 +76,7 @@ def command(
         Path | None,
         typer.Option(help="Readings that no fit saw: the error before, and what compensation would leave."),
     ] = None,
-    as_json: JsonOption = False,
+    as_json: options.Json = False,
 ) -> None:
     """Commands at which a deflected machine with errors stands where it is wanted.
 

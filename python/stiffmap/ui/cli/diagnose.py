@@ -14,31 +14,24 @@ from stiffmap.common.outputs.option import written
 from stiffmap.identification.diagnosis import Diagnosis, diagnose
 from stiffmap.identification.diagnosis.report.sentences import next_step
 from stiffmap.identification.numbers import Tolerances
-from stiffmap.ui.cli.inputs import (
-    BudgetOption,
-    DeclaredArgument,
-    ExperimentArgument,
-    SpreadOption,
-    ThreadsOption,
-    finish,
-)
-from stiffmap.ui.cli.output import JsonOption
+from stiffmap.ui.cli import options
+from stiffmap.ui.cli.inputs import finish
 
 
 def command(
-    machine: DeclaredArgument,
-    data: ExperimentArgument,
+    machine: options.Declared,
+    data: options.Experiment,
     output: Annotated[Path | None, written(help="Folder for report and files.")] = None,
     seed: Annotated[int, typer.Option(help="Seed of the folds, and of the poses drawn of many.")] = 0,
-    threads: ThreadsOption = None,
+    threads: options.Threads = None,
     exclude: Annotated[
         list[str] | None, typer.Option(help="Kind of effect or group of numbers known not to be; repeatable.")
     ] = None,
-    budget: BudgetOption = None,
-    tolerance: SpreadOption = 1.0,
+    budget: options.Budget = None,
+    tolerance: options.Spread = 1.0,
     date: Annotated[str | None, typer.Option(help="Date that the report bears, as you write it.")] = None,
     quiet: Annotated[bool, typer.Option("--quiet", help="Say nothing of what is being tried.")] = False,
-    as_json: JsonOption = False,
+    as_json: options.Json = False,
 ) -> None:
     """Which physical effect a machine lacks, where it sits, how large it is, and how sure that is.
 

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.text import Text
 
-from stiffmap.ui.cli.output import JsonOption, print_json, say
+from stiffmap.ui.cli import options
+from stiffmap.ui.cli.output import print_json, say
 
 if TYPE_CHECKING:
     from stiffmap.model.effects import EffectType
@@ -24,7 +25,7 @@ def command(
         ),
     ] = None,
     on: Annotated[str | None, typer.Option(help="Machine: the elements and legs where each can be.")] = None,
-    as_json: JsonOption = False,
+    as_json: options.Json = False,
 ) -> None:
     """List the effects that a machine can have beyond what is declared, for --effect and with_effect.
 

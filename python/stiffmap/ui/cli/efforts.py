@@ -11,23 +11,13 @@ import typer
 import xarray as xr
 from rich.table import Table
 
-from stiffmap.ui.cli.inputs import (
-    MM,
-    EffectsOption,
-    FolderOption,
-    GravityOption,
-    MachineArgument,
-    ThreadsOption,
-    finish,
-    gravity,
-    in_si,
-    machine_with,
-)
-from stiffmap.ui.cli.output import JsonOption, show, table, write_files
+from stiffmap.ui.cli import options
+from stiffmap.ui.cli.inputs import MM, finish, gravity, in_si, machine_with
+from stiffmap.ui.cli.output import show, table, write_files
 
 
 def command(
-    machine: MachineArgument,
+    machine: options.Machine,
     trajectory: Annotated[
         Path,
         typer.Argument(help="Motion of the tool: CSV or YAML, numbers with units; or a shipped one: trim."),
@@ -42,11 +32,11 @@ def command(
         float | None, typer.Option(help="mm/min along the path all the way, in place of a duration.")
     ] = None,
     friction: Annotated[bool, typer.Option(help="Coulomb and viscous friction of the drives.")] = True,
-    effect: EffectsOption = None,
-    gravity_: GravityOption = None,
-    output: FolderOption = None,
-    threads: ThreadsOption = None,
-    as_json: JsonOption = False,
+    effect: options.Effects = None,
+    gravity_: options.Gravity = None,
+    output: options.Folder = None,
+    threads: options.Threads = None,
+    as_json: options.Json = False,
 ) -> None:
     """Efforts, speeds and powers of the drives along a motion of the tool: inverse dynamics of the closed machine.
 

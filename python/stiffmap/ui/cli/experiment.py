@@ -14,8 +14,9 @@ from rich.text import Text
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import number_in
 from stiffmap.common.outputs.option import written
-from stiffmap.ui.cli.inputs import DhConventionOption, OverwriteOption, pairs
-from stiffmap.ui.cli.output import JsonOption, show
+from stiffmap.ui.cli import options
+from stiffmap.ui.cli.inputs import pairs
+from stiffmap.ui.cli.output import show
 from stiffmap.ui.cli.output import table as table_of
 
 if TYPE_CHECKING:
@@ -38,7 +39,7 @@ def command(
             help="Instead: table of Denavit and Hartenberg of a serial arm, of which machine.yaml is made.",
         ),
     ] = None,
-    dh_convention: DhConventionOption = "standard",
+    dh_convention: options.DhConvention = "standard",
     difference: Annotated[
         str,
         typer.Option(help="What differences in the file are: actual-minus-target or target-minus-actual."),
@@ -93,8 +94,8 @@ def command(
     dialogue: Annotated[
         bool, typer.Option("--dialogue", help="Ask what cannot be guessed, and remember the answers.")
     ] = False,
-    overwrite: OverwriteOption = False,
-    as_json: JsonOption = False,
+    overwrite: options.Overwrite = False,
+    as_json: options.Json = False,
 ) -> None:
     """Make an experiment of a spreadsheet: columns, units and repeats are understood and described in words.
 

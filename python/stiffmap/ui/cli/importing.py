@@ -13,8 +13,9 @@ from rich.text import Text
 from stiffmap.common.errors import FileError
 from stiffmap.common.outputs import new_file
 from stiffmap.common.outputs.option import written
-from stiffmap.ui.cli.inputs import DhConventionOption, OverwriteOption, pairs
-from stiffmap.ui.cli.output import JsonOption, show
+from stiffmap.ui.cli import options
+from stiffmap.ui.cli.inputs import pairs
+from stiffmap.ui.cli.output import show
 
 if TYPE_CHECKING:
     from stiffmap.model.urdf import Imported
@@ -30,7 +31,7 @@ def command(
         Path | None, typer.Option(help="YAML with what a URDF lacks: loops, motors, compliances.")
     ] = None,
     output: Annotated[Path | None, written(help="Machine file to write. [default: NAME.yaml]")] = None,
-    dh_convention: DhConventionOption = "standard",
+    dh_convention: options.DhConvention = "standard",
     unit: Annotated[
         list[str] | None, typer.Option(help="Unit of a column of the table without one, e.g. a=mm.")
     ] = None,
@@ -40,8 +41,8 @@ def command(
             help="Link of the URDF that is the tool. [default: tool0 and the like, or the only end]"
         ),
     ] = None,
-    overwrite: OverwriteOption = False,
-    as_json: JsonOption = False,
+    overwrite: options.Overwrite = False,
+    as_json: options.Json = False,
 ) -> None:
     """Machine file from a URDF: its tree to a tool as a serial machine, with a sidecar also closed loops; or from a table
     of Denavit and Hartenberg: a serial arm with rigid joints, whose compliances can be written into the file.

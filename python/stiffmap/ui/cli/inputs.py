@@ -1,10 +1,9 @@
-"""Options that several commands share: mm, N, N·mm and deg become SI here."""
+"""Values of options that several commands share: mm, N, N·mm and deg become SI here."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import typer
@@ -12,76 +11,11 @@ import typer
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import number_in
-from stiffmap.common.outputs.option import written
 
 if TYPE_CHECKING:
     from stiffmap.solve.machine import Machine
 
 MM = 1e-3
-
-MachineArgument = Annotated[str, typer.Argument(help="Shipped name (stiffmap machines) or machine file.")]
-DeclaredArgument = Annotated[str, typer.Argument(help="Declared machine: shipped name or machine file.")]
-CorrectedArgument = Annotated[
-    str, typer.Argument(help="Corrected machine: file with its effects, or a shipped name.")
-]
-ExperimentArgument = Annotated[
-    str, typer.Argument(help="Experiment: folder with experiment.yaml and its CSV file.")
-]
-AtOption = Annotated[
-    str | None, typer.Option("--at", help="Commanded TCP in mm, e.g. 0,0,300. [default: home]")
-]
-PlacesOption = Annotated[
-    list[str] | None,
-    typer.Option("--at", help="TCP position in mm, e.g. 0,0,300; repeatable. [default: home]"),
-]
-EffectsOption = Annotated[
-    list[str] | None,
-    typer.Option("--effect", help="Add an effect, e.g. 'dead_zone actuator y half_width=12um'; repeatable."),
-]
-GravityOption = Annotated[
-    str | None,
-    typer.Option(
-        "--gravity", help="Gravity in m/s², base axes, e.g. 0,0,-9.81; default: the machine file's."
-    ),
-]
-ForceOption = Annotated[
-    str,
-    typer.Option(
-        help="Force on the tool in N: a vector in base axes, such as 300,0,0, or a size, such as 300, "
-        "whose directions are searched."
-    ),
-]
-MethodOption = Annotated[str, typer.Option(help="fast or reference.")]
-QuantityOption = Annotated[str, typer.Option(help="deflection or position.")]
-FrameOption = Annotated[str, typer.Option(help="Instrument's frame: known, offset_unknown or unknown.")]
-TargetOption = Annotated[str, typer.Option("--tool", help="Point on the tool: known or offset_unknown.")]
-BudgetOption = Annotated[
-    float | None, typer.Option("--budget", min=0.1, help="Seconds after which the best so far is given.")
-]
-SpreadOption = Annotated[
-    float,
-    typer.Option(
-        "--tolerance", min=1e-3, help="Factor on the default standard uncertainties of the machine."
-    ),
-]
-SchedulerOption = Annotated[
-    str | None, typer.Option(help="Address of a dask scheduler whose workers do the work.")
-]
-DhConventionOption = Annotated[
-    str,
-    typer.Option("--dh-convention", help="standard, or modified (Craig: a and alpha of the link before)."),
-]
-OverwriteOption = Annotated[bool, typer.Option("--overwrite", help="Overwrite what is there already.")]
-ThreadsOption = Annotated[int | None, typer.Option(help="Threads; default: all cores.")]
-ToleranceOption = Annotated[float, typer.Option(help="Tolerated deflection, mm.")]
-PlaneOption = Annotated[str, typer.Option(help="Plane in which the force turns: xy, xz or yz.")]
-FolderOption = Annotated[Path | None, written(help="Folder for files and pictures.")]
-RotationOption = Annotated[
-    str | None,
-    typer.Option(
-        "--rotation", help="Commanded orientation as a rotation vector in deg, base axes, e.g. 0,0,30."
-    ),
-]
 
 
 def numbers(text: str, name: str, count: int | None = None) -> Floats:

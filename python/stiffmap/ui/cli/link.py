@@ -22,8 +22,9 @@ from stiffmap.model.link.pipeline import PartLink, Solver, Support, link_from_pa
 from stiffmap.model.link.readers import read_field
 from stiffmap.model.link.result import Link
 from stiffmap.model.link.solve import Material, Setup
+from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import in_si
-from stiffmap.ui.cli.output import JsonOption, show
+from stiffmap.ui.cli.output import show
 
 FIELDS = {".csv", ".dat", ".frd", ".vtk", ".vtu", ".lis", ".txt"}
 
@@ -67,7 +68,7 @@ def command(
     zeros: Annotated[bool, typer.Option("--zeros", help="Set insignificant entries to zero.")] = False,
     out: Annotated[Path | None, written("-o", "--out", help="Link file to write (YAML).")] = None,
     picture: Annotated[Path | None, written("--picture", help="PNG to write.")] = None,
-    as_json: JsonOption = False,
+    as_json: options.Json = False,
 ) -> None:
     """Identify a link's 6x6 spring, with error bars, from a part or a displacement field."""
     wrenches = UNIT_WRENCHES if cases is None else read_cases(cases)

@@ -11,25 +11,9 @@ import numpy as np
 import typer
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.ui.cli.inputs import (
-    MM,
-    EffectsOption,
-    FolderOption,
-    GravityOption,
-    MachineArgument,
-    PlacesOption,
-    RotationOption,
-    SchedulerOption,
-    ThreadsOption,
-    finish,
-    gravity,
-    in_si,
-    machine_with,
-    numbers,
-    position,
-    rotation,
-)
-from stiffmap.ui.cli.output import JsonOption, show, write_files
+from stiffmap.ui.cli import options
+from stiffmap.ui.cli.inputs import MM, finish, gravity, in_si, machine_with, numbers, position, rotation
+from stiffmap.ui.cli.output import show, write_files
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -40,9 +24,9 @@ RPM = 60 / (2 * math.pi)
 
 
 def command(
-    machine: MachineArgument,
+    machine: options.Machine,
     process: Annotated[str, typer.Option(help="Process file, or a shipped name: slot.")],
-    at: PlacesOption = None,
+    at: options.Places = None,
     feed: Annotated[
         str | None, typer.Option(help="Direction of the feed, base axes. [default: x, or y across the tool]")
     ] = None,
@@ -50,7 +34,7 @@ def command(
         str | None,
         typer.Option(help="Direction from the tool's tip to its holder, base axes. [default: the flange's]"),
     ] = None,
-    rotation_: RotationOption = None,
+    rotation_: options.Rotation = None,
     speeds: Annotated[
         str | None, typer.Option(help="Lowest and highest speed, rpm, e.g. 2000,12000.")
     ] = None,
@@ -68,12 +52,12 @@ def command(
         ),
     ] = None,
     method: Annotated[str, typer.Option(help="semi-discretization or 'zero order'.")] = "semi-discretization",
-    effect: EffectsOption = None,
-    gravity_: GravityOption = None,
-    output: FolderOption = None,
-    threads: ThreadsOption = None,
-    scheduler: SchedulerOption = None,
-    as_json: JsonOption = False,
+    effect: options.Effects = None,
+    gravity_: options.Gravity = None,
+    output: options.Folder = None,
+    threads: options.Threads = None,
+    scheduler: options.Scheduler = None,
+    as_json: options.Json = False,
 ) -> None:
     """Stability lobes: at which speed of the spindle what depth of cut does not chatter.
 

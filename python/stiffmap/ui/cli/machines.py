@@ -6,10 +6,11 @@ from rich.padding import Padding
 from rich.text import Text
 
 from stiffmap.model.files import shipped_machines
-from stiffmap.ui.cli.output import JsonOption, print_json, say
+from stiffmap.ui.cli import options
+from stiffmap.ui.cli.output import print_json, say
 
 
-def command(as_json: JsonOption = False) -> None:
+def command(as_json: options.Json = False) -> None:
     """List the machines that come with stiffmap.
 
     Examples:

@@ -14,22 +14,8 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs import make_folder
 from stiffmap.common.outputs.option import written
 from stiffmap.solve.machine import Machine
-from stiffmap.ui.cli.inputs import (
-    MM,
-    EffectsOption,
-    ForceOption,
-    GravityOption,
-    MachineArgument,
-    MethodOption,
-    PlaneOption,
-    SchedulerOption,
-    ThreadsOption,
-    ToleranceOption,
-    finish,
-    force_given,
-    gravity,
-    machine_with,
-)
+from stiffmap.ui.cli import options
+from stiffmap.ui.cli.inputs import MM, finish, force_given, gravity, machine_with
 from stiffmap.ui.cli.map_big import print_estimate, print_statistics
 from stiffmap.ui.cli.map_files import Wanted, write_map_files
 from stiffmap.ui.cli.map_summary import (
@@ -42,25 +28,25 @@ from stiffmap.ui.cli.map_summary import (
     uncertainty_told,
     worst_pose,
 )
-from stiffmap.ui.cli.output import JsonOption, failed_in_words, show
+from stiffmap.ui.cli.output import failed_in_words, show
 from stiffmap.workspace.maps.inputs import magnitude, plane_axes
 
 
 def command(
     context: typer.Context,
-    machine: MachineArgument,
+    machine: options.Machine,
     output: OutputOption = Path("stiffmap-map"),
     z: ZOption = None,
     y: YOption = None,
     x: XOption = None,
     points: PointsOption = 101,
-    force: ForceOption = "300",
+    force: options.Force = "300",
     toolpath: ToolpathOption = None,
-    plane: PlaneOption = "xy",
-    tolerance: ToleranceOption = 0.25,
+    plane: options.Plane = "xy",
+    tolerance: options.Tolerance = 0.25,
     directions: DirectionsOption = 4,
-    effect: EffectsOption = None,
-    gravity_: GravityOption = None,
+    effect: options.Effects = None,
+    gravity_: options.Gravity = None,
     compliance: ComplianceOption = False,
     uncertainty: UncertaintyOption = False,
     zarr: ZarrOption = False,
@@ -71,10 +57,10 @@ def command(
     own_scales: OwnScalesOption = False,
     estimate: EstimateOption = False,
     statistics: StatisticsOption = False,
-    scheduler: SchedulerOption = None,
-    method: MethodOption = "fast",
-    threads: ThreadsOption = None,
-    as_json: JsonOption = False,
+    scheduler: options.Scheduler = None,
+    method: options.Method = "fast",
+    threads: options.Threads = None,
+    as_json: options.Json = False,
 ) -> None:
     """Error maps of z-planes: how far a force in the plane pushes the tool off its commanded position.
 

@@ -13,22 +13,9 @@ from rich.table import Table
 from rich.text import Text
 
 from stiffmap.common.outputs import make_folder
-from stiffmap.ui.cli.inputs import (
-    MM,
-    EffectsOption,
-    FolderOption,
-    GravityOption,
-    MachineArgument,
-    SchedulerOption,
-    ThreadsOption,
-    finish,
-    gravity,
-    in_si,
-    machine_with,
-    numbers,
-    words,
-)
-from stiffmap.ui.cli.output import JsonOption, as_text, show, write_files
+from stiffmap.ui.cli import options
+from stiffmap.ui.cli.inputs import MM, finish, gravity, in_si, machine_with, numbers, words
+from stiffmap.ui.cli.output import as_text, show, write_files
 from stiffmap.ui.cli.output import table as table_of
 
 if TYPE_CHECKING:
@@ -39,7 +26,7 @@ if TYPE_CHECKING:
 
 
 def command(
-    machine: MachineArgument,
+    machine: options.Machine,
     requirements: Annotated[
         str | None, typer.Option(help="Requirements file, or a shipped one by name: trimming.")
     ] = None,
@@ -71,12 +58,12 @@ def command(
         float | None,
         typer.Option(help="mm of deflection under the force that workspace and largest box keep to."),
     ] = None,
-    effect: EffectsOption = None,
-    gravity_: GravityOption = None,
-    output: FolderOption = None,
-    threads: ThreadsOption = None,
-    scheduler: SchedulerOption = None,
-    as_json: JsonOption = False,
+    effect: options.Effects = None,
+    gravity_: options.Gravity = None,
+    output: options.Folder = None,
+    threads: options.Threads = None,
+    scheduler: options.Scheduler = None,
+    as_json: options.Json = False,
 ) -> None:
     """All performance measures of a machine over a box: worst and best pose, requirement, margin.
 

@@ -10,24 +10,14 @@ from typing import Annotated
 import typer
 
 from stiffmap.machining.milling import mill_job
-from stiffmap.ui.cli.inputs import (
-    MM,
-    CorrectedArgument,
-    EffectsOption,
-    FolderOption,
-    SchedulerOption,
-    ThreadsOption,
-    finish,
-    in_si,
-    machine_with,
-    pairs,
-)
-from stiffmap.ui.cli.output import JsonOption, show
+from stiffmap.ui.cli import options
+from stiffmap.ui.cli.inputs import MM, finish, in_si, machine_with, pairs
+from stiffmap.ui.cli.output import show
 from stiffmap.ui.report.milling import summary, write_report
 
 
 def command(
-    machine: CorrectedArgument,
+    machine: options.Corrected,
     path: Annotated[
         str,
         typer.Argument(
@@ -35,7 +25,7 @@ def command(
         ),
     ],
     process: Annotated[str, typer.Option(help="Process file, or a shipped name: trimming, slot.")],
-    output: FolderOption = None,
+    output: options.Folder = None,
     at: Annotated[
         str | None, typer.Option(help="Origin of the part on the machine, mm. [default: the machine's home]")
     ] = None,
@@ -46,7 +36,7 @@ def command(
     offset: Annotated[
         list[str] | None, typer.Option(help="Work offset of the G-code, mm, e.g. 'G55=10,0,0'; repeatable.")
     ] = None,
-    effect: EffectsOption = None,
+    effect: options.Effects = None,
     true_machine: Annotated[
         str | None, typer.Option("--true", help="Machine file that the program is also simulated on.")
     ] = None,
@@ -89,9 +79,9 @@ def command(
         int | None,
         typer.Option(help="Arms: choose the turn about the tool from so many over a full turn, e.g. 72."),
     ] = None,
-    threads: ThreadsOption = None,
-    scheduler: SchedulerOption = None,
-    as_json: JsonOption = False,
+    threads: options.Threads = None,
+    scheduler: options.Scheduler = None,
+    as_json: options.Json = False,
 ) -> None:
     """The part as a machine will cut it, and a program that makes it right.
 

@@ -14,20 +14,21 @@ from stiffmap.identification.planning.budget import budgets
 from stiffmap.identification.planning.calls import monitor
 from stiffmap.model.description import AppliedEffect
 from stiffmap.solve.machine import load_machine
-from stiffmap.ui.cli.inputs import DeclaredArgument, EffectsOption, finish
-from stiffmap.ui.cli.output import JsonOption, show
+from stiffmap.ui.cli import options
+from stiffmap.ui.cli.inputs import finish
+from stiffmap.ui.cli.output import show
 
 
 def command(
-    machine: DeclaredArgument,
+    machine: options.Declared,
     before: Annotated[str, typer.Argument(help="Experiment folder: the machine as it was, or one specimen.")],
     after: Annotated[str, typer.Argument(help="Experiment folder: the machine now, or another specimen.")],
-    effect: EffectsOption = None,
+    effect: options.Effects = None,
     diagnosis: Annotated[
         Path | None, typer.Option(help="diagnosis.json of the last diagnosis: its effects are followed.")
     ] = None,
     budget: Annotated[bool, typer.Option(help="Print the uncertainty budget of every number now.")] = False,
-    as_json: JsonOption = False,
+    as_json: options.Json = False,
 ) -> None:
     """What changed since the last diagnosis; or whether two specimens of a type share their numbers.
 

@@ -13,8 +13,8 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs import new_file, write_text
 from stiffmap.model.files.shipped import starter_text
 from stiffmap.solve.starters import CLASSES, class_of, machine_text
-from stiffmap.ui.cli.inputs import OverwriteOption
-from stiffmap.ui.cli.output import JsonOption, print_json, show
+from stiffmap.ui.cli import options
+from stiffmap.ui.cli.output import print_json, show
 
 DIMENSIONS = {
     "radius": "mm, of the circle on which the legs stand on the base",
@@ -61,8 +61,8 @@ def command(
     tube: Annotated[Length, _dimension("tube")] = None,
     wall: Annotated[Length, _dimension("wall")] = None,
     drive: Annotated[Length, _dimension("drive")] = None,
-    overwrite: OverwriteOption = False,
-    as_json: JsonOption = False,
+    overwrite: options.Overwrite = False,
+    as_json: options.Json = False,
 ) -> None:
     """Start a machine file: a template in which every key is explained, or a machine of a common class.
 

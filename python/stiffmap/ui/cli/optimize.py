@@ -16,8 +16,9 @@ from rich.text import Text
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs import make_folder
 from stiffmap.common.outputs.option import written
-from stiffmap.ui.cli.inputs import SchedulerOption, finish
-from stiffmap.ui.cli.output import JsonOption, show, table, write_files
+from stiffmap.ui.cli import options
+from stiffmap.ui.cli.inputs import finish
+from stiffmap.ui.cli.output import show, table, write_files
 
 if TYPE_CHECKING:
     from stiffmap.ui.report.design import Chosen, Report
@@ -29,8 +30,8 @@ def command(
     output: Annotated[Path, written(help="Folder for results; resumed from there.")] = Path("design"),
     generations: Annotated[int | None, typer.Option(help="Generations; default: the file's.")] = None,
     processes: Annotated[int | None, typer.Option(help="Processes; default: all cores.")] = None,
-    scheduler: SchedulerOption = None,
-    as_json: JsonOption = False,
+    scheduler: options.Scheduler = None,
+    as_json: options.Json = False,
 ) -> None:
     """Machines that are best under several measures at once: a Pareto set, and chosen designs as machine files.
 

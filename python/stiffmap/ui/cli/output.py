@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-import typer
 from rich import box
 from rich.console import Console
 from rich.table import Table
@@ -27,8 +26,6 @@ MEANINGS = {
     "early: docs/machine_files.md",
     "NOT_CONVERGED": "no equilibrium was found under the whole load",
 }
-
-JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON instead of text (SI units).")]
 
 
 def print_json(data: Any) -> None:

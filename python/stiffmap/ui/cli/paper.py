@@ -9,8 +9,8 @@ import typer
 
 from stiffmap.common.outputs import make_folder, write_text
 from stiffmap.common.outputs.option import written
-from stiffmap.ui.cli.inputs import ThreadsOption
-from stiffmap.ui.cli.output import JsonOption, show
+from stiffmap.ui.cli import options
+from stiffmap.ui.cli.output import show
 
 if TYPE_CHECKING:
     from stiffmap.ui.paper import Results, Statement
@@ -22,8 +22,8 @@ def command(
     output: Annotated[Path | None, written(help="Folder for figures and tables.")] = None,
     points: Annotated[int, typer.Option(help="Positions along x and y of the error maps.")] = 101,
     figures: Annotated[bool, typer.Option(help="Draw Figures 5 to 7 (with -o).")] = True,
-    threads: ThreadsOption = None,
-    as_json: JsonOption = False,
+    threads: options.Threads = None,
+    as_json: options.Json = False,
 ) -> None:
     """Reproduce the paper's application: Figures 5a–h, 6, 7 and every quantitative statement of §5.2 and §5.3.
 

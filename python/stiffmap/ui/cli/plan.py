@@ -21,8 +21,9 @@ from stiffmap.identification.planning import Design, Estimate, follow
 from stiffmap.identification.planning.calls import plan as design
 from stiffmap.identification.planning.estimate import fitted
 from stiffmap.solve.machine import Machine, load_machine
-from stiffmap.ui.cli.inputs import MM, FrameOption, QuantityOption, TargetOption, in_si, numbers
-from stiffmap.ui.cli.output import JsonOption, show
+from stiffmap.ui.cli import options
+from stiffmap.ui.cli.inputs import MM, in_si, numbers
+from stiffmap.ui.cli.output import show
 
 
 def command(
@@ -48,13 +49,13 @@ def command(
         typer.Option(help="Point of the workpiece, mm, as 100,0,50; repeatable (with --map)."),
     ] = None,
     rows: Annotated[int, typer.Option(help="Rows to measure.")] = 12,
-    quantity: QuantityOption = "deflection",
+    quantity: options.Quantity = "deflection",
     poses: Annotated[int, typer.Option(help="Candidate poses, at random in the workspace.")] = 60,
     force: Annotated[float, typer.Option(help="Size of the forces, N.")] = 400.0,
     read: Annotated[str, typer.Option(help="Axes read, of dx,dy,dz,rx,ry,rz.")] = "dx,dy,dz",
     noise: Annotated[float | None, typer.Option(help="One standard deviation of a reading, mm.")] = None,
-    frame: FrameOption = "known",
-    tool: TargetOption = "known",
+    frame: options.Frame = "known",
+    tool: options.Target = "known",
     until: Annotated[
         float | None,
         typer.Option(
@@ -65,7 +66,7 @@ def command(
         list[str] | None, typer.Option("--twin", help="What the twin really has; default: --identify.")
     ] = None,
     seed: Annotated[int, typer.Option(help="Seed of candidates and of the twin's noise.")] = 0,
-    as_json: JsonOption = False,
+    as_json: options.Json = False,
 ) -> None:
     """Which poses, loads and readings are most informative, before the instrument is booked.
 
@@ -95,15 +96,15 @@ def command(
     if rival and for_map:
         raise StiffmapError("--map and --rival exclude each other")
     aim = "separate" if rival else "map" if for_map else "identify"
-    options: dict[str, Any] = {
+    how: dict[str, Any] = {
         "quantity": quantity, "poses": poses, "force": force, "axes": tuple(read.split(",")), "frame": frame,
         "tool": tool, "noise": in_si(noise), "seed": seed,
     }  # fmt: skip
     if until is not None:
-        _sequential(m, identify or (), twin, until, rows, options, as_json)
+        _sequential(m, identify or (), twin, until, rows, how, as_json)
         return
     workpiece = np.array([MM * numbers(t, "at", 3) for t in at]) if at else None
-    found = design(m, identify or (), rows=rows, aim=aim, rival=rival or (), position=workpiece, **options)
+    found = design(m, identify or (), rows=rows, aim=aim, rival=rival or (), position=workpiece, **how)
     if output is not None:
         _write(found, output)
     show(as_json, found.as_plain(), _lines(found))
@@ -128,19 +129,19 @@ def _sequential(
     twin: list[str] | None,
     until: float,
     rows: int,
-    options: dict[str, Any],
+    how: dict[str, Any],
     as_json: bool,
 ) -> None:
     """Plan, simulate, fit, again; prints each step."""
     terms = effects_of(m, identify)
-    seeds = itertools.count(options["seed"])
+    seeds = itertools.count(how["seed"])
     steps = follow(
         m,
         terms,
         lambda e: simulate(m, e, twin or terms, seed=next(seeds)),
         until=until,
         batch=rows,
-        **options,
+        **how,
     )
     last = steps[-1][1]
     scale = np.array([p.scale for _, p in fitted(m.description, tuple(terms))])

@@ -10,38 +10,23 @@ import typer
 import xarray as xr
 from rich.table import Table
 
-from stiffmap.ui.cli.inputs import (
-    MM,
-    EffectsOption,
-    FolderOption,
-    ForceOption,
-    GravityOption,
-    MachineArgument,
-    MethodOption,
-    PlacesOption,
-    PlaneOption,
-    ToleranceOption,
-    finish,
-    force_given,
-    gravity,
-    machine_with,
-    position,
-)
-from stiffmap.ui.cli.output import JsonOption, failed, failed_in_words, show, table, write_files
+from stiffmap.ui.cli import options
+from stiffmap.ui.cli.inputs import MM, finish, force_given, gravity, machine_with, position
+from stiffmap.ui.cli.output import failed, failed_in_words, show, table, write_files
 
 
 def command(
-    machine: MachineArgument,
-    at: PlacesOption = None,
-    force: ForceOption = "300",
-    plane: PlaneOption = "xy",
+    machine: options.Machine,
+    at: options.Places = None,
+    force: options.Force = "300",
+    plane: options.Plane = "xy",
     directions: Annotated[int, typer.Option(help="Number of directions.")] = 72,
-    tolerance: ToleranceOption = 0.25,
-    effect: EffectsOption = None,
-    gravity_: GravityOption = None,
-    output: FolderOption = None,
-    method: MethodOption = "fast",
-    as_json: JsonOption = False,
+    tolerance: options.Tolerance = 0.25,
+    effect: options.Effects = None,
+    gravity_: options.Gravity = None,
+    output: options.Folder = None,
+    method: options.Method = "fast",
+    as_json: options.Json = False,
 ) -> None:
     """Deflection against the direction of a force in a plane: weakest and strongest direction.
 

@@ -8,7 +8,8 @@ from typing import Annotated
 import typer
 
 from stiffmap.common.outputs.option import written
-from stiffmap.ui.cli.output import JsonOption, show
+from stiffmap.ui.cli import options
+from stiffmap.ui.cli.output import show
 
 
 def command(
@@ -29,7 +30,7 @@ def command(
         str | None, typer.Option(help="Sheet of a workbook; the first where none is named.")
     ] = None,
     output: Annotated[Path | None, written(help="Process file, for mill, lobes, map and so on.")] = None,
-    as_json: JsonOption = False,
+    as_json: options.Json = False,
 ) -> None:
     """Coefficients of the cutting force from a dynamometer's table.
 

@@ -15,25 +15,19 @@ from stiffmap.experiment import Experiment, Residual, residual
 from stiffmap.experiment.channels import Channel
 from stiffmap.identification.validity import beyond
 from stiffmap.solve.machine import load_machine
-from stiffmap.ui.cli.inputs import (
-    DeclaredArgument,
-    EffectsOption,
-    ExperimentArgument,
-    FolderOption,
-    ThreadsOption,
-    finish,
-)
-from stiffmap.ui.cli.output import JsonOption, show
+from stiffmap.ui.cli import options
+from stiffmap.ui.cli.inputs import finish
+from stiffmap.ui.cli.output import show
 
 
 def command(
-    machine: DeclaredArgument,
-    data: ExperimentArgument,
+    machine: options.Declared,
+    data: options.Experiment,
     rows: Annotated[int, typer.Option(help="Number of worst rows to print.")] = 5,
-    effect: EffectsOption = None,
-    output: FolderOption = None,
-    threads: ThreadsOption = None,
-    as_json: JsonOption = False,
+    effect: options.Effects = None,
+    output: options.Folder = None,
+    threads: options.Threads = None,
+    as_json: options.Json = False,
 ) -> None:
     """Prediction for every reading: rms, per axis, worst rows, noise, lack of fit, model-free checks.
 

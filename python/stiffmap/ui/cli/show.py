@@ -19,23 +19,17 @@ from stiffmap.solve.kinematics import inverse_kinematics
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.mobility import Mobility, mobility
 from stiffmap.solve.status import Status
-from stiffmap.ui.cli.inputs import (
-    AtOption,
-    EffectsOption,
-    MachineArgument,
-    RotationOption,
-    machine_at,
-    numbers,
-)
-from stiffmap.ui.cli.output import JsonOption, show
+from stiffmap.ui.cli import options
+from stiffmap.ui.cli.inputs import machine_at, numbers
+from stiffmap.ui.cli.output import show
 
 
 def command(
-    machine: MachineArgument,
-    at: AtOption = None,
-    turned: RotationOption = None,
+    machine: options.Machine,
+    at: options.At = None,
+    turned: options.Rotation = None,
     output: Annotated[Path | None, written(help="Picture to write. [default: MACHINE.png]")] = None,
-    effect: EffectsOption = None,
+    effect: options.Effects = None,
     load: Annotated[
         str | None,
         typer.Option(help="Force on the tool in N, e.g. 300,0,0: draw the machine deformed by it."),
@@ -49,7 +43,7 @@ def command(
         typer.Option(help="Elevation and azimuth of the view, deg. [default: 22,35; flat: from above]"),
     ] = None,
     picture: Annotated[bool, typer.Option(help="Draw the machine.")] = True,
-    as_json: JsonOption = False,
+    as_json: options.Json = False,
 ) -> None:
     """Draw a machine in 3-D at a pose and print what it is made of.
 

@@ -19,8 +19,9 @@ from stiffmap.experiment.channels import AXES, SIDES, Channel
 from stiffmap.experiment.files.plan_file import load_plan
 from stiffmap.experiment.virtual import plans as make
 from stiffmap.solve.machine import Machine, load_machine
-from stiffmap.ui.cli.inputs import FrameOption, QuantityOption, TargetOption, in_si, numbers
-from stiffmap.ui.cli.output import JsonOption, show
+from stiffmap.ui.cli import options
+from stiffmap.ui.cli.inputs import in_si, numbers
+from stiffmap.ui.cli.output import show
 
 GRID = re.compile(r"^grid:(\d+)x(\d+)x(\d+)$")
 WORDS = {
@@ -44,7 +45,7 @@ def command(
             "fx … in N and any other column of an experiment), or an experiment folder to repeat."
         ),
     ] = "random",
-    quantity: QuantityOption = "deflection",
+    quantity: options.Quantity = "deflection",
     poses: Annotated[int, typer.Option(help="Poses of a random plan.")] = 30,
     loads: Annotated[
         str, typer.Option(help="Loads per pose: axes, full (with sums of pairs and zero), or N at random.")
@@ -71,8 +72,8 @@ def command(
     shuffle: Annotated[bool, typer.Option(help="Visit the poses in random order.")] = False,
     temperature: Annotated[str | None, typer.Option(help="First and last temperature, °C, as 20,26.")] = None,
     setups: Annotated[int, typer.Option(help="Set-ups that the poses are dealt to.")] = 1,
-    frame: FrameOption = "known",
-    tool: TargetOption = "known",
+    frame: options.Frame = "known",
+    tool: options.Target = "known",
     unloaded: Annotated[str, typer.Option(help="Unloaded state: centre, approach, unknown.")] = "centre",
     approach: Annotated[bool, typer.Option(help="Reach each pose along ±x, ±y or ±z.")] = False,
     instrument_on: Annotated[str, typer.Option(help="floor, base, or a point of the machine.")] = "floor",
@@ -81,7 +82,7 @@ def command(
     gravity: Annotated[str | None, typer.Option(help="m/s², base axes, as 0,0,-9.81.")] = None,
     outliers: Annotated[float, typer.Option(help="Share of rows that are wild, 0 to 1.")] = 0.0,
     seed: Annotated[int, typer.Option(help="Seed of poses, loads and noise.")] = 0,
-    as_json: JsonOption = False,
+    as_json: options.Json = False,
 ) -> None:
     """Write a virtual experiment, to try a plan before the instrument is booked.
 

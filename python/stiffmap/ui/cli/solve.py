@@ -20,21 +20,9 @@ from stiffmap.solve.free_motions import free_motions
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.solution import Solution
 from stiffmap.solve.status import Flag, Status
-from stiffmap.ui.cli.inputs import (
-    MM,
-    EffectsOption,
-    ForceOption,
-    GravityOption,
-    MachineArgument,
-    MethodOption,
-    RotationOption,
-    finish,
-    force_given,
-    machine_at,
-    numbers,
-    position_words,
-)
-from stiffmap.ui.cli.output import MEANINGS, JsonOption, show
+from stiffmap.ui.cli import options
+from stiffmap.ui.cli.inputs import MM, finish, force_given, machine_at, numbers, position_words
+from stiffmap.ui.cli.output import MEANINGS, show
 from stiffmap.ui.cli.output import table as table_of
 
 SCALE = [1e3] * 3 + [1.0] * 3
@@ -44,20 +32,20 @@ SHOWN = 20  # rows of a file that are printed
 
 
 def command(
-    machine: MachineArgument,
+    machine: options.Machine,
     at: Annotated[
         str | None,
         typer.Option(help="Commanded TCP in mm, e.g. 0,0,300, or a CSV file of poses. [default: home]"),
     ] = None,
     output: Annotated[Path | None, written(help="With a file of poses: CSV of the answers.")] = None,
-    force: ForceOption = "0,0,0",
+    force: options.Force = "0,0,0",
     moment: Annotated[str, typer.Option(help="Moment about the point in N mm, base axes.")] = "0,0,0",
-    turned: RotationOption = None,
+    turned: options.Rotation = None,
     point: Annotated[str, typer.Option(help="Named point where the wrench acts.")] = "tcp",
-    effect: EffectsOption = None,
-    gravity_: GravityOption = None,
-    method: MethodOption = "fast",
-    as_json: JsonOption = False,
+    effect: options.Effects = None,
+    gravity_: options.Gravity = None,
+    method: options.Method = "fast",
+    as_json: options.Json = False,
 ) -> None:
     """Deflection and compliance at one pose under one wrench.
 

@@ -9,27 +9,19 @@ from rich.table import Table
 
 from stiffmap.solve.internal_wrenches import InternalWrenches
 from stiffmap.solve.status import Status
-from stiffmap.ui.cli.inputs import (
-    AtOption,
-    EffectsOption,
-    FolderOption,
-    GravityOption,
-    MachineArgument,
-    RotationOption,
-    finish,
-    machine_at,
-)
-from stiffmap.ui.cli.output import JsonOption, show, table, write_files
+from stiffmap.ui.cli import options
+from stiffmap.ui.cli.inputs import finish, machine_at
+from stiffmap.ui.cli.output import show, table, write_files
 
 
 def command(
-    machine: MachineArgument,
-    at: AtOption = None,
-    turned: RotationOption = None,
-    effect: EffectsOption = None,
-    gravity_: GravityOption = None,
-    output: FolderOption = None,
-    as_json: JsonOption = False,
+    machine: options.Machine,
+    at: options.At = None,
+    turned: options.Rotation = None,
+    effect: options.Effects = None,
+    gravity_: options.Gravity = None,
+    output: options.Folder = None,
+    as_json: options.Json = False,
 ) -> None:
     """Wrenches inside a machine that carries nothing: geometric errors of over-constrained legs, preload.
 

@@ -12,25 +12,14 @@ from rich.table import Table
 
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.status import Status
-from stiffmap.ui.cli.inputs import (
-    MM,
-    AtOption,
-    EffectsOption,
-    FolderOption,
-    GravityOption,
-    MachineArgument,
-    MethodOption,
-    ToleranceOption,
-    finish,
-    machine_at,
-    numbers,
-)
-from stiffmap.ui.cli.output import JsonOption, show, table, write_files
+from stiffmap.ui.cli import options
+from stiffmap.ui.cli.inputs import MM, finish, machine_at, numbers
+from stiffmap.ui.cli.output import show, table, write_files
 
 
 def command(
-    machine: MachineArgument,
-    at: AtOption = None,
+    machine: options.Machine,
+    at: options.At = None,
     direction: Annotated[str, typer.Option(help="Direction of the force, any length.")] = "1,0,0",
     to: Annotated[float, typer.Option(help="Largest force, N.")] = 1000.0,
     from_: Annotated[
@@ -50,12 +39,12 @@ def command(
             help="With --limit: follow the branch that crosses at this bifurcation, 1, 2 …; -1: to the other side."
         ),
     ] = 0,
-    tolerance: ToleranceOption = 0.25,
-    effect: EffectsOption = None,
-    gravity_: GravityOption = None,
-    output: FolderOption = None,
-    method: MethodOption = "fast",
-    as_json: JsonOption = False,
+    tolerance: options.Tolerance = 0.25,
+    effect: options.Effects = None,
+    gravity_: options.Gravity = None,
+    output: options.Folder = None,
+    method: options.Method = "fast",
+    as_json: options.Json = False,
 ) -> None:
     """Deflection against the size of a force of one direction.
 

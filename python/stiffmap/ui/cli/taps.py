@@ -10,15 +10,16 @@ import numpy as np
 import typer
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.ui.cli.inputs import EffectsOption, FolderOption, MachineArgument, finish, machine_with, words
-from stiffmap.ui.cli.output import JsonOption, show, write_files
+from stiffmap.ui.cli import options
+from stiffmap.ui.cli.inputs import finish, machine_with, words
+from stiffmap.ui.cli.output import show, write_files
 
 if TYPE_CHECKING:
     from stiffmap.identification.taps import TapDiagnosis, TapTest
 
 
 def command(
-    machine: MachineArgument,
+    machine: options.Machine,
     table: Annotated[
         Path,
         typer.Argument(
@@ -30,9 +31,9 @@ def command(
     ] = None,
     only: Annotated[str | None, typer.Option(help="Kinds of effects to try, separated by commas.")] = None,
     mass_u: Annotated[float, typer.Option(help="Standard uncertainty of masses that declare none, %.")] = 5.0,
-    effect: EffectsOption = None,
-    output: FolderOption = None,
-    as_json: JsonOption = False,
+    effect: options.Effects = None,
+    output: options.Folder = None,
+    as_json: options.Json = False,
 ) -> None:
     """Which effect explains the frequencies and damping that tap tests found, typed or from measured responses.
 

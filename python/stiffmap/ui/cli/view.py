@@ -12,18 +12,9 @@ import typer
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import number_in
 from stiffmap.common.outputs.option import written
-from stiffmap.ui.cli.inputs import (
-    MM,
-    AtOption,
-    EffectsOption,
-    GravityOption,
-    MachineArgument,
-    RotationOption,
-    in_si,
-    machine_with,
-    numbers,
-)
-from stiffmap.ui.cli.output import JsonOption, show
+from stiffmap.ui.cli import options
+from stiffmap.ui.cli.inputs import MM, in_si, machine_with, numbers
+from stiffmap.ui.cli.output import show
 
 LOCAL = "127.0.0.1"
 
@@ -31,13 +22,13 @@ DEGREE = math.pi / 180
 
 
 def command(
-    machine: MachineArgument,
-    at: AtOption = None,
-    rotation: RotationOption = None,
+    machine: options.Machine,
+    at: options.At = None,
+    rotation: options.Rotation = None,
     force: Annotated[str, typer.Option(help="Force on the tool in N.")] = "0,0,-300",
     moment: Annotated[str, typer.Option(help="Moment on the tool in N·m.")] = "0,0,0",
-    gravity: GravityOption = None,
-    effect: EffectsOption = None,
+    gravity: options.Gravity = None,
+    effect: options.Effects = None,
     plane: Annotated[
         str | None,
         typer.Option(help="Axis across which the plane lies (x, y, z), or the normal of a free one."),
@@ -86,7 +77,7 @@ def command(
         str, typer.Option(help="Address to listen on; beyond this computer a token is asked for.")
     ] = LOCAL,
     browser: Annotated[bool, typer.Option(help="Open the browser.")] = True,
-    as_json: JsonOption = False,
+    as_json: options.Json = False,
 ) -> None:
     """Look at a machine and its map live in a browser: drag the tool, turn the force, change a number.
 

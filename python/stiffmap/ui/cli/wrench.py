@@ -8,30 +8,21 @@ import numpy as np
 import typer
 
 from stiffmap.solve.status import Flag, Status
-from stiffmap.ui.cli.inputs import (
-    MM,
-    AtOption,
-    EffectsOption,
-    GravityOption,
-    MachineArgument,
-    RotationOption,
-    finish,
-    machine_at,
-    numbers,
-)
-from stiffmap.ui.cli.output import JsonOption, show
+from stiffmap.ui.cli import options
+from stiffmap.ui.cli.inputs import MM, finish, machine_at, numbers
+from stiffmap.ui.cli.output import show
 
 
 def command(
-    machine: MachineArgument,
-    at: AtOption = None,
+    machine: options.Machine,
+    at: options.At = None,
     by: Annotated[str, typer.Option(help="Imposed translation of the point in mm, base axes.")] = "0,0,0",
     turn: Annotated[str, typer.Option(help="Imposed rotation vector in deg, base axes.")] = "0,0,0",
-    turned: RotationOption = None,
+    turned: options.Rotation = None,
     point: Annotated[str, typer.Option(help="Named point that is held.")] = "tcp",
-    effect: EffectsOption = None,
-    gravity_: GravityOption = None,
-    as_json: JsonOption = False,
+    effect: options.Effects = None,
+    gravity_: options.Gravity = None,
+    as_json: options.Json = False,
 ) -> None:
     """Wrench that holds a machine at a displacement from its commanded pose, whole and per leg.
 

@@ -1,0 +1,69 @@
+"""Options and arguments that several commands share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from stiffmap.common.outputs.option import written
+
+Machine = Annotated[str, typer.Argument(help="Shipped name (stiffmap machines) or machine file.")]
+Declared = Annotated[str, typer.Argument(help="Declared machine: shipped name or machine file.")]
+Corrected = Annotated[
+    str, typer.Argument(help="Corrected machine: file with its effects, or a shipped name.")
+]
+Experiment = Annotated[str, typer.Argument(help="Experiment: folder with experiment.yaml and its CSV file.")]
+At = Annotated[str | None, typer.Option("--at", help="Commanded TCP in mm, e.g. 0,0,300. [default: home]")]
+Places = Annotated[
+    list[str] | None,
+    typer.Option("--at", help="TCP position in mm, e.g. 0,0,300; repeatable. [default: home]"),
+]
+Effects = Annotated[
+    list[str] | None,
+    typer.Option("--effect", help="Add an effect, e.g. 'dead_zone actuator y half_width=12um'; repeatable."),
+]
+Gravity = Annotated[
+    str | None,
+    typer.Option(
+        "--gravity", help="Gravity in m/s², base axes, e.g. 0,0,-9.81; default: the machine file's."
+    ),
+]
+Force = Annotated[
+    str,
+    typer.Option(
+        help="Force on the tool in N: a vector in base axes, such as 300,0,0, or a size, such as 300, "
+        "whose directions are searched."
+    ),
+]
+Method = Annotated[str, typer.Option(help="fast or reference.")]
+Quantity = Annotated[str, typer.Option(help="deflection or position.")]
+Frame = Annotated[str, typer.Option(help="Instrument's frame: known, offset_unknown or unknown.")]
+Target = Annotated[str, typer.Option("--tool", help="Point on the tool: known or offset_unknown.")]
+Budget = Annotated[
+    float | None, typer.Option("--budget", min=0.1, help="Seconds after which the best so far is given.")
+]
+Spread = Annotated[
+    float,
+    typer.Option(
+        "--tolerance", min=1e-3, help="Factor on the default standard uncertainties of the machine."
+    ),
+]
+Scheduler = Annotated[str | None, typer.Option(help="Address of a dask scheduler whose workers do the work.")]
+DhConvention = Annotated[
+    str,
+    typer.Option("--dh-convention", help="standard, or modified (Craig: a and alpha of the link before)."),
+]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Overwrite what is there already.")]
+Threads = Annotated[int | None, typer.Option(help="Threads; default: all cores.")]
+Tolerance = Annotated[float, typer.Option(help="Tolerated deflection, mm.")]
+Plane = Annotated[str, typer.Option(help="Plane in which the force turns: xy, xz or yz.")]
+Folder = Annotated[Path | None, written(help="Folder for files and pictures.")]
+Rotation = Annotated[
+    str | None,
+    typer.Option(
+        "--rotation", help="Commanded orientation as a rotation vector in deg, base axes, e.g. 0,0,30."
+    ),
+]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON instead of text (SI units).")]
