@@ -10,7 +10,10 @@ import typer
 from rich.text import Text
 
 from stiffmap.model.home import gap_text
+from stiffmap.solve.advice import advice
 from stiffmap.solve.check import FileCheck, check_file
+from stiffmap.solve.machine import Machine
+from stiffmap.solve.trial import tried
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.output import show
 
@@ -34,24 +37,14 @@ def command(
 
       [cyan]stiffmap check --strict my_machine.yaml[/cyan]
     """
-    result = with_advice(check_file(file), file)
+    found = check_file(file)
+    result = replace(found, warnings=[*found.warnings, *advice(Machine(found.description), file)])
     show(as_json, result.as_plain(), _lines(result))
     if strict and result.warnings:
         raise typer.Exit(1)
 
 
-def with_advice(result: FileCheck, file: str) -> FileCheck:
-    """The check with findings about freedoms, reach and numbers among its warnings."""
-    from stiffmap.solve.advice import advice
-    from stiffmap.solve.machine import Machine
-
-    return replace(result, warnings=[*result.warnings, *advice(Machine(result.description), file)])
-
-
 def _lines(result: FileCheck) -> Iterator[str | Text]:
-    from stiffmap.solve.machine import Machine
-    from stiffmap.solve.trial import tried
-
     machine = result.description
     trial = tried(Machine(machine))
     yield Text.assemble((machine.name, "bold"), f"  {machine.title}")

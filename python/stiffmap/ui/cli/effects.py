@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 from rich.text import Text
 
+from stiffmap.model.effects import EffectType, get, kinds
+from stiffmap.model.effects.synonyms import found_by
+from stiffmap.model.files.shipped import machine_names
+from stiffmap.solve.machine import Machine, load_machine
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.output import print_json, say
-
-if TYPE_CHECKING:
-    from stiffmap.model.effects import EffectType
-    from stiffmap.solve.machine import Machine
 
 
 def command(
@@ -39,11 +39,6 @@ def command(
 
       [cyan]stiffmap effects straightness --on orthoglide-revised[/cyan]
     """
-    from stiffmap.model.effects import get, kinds
-    from stiffmap.model.effects.synonyms import found_by
-    from stiffmap.model.files.shipped import machine_names
-    from stiffmap.solve.machine import load_machine
-
     if kind and not on and kind not in kinds() and kind in machine_names():
         kind, on = None, kind
     machine = load_machine(on) if on else None

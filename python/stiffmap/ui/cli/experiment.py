@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import numpy as np
 import typer
@@ -14,13 +14,11 @@ from rich.text import Text
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import number_in
 from stiffmap.common.outputs.option import written
+from stiffmap.experiment.spreadsheet.from_table import FromTable, experiment_from_table
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import pairs
 from stiffmap.ui.cli.output import show
 from stiffmap.ui.cli.output import table as table_of
-
-if TYPE_CHECKING:
-    from stiffmap.experiment.spreadsheet.from_table import FromTable
 
 
 def command(
@@ -114,8 +112,6 @@ def command(
 
       [cyan]stiffmap experiment new clocks.csv --machine five-bar --map dx='Uhr 1|Uhr 2' --set z=0 -o clocks[/cyan]
     """
-    from stiffmap.experiment.spreadsheet.from_table import experiment_from_table
-
     if action != "new":
         raise StiffmapError(f"experiment: expected 'new', got '{action}'")
     made = experiment_from_table(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 from rich.text import Text
@@ -13,12 +13,11 @@ from rich.text import Text
 from stiffmap.common.errors import FileError
 from stiffmap.common.outputs import new_file
 from stiffmap.common.outputs.option import written
+from stiffmap.model.urdf import Imported, import_urdf
+from stiffmap.solve.machine import Machine
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import pairs
 from stiffmap.ui.cli.output import show
-
-if TYPE_CHECKING:
-    from stiffmap.model.urdf import Imported
 
 TABLES = (".csv", ".txt", ".tsv", ".xlsx", ".xlsm")
 
@@ -59,9 +58,6 @@ def command(
 
       [cyan]stiffmap import arm.urdf --tip tool -o tool.yaml[/cyan]
     """
-    from stiffmap.model.urdf import import_urdf
-    from stiffmap.solve.machine import Machine
-
     table = urdf.suffix.lower() in TABLES
     for option, given in {"--sidecar": sidecar, "--tip": tip}.items() if table else [("--unit", unit)]:
         if given:
@@ -94,7 +90,6 @@ def _of_table(file: Path, convention: str, unit: list[str] | None) -> Imported:
     """The arm of a table of Denavit and Hartenberg."""
     from stiffmap.common.tables.sheet import read_sheet
     from stiffmap.experiment.spreadsheet.dh import arm, read_dh
-    from stiffmap.model.urdf import Imported
 
     name = re.sub(r"[^A-Za-z0-9_\-]+", "-", file.stem)
     rows = read_dh(read_sheet(file), pairs(unit, "unit"))

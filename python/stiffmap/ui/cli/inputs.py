@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import typer
@@ -11,9 +11,8 @@ import typer
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import number_in
-
-if TYPE_CHECKING:
-    from stiffmap.solve.machine import Machine
+from stiffmap.model.effects import apply_records, parse_effect
+from stiffmap.solve.machine import Machine, load_machine
 
 MM = 1e-3
 
@@ -126,16 +125,11 @@ def machine_at(
 
 def machine_with(name: str, effects: Sequence[str] | None) -> Machine:
     """A machine with effects added."""
-    from stiffmap.solve.machine import Machine, load_machine
-
     machine = load_machine(name)
     if not effects:
         return machine
-    from stiffmap.model.effects import apply_records, parse_effect
-
-    return Machine(
-        apply_records(machine.description, [parse_effect(text, machine.description) for text in effects])
-    )
+    records = [parse_effect(text, machine.description) for text in effects]
+    return Machine(apply_records(machine.description, records))
 
 
 def finish(found: bool) -> None:

@@ -5,20 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import numpy as np
 import typer
+import xarray as xr
 
 from stiffmap.common.errors import StiffmapError
+from stiffmap.machining.chatter import stability_lobes
+from stiffmap.machining.process import Process, load_process
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import MM, finish, gravity, in_si, machine_with, numbers, position, rotation
 from stiffmap.ui.cli.output import show, write_files
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from stiffmap.machining.process import Process
 
 RPM = 60 / (2 * math.pi)
 
@@ -74,8 +72,6 @@ def command(
 
       [cyan]stiffmap lobes linear-delta --process slot --mode 1243,6.2,0.048,x --mode 1747,2.9,0.1,y --json[/cyan]
     """
-    from stiffmap.machining.process import load_process
-
     m = machine_with(machine, effect)
     p = load_process(process)
     many = numbers(points, "points", 2).astype(int)
@@ -105,8 +101,6 @@ def _one(
     machine: Any, p: Process, at: str | None, given: dict[str, Any], output: Path | None, i: int
 ) -> dict[str, Any]:
     """Answer of one pose; files where there is a folder."""
-    from stiffmap.machining.chatter import stability_lobes
-
     place = position(at, machine)
     ds = stability_lobes(machine, p, place, **given)
     a = ds.attrs

@@ -17,12 +17,12 @@ from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import MM, finish, gravity, in_si, machine_with, numbers, words
 from stiffmap.ui.cli.output import as_text, show, write_files
 from stiffmap.ui.cli.output import table as table_of
+from stiffmap.workspace.maps.loading import machine_digest
+from stiffmap.workspace.performance import MeasuresTable, measures
+from stiffmap.workspace.performance.table import Row
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from stiffmap.workspace.performance import MeasuresTable
-    from stiffmap.workspace.performance.table import Row
 
 
 def command(
@@ -81,11 +81,9 @@ def command(
 
       [cyan]stiffmap measures orthoglide-revised --only workspace --clearance 60 --deflection 0.5[/cyan]
     """
-    from stiffmap.workspace.performance import measures as all_of
-
     m = machine_with(machine, effect)
     limits = None if box is None else MM * numbers(box, "box", 6).reshape(3, 2).T
-    table = all_of(
+    table = measures(
         m, box=limits, force=force, plane=plane, requirements=requirements,
         only=words(only), nodes=nodes, coarse=coarse,
         length=in_si(length), gravity=gravity(gravity_), threads=threads, scheduler=scheduler,
@@ -167,7 +165,6 @@ def write_report(table: MeasuresTable, path: Path, figures: dict[str, Figure | b
     """The table as one page with its pictures."""
     from stiffmap.ui.plot.measures import caption
     from stiffmap.ui.report.sheet import Sheet, write_sheet
-    from stiffmap.workspace.maps.loading import machine_digest
 
     text = as_table(table)
     head, rows = as_text(text)

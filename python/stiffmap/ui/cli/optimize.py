@@ -6,7 +6,7 @@ import time
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 from rich.console import Console
@@ -19,10 +19,9 @@ from stiffmap.common.outputs.option import written
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import finish
 from stiffmap.ui.cli.output import show, table, write_files
-
-if TYPE_CHECKING:
-    from stiffmap.ui.report.design import Chosen, Report
-    from stiffmap.workspace.design import ParetoSet
+from stiffmap.ui.report.design import Chosen, Report, measured
+from stiffmap.workspace.design import ParetoSet, load_design, optimize
+from stiffmap.workspace.performance.registry import get_measure
 
 
 def command(
@@ -50,9 +49,6 @@ def command(
 
       [cyan]stiffmap optimize redesign --scheduler tcp://HOST:8786 -o results/redesign[/cyan]
     """
-    from stiffmap.ui.report.design import measured
-    from stiffmap.workspace.design import load_design, optimize
-
     console = Console(stderr=True, highlight=False)
     begun = time.monotonic()
 
@@ -140,7 +136,6 @@ def as_table(found: ParetoSet, report: Report) -> Table:
 
 def remarks(report: Report) -> list[str]:
     """What refinement gained, and how random machines differ from first order."""
-    from stiffmap.workspace.performance.registry import get_measure
 
     def shown(name: str, value: float, digits: int) -> str:
         return f"{get_measure(name).factor * value:.{digits}g}"

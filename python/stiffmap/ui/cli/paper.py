@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -11,9 +11,8 @@ from stiffmap.common.outputs import make_folder, write_text
 from stiffmap.common.outputs.option import written
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.output import show
-
-if TYPE_CHECKING:
-    from stiffmap.ui.paper import Results, Statement
+from stiffmap.ui.paper import Results, Statement, all_statements, compute
+from stiffmap.ui.paper.table import as_csv, as_markdown, as_rich, count, count_text
 
 NO_CURVES = "The paper prints no numbers of the curves in Figures 5 to 7; the numbers above are those of its text and Table 1."
 
@@ -40,9 +39,6 @@ def command(
 
       [cyan]stiffmap paper --points 31 --no-figures -o results[/cyan]
     """
-    from stiffmap.ui.paper import all_statements, compute
-    from stiffmap.ui.paper.table import as_rich, count, count_text
-
     target = make_folder(output) if output else None
     results = compute(points, threads=threads, progress=False if as_json else None)
     statements = all_statements(results)
@@ -54,7 +50,6 @@ def command(
 def write(results: Results, statements: list[Statement], target: Path, figures: bool) -> list[Path]:
     """Figures and tables."""
     from stiffmap.ui.paper.figures import save_all
-    from stiffmap.ui.paper.table import as_csv, as_markdown
 
     out = save_all(results, target) if figures else []
     for name, text in (("statements.csv", as_csv(statements)), ("statements.md", as_markdown(statements))):

@@ -15,6 +15,7 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs.option import written
 from stiffmap.model.description import Block, Body, Element, Joint, Offset, Point, Spring
 from stiffmap.model.effects import effect_text
+from stiffmap.solve.budget import deflection_budget
 from stiffmap.solve.kinematics import inverse_kinematics
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.mobility import Mobility, mobility
@@ -92,8 +93,6 @@ def _draw(m: Machine, p: Any, r: Any, path: Path, view: str | None, wrench: Any)
 
 def _show_load(m: Machine, p: Any, r: Any, wrench: Any, files: list[Path], as_json: bool) -> None:
     """The budget of the deflection, and the files written."""
-    from stiffmap.solve.budget import deflection_budget
-
     budget = deflection_budget(m, p, wrench, rotation=r)
     shares = {n: {"share": s, "displacement": c} for n, c, s in budget.ranked()}
     found = {"machine": m.name, "wrench": wrench, "displacement": budget.displacement, "elements": shares}

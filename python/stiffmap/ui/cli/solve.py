@@ -20,6 +20,8 @@ from stiffmap.solve.free_motions import free_motions
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.solution import Solution
 from stiffmap.solve.status import Flag, Status
+from stiffmap.solve.unreachable import why_unreachable
+from stiffmap.solve.worst_force import worst_force
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import MM, finish, force_given, machine_at, numbers, position_words
 from stiffmap.ui.cli.output import MEANINGS, show
@@ -72,18 +74,16 @@ def command(
     m, place, how = machine_at(machine, effect, None if file else at, turned, gravity_)
     how |= {"point": point, "method": method}
     if file is not None:
-        load = np.r_[force_vector(force), MM * numbers(moment, "moment", 3)]
+        acting = force_given(force)[1]
+        if acting is None:  # its worst direction would differ from pose to pose
+            raise StiffmapError("--force: with a file of poses, expected a vector, such as 0,0,-100")
+        load = np.r_[acting, MM * numbers(moment, "moment", 3)]
         finish(not solve_table(m, file, load, how, output, as_json))
         return
     if output is not None:
         raise StiffmapError("--output: only with a file of poses (--at poses.csv)")
     size, vector = force_given(force)
-    if vector is None:
-        from stiffmap.solve.worst_force import worst_force
-
-        acting = worst_force(m, place, size, **how)
-    else:
-        acting = vector
+    acting = worst_force(m, place, size, **how) if vector is None else vector
     load = np.r_[acting, MM * numbers(moment, "moment", 3)]
     s = m.solve(place, load, **how)
     why = reason(m, s, place, how["rotation"])
@@ -140,9 +140,7 @@ def reason(m: Machine, s: Solution, at: Any, turned: Any) -> str | None:
         return None
     if int(s.status) != Status.UNREACHABLE:
         return MEANINGS[Status(int(s.status)).name]
-    from stiffmap.solve.unreachable import why_unreachable
-
-    return why_unreachable(m, m.description.home.p if at is None else at, turned)
+    return why_unreachable(m, at, turned)
 
 
 def _matrix(title: str, values: Any) -> Table:
@@ -156,19 +154,12 @@ def is_file_name(text: str) -> bool:
     return Path(text).suffix.lower() in (".csv", ".txt", ".tsv") or Path(text).is_file()
 
 
-def force_vector(text: str) -> Floats:
-    """A force in N as a vector; StiffmapError for a size alone, whose worst direction would differ from pose to pose."""
-    vector = force_given(text)[1]
-    if vector is None:
-        raise StiffmapError("--force: with a file of poses, expected a vector, such as 0,0,-100")
-    return vector
-
-
 def solve_table(
     m: Machine, file: Path, load: Floats, how: dict[str, Any], output: Path | None, as_json: bool
 ) -> bool:
     """Solve, print, write; whether every pose converged."""
-    table = read_pose_table(file, at_home=_stand_in(m))
+    commanded = {"x", "y", "z"} <= set(m.description.task)
+    table = read_pose_table(file, at_home=None if commanded else m.description.home.p)
     turned = table.rotation(m.description.home.r)
     if turned is not None and how["rotation"] is not None:
         raise StiffmapError(f"--rotation: {file} has orientations of its own (rx, ry, rz)")
@@ -189,11 +180,6 @@ def solve_table(
     data = {"machine": m.name, "point": s.point, "poses": rows}
     show(as_json, data, _rows(table, s, words), files)
     return bool(s.ok.all())
-
-
-def _stand_in(m: Machine) -> Floats | None:
-    """Home, for coordinates that a machine is not commanded along; None where it is along all three."""
-    return None if {"x", "y", "z"} <= set(m.description.task) else m.description.home.p
 
 
 def _rows(table: PoseTable, s: Solution, words: list[str]) -> Iterator[str | Table]:

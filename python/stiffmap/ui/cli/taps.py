@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import numpy as np
 import typer
 
 from stiffmap.common.errors import StiffmapError
+from stiffmap.experiment import load_experiment
+from stiffmap.identification.taps import TapDiagnosis, TapTest, explain_taps, load_taps, predict_taps
+from stiffmap.identification.taps.causes import corrected
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import finish, machine_with, words
 from stiffmap.ui.cli.output import show, write_files
-
-if TYPE_CHECKING:
-    from stiffmap.identification.taps import TapDiagnosis, TapTest
 
 
 def command(
@@ -48,9 +48,6 @@ def command(
 
       [cyan]stiffmap taps examples/taps/kr210.yaml examples/taps/taps.csv --only compliance --json[/cyan]
     """
-    from stiffmap.experiment import load_experiment
-    from stiffmap.identification.taps import explain_taps, load_taps
-
     if not 0 < mass_u < 100:
         raise StiffmapError(f"--mass-u: expected an uncertainty above 0 and below 100 %, got {mass_u:g}")
     m = machine_with(machine, effect)
@@ -79,8 +76,6 @@ def _row(r: dict[str, Any]) -> str:
 
 def compared(machine: Any, measured: TapTest, found: TapDiagnosis) -> list[dict[str, Any]]:
     """A row per mode: measured, before and after."""
-    from stiffmap.identification.taps import predict_taps
-
     before = predict_taps(machine, measured)
     real = found.alike[0].machine if found.alike else None
     after = None if real is None else predict_taps(real, measured)
@@ -98,7 +93,6 @@ def compared(machine: Any, measured: TapTest, found: TapDiagnosis) -> list[dict[
 
 def _files(machine: Any, measured: TapTest, found: TapDiagnosis) -> Iterator[tuple[str, Any]]:
     """Corrected machine and responses before and after."""
-    from stiffmap.identification.taps.causes import corrected
     from stiffmap.ui.plot.vibration import response_figure
     from stiffmap.workspace.vibration import frequency_response
 

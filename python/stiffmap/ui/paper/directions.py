@@ -38,15 +38,10 @@ class Point:
     def __init__(self, results: Results, name: str) -> None:
         p = results.points[name]
         self.range = ratio_range(results.revised, POINTS[name])
-        self.worst: float
-        self.best: float
-        self.fx: float
-        self.fy: float
-        self.worst, self.best = (1e3 * p[f"{w}_deflection_xy"].item() for w in ("worst", "best"))
-        self.worst_angle, self.best_angle = (
-            float(np.rad2deg(p[f"{w}_direction_xy"].item())) for w in ("worst", "best")
-        )
-        self.fx, self.fy = (1e3 * p.deflection_xy.sel(case=c).item() for c in ("Fx", "Fy"))
+        ends = ("worst", "best")
+        self.worst, self.best = (1e3 * float(p[f"{w}_deflection_xy"]) for w in ends)
+        self.worst_angle, self.best_angle = (float(np.rad2deg(p[f"{w}_direction_xy"])) for w in ends)
+        self.fx, self.fy = (1e3 * float(p.deflection_xy.sel(case=c)) for c in ("Fx", "Fy"))
 
     @property
     def spread(self) -> str:

@@ -4,11 +4,11 @@ Lengths in mm, angles in deg; colours that a colour-blind reader can distinguish
 never shown as a value. No display is needed.
 """
 
+from stiffmap.ui.plot.efforts import stress_figure
 from stiffmap.ui.plot.error_maps import map_figure
 from stiffmap.ui.plot.forces import ellipse_figure, polar_figure, sweep_figure
 from stiffmap.ui.plot.loaded import loaded_figure, machine_figure
 from stiffmap.ui.plot.paths import mode_figure, path_figure
-from stiffmap.ui.plot.stresses import stress_figure
 from stiffmap.ui.plot.style import save
 
 __all__ = [
