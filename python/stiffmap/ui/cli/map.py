@@ -35,28 +35,57 @@ from stiffmap.workspace.maps.inputs import magnitude, plane_axes
 def command(
     context: typer.Context,
     machine: options.Machine,
-    output: OutputOption = Path("stiffmap-map"),
-    z: ZOption = None,
-    y: YOption = None,
-    x: XOption = None,
-    points: PointsOption = 101,
+    output: Annotated[Path, written(help="Folder for the map and its pictures.")] = Path("stiffmap-map"),
+    z: Annotated[
+        list[float] | None,
+        typer.Option(help="z-plane in mm; repeatable. [default: lowest, 0, highest of the workspace]"),
+    ] = None,
+    y: Annotated[list[float] | None, typer.Option(help="Planes across y instead, in mm; repeatable.")] = None,
+    x: Annotated[list[float] | None, typer.Option(help="Planes across x instead, in mm; repeatable.")] = None,
+    points: Annotated[
+        int, typer.Option(help="Positions along each axis of a plane, over the whole workspace.")
+    ] = 101,
     force: options.Force = "300",
-    toolpath: ToolpathOption = None,
+    toolpath: Annotated[
+        str | None,
+        typer.Option(
+            help="Along a path of the tool instead of over planes: CSV or YAML, as for `efforts`; or a shipped one: trim."
+        ),
+    ] = None,
     plane: options.Plane = "xy",
     tolerance: options.Tolerance = 0.25,
-    directions: DirectionsOption = 4,
+    directions: Annotated[
+        int,
+        typer.Option(
+            help="Force directions solved before the extremes are searched; 16 or more for machines with play."
+        ),
+    ] = 4,
     effect: options.Effects = None,
     gravity_: options.Gravity = None,
-    compliance: ComplianceOption = False,
-    uncertainty: UncertaintyOption = False,
-    zarr: ZarrOption = False,
-    resume: ResumeOption = False,
-    pictures: PicturesOption = True,
-    formats: FormatsOption = "png",
-    tables: TablesOption = None,
-    own_scales: OwnScalesOption = False,
-    estimate: EstimateOption = False,
-    statistics: StatisticsOption = False,
+    compliance: Annotated[bool, typer.Option(help="Keep the 6x6 compliance of every pose.")] = False,
+    uncertainty: Annotated[
+        bool,
+        typer.Option("--uncertainty", help="Standard deviation of the map, from links and `u` of the file."),
+    ] = False,
+    zarr: Annotated[bool, typer.Option("--zarr", help="Write Zarr instead of NetCDF.")] = False,
+    resume: Annotated[bool, typer.Option("--resume", help="Take up an interrupted run.")] = False,
+    pictures: Annotated[bool, typer.Option(help="Draw the maps, and write them as a report (HTML).")] = True,
+    formats: Annotated[
+        str, typer.Option("--format", help="Formats of the pictures: png, svg, pdf, or several as png,pdf.")
+    ] = "png",
+    tables: Annotated[
+        str | None, typer.Option("--table", help="Write the map as a table too: csv, xlsx, or csv,xlsx.")
+    ] = None,
+    own_scales: Annotated[
+        bool, typer.Option("--own-scales", help="A colour scale for each plane instead of a common one.")
+    ] = False,
+    estimate: Annotated[
+        bool,
+        typer.Option("--estimate", help="Only say how long it will take, and the memory and disk it needs."),
+    ] = False,
+    statistics: Annotated[
+        bool, typer.Option("--statistics", help="Maxima, percentiles and shares only; no map is stored.")
+    ] = False,
     scheduler: options.Scheduler = None,
     method: options.Method = "fast",
     threads: options.Threads = None,
@@ -205,50 +234,3 @@ def cases(plane: str, text: str) -> dict[str, list[float]]:
     if vector is not None:
         return {"F": [*vector, 0.0, 0.0, 0.0]}
     return {f"F{'xyz'[i]}": [size if k == i else 0.0 for k in range(6)] for i in plane_axes(plane)}
-
-
-OutputOption = Annotated[Path, written(help="Folder for the map and its pictures.")]
-ZOption = Annotated[
-    list[float] | None,
-    typer.Option(help="z-plane in mm; repeatable. [default: lowest, 0, highest of the workspace]"),
-]
-YOption = Annotated[list[float] | None, typer.Option(help="Planes across y instead, in mm; repeatable.")]
-XOption = Annotated[list[float] | None, typer.Option(help="Planes across x instead, in mm; repeatable.")]
-PointsOption = Annotated[
-    int, typer.Option(help="Positions along each axis of a plane, over the whole workspace.")
-]
-DirectionsOption = Annotated[
-    int,
-    typer.Option(
-        help="Force directions solved before the extremes are searched; 16 or more for machines with play."
-    ),
-]
-ComplianceOption = Annotated[bool, typer.Option(help="Keep the 6x6 compliance of every pose.")]
-UncertaintyOption = Annotated[
-    bool, typer.Option("--uncertainty", help="Standard deviation of the map, from links and `u` of the file.")
-]
-ZarrOption = Annotated[bool, typer.Option("--zarr", help="Write Zarr instead of NetCDF.")]
-ResumeOption = Annotated[bool, typer.Option("--resume", help="Take up an interrupted run.")]
-PicturesOption = Annotated[bool, typer.Option(help="Draw the maps, and write them as a report (HTML).")]
-FormatsOption = Annotated[
-    str, typer.Option("--format", help="Formats of the pictures: png, svg, pdf, or several as png,pdf.")
-]
-TablesOption = Annotated[
-    str | None, typer.Option("--table", help="Write the map as a table too: csv, xlsx, or csv,xlsx.")
-]
-OwnScalesOption = Annotated[
-    bool, typer.Option("--own-scales", help="A colour scale for each plane instead of a common one.")
-]
-EstimateOption = Annotated[
-    bool,
-    typer.Option("--estimate", help="Only say how long it will take, and the memory and disk it needs."),
-]
-StatisticsOption = Annotated[
-    bool, typer.Option("--statistics", help="Maxima, percentiles and shares only; no map is stored.")
-]
-ToolpathOption = Annotated[
-    str | None,
-    typer.Option(
-        help="Along a path of the tool instead of over planes: CSV or YAML, as for `efforts`; or a shipped one: trim."
-    ),
-]

@@ -106,7 +106,8 @@ def command(
     workpiece = np.array([MM * numbers(t, "at", 3) for t in at]) if at else None
     found = design(m, identify or (), rows=rows, aim=aim, rival=rival or (), position=workpiece, **how)
     if output is not None:
-        _write(found, output)
+        columns = plan_columns(found.experiment)
+        write_rows(output, list(columns), zip(*columns.values(), strict=True))
     show(as_json, found.as_plain(), _lines(found))
 
 
@@ -160,11 +161,6 @@ def _numbers(e: Estimate) -> list[dict[str, object]]:
     """Values and uncertainties of a step, SI."""
     each = zip(e.names, e.units, e.values, e.sigma * e.misfit, strict=True)
     return [{"name": n, "unit": s, "value": v, "u": u} for n, s, v, u in each]
-
-
-def _write(found: Design, path: Path) -> None:
-    columns = plan_columns(found.experiment)
-    write_rows(path, list(columns), zip(*columns.values(), strict=True))
 
 
 def _lines(d: Design) -> list[str]:

@@ -16,9 +16,8 @@ from stiffmap.ui.plot.style import MM, headline, panel, paper, save
 def figure_5(results: Results) -> Figure:
     """(a)-(d) size of the deflection against the force's direction; (e)-(h) ellipses of deflections."""
     many = list(results.polars.values())
-    with paper(
-        10.4, 5.7, f"Figure 5. Deflection in the xy plane, mm, under a force of {FORCE:g} N"
-    ) as figure:
+    title = f"Figure 5. Deflection in the xy plane, mm, under a force of {FORCE:g} N"
+    with paper(10.4, 5.7, title) as figure:
         for i, pol in enumerate(many):
             top: Any = figure.add_subplot(2, 4, i + 1, projection="polar")
             draw_polar(top, pol, "deflection_xy", TOLERANCE)
@@ -41,7 +40,7 @@ def figure_7(results: Results, variable: str = "worst_deflection_xy", case: str 
     return map_figure(results.maps, variable, case=case, tolerance=TOLERANCE)
 
 
-def save_all(results: Results, folder: Path, dpi: int = 150) -> list[Path]:
+def save_all(results: Results, folder: Path) -> list[Path]:
     """Write every figure as PNG; Figure 7 in four readings, since the paper does not state its force."""
     worst = float(results.maps.worst_deflection_xy.max()) * MM
     figures = {
@@ -56,4 +55,4 @@ def save_all(results: Results, folder: Path, dpi: int = 150) -> list[Path]:
         figures["figure7-worst"],
         f"Figure 7. {FORCE:g} N in the worst direction of the plane, up to {worst:.2f} mm",
     )
-    return [save(figure, folder / f"{name}.png", dpi) for name, figure in figures.items()]
+    return [save(figure, folder / f"{name}.png") for name, figure in figures.items()]

@@ -165,9 +165,10 @@ def diagonal_limits(machine: Machine, low: float, high: float, reach: float) -> 
     return low_end, high_end
 
 
-def box_factors(machine: Machine, box: Floats, count: int = 5) -> tuple[float, float]:
-    """Least and largest factor over a grid of count³ positions in a box (2, 3), corners included."""
-    axes = [np.linspace(box[0, i], box[1, i], count) for i in range(3)]
+def box_factors(machine: Machine, box: Floats) -> tuple[float, float]:
+    """Least and largest factor over a grid of 5³ positions in a box (2, 3), corners included."""
+    low, high = box
+    axes = np.linspace(low, high, 5).T
     f = factors(machine, np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1))
     return float(f.min()), float(f.max())
 

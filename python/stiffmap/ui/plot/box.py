@@ -76,11 +76,9 @@ def section(at: Floats, a: int, b: int, u: Floats, v: Floats) -> Floats:
 
 def name_axes(axes: Axes, a: int, b: int, at: Floats, marks: Sequence[str] = "xyz") -> None:
     """Which axes a section shows, and where it lies on the third."""
-    axes.set_xlabel(f"{marks[a]}, mm")
-    axes.set_ylabel(f"{marks[b]}, mm")
+    axes.set(xlabel=f"{marks[a]}, mm", ylabel=f"{marks[b]}, mm")
     (rest,) = {0, 1, 2} - {a, b}
-    axes.set_title(f"{marks[rest]} = {round(MM * at[rest]) + 0:d} mm")
-    axes.set_aspect("equal")
+    axes.set(title=f"{marks[rest]} = {round(MM * at[rest]) + 0:d} mm", aspect="equal")
 
 
 def edges(low: Floats, high: Floats, a: int, b: int, **look: Any) -> Rectangle:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from itertools import combinations
 
 import numpy as np
@@ -33,8 +33,7 @@ def front_figure(found: ParetoSet) -> Figure:
             axes.plot(values[:, a], values[:, b], "o", color=SKY, markersize=4)
             for colour, (label, i) in zip(CYCLE[1:], found.chosen().items(), strict=False):
                 axes.plot(values[i, a], values[i, b], "s", color=colour, markersize=6, label=label)
-            axes.set_xlabel(_axis(names[a]))
-            axes.set_ylabel(_axis(names[b]))
+            axes.set(xlabel=_axis(names[a]), ylabel=_axis(names[b]))
             axes.legend()
     return figure
 
@@ -68,16 +67,15 @@ def progress_figure(found: ParetoSet) -> Figure:
     with paper(4.2, 3.0, most=0) as figure:
         axes = figure.add_subplot()
         axes.plot(steps[:, 1], steps[:, 2], color=BLUE)
-        axes.set_xlabel("designs evaluated")
-        axes.set_ylabel("hypervolume")
+        axes.set(xlabel="designs evaluated", ylabel="hypervolume")
     return figure
 
 
-def beside_figure(tables: Mapping[str, MeasuresTable], names: Sequence[str] = MAPPED) -> Figure:
+def beside_figure(tables: Mapping[str, MeasuresTable]) -> Figure:
     """Maps on the middle plane of the box, a row per measure and a column per machine; one scale per row."""
-    rows = [n for n in names if all(_map(t, n) is not None for t in tables.values())]
+    rows = [n for n in MAPPED if all(_map(t, n) is not None for t in tables.values())]
     if not rows:
-        raise StiffmapError(f"no maps to set side by side; asked for {', '.join(names)}")
+        raise StiffmapError(f"no maps to set side by side; asked for {', '.join(MAPPED)}")
     with paper(2.2 * len(tables) + 0.8, 2.3 * len(rows) + 0.4, most=0) as figure:
         grid = figure.subplots(len(rows), len(tables), squeeze=False)
         for line, name in zip(grid, rows, strict=True):
@@ -85,9 +83,7 @@ def beside_figure(tables: Mapping[str, MeasuresTable], names: Sequence[str] = MA
             steps = levels(*map(_middle, maps.values()))
             for axes, (machine, m) in zip(line, maps.items(), strict=True):
                 drawn = axes.contourf(MM * m.x, MM * m.y, _middle(m).T, levels=steps, cmap=COLOURS)
-                axes.set_aspect("equal")
-                axes.set_title(machine)
-                axes.set_xlabel("x, mm")
+                axes.set(aspect="equal", title=machine, xlabel="x, mm")
             line[0].set_ylabel("y, mm")
             figure.colorbar(drawn, ax=list(line), label=_axis(name))
         figure.suptitle("Middle plane of the box")

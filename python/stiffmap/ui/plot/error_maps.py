@@ -198,8 +198,7 @@ def draw_plane(ax: Axes, m: Drawn, plane: xr.DataArray, norm: Normalize) -> Any:
     hatch_failed(ax, x, y, v, m.status(plane))
     if m.tolerance is not None:
         draw_tolerance(ax, x, y, v, m.factor * m.tolerance, f"{MM * m.tolerance:g} mm")
-    ax.set_aspect("equal")
-    ax.set_xlabel(f"{m.how.right}, mm")
+    ax.set(aspect="equal", xlabel=f"{m.how.right}, mm")
     return mesh
 
 

@@ -90,8 +90,7 @@ def draw_ellipse(ax: Axes, pol: xr.Dataset, plane: str, tolerance: float | None)
     ax.axhline(0, color="0.7", lw=0.5, zorder=0)
     ax.axvline(0, color="0.7", lw=0.5, zorder=0)
     ax.set_aspect("equal", adjustable="datalim")
-    ax.set_xlabel(f"{names[0]}, mm")
-    ax.set_ylabel(f"{names[1]}, mm")
+    ax.set(xlabel=f"{names[0]}, mm", ylabel=f"{names[1]}, mm")
 
 
 def sweep_figure(

@@ -41,16 +41,14 @@ def transmission_figure(machine: Machine, position: ArrayLike, plane: str = "xy"
         _parallelepiped(axes[1], j)
         axes[1].set_title(f"(b) cube: {v.cube_min:.3g} … {v.cube_max:.3g}", y=0.95)
         for a in axes[:2]:
-            a.set_xlabel("$v_x$")
-            a.set_ylabel("$v_y$")
+            a.set(xlabel="$v_x$", ylabel="$v_y$")
             a.set_zlabel("$v_z$", labelpad=-1)
             a.tick_params(labelsize=7, pad=0)
             a.set_box_aspect(None, zoom=0.9)  # the layout does not know labels in space
         h = velocity_section(machine, p, plane=plane)
         _hexagon(axes[2], h.vertices, float(h.inner), float(h.outer))
         axes[2].set_title(f"(c) {plane} plane: {float(h.inner):.3g} … {float(h.outer):.3g}")
-        axes[2].set_xlabel(f"$v_{plane[0]}$ per drive speed")
-        axes[2].set_ylabel(f"$v_{plane[1]}$ per drive speed")
+        axes[2].set(xlabel=f"$v_{plane[0]}$ per drive speed", ylabel=f"$v_{plane[1]}$ per drive speed")
         where = ", ".join(f"{MM * x:.0f}" for x in p)
         headline(figure, f"{machine.name} at ({where}) mm: velocity transmission")
     return figure
@@ -272,6 +270,4 @@ def _plane(axes: Axes, row: Row, x: Floats, y: Floats, values: Floats, steps: Fl
         axes.scatter(
             *np.meshgrid(MM * x, MM * y, indexing="ij"), c=line, cmap=COLOURS, vmin=steps[0], vmax=steps[-1]
         )
-    axes.set_xlabel("x, mm")
-    axes.set_ylabel("y, mm")
-    axes.set_aspect("equal")
+    axes.set(xlabel="x, mm", ylabel="y, mm", aspect="equal")

@@ -23,15 +23,13 @@ SWING = 0.08
 """Of the machine's extent: how far the point that moves most is drawn from its place."""
 
 
-def mode_figure(
-    machine: Machine, position: ArrayLike, *, modes: int = 3, phase: float = np.pi / 2, **options: object
-) -> Figure:
-    """The first `modes` modes at a pose (3,) m, each at `phase` of its swing (rad; pi/2: farthest), exaggerated.
+def mode_figure(machine: Machine, position: ArrayLike, *, modes: int = 3, **options: object) -> Figure:
+    """The first `modes` modes at a pose (3,) m, each where its swing is farthest, exaggerated.
 
     `options` go to `natural_frequencies`. Raises StiffmapError for bad input and for a pose without modes.
     """
     scene = _Scene(machine, position, modes, options)
-    scene.swing(phase)
+    scene.swing(np.pi / 2)
     return scene.figure
 
 

@@ -123,8 +123,7 @@ def finish(ax: Any, view: tuple[float, float] | None = None) -> None:
         ax.grid(color="0.9", lw=0.5)
         ax.set_axisbelow(True)
         return
-    ax.set_zlabel("z, mm")
-    ax.set_aspect("equal")
+    ax.set(zlabel="z, mm", aspect="equal")
     for limits, to in (
         (ax.get_xlim(), ax.set_xlim),
         (ax.get_ylim(), ax.set_ylim),

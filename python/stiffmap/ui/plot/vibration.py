@@ -47,8 +47,7 @@ def lobes_figure(
         ax.margins(0)
         ax.set_xlim(s[0], s[-1])
         ax.set_ylim(0, d[-1])
-        ax.set_xlabel("speed of the spindle, rpm")
-        ax.set_ylabel("depth along the tool, mm")
+        ax.set(xlabel="speed of the spindle, rpm", ylabel="depth along the tool, mm")
     return figure
 
 
@@ -60,8 +59,7 @@ def response_figure(responses: Mapping[str, xr.DataArray]) -> Figure:
             for i, (label, H) in enumerate(responses.items()):
                 own = np.abs(H.sel(response=axis, force=f"f{axis}"))
                 ax.semilogy(H.frequency, UM * own, label=label, **line_look(i))
-            ax.set_title(f"along {axis}")
-            ax.set_xlabel("frequency, Hz")
+            ax.set(title=f"along {axis}", xlabel="frequency, Hz")
         panels[0].set_ylabel("receptance, µm/N")
         if len(responses) > 1:
             legend_below(figure)

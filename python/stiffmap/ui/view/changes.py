@@ -24,11 +24,6 @@ def addresses(description: MachineDescription) -> dict[str, float]:
     return own | _of_effects(description.effects)
 
 
-def units(description: MachineDescription) -> dict[str, str]:
-    """Unit of every address of the machine itself; effects say none."""
-    return {n.address: n.unit for n in listed(description.declared or description)}
-
-
 def _of_effects(records: tuple[AppliedEffect, ...]) -> dict[str, float]:
     return {f"{EFFECTS}/{i}/{name}": value for i, r in enumerate(records) for name, value in r.parameters}
 

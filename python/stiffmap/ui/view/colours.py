@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from stiffmap.solve.status import Status
 from stiffmap.ui.plot.style import BLUE, COLOURS, ORANGE, PURPLE, VERMILLION
 from stiffmap.ui.view.plane import PlaneMap
-from stiffmap.ui.view.quantities import Mask
 
 Image = NDArray[np.uint8]
 HATCHED, PERIOD = 4, 8
@@ -64,11 +63,6 @@ def plane_image(found: PlaneMap, limits: tuple[float, float]) -> Image:
     if not failed.any():
         return image
     image = image.repeat(HATCHED, axis=0).repeat(HATCHED, axis=1)
-    image[_stripes(len(image)) & failed.repeat(HATCHED, axis=0).repeat(HATCHED, axis=1), :3] = DARK
+    stripes = np.indices(image.shape[:2]).sum(axis=0) % PERIOD < 2
+    image[stripes & failed.repeat(HATCHED, axis=0).repeat(HATCHED, axis=1), :3] = DARK
     return image
-
-
-@cache
-def _stripes(size: int) -> Mask:
-    rows, columns = np.indices((size, size))
-    return np.asarray((rows + columns) % PERIOD < 2)

@@ -98,12 +98,12 @@ class Moment:
             id(m), place, idle, s.rotation, s.wrench, s.gravity, s.quantity, s.frequency, s.start, s.tolerance,
         )  # fmt: skip
 
-    def assembly_modes(self, seed: int = 0) -> list[tuple[float, ...]]:
+    def assembly_modes(self) -> list[tuple[float, ...]]:
         """All coordinates of the ways to take this pose that a search from random joints finds, that of home first."""
         m, s = self.machine, self.state
         names = m.compiled.names
         home = m.compiled.home_coordinates()
-        rng = np.random.default_rng(seed)
+        rng = np.random.default_rng(0)
         starts = np.tile(home, (BRANCHES_TRIED, 1))
         for name, i in names.joints.items():
             spread = 0.5 * m.compiled.length if names.is_prismatic(name) else np.pi

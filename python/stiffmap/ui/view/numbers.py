@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from stiffmap.ui.view.changes import addresses, units
+from stiffmap.model.addresses import listed
+from stiffmap.ui.view.changes import addresses
 from stiffmap.ui.view.moment import Moment
 from stiffmap.ui.view.state import State
 
@@ -64,7 +65,8 @@ class Numbers:
     def _list(self, moment: Moment) -> tuple[str, ...]:
         """Addresses that may be changed; what the file says of each is kept."""
         d = moment.machine.description
-        self.all, self._units = addresses(d), units(d)
+        self.all = addresses(d)
+        self._units = {n.address: n.unit for n in listed(d.declared or d)}
         return tuple(self.all)
 
 

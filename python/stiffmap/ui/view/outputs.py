@@ -27,6 +27,7 @@ from stiffmap.ui.view.colours import plane_image
 from stiffmap.ui.view.data import Data
 from stiffmap.ui.view.legend import legend
 from stiffmap.ui.view.moment import Moment
+from stiffmap.ui.view.numbers import write
 from stiffmap.ui.view.panels import (
     colour_bar,
     compliance_panel,
@@ -68,13 +69,9 @@ class Outputs:
     def show(self, moment: Moment) -> None:
         """The texts of a state."""
         name = self.source
-        for handle, text in (
-            (self._link, f"/?state={permalink(name, moment.state)}"),
-            (self._command, command_line(name, moment)),
-            (self._python, python_lines(name, moment)),
-        ):
-            if handle.value != text:
-                handle.value = text
+        write(self._link, "value", f"/?state={permalink(name, moment.state)}")
+        write(self._command, "value", command_line(name, moment))
+        write(self._python, "value", python_lines(name, moment))
 
     @property
     def source(self) -> str:

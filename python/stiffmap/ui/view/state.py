@@ -21,6 +21,7 @@ from stiffmap.ui.view.quantities import QUANTITIES
 PLANES = ("x", "y", "z", "free")
 MOST_LINK, MOST_TEXT = 16_000, 200_000
 """Characters of a permalink, and of what it says."""
+MOST_STATES = 200  # that can be undone
 Vector = tuple[float, float, float]
 
 
@@ -160,8 +161,8 @@ def from_permalink(word: str) -> tuple[str, State]:
 class History:
     """States that were on the screen; the last one is."""
 
-    def __init__(self, first: State, most: int = 200) -> None:
-        self.first, self._most = first, most
+    def __init__(self, first: State) -> None:
+        self.first = first
         self._past: list[State] = []
         self.now = first
 
@@ -170,13 +171,13 @@ class History:
         if state == self.now:
             return
         if keep:
-            self._past = [*self._past, self.now][-self._most :]
+            self.mark()
         self.now = state
 
     def mark(self) -> None:
         """What comes next can be undone to here, such as the end of a drag."""
         if not self._past or self._past[-1] != self.now:
-            self._past = [*self._past, self.now][-self._most :]
+            self._past = [*self._past, self.now][-MOST_STATES:]
 
     def undo(self) -> State:
         """Back to the last state that differs."""

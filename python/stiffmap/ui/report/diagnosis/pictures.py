@@ -250,10 +250,10 @@ def worst_pose(d: Findings) -> tuple[Floats, Floats] | None:
     return np.array([x[column], y[row], _middle(d.declared)[2]]), force
 
 
-def plane_errors(d: Findings, count: int = 25) -> tuple[Floats, Floats, Floats, Floats, Floats]:
-    """x, y (count), the force (6,), and errors (count, count, 3) m before and after."""
+def plane_errors(d: Findings) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+    """x, y (25), the force (6,), and errors (25, 25, 3) m before and after."""
     low, high = d.declared.workspace
-    x, y = np.linspace(low[0], high[0], count), np.linspace(low[1], high[1], count)
+    x, y, _ = np.linspace(low, high, 25).T
     gx, gy = np.meshgrid(x, y)
     position = np.stack([gx, gy, np.full_like(gx, _middle(d.declared)[2])], axis=-1)
     one, other, force = _worst_force(d, position)
