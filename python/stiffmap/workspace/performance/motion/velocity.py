@@ -23,7 +23,6 @@ from stiffmap.workspace.performance.motion.sharing import facets, motions, sides
 from stiffmap.workspace.performance.motion.zonotopes import (
     Polygon,
     farthest_vertex,
-    inscribed_sphere,
     inverse_rows,
     rows_limit,
     section_polygon,
@@ -111,14 +110,15 @@ def transmission_of(
     driven = j * speeds
     s, low = of_motions(machine, k, singular_values(j))
     high = s[..., 0]
-    if part == "all" and machine.compiled.redundancy:
-        rank = int((np.isfinite(s) & (s > 0)).sum(axis=-1).max(initial=1))
-        slowest = facets(driven, rank)[1].min(axis=-1)
+    if part == "translation" or (part == "all" and machine.compiled.redundancy):
+        rank = 3 if part == "translation" else _rank(s)
+        slowest = facets(driven, rank)[1].min(axis=-1, initial=np.inf)
+        slowest = np.where(np.isinf(slowest), 0.0, slowest)  # no facets: some motion has no drive
     elif part == "all":
         same = inverse is not None and not mixes_units(machine) and _translates(k.jacobian)
         slowest = rows_limit(inverse if same and inverse is not None else inverse_rows(j), speeds)
     else:
-        slowest = inscribed_sphere(driven) if part == "translation" else rows_limit(inverse_rows(j), speeds)
+        slowest = rows_limit(inverse_rows(j), speeds)
     with np.errstate(invalid="ignore", divide="ignore"):
         return VelocityTransmission(
             sphere_min=low, sphere_max=high, cube_min=slowest, cube_max=farthest_vertex(driven),
@@ -138,6 +138,11 @@ def of_motions(machine: Machine, k: DriveKinematics, values: Floats) -> tuple[Fl
     count = motions(k.together, values, redundancy)
     last = np.take_along_axis(values, np.maximum(count - 1, 0)[..., None], axis=-1)[..., 0]
     return np.where(np.arange(values.shape[-1]) < count[..., None], values, np.nan), last
+
+
+def _rank(values: Floats) -> int:
+    """The most singular values (..., n) that a pose has above zero."""
+    return int((np.isfinite(values) & (values > 0)).sum(axis=-1).max(initial=1))
 
 
 def _translates(jacobian: Floats) -> bool:
@@ -182,8 +187,7 @@ def velocity_section(
     j = weighted(machine, k.jacobian, 1.0, "all")
     axes = list(plane_axes(plane))
     if machine.compiled.redundancy:
-        s = of_motions(machine, k, singular_values(j))[0]
-        rank = int((np.isfinite(s) & (s > 0)).sum(axis=-1).max(initial=1))
+        rank = _rank(of_motions(machine, k, singular_values(j))[0])
         rows, most = sides(k.jacobian * speeds, rank)
         return section_polygon(rows[..., axes], most, k.status)
     return section_polygon(inverse_rows(j)[..., axes], speeds, k.status)

@@ -85,24 +85,6 @@ def rows_limit(inverse: Floats, limits: Floats) -> Floats:
         return np.asarray((limits / np.linalg.norm(inverse, axis=-1)).min(axis=-1))
 
 
-def inscribed_sphere(j: Floats) -> Floats:
-    """(...) radius of the largest sphere in the image (…, 3, drives) of the unit cube.
-
-    Each facet is parallel to two generators; its distance is the support of the zonotope along their
-    normal. Square matrices reduce to the rows of the inverse.
-    """
-    n = j.shape[-1]
-    best = np.full(j.shape[:-2], np.inf)
-    for a, b in combinations(range(n), 2):
-        normal = np.cross(j[..., a], j[..., b])
-        size = np.linalg.norm(normal, axis=-1)
-        with np.errstate(invalid="ignore", divide="ignore"):
-            support = np.abs(np.einsum("...i,...in->...n", normal, j)).sum(axis=-1) / size
-        best = np.fmin(best, np.where(size > 1e-14, support, np.inf))
-    best = np.where(np.isfinite(j).all(axis=(-2, -1)), best, np.nan)
-    return np.where(np.isinf(best), 0.0, best)
-
-
 NOTHING = 1e-12
 """Entries of the rows, relative to their largest, that count as zero: directions a drive does not feel."""
 
