@@ -97,7 +97,9 @@ class Inside:
             lit = new[near]
             rows = np.flatnonzero(~out.closed & lit.any(axis=1))
             before = out.closed.copy()
-            self._judge(out, rows, *self._beside(out, near[rows, lit[rows].argmax(axis=1)], position[rows]))
+            at = near[rows, lit[rows].argmax(axis=1)]
+            k = self._from(position[rows], out.coordinates[at])
+            self._judge(out, rows, k, self._sound(out, at, k))
             new = out.closed & ~before
             if new.any():
                 continue
@@ -121,15 +123,9 @@ class Inside:
         """The nearest closed neighbour of each."""
         return np.asarray(near[rows, out.closed[near[rows]].argmax(axis=1)])
 
-    def _beside(
-        self, out: Judged, neighbour: NDArray[np.int64], p: Floats
-    ) -> tuple[DriveKinematics, NDArray[np.bool_]]:
-        """Poses from closed neighbours, and whether the way back ends where it began: else Newton's method has
-        fallen into another working mode."""
-        k = self._from(p, out.coordinates[neighbour])
-        return k, self._sound(out, neighbour, k)
-
     def _sound(self, out: Judged, neighbour: NDArray[np.int64], k: DriveKinematics) -> NDArray[np.bool_]:
+        """Whether the way back to closed neighbours ends where it began: else Newton's method has fallen into another
+        working mode."""
         start, same = out.coordinates[neighbour], np.zeros(len(neighbour), dtype=bool)
         rows = np.flatnonzero(k.status == Status.CONVERGED)
         back = self._from(out.position[neighbour[rows]], k.coordinates[rows])
