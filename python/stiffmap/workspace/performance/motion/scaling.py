@@ -76,11 +76,5 @@ def weighted(machine: Machine, jacobian: Floats, length: float, part: str) -> Fl
         raise StiffmapError(f"part: expected one of {', '.join(PARTS)}, got {part!r}")
     out = jacobian.copy()
     out[..., 3:, :] *= length
-    if mixes_units(machine):
-        out[..., revolute_drives(machine)] /= length
+    out[..., revolute_drives(machine)] /= length
     return out[..., PARTS[part], :]
-
-
-def mixes_units(machine: Machine) -> bool:
-    """Whether drives turn as well as slide, or turn while the platform translates: always if any turns."""
-    return bool(revolute_drives(machine).any())

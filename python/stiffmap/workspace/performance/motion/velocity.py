@@ -16,7 +16,6 @@ from stiffmap.workspace.performance.motion.closing import DriveKinematics, drive
 from stiffmap.workspace.performance.motion.scaling import (
     characteristic_length,
     drive_limits,
-    mixes_units,
     weighted,
 )
 from stiffmap.workspace.performance.motion.sharing import facets, motions, sides
@@ -101,9 +100,8 @@ def transmission_of(
     length: float | None = None,
     limits: ArrayLike | str = "unit",
     part: str = "all",
-    inverse: Floats | None = None,
 ) -> VelocityTransmission:
-    """The same from kinematics that are at hand, and perhaps the inverse (..., drives, 6) of their Jacobian."""
+    """The same from kinematics that are at hand."""
     speeds = drive_limits(machine, "speed", limits, "m/s or rad/s")
     size = characteristic_length(machine, length)
     j = weighted(machine, k.jacobian, size, part)
@@ -114,9 +112,6 @@ def transmission_of(
         rank = 3 if part == "translation" else _rank(s)
         slowest = facets(driven, rank)[1].min(axis=-1, initial=np.inf)
         slowest = np.where(np.isinf(slowest), 0.0, slowest)  # no facets: some motion has no drive
-    elif part == "all":
-        same = inverse is not None and not mixes_units(machine) and _translates(k.jacobian)
-        slowest = rows_limit(inverse if same and inverse is not None else inverse_rows(j), speeds)
     else:
         slowest = rows_limit(inverse_rows(j), speeds)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -143,12 +138,6 @@ def of_motions(machine: Machine, k: DriveKinematics, values: Floats) -> tuple[Fl
 def _rank(values: Floats) -> int:
     """The most singular values (..., n) that a pose has above zero."""
     return int((np.isfinite(values) & (values > 0)).sum(axis=-1).max(initial=1))
-
-
-def _translates(jacobian: Floats) -> bool:
-    """Whether the platform turns nowhere, so that weights of rotations change nothing."""
-    turning, moving = (np.abs(jacobian[..., rows, :]) for rows in (slice(3, 6), slice(3)))
-    return bool(np.nanmax(turning, initial=0.0) <= 1e-13 * np.nanmax(moving, initial=0.0))
 
 
 def singular_values(j: Floats) -> Floats:
