@@ -51,15 +51,14 @@ def _divided(elements: Elements, count: int, found: list[str]) -> Elements:
             out.append(elements[i])
             i += 1
             continue
-        used, offset, body, spring = bar
-        found.append(spring.name)
-        out.extend(_pieces(offset, body, spring, count))
-        i += used
+        found.append(bar[2].name)
+        out.extend(_pieces(*bar, count))
+        i += 3
     return tuple(out)
 
 
-def _bar(elements: Elements, i: int) -> tuple[int, Offset, Body, Spring] | None:
-    """Number of elements, offset, body (centre as seen from the root) and spring of a bar that starts at `i`."""
+def _bar(elements: Elements, i: int) -> tuple[Offset, Body, Spring] | None:
+    """Offset, body (centre as seen from the root) and spring of a bar, the three elements from `i` on."""
     row = elements[i : i + 3]
     if len(row) < 3 or not isinstance(row[2], Spring):
         return None
@@ -74,7 +73,7 @@ def _bar(elements: Elements, i: int) -> tuple[int, Offset, Body, Spring] | None:
     middle = np.linalg.norm(np.array(body.com) - share * way) <= LIKE * length
     if not (straight and middle and _is_beam(row[2], way)):
         return None
-    return 3, offset, body, row[2]
+    return offset, body, row[2]
 
 
 def _is_beam(spring: Spring, way: Floats) -> bool:
