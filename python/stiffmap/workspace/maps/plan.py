@@ -12,7 +12,6 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import Floats, instance_of, whole_number
-from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.labels import (
     COMPLIANCE_UNITS,
     COMPONENTS,
@@ -242,8 +241,7 @@ def map_plan(
     grid = grid_of(machine, {"x": x, "y": y, "z": z}, points)
     instance_of(compliance, (bool, np.bool_), "compliance", "True or False")
     wrenches, names = wrench_cases(wrench, None if cases is None else tuple(cases))
-    if (directions := whole_number(directions, "directions", 1)) < 3:
-        raise StiffmapError(f"directions: expected 3 or more, got {directions}")
+    directions = whole_number(directions, "directions", 3)
     return MapPlan(
         loading=loading,
         x=axis(grid["x"], "x"),

@@ -9,7 +9,6 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import whole_number
-from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.labels import meaning
 from stiffmap.solve.machine import Machine, takes_machine
 from stiffmap.solve.options import LoadingKeywords, spelled_out
@@ -48,8 +47,7 @@ def polar(
     loading = Loading(machine, **given)
     p, axes = place(position), plane_axes(plane)
     force = magnitude(force, "force", "N")
-    if (directions := whole_number(directions, "directions", 1)) < 3:
-        raise StiffmapError(f"directions: expected 3 or more, got {directions}")
+    directions = whole_number(directions, "directions", 3)
     angle = even_angles(directions)
     wrench = np.concatenate([force * direction(angle, axes), np.zeros((directions, 3))], axis=1)
     s = loading.solve(p[None, None], wrench[None])

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from stiffmap.common.broadcasting import Floats
+from stiffmap.common.broadcasting import Floats, whole_number
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.description import Body, Offset, Pose, Spring
 from stiffmap.model.description.elements import Element
@@ -26,12 +26,11 @@ def in_pieces(machine: Machine, pieces: int) -> Machine:
     frequencies tend to those of the continuous bar with the square of the number. The last piece keeps the
     names. Other links stay one mass and one spring. Raises StiffmapError where there is no such bar.
     """
-    if isinstance(pieces, bool) or not isinstance(pieces, int | np.integer) or pieces < 1:
-        raise StiffmapError(f"pieces: expected a number from 1 on, got {pieces!r}")
+    count = whole_number(pieces, "pieces", 1, what="a number from 1 on")
     found: list[str] = []
 
     def divide(elements: Elements) -> Elements:
-        return _divided(elements, int(pieces), found)
+        return _divided(elements, count, found)
 
     d = machine.description
     legs = tuple(replace(leg, elements=edit_sequences(leg.elements, divide)) for leg in d.legs)
