@@ -9,7 +9,14 @@ from stiffmap.workspace.performance.motion.force import accuracy_transmission, f
 from stiffmap.workspace.performance.motion.inertia import moving_mass, natural_frequencies, total_mass
 from stiffmap.workspace.performance.motion.motion_files import Motion, load_motion
 from stiffmap.workspace.performance.motion.timing import fastest
-from stiffmap.workspace.performance.motion.trajectory import Trajectory, circle, line, timed
+from stiffmap.workspace.performance.motion.trajectory import (
+    Trajectory,
+    circle,
+    line,
+    read_points,
+    through,
+    timed,
+)
 from stiffmap.workspace.performance.motion.velocity import velocity_section, velocity_transmission
 from stiffmap.workspace.performance.pieces import in_pieces
 from stiffmap.workspace.performance.requirements import load_requirements
@@ -34,6 +41,8 @@ __all__ = [
     "moving_mass",
     "natural_frequencies",
     "peak_acceleration",
+    "read_points",
+    "through",
     "timed",
     "total_mass",
     "velocity_section",

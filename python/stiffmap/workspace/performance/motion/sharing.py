@@ -117,7 +117,7 @@ def followed(
     compiled, drives, cores = machine.compiled, list(machine.compiled.drives), thread_count(threads)
     unit = np.array([1.0] * 3 + [compiled.length] * 3)
     h = STRIDE * compiled.length
-    closed = np.isfinite(coordinates).all(axis=1)[:, None]
+    closed = np.asarray(np.isfinite(coordinates).all(axis=1))[:, None]
     _, p, r, _, _ = compiled.close_actuators(np.ascontiguousarray(coordinates[:, drives]), cores, coordinates)
 
     def joints_at(moved: Floats) -> Floats:
