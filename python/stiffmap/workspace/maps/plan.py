@@ -136,11 +136,8 @@ class MapPlan:
     def positions(self, rows: slice) -> Floats:
         """TCP positions (rows * x, 3) of some rows."""
         iz, iy = np.divmod(np.arange(rows.start, rows.stop), self.y.size)
-        out = np.empty((iz.size, self.x.size, 3))
-        out[..., 0] = self.x
-        out[..., 1] = self.y[iy, None]
-        out[..., 2] = self.z[iz, None]
-        return out.reshape(-1, 3)
+        grid = np.broadcast_arrays(self.x, self.y[iy, None], self.z[iz, None])
+        return np.stack(grid, axis=-1).reshape(-1, 3)
 
     @cached_property
     def validity(self) -> Validity | None:

@@ -44,13 +44,6 @@ class Judged:
     broken: dict[str, NDArray[np.bool_]]
     """(n,) by limit: who breaks it."""
 
-    @classmethod
-    def of(cls, position: Floats, coordinates: int) -> Judged:
-        """Nothing known yet."""
-        n = len(position)
-        none = np.zeros(n, dtype=bool)
-        return cls(position, none.copy(), none.copy(), np.full((n, coordinates), np.nan), {})
-
     def mark(self, name: str, rows: NDArray[np.int64], bad: NDArray[np.bool_]) -> None:
         """These of the rows break a limit, or its other end."""
         self.broken.setdefault(name, np.zeros(len(self.position), dtype=bool))[rows] |= bad
@@ -78,7 +71,10 @@ class Inside:
     def __call__(self, position: Floats, known: Judged | None = None) -> Judged:
         """Judges poses (n, 3): each begins at a neighbour that closed, the first ones at the middle of the workspace;
         or all of them at the nearest one of poses that are known."""
-        out = Judged.of(position, len(self.bounds.machine.compiled.names.coordinates))
+        n, size = len(position), len(self.bounds.machine.compiled.names.coordinates)
+        out = Judged(
+            position, np.zeros(n, dtype=bool), np.zeros(n, dtype=bool), np.full((n, size), np.nan), {}
+        )
         if known is not None:
             if known.closed.any():
                 nearest = cKDTree(known.position[known.closed]).query(position)[1]

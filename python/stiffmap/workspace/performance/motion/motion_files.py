@@ -182,7 +182,10 @@ def _table(place: FilePath) -> Motion:
         if feed is not None and not (feed > 0).all():
             line = table.lines[int(np.argmax(~(feed > 0)))]
             raise FileError("expected a feed above zero", file=file, line=line, key="feed")
-        path = _through(p, file)
+        try:
+            path = through(p)
+        except StiffmapError as error:
+            raise FileError(str(error), file=file) from None
         along = way_along(p) / way_along(p)[-1]
         force = f[0] if not np.ptp(f, axis=0).any() else _between(path.s, along, f)
         if feed is None:
@@ -211,10 +214,3 @@ def _table(place: FilePath) -> Motion:
 def _between(s: Floats, at: Floats, values: Floats) -> Floats:
     """(n, 3) values given at some places of a path, straight between them."""
     return np.stack([np.interp(s, at, v) for v in values.T], axis=1)
-
-
-def _through(points: Floats, file: str) -> Path:
-    try:
-        return through(points)
-    except StiffmapError as error:
-        raise FileError(str(error), file=file) from None

@@ -41,14 +41,14 @@ def drive_values(machine: Machine, field: str, given: ArrayLike | None, unit: st
                 f"not negative, {unit}; got {given!r}"
             )
         return np.broadcast_to(out, (n,)).copy()
-    values = [getattr(d, field) for d in drive_table(machine)]
-    missing = [a for a, v in zip(machine.actuators, values, strict=True) if v is None]
+    values = declared(machine, field, np.nan)
+    missing = [a for a, v in zip(machine.actuators, values, strict=True) if np.isnan(v)]
     if missing:
         raise StiffmapError(
             f"{machine.name}: no {field} declared for {', '.join(missing)}; add it to the machine file or "
             f"give {field}= ({unit})"
         )
-    return np.array(values, dtype=float)
+    return values
 
 
 def drive_limits(machine: Machine, field: str, limits: ArrayLike | str, unit: str) -> Floats:

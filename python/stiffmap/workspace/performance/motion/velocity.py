@@ -144,15 +144,12 @@ def singular_values(j: Floats) -> Floats:
     """(..., min(rows, drives)) largest first; NaN rows where the matrix is NaN."""
     out = np.full((*j.shape[:-2], min(j.shape[-2:])), np.nan)
     ok = np.isfinite(j).all(axis=(-2, -1))
+    poor = ok
     if j.shape[-1] <= j.shape[-2]:  # the small symmetric problem is several times quicker
         gram = np.swapaxes(j[ok], -1, -2) @ j[ok]
-        values = np.linalg.eigvalsh(gram)[..., ::-1]
-        out[ok] = np.sqrt(np.maximum(values, 0.0))
+        out[ok] = np.sqrt(np.maximum(np.linalg.eigvalsh(gram)[..., ::-1], 0.0))
         poor = ok & (out[..., -1] < 1e-5 * out[..., 0])  # squaring lost their digits
-        if poor.any():
-            out[poor] = np.linalg.svd(j[poor], compute_uv=False)
-        return out
-    out[ok] = np.linalg.svd(j[ok], compute_uv=False)
+    out[poor] = np.linalg.svd(j[poor], compute_uv=False)
     return out
 
 
