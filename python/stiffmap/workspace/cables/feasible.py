@@ -82,12 +82,12 @@ def wrench_feasible(
     low, high = read_box(machine, box)
     r = commanded(machine.compiled, low, rotation)[1]
     w = np.atleast_2d(wrench_array(wrenches)) + weight(h, r, machine.compiled.gravity(gravity))
-    ask = _Ask(h, r, w, *limits(h, lowest, highest))
+    bounds = limits(h, lowest, highest)
     least = gap * float((high - low).max())
     cells = np.stack([low, high])[None]
     found: tuple[list[Floats], list[Floats], list[Floats]] = ([], [], [])
     while len(cells):
-        inside, outside = ask.judge(cells)
+        inside, outside = _judged(h, r, w, *bounds, cells)
         open_ = cells[~inside & ~outside]
         small = (open_[:, 1] - open_[:, 0]).max(axis=1) <= least
         for kept, some in zip(found, (cells[inside], cells[outside], open_[small]), strict=True):
@@ -118,41 +118,32 @@ def changed(h: Hanging, straight: Floats, arm: Floats, reach: Floats) -> Floats:
     return np.asarray(turned(straight, reach) * np.sqrt(1.0 + (arm**2).sum(-1) / h.length**2))
 
 
-@dataclass(frozen=True, eq=False)
-class _Ask:
-    h: Hanging
-    rotation: Floats
-    wrenches: Floats
-    low: Floats
-    high: Floats
-
-    def judge(self, cells: Floats) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        centre = cells.mean(axis=1)
-        reach = 0.5 * np.linalg.norm(cells[:, 1] - cells[:, 0], axis=1)
-        unit, straight, arm = lines(self.h, centre, self.rotation)
-        plain = matrix(unit, straight, arm)
-        column = changed(self.h, straight, arm, reach[:, None])
-        inside, outside = np.ones(len(cells), dtype=bool), np.zeros(len(cells), dtype=bool)
-        top = np.where(np.isfinite(self.high), self.high, self.low + ROOMY)
-        for wrench in self.wrenches:
-            a, b = scaled(self.h, plain, -np.broadcast_to(wrench, (len(cells), 6)))
-            t, ok, v = nearest(a, b, self.low, top, 0.5 * (self.low + top))
-            room = np.minimum(t - self.low, top - t).min(axis=1)
-            sigma = (
-                np.linalg.svd(a, compute_uv=False)[:, len(self.h.rows) - 1]
-                if a.shape[2] >= a.shape[1]
-                else 0.0
-            )
-            with np.errstate(invalid="ignore"):
-                rest = sigma - np.linalg.norm(column, axis=1)
-                correction = np.where(rest > 0, (column * t).sum(axis=1) / np.maximum(rest, 1e-300), np.inf)
-                inside &= ok & (correction <= room)
-            # A direction that no tensions reach: b is farther along it than any of them.
-            y = v / np.maximum(np.linalg.norm(v, axis=1, keepdims=True), 1e-300)
-            along = np.einsum("mrn,mr->mn", a, y)
-            with np.errstate(invalid="ignore"):
-                best = np.where(along > 0, along * self.high, along * self.low)
-                best = np.where(along == 0, 0.0, best).sum(axis=1)
-                more = (column * np.where(np.isfinite(self.high), self.high, np.inf)).sum(axis=1)
-                outside |= ~ok & ((y * b).sum(axis=1) > best + more)
-        return inside, outside
+def _judged(
+    h: Hanging, rotation: Floats, wrenches: Floats, low: Floats, high: Floats, cells: Floats
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Which cells (n, 2, 3) hold every wrench everywhere, and which nowhere all of them."""
+    centre = cells.mean(axis=1)
+    reach = 0.5 * np.linalg.norm(cells[:, 1] - cells[:, 0], axis=1)
+    unit, straight, arm = lines(h, centre, rotation)
+    plain = matrix(unit, straight, arm)
+    column = changed(h, straight, arm, reach[:, None])
+    inside, outside = np.ones(len(cells), dtype=bool), np.zeros(len(cells), dtype=bool)
+    top = np.where(np.isfinite(high), high, low + ROOMY)
+    for wrench in wrenches:
+        a, b = scaled(h, plain, -np.broadcast_to(wrench, (len(cells), 6)))
+        t, ok, v = nearest(a, b, low, top, 0.5 * (low + top))
+        room = np.minimum(t - low, top - t).min(axis=1)
+        sigma = np.linalg.svd(a, compute_uv=False)[:, len(h.rows) - 1] if a.shape[2] >= a.shape[1] else 0.0
+        with np.errstate(invalid="ignore"):
+            rest = sigma - np.linalg.norm(column, axis=1)
+            correction = np.where(rest > 0, (column * t).sum(axis=1) / np.maximum(rest, 1e-300), np.inf)
+            inside &= ok & (correction <= room)
+        # A direction that no tensions reach: b is farther along it than any of them.
+        y = v / np.maximum(np.linalg.norm(v, axis=1, keepdims=True), 1e-300)
+        along = np.einsum("mrn,mr->mn", a, y)
+        with np.errstate(invalid="ignore"):
+            best = np.where(along > 0, along * high, along * low)
+            best = np.where(along == 0, 0.0, best).sum(axis=1)
+            more = (column * np.where(np.isfinite(high), high, np.inf)).sum(axis=1)
+            outside |= ~ok & ((y * b).sum(axis=1) > best + more)
+    return inside, outside

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from stiffmap.common.broadcasting import Floats, wrench_array
 from stiffmap.common.errors import StiffmapError
-from stiffmap.model.description import Body, Cable, MachineDescription, Offset, Pose
+from stiffmap.model.description import Body, Cable, Offset, Pose
 from stiffmap.model.description.machine import TASK
 from stiffmap.model.description.pose import Vector
 from stiffmap.solve.closing import commanded
@@ -44,7 +44,17 @@ def hanging(machine: Machine) -> Hanging:
     d = machine.description
     if d.legs:
         raise StiffmapError(f"{d.name}: expected a machine that hangs in its cables alone, got one with legs")
-    found, bodies, tip = _walk(d)
+    tip = Pose()
+    found: list[tuple[Cable, Vector]] = []
+    bodies: list[tuple[Body, Vector]] = []
+    for e in d.platform:  # their points in the platform's first frame
+        match e:
+            case Offset():
+                tip = tip @ e.nominal
+            case Cable():
+                found.append((e, (tip @ Pose(e.at)).translation))
+            case Body():
+                bodies.append((e, (tip @ Pose(e.com)).translation))
     back = tip.inverse()
     at = np.array([(back @ Pose(p)).p for _, p in found])
     mass = sum(b.mass for b, _ in bodies)
@@ -60,24 +70,6 @@ def hanging(machine: Machine) -> Hanging:
         rows=tuple(i for i, name in enumerate(TASK) if name in d.freedoms),
         length=float(np.sqrt(np.mean(np.sum(at**2, axis=1)))) or machine.compiled.length,
     )
-
-
-def _walk(
-    d: MachineDescription,
-) -> tuple[list[tuple[Cable, Vector]], list[tuple[Body, Vector]], Pose]:
-    """Cables and bodies with their points in the platform's first frame, and the tcp there."""
-    frame = Pose()
-    found: list[tuple[Cable, Vector]] = []
-    bodies: list[tuple[Body, Vector]] = []
-    for e in d.platform:
-        match e:
-            case Offset():
-                frame = frame @ e.nominal
-            case Cable():
-                found.append((e, (frame @ Pose(e.at)).translation))
-            case Body():
-                bodies.append((e, (frame @ Pose(e.com)).translation))
-    return found, bodies, frame
 
 
 def lines(h: Hanging, position: Floats, rotation: Floats) -> tuple[Floats, Floats, Floats]:

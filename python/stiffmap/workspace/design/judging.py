@@ -142,20 +142,12 @@ def refine(design: Design, x: Floats, weights: Floats, *, keep: bool = False) ->
             out.append((rows(y + step) - here) / step[i])
         return np.stack(out, axis=1)
 
-    cache: dict[bytes, Floats] = {}
-
-    def slope(y: Floats) -> Floats:
-        key = y.tobytes()
-        if key not in cache:
-            cache[key] = slopes(y)
-        return cache[key]
-
     for radius in RADII:
         begin = ((best_at - low) / (high - low))[moves]
         reach = [(max(0.0, y - radius), min(1.0, y + radius)) for y in begin]
         minimize(
-            lambda y: rows(y)[0], begin, jac=lambda y: slope(y)[0], bounds=reach, method="SLSQP",
-            constraints={"type": "ineq", "fun": lambda y: rows(y)[1:], "jac": lambda y: slope(y)[1:]}
+            lambda y: rows(y)[0], begin, jac=lambda y: slopes(y)[0], bounds=reach, method="SLSQP",
+            constraints={"type": "ineq", "fun": lambda y: rows(y)[1:], "jac": lambda y: slopes(y)[1:]}
             if slides.any() or keep else (),
             options={"maxiter": ROUNDS, "ftol": 1e-7},
         )  # fmt: skip

@@ -1,6 +1,6 @@
 """Labelled results over a workspace: error maps, polar diagrams, force sweeps (xarray, SI)."""
 
-from stiffmap.workspace.maps.estimate import MapEstimate, map_estimate
+from stiffmap.workspace.maps.estimate import map_estimate
 from stiffmap.workspace.maps.grid_map import error_map
 from stiffmap.workspace.maps.polar_diagram import polar
 from stiffmap.workspace.maps.statistics import map_statistics
@@ -9,7 +9,6 @@ from stiffmap.workspace.maps.sweep_of_numbers import design_sweep
 from stiffmap.workspace.maps.uncertainty import uncertainty_ranking
 
 __all__ = [
-    "MapEstimate",
     "design_sweep",
     "error_map",
     "map_estimate",

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.fingerprints import code, digest
 from stiffmap.common.version import __version__
-from stiffmap.solve.labels import TWIST_UNITS, flag_attrs, meaning, status_attrs
+from stiffmap.solve.labels import COMPONENTS, TWIST_UNITS, flag_attrs, meaning, status_attrs
 from stiffmap.solve.machine import Machine, solve_with
 from stiffmap.solve.options import LoadingKeywords, options_of
 from stiffmap.solve.solution import Solution
@@ -81,6 +81,15 @@ def displaced(dim: str, d: Floats, status: Any, flags: Any, plane: str) -> dict[
     values = deflections(d, plane) | {"status": status, "flags": flags}
     attrs = meanings(plane, "the equilibrium")
     return {n: ((dim, "component") if v.ndim == 2 else dim, v, attrs[n]) for n, v in values.items()}
+
+
+def at_place(position: Floats) -> dict[str, Any]:
+    """Coordinates of a Dataset of equilibria at one commanded position (3,) m."""
+    return {
+        "component": ("component", np.array(COMPONENTS)),
+        "axis": ("axis", np.array(["x", "y", "z"])),
+        "position": ("axis", position, meaning("m", "commanded tcp")),
+    }
 
 
 def describe(loading: Loading, title: str, call: dict[str, Any]) -> dict[str, Any]:

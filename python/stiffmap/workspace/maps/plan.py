@@ -12,7 +12,6 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import Floats, instance_of, whole_number
-from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.labels import (
     COMPLIANCE_UNITS,
     COMPONENTS,
@@ -137,11 +136,8 @@ class MapPlan:
     def positions(self, rows: slice) -> Floats:
         """TCP positions (rows * x, 3) of some rows."""
         iz, iy = np.divmod(np.arange(rows.start, rows.stop), self.y.size)
-        out = np.empty((iz.size, self.x.size, 3))
-        out[..., 0] = self.x
-        out[..., 1] = self.y[iy, None]
-        out[..., 2] = self.z[iz, None]
-        return out.reshape(-1, 3)
+        grid = np.broadcast_arrays(self.x, self.y[iy, None], self.z[iz, None])
+        return np.stack(grid, axis=-1).reshape(-1, 3)
 
     @cached_property
     def validity(self) -> Validity | None:
@@ -242,8 +238,7 @@ def map_plan(
     grid = grid_of(machine, {"x": x, "y": y, "z": z}, points)
     instance_of(compliance, (bool, np.bool_), "compliance", "True or False")
     wrenches, names = wrench_cases(wrench, None if cases is None else tuple(cases))
-    if (directions := whole_number(directions, "directions", 1)) < 3:
-        raise StiffmapError(f"directions: expected 3 or more, got {directions}")
+    directions = whole_number(directions, "directions", 3)
     return MapPlan(
         loading=loading,
         x=axis(grid["x"], "x"),

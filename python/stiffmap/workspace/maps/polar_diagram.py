@@ -9,8 +9,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import whole_number
-from stiffmap.common.errors import StiffmapError
-from stiffmap.solve.labels import COMPONENTS, meaning
+from stiffmap.solve.labels import meaning
 from stiffmap.solve.machine import Machine, takes_machine
 from stiffmap.solve.options import LoadingKeywords, spelled_out
 from stiffmap.workspace.maps.extremes import (
@@ -21,7 +20,7 @@ from stiffmap.workspace.maps.extremes import (
     even_angles,
 )
 from stiffmap.workspace.maps.inputs import magnitude, place, plane_axes
-from stiffmap.workspace.maps.loading import Loading, describe, displaced, without_failed
+from stiffmap.workspace.maps.loading import Loading, at_place, describe, displaced, without_failed
 
 
 @takes_machine
@@ -48,8 +47,7 @@ def polar(
     loading = Loading(machine, **given)
     p, axes = place(position), plane_axes(plane)
     force = magnitude(force, "force", "N")
-    if (directions := whole_number(directions, "directions", 1)) < 3:
-        raise StiffmapError(f"directions: expected 3 or more, got {directions}")
+    directions = whole_number(directions, "directions", 3)
     angle = even_angles(directions)
     wrench = np.concatenate([force * direction(angle, axes), np.zeros((directions, 3))], axis=1)
     s = loading.solve(p[None, None], wrench[None])
@@ -57,15 +55,12 @@ def polar(
     turning = TurningForce(loading, p[None], force, axes)
     d = without_failed(s.displacement, s.status)[0]
     data = displaced("angle", d, s.status[0], s.flags[0], plane) | _extremes(turning, plane, swept)
-    coords = {
+    coords = at_place(p) | {
         "angle": (
             "angle",
             angle,
             meaning("rad", f"direction of the force, from {plane[0]} towards {plane[1]}"),
         ),
-        "component": ("component", np.array(COMPONENTS)),
-        "position": ("axis", p, meaning("m", "commanded tcp")),
-        "axis": ("axis", np.array(["x", "y", "z"])),
         "force": ((), force, meaning("N", "magnitude of the force")),
     }
     call = {"function": "polar", "position": p, "force": force, "plane": plane, "directions": directions}

@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from typing import TypeVar
 
 T = TypeVar("T")
 
 
-def track(items: Iterable[T], total: int, what: str, show: bool | None) -> Iterator[T]:
+def track(items: Iterable[T], total: int, what: str, show: bool | None) -> Iterable[T]:
     """The items, with a bar on standard error where wanted; None: where that is a terminal."""
     if show is False:
-        yield from items
-        return
+        return items
+    from rich import progress
     from rich.console import Console
-    from rich.progress import Progress
 
     console = Console(stderr=True)
     hidden = show is None and not console.is_terminal
-    with Progress(console=console, disable=hidden, transient=True) as bar:
-        task = bar.add_task(what, total=total)
-        for item in items:
-            yield item
-            bar.advance(task)
+    return progress.track(items, what, total, console=console, transient=True, disable=hidden)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
+from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from tokenize import TokenError
 from typing import Any
@@ -79,7 +81,6 @@ BLOCKS_PER_FLUSH = 32
 """Blocks that a power cut may cost; writing back after each would take a third of the time."""
 UNREADABLE = (OSError, ValueError, TypeError, SyntaxError, TokenError)
 """What numpy raises for a damaged array: its header is Python's text."""
-FILL = {"u1": 255, "u4": 0, "f8": np.nan}
 
 
 class Store:
@@ -100,64 +101,49 @@ class Store:
 
     def flush(self) -> None:
         """Rows count as done only once their values are on the disk."""
-        for array in self.arrays.values():
-            flush(array)
+        mapped = [a for a in self.arrays.values() if isinstance(a, np.memmap)]
+        for array in mapped:
+            array.flush()
         for rows in self._waiting:
             self.done[rows] = True
-        flush(self.done)
+        if isinstance(self.done, np.memmap):
+            self.done.flush()
         self._waiting.clear()
-
-
-def flush(array: Any) -> None:
-    """Write a mapped array back; plain ones have nothing to write."""
-    if isinstance(array, np.memmap):
-        array.flush()
 
 
 def memory_store(plan: MapPlan) -> Store:
     """A map that lives in memory."""
-    arrays = {
-        v.name: np.full((plan.rows, plan.x.size, *plan.tail(v)), FILL[v.dtype], v.dtype)
-        for v in plan.variables
-    }
-    return Store(arrays, np.zeros(plan.rows, dtype=bool))
+    return _store(plan, lambda _, dtype, shape: np.zeros(shape, dtype))
 
 
 def folder_store(plan: MapPlan, folder: Path, resume: bool) -> Store:
     """A map that lives in a folder; taken up again where an earlier run of the same call left it."""
     key = folder / "key.json"
-    if not (resume and key.exists()):
-        return _new(plan, folder, json.dumps(plan.attrs, sort_keys=True, default=lambda v: v.tolist()))
-    refuse_another_map(folder, kept_attributes(key), plan.attrs)
-    return _mapped(plan, folder, "r+")
-
-
-def _new(plan: MapPlan, folder: Path, key: str) -> Store:
-    (folder / "key.json").unlink(missing_ok=True)
-    store = _mapped(plan, folder, "w+")
-    write_text(folder / "key.json", key)
+    if resume and key.exists():
+        refuse_another_map(folder, kept_attributes(key), plan.attrs)
+        return _store(plan, partial(_kept, folder))
+    key.unlink(missing_ok=True)
+    store = _store(plan, lambda name, dtype, shape: mapped_array(folder / f"{name}.npy", dtype, shape))
+    write_text(key, json.dumps(plan.attrs, sort_keys=True, default=np.ndarray.tolist))
     return store
 
 
-def _mapped(plan: MapPlan, folder: Path, mode: Any) -> Store:
-    def array(name: str, dtype: str, shape: tuple[int, ...]) -> Any:
-        if mode == "w+":
-            return mapped_array(folder / f"{name}.npy", dtype, shape)
-        path = folder / f"{name}.npy"
-        try:
-            kept = open_memmap(path, mode)
-        except UNREADABLE as error:
-            raise _damaged(path, shape, "none") from error
-        if (kept.shape, kept.dtype) != (shape, np.dtype(dtype)):
-            raise _damaged(path, shape, f"{kept.shape} {kept.dtype}")
-        return kept
-
-    arrays = {v.name: array(v.name, v.dtype, (plan.rows, plan.x.size, *plan.tail(v))) for v in plan.variables}
-    return Store(arrays, array("done", "?", (plan.rows,)))
+def _store(plan: MapPlan, array: Callable[[str, str, tuple[int, ...]], Any]) -> Store:
+    """Arrays are made, or found, by name, type and shape."""
+    shape = (plan.rows, plan.x.size)
+    arrays = {v.name: array(v.name, v.dtype, (*shape, *plan.tail(v))) for v in plan.variables}
+    return Store(arrays, array("done", "?", shape[:1]))
 
 
-def _damaged(path: Path, shape: tuple[int, ...], found: str) -> FileError:
-    return FileError(
+def _kept(folder: Path, name: str, dtype: str, shape: tuple[int, ...]) -> Any:
+    """The array that an earlier run left; FileError where it is none of this map."""
+    path, found = folder / f"{name}.npy", "none"
+    with suppress(*UNREADABLE):
+        kept = open_memmap(path, "r+")
+        if (kept.shape, kept.dtype) == (shape, np.dtype(dtype)):
+            return kept
+        found = f"{kept.shape} {kept.dtype}"
+    raise FileError(
         f"is damaged: expected an array {shape} of an unfinished map, found {found}; start again without resume "
         "(--resume)",
         file=str(path),

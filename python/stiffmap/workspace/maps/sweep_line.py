@@ -14,13 +14,13 @@ from stiffmap.common.broadcasting import Floats, real_number, whole_number
 from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.compiled import Role
 from stiffmap.solve.compiled.machine import PATH_CONTROLS as CONTROLS
-from stiffmap.solve.labels import COMPONENTS, meaning
+from stiffmap.solve.labels import meaning
 from stiffmap.solve.machine import Machine, hint_metres, takes_machine
 from stiffmap.solve.options import LoadingKeywords, spelled_out
 from stiffmap.solve.status import Status
 from stiffmap.workspace.maps.fixed_order_sums import dot
 from stiffmap.workspace.maps.inputs import force_list, place, unit
-from stiffmap.workspace.maps.loading import Loading, describe, displaced, without_failed
+from stiffmap.workspace.maps.loading import Loading, at_place, describe, displaced, without_failed
 
 
 @takes_machine
@@ -187,13 +187,14 @@ def _dataset(
     branch that crosses it have ends and critical points."""
     modes, coordinate = critical_variables(loading.machine, [*critical[0], *critical[1]])
     modes["critical_branch"] = ("critical", np.repeat([0, 1], [len(c) for c in critical]), BRANCH)
-    coords = coordinate | {
-        "force": ("step", force, meaning("N", "force along the direction")),
-        "component": ("component", np.array(COMPONENTS)),
-        "axis": ("axis", np.array(["x", "y", "z"])),
-        "position": ("axis", call["position"], meaning("m", "commanded tcp")),
-        "direction": ("axis", call["direction"], meaning("1", "direction of the force, base axes")),
-    }
+    coords = (
+        coordinate
+        | at_place(call["position"])
+        | {
+            "force": ("step", force, meaning("N", "force along the direction")),
+            "direction": ("axis", call["direction"], meaning("1", "direction of the force, base axes")),
+        }
+    )
     attrs = describe(loading, title, {"function": "sweep", **call}) | {
         "failed_poses": "NaN, with their status; unstable ones kept",
         "end": ends[0],
@@ -213,54 +214,39 @@ def critical_variables(
     machine: Machine, critical: list[dict[str, Any]]
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """Variables and coordinates over the dimensions ``critical`` and ``coordinate``."""
-    names = list(machine.compiled.names.coordinates)
-    modes = np.array([c["mode"] for c in critical]).reshape(len(critical), len(names))
-    sizes = np.abs(modes) * _units(machine)
+    known = machine.compiled.names
+    names = list(known.coordinates)
+
+    def column(key: str) -> Floats:
+        return np.array([c[key] for c in critical], dtype=float)
+
+    modes, places = (column(key).reshape(len(critical), len(names)) for key in ("mode", "coordinates"))
+    sizes = np.abs(modes) * np.where(known.prismatic, 1.0, machine.compiled.length)
+    moving = [_joint(names, np.array(known.roles), s) for s in sizes]
+    legs = [joint.split(".")[0] for joint in moving]
+    kinds = ["limit" if c["limit"] else "bifurcation" for c in critical]
+    what = "limit: the force has an extremum; bifurcation: branches cross"
+    wide = ("critical", "coordinate")
     over = {
-        "critical_force": _floats(critical, "load", "N", "force at the critical point"),
-        "critical_deflection": _floats(critical, "along", "m", "translation along the force there"),
-        "critical_kind": (
+        "critical_force": ("critical", column("load"), meaning("N", "force at the critical point")),
+        "critical_deflection": (
             "critical",
-            np.array(["limit" if c["limit"] else "bifurcation" for c in critical], dtype=object).astype(str),
-            meaning("", "limit: the force has an extremum; bifurcation: branches cross"),
+            column("along"),
+            meaning("m", "translation along the force there"),
         ),
-        "unstable_before": ("critical", np.array([c["before"] for c in critical], dtype=int)),
-        "unstable_after": ("critical", np.array([c["after"] for c in critical], dtype=int)),
-        "mode_leg": ("critical", np.array([_leg(machine, names, s) for s in sizes]).astype(str)),
-        "mode_joint": ("critical", np.array([_joint(machine, names, s) for s in sizes]).astype(str)),
-        "mode": (
-            ("critical", "coordinate"),
-            modes,
-            meaning("m or rad", "buckling mode; the largest motion, angles as arcs, is 1"),
-        ),
-        "critical_coordinates": (
-            ("critical", "coordinate"),
-            np.array([c["coordinates"] for c in critical]).reshape(len(critical), len(names)),
-            meaning("m or rad", "coordinates at the critical point"),
-        ),
+        "critical_kind": ("critical", np.array(kinds).astype(str), meaning("", what)),
+        "unstable_before": ("critical", column("before").astype(int)),
+        "unstable_after": ("critical", column("after").astype(int)),
+        "mode_leg": ("critical", np.array([leg if leg in machine.legs else "" for leg in legs]).astype(str)),
+        "mode_joint": ("critical", np.array(moving).astype(str)),
+        "mode": (wide, modes, meaning("m or rad", "buckling mode; the largest motion, angles as arcs, is 1")),
+        "critical_coordinates": (wide, places, meaning("m or rad", "coordinates at the critical point")),
     }
     return over, {"coordinate": ("coordinate", np.array(names))}
 
 
-def _floats(critical: list[dict[str, Any]], key: str, units: str, what: str) -> tuple[Any, ...]:
-    return ("critical", np.array([c[key] for c in critical], dtype=float), meaning(units, what))
-
-
-def _units(machine: Machine) -> Floats:
-    """Length that a unit of each coordinate stands for."""
-    prismatic = np.array(machine.compiled.names.prismatic)
-    return np.where(prismatic, 1.0, machine.compiled.length)
-
-
-def _leg(machine: Machine, names: list[str], sizes: Floats) -> str:
-    """Leg of the joint that moves most; '' where that belongs to the base or the platform."""
-    leg = _joint(machine, names, sizes).split(".")[0]
-    return leg if leg in machine.legs else ""
-
-
-def _joint(machine: Machine, names: list[str], sizes: Floats) -> str:
+def _joint(names: list[str], roles: Any, sizes: Floats) -> str:
     """Joint, drive or spring coordinate that moves most; joints go before springs."""
-    roles = np.array(machine.compiled.names.roles)
     joints = np.where(roles != Role.SPRING, sizes, 0.0)
     pick = joints if joints.max(initial=0.0) > 0.1 * sizes.max() else sizes
     return names[int(np.argmax(pick))]

@@ -11,7 +11,6 @@ import json
 import shutil
 import tempfile
 import zlib
-from collections.abc import Iterator
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -25,10 +24,11 @@ from stiffmap.common.json_text import parse_json
 from stiffmap.common.outputs import add_lines, put_folder, write_text
 from stiffmap.workspace.maps.files import write_zarr, zarr_package
 from stiffmap.workspace.maps.plan import MapPlan
-from stiffmap.workspace.maps.store import FILL, kept_attributes, refuse_another_map
+from stiffmap.workspace.maps.store import kept_attributes, refuse_another_map
 from stiffmap.workspace.maps.tiles import Tiles, tiles_of
 
 JOURNAL = "journal.jsonl"
+FILL = {"u1": 255, "u4": 0, "f8": np.nan}
 
 
 class ZarrMap:
@@ -73,13 +73,8 @@ class ZarrMap:
         (self.folder / JOURNAL).unlink(missing_ok=True)
         put_folder(self.folder, out)
 
-    def begin(self) -> None:
-        """Write the empty map and an empty journal."""
-        self._frame(self.folder)
-        write_text(self.folder / JOURNAL, "")
-
-    def _frame(self, folder: Path) -> None:
-        """Write metadata and coordinates."""
+    def frame(self, folder: Path) -> None:
+        """Write the empty map: metadata and coordinates."""
         package = zarr_package()
         write_zarr(xr.Dataset(coords=self.plan.coords, attrs=self.plan.attrs), folder)
         group = package.open_group(folder, mode="r+", zarr_format=3)
@@ -108,8 +103,9 @@ class ZarrMap:
         self._mend_frame()
         for scrap in self.folder.rglob("*.partial"):  # chunks that zarr had not put in their place
             scrap.unlink()
-        for line, entry in entries(self.folder / JOURNAL):
-            index, checks = self._checksums(line, entry)
+        lines = (self.folder / JOURNAL).read_bytes().split(b"\n")[:-1]  # the last one may have been cut off
+        for number, line in enumerate(lines, 1):
+            index, checks = self._checksums(number, line)
             for path, value in checks.items():
                 if path.exists() and crc(path) != value:
                     raise FileError(
@@ -123,52 +119,34 @@ class ZarrMap:
         """Metadata and coordinates follow from the plan: what is damaged is written again."""
         with tempfile.TemporaryDirectory(dir=self.folder.parent, prefix=f"{self.folder.name}.") as place:
             fresh = Path(place) / "frame"
-            self._frame(fresh)
+            self.frame(fresh)
             for path in fresh.rglob("*"):
                 target = self.folder / path.relative_to(fresh)
                 if path.is_file() and not (target.is_file() and target.read_bytes() == path.read_bytes()):
                     target.parent.mkdir(parents=True, exist_ok=True)
                     shutil.copyfile(path, target)
 
-    def _checksums(self, line: int, entry: Any) -> tuple[int, dict[Path, int]]:
-        """Tile and checksums of its chunks by a line of the journal."""
+    def _checksums(self, number: int, line: bytes) -> tuple[int, dict[Path, int]]:
+        """Tile and checksums of its chunks by a line of the journal; FileError where this program did not write it."""
         try:
+            entry = parse_json(line)
             index, checks = entry["tile"], entry["crc"]
-            known = type(index) is int and 0 <= index < self.tiles.count
-            if (
-                not known
-                or not isinstance(checks, dict)
-                or set(checks) != {v.name for v in self.plan.variables}
-            ):
+            known = type(index) is int and 0 <= index < self.tiles.count and isinstance(checks, dict)
+            if not known or set(checks) != {v.name for v in self.plan.variables}:
                 raise ValueError
-            return index, {self.chunk(n, index): value for n, value in checks.items()}
         except (KeyError, TypeError, ValueError) as error:
-            raise damaged_line(self.folder / JOURNAL, line) from error
+            raise FileError(
+                "is damaged: expected a tile and the checksums of its chunks; delete this line, and resume=True "
+                "(--resume) computes its tile again",
+                file=str(self.folder / JOURNAL),
+                line=number,
+            ) from error
+        return index, {self.chunk(n, index): value for n, value in checks.items()}
 
 
 def crc(path: Path) -> int:
     """Checksum of a file."""
     return zlib.crc32(path.read_bytes())
-
-
-def entries(journal: Path) -> Iterator[tuple[int, Any]]:
-    """Complete lines of the journal by their numbers; the last one may have been cut off."""
-    lines = journal.read_bytes().split(b"\n")[:-1]
-    for number, line in enumerate(lines, 1):
-        try:
-            yield number, parse_json(line)
-        except ValueError as error:
-            raise damaged_line(journal, number) from error
-
-
-def damaged_line(journal: Path, line: int) -> FileError:
-    """What is said of a line that this program did not write."""
-    return FileError(
-        "is damaged: expected a tile and the checksums of its chunks; delete this line, and resume=True "
-        "(--resume) computes its tile again",
-        file=str(journal),
-        line=line,
-    )
 
 
 def open_zarr_map(plan: MapPlan, folder: Path, resume: bool) -> ZarrMap:
@@ -179,7 +157,8 @@ def open_zarr_map(plan: MapPlan, folder: Path, resume: bool) -> ZarrMap:
         if resume and (folder / JOURNAL).exists():
             out.recover()
         else:
-            out.begin()
+            out.frame(folder)
+            write_text(folder / JOURNAL, "")
     except OSError as error:
         raise FileError(f"cannot be written: {error.strerror or error}", file=str(folder)) from error
     return out

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from stiffmap.common.broadcasting import Floats
+from stiffmap.common.broadcasting import Floats, whole_number
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.description import Body, Offset, Pose, Spring
 from stiffmap.model.description.elements import Element
@@ -26,12 +26,11 @@ def in_pieces(machine: Machine, pieces: int) -> Machine:
     frequencies tend to those of the continuous bar with the square of the number. The last piece keeps the
     names. Other links stay one mass and one spring. Raises StiffmapError where there is no such bar.
     """
-    if isinstance(pieces, bool) or not isinstance(pieces, int | np.integer) or pieces < 1:
-        raise StiffmapError(f"pieces: expected a number from 1 on, got {pieces!r}")
+    count = whole_number(pieces, "pieces", 1, what="a number from 1 on")
     found: list[str] = []
 
     def divide(elements: Elements) -> Elements:
-        return _divided(elements, int(pieces), found)
+        return _divided(elements, count, found)
 
     d = machine.description
     legs = tuple(replace(leg, elements=edit_sequences(leg.elements, divide)) for leg in d.legs)
@@ -51,15 +50,14 @@ def _divided(elements: Elements, count: int, found: list[str]) -> Elements:
             out.append(elements[i])
             i += 1
             continue
-        used, offset, body, spring = bar
-        found.append(spring.name)
-        out.extend(_pieces(offset, body, spring, count))
-        i += used
+        found.append(bar[2].name)
+        out.extend(_pieces(*bar, count))
+        i += 3
     return tuple(out)
 
 
-def _bar(elements: Elements, i: int) -> tuple[int, Offset, Body, Spring] | None:
-    """Number of elements, offset, body (centre as seen from the root) and spring of a bar that starts at `i`."""
+def _bar(elements: Elements, i: int) -> tuple[Offset, Body, Spring] | None:
+    """Offset, body (centre as seen from the root) and spring of a bar, the three elements from `i` on."""
     row = elements[i : i + 3]
     if len(row) < 3 or not isinstance(row[2], Spring):
         return None
@@ -74,7 +72,7 @@ def _bar(elements: Elements, i: int) -> tuple[int, Offset, Body, Spring] | None:
     middle = np.linalg.norm(np.array(body.com) - share * way) <= LIKE * length
     if not (straight and middle and _is_beam(row[2], way)):
         return None
-    return 3, offset, body, row[2]
+    return offset, body, row[2]
 
 
 def _is_beam(spring: Spring, way: Floats) -> bool:

@@ -4,6 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
+from typing import Annotated
+
+from pydantic import BeforeValidator
 
 from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.value_units import read_value
@@ -28,12 +32,6 @@ def quantity(value: object, unit: str) -> float:
     return read_value(text, unit)
 
 
-def quantity_in(document: Document, file: str, value: object, unit: str, *keys: str | int) -> float:
-    """`quantity` of a number that stands in a file under these keys; raises `FileError` with its line."""
-    with under(document, file, *keys):
-        return quantity(value, unit)
-
-
 @contextmanager
 def under(document: Document, file: str, *keys: str | int) -> Iterator[None]:
     """What is wrong with the value under these keys of a file is a `FileError` with its line."""
@@ -43,3 +41,10 @@ def under(document: Document, file: str, *keys: str | int) -> Iterator[None]:
         raise
     except ValueError as error:
         raise FileError(str(error), file=file, line=document.line(keys), key=key_text(keys)) from None
+
+
+Length = Annotated[float, BeforeValidator(partial(quantity, unit="m"))]
+Force = Annotated[float, BeforeValidator(partial(quantity, unit="N"))]
+Time = Annotated[float, BeforeValidator(partial(quantity, unit="s"))]
+Speed = Annotated[float, BeforeValidator(partial(quantity, unit="m/s"))]
+"""Fields of a file's schema, written with a unit and read as SI values."""

@@ -118,7 +118,7 @@ class Case:
     @cached_property
     def factors(self) -> VelocityTransmission:
         """Velocity transmission at `positions`."""
-        return transmission_of(self.machine, self.kinematics, length=self.length, inverse=self.inverse)
+        return transmission_of(self.machine, self.kinematics, length=self.length)
 
     @cached_property
     def inverse(self) -> Floats:

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
 from os import PathLike
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 
 from stiffmap.common.broadcasting import given_path
 from stiffmap.common.errors import FileError, StiffmapError
@@ -17,18 +16,29 @@ from stiffmap.common.yaml_text import Document, read
 from stiffmap.model.files.report import validated
 from stiffmap.model.files.schema.base import FileModel, Name
 from stiffmap.workspace.performance.motion.motion_files import given_or_shipped, near_or_shipped
-from stiffmap.workspace.performance.quantities import quantity_in, under
+from stiffmap.workspace.performance.quantities import Force, Length, quantity, under
 from stiffmap.workspace.performance.registry import get_measure
 
 Written = str | float | int
 
 
+def positive_length(value: object) -> float:
+    """m, of a text with its unit."""
+    length = quantity(value, "m")
+    if length <= 0:
+        raise StiffmapError(f"expected a positive length, found {value}")
+    return length
+
+
+PositiveLength = Annotated[float, BeforeValidator(positive_length)]
+
+
 class BoxModel(FileModel):
     """Edges of the box in which the machine works, with units."""
 
-    x: Written
-    y: Written
-    z: Written
+    x: Length
+    y: Length
+    z: Length
 
 
 class BoundModel(FileModel):
@@ -41,8 +51,8 @@ class BoundModel(FileModel):
 class LimitsModel(FileModel):
     """What poses of the workspace and of the largest box keep, with units."""
 
-    clearance: Written | None = None
-    deflection: Written | None = None
+    clearance: PositiveLength | None = None
+    deflection: PositiveLength | None = None
 
 
 class RequirementsFile(FileModel):
@@ -53,7 +63,7 @@ class RequirementsFile(FileModel):
     source: str = ""
     box: BoxModel | None = None
     plane: Literal["xy", "xz", "yz"] = "xy"
-    force: Written | None = None
+    force: Force | None = None
     toolpath: str | None = None
     limits: LimitsModel = LimitsModel()
     requirements: dict[str, BoundModel] = Field(default_factory=dict)
@@ -113,10 +123,11 @@ def bound_in(document: Document, file: str, given: BoundModel, *keys: str) -> Bo
     sides = (("at_least", given.at_least), ("at_most", given.at_most))
     with under(document, file, *keys):
         unit = get_measure(keys[-1]).unit
-        least, most = (
-            None if value is None else quantity_in(document, file, value, unit, *keys, side)
-            for side, value in sides
-        )
+        ends: list[float | None] = []
+        for side, value in sides:
+            with under(document, file, *keys, side):
+                ends.append(None if value is None else quantity(value, unit))
+        least, most = ends
         if least is None and most is None:
             raise StiffmapError("give at_least or at_most")
         if least is not None and most is not None and least > most:
@@ -141,26 +152,13 @@ def load_requirements(source: str | PathLike[str]) -> Requirements:
     document, file = read(path), str(path)
     expected = "a requirements file is a mapping with name, box, force and requirements"
     model = validated(RequirementsFile, document, file, expected)
-    si = partial(quantity_in, document, file)
     bounds = tuple(
         (name, bound_in(document, file, given, "requirements", name))
         for name, given in model.requirements.items()
     )
-    box = None
-    if model.box is not None:
-        x, y, z = (si(getattr(model.box, axis), "m", "box", axis) for axis in "xyz")
-        box = x, y, z
-    force = None if model.force is None else si(model.force, "N", "force")
+    box = None if model.box is None else (model.box.x, model.box.y, model.box.z)
     toolpath = None if model.toolpath is None else near_or_shipped(model.toolpath, path.parent)
-    limits: dict[str, float | None] = {}
-    for name, value in (("clearance", model.limits.clearance), ("deflection", model.limits.deflection)):
-        length = None if value is None else si(value, "m", "limits", name)
-        limits[name] = length
-        if length is not None and length <= 0:
-            raise FileError(
-                f"expected a positive length, found {value}",
-                file=file, line=document.line(("limits", name)), key=f"limits.{name}",
-            )  # fmt: skip
     return Requirements(
-        model.name, model.title, model.source, box, model.plane, force, bounds, toolpath, **limits
-    )
+        model.name, model.title, model.source, box, model.plane, model.force, bounds, toolpath,
+        model.limits.clearance, model.limits.deflection,
+    )  # fmt: skip

@@ -172,6 +172,7 @@ def measures(
     size = force if force is not None else task.force if task.force is not None else 100.0
     edges = np.array(task.box) if task.box else np.ones(3)
     lowest, largest = task.bound("transmission_min"), task.bound("transmission_max")
+    path = toolpath or task.toolpath
     case = Case(
         machine, low, high, size, plane or task.plane,
         transmission=(
@@ -181,7 +182,7 @@ def measures(
         proportions=(1.0, float(edges[1] / edges[0]), float(edges[2] / edges[0])), nodes=nodes, coarse=coarse, gap=box_tolerance,
         length=length, gravity=None if gravity is None else real_array(gravity, "gravity"),
         rotation=None if rotation is None else real_array(rotation, "rotation"), threads=threads,
-        toolpath=_motion(toolpath or task.toolpath),
+        toolpath=path if path is None or isinstance(path, Motion) else load_motion(path),
         clearance=_positive("clearance", task.clearance if clearance is None else clearance),
         deflection=_positive("deflection", task.deflection if deflection is None else deflection),
     )  # fmt: skip
@@ -205,10 +206,6 @@ def _rows(chosen: Sequence[Measure], case: Case, task: Requirements) -> tuple[Ro
 
 def _positive(name: str, value: float | None) -> float | None:
     return None if value is None else magnitude(value, name, "m")
-
-
-def _motion(given: Motion | str | PathLike[str] | None) -> Motion | None:
-    return given if given is None or isinstance(given, Motion) else load_motion(given)
 
 
 def _row(measure: Measure, case: Case, bound: Bound | None) -> Row:

@@ -45,8 +45,7 @@ class Damping:
         """(count,) damping ratios."""
         if not self.ratios:
             return np.zeros(count)
-        last = self.ratios[-1]
-        return np.array([*self.ratios[:count], *[last] * (count - len(self.ratios))])
+        return np.array(self.ratios)[np.minimum(np.arange(count), len(self.ratios) - 1)]
 
 
 def damping_of(machine: Machine, given: ArrayLike | None = None) -> Damping:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from stiffmap.common.broadcasting import Floats, real_array, thread_count
 from stiffmap.common.errors import StiffmapError
-from stiffmap.solve.labels import batch_dims
+from stiffmap.solve.labels import WRENCH, batch_dims
 from stiffmap.solve.machine import Machine, takes_machine
 from stiffmap.workspace.vibration.modes import SYMMETRIC, TipModes, tip_modes
 
@@ -107,7 +107,6 @@ def direct(m: dict[str, Floats], s: Complex) -> Complex:
 KINDS = {"receptance": 0, "mobility": 1, "accelerance": 2}
 """Displacement, velocity, acceleration by force: derivatives of a receptance by time."""
 MOTION = ("x", "y", "z", "rx", "ry", "rz")
-FORCE = ("fx", "fy", "fz", "mx", "my", "mz")
 
 
 @takes_machine
@@ -191,7 +190,7 @@ def frequency_response(
         coords={
             "frequency": ("frequency", f, {"units": "Hz"}),
             "response": list(MOTION),
-            "force": list(FORCE),
+            "force": list(WRENCH),
             "status": (poses, found.status.reshape(batch)),
         },
         name=kind,

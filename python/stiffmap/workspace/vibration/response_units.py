@@ -6,10 +6,7 @@ import math
 import re
 from typing import NamedTuple
 
-from stiffmap.common.units import FORCES, LENGTHS
-
-GRAVITY = 9.80665  # m/s2
-POUND = 4.4482216152605  # N
+from stiffmap.common.units import FORCES, GRAVITY, LENGTHS, POUND
 
 
 class ResponseUnit(NamedTuple):
@@ -32,12 +29,12 @@ UNITS = {
     **{name: ResponseUnit(float(size), length=1) for name, size in LENGTHS.items()},
     **{name: ResponseUnit(float(size), force=1) for name, size in FORCES.items()},
     **{name: ResponseUnit(size, length=1) for name, size in {"nm": 1e-9, "mil": 2.54e-5, "ft": 0.3048}.items()},
-    **{name: ResponseUnit(POUND, force=1) for name in ("lbf", "lb", "lbs")},
-    **{name: ResponseUnit(GRAVITY, force=1) for name in ("kgf", "kp")},
+    **{name: ResponseUnit(float(POUND), force=1) for name in ("lbf", "lb", "lbs")},
+    **{name: ResponseUnit(float(GRAVITY), force=1) for name in ("kgf", "kp")},
     "mN": ResponseUnit(1e-3, force=1),
     "Nm": ResponseUnit(length=1, force=1),
     "kg": ResponseUnit(length=-1, force=1, time=2),
-    **{name: ResponseUnit(GRAVITY, length=1, time=-2) for name in ("g", "gn", "g_n", "g's")},
+    **{name: ResponseUnit(float(GRAVITY), length=1, time=-2) for name in ("g", "gn", "g_n", "g's")},
     **{name: ResponseUnit(time=1) for name in ("s", "sec")},
     "ms": ResponseUnit(1e-3, time=1),
     "rad": ResponseUnit(),

@@ -168,39 +168,29 @@ class BoxSearch:
     def _program(self, centre: Floats, edge: float, reach: float) -> tuple[Floats, float] | None:
         """Best cube with its centre within `reach`, limits at the points watched taken as linear."""
         points = centre + self.touched * edge / 2
-        rows: list[Floats] = []
-        room: list[float] = []
         step = STEP * self.size
         closed, limits = self.bounds.at(self.base((points[:, None] + step * CROSS).reshape(-1, 3)))
-        closed = closed.reshape(len(points), -1)
-        for limit in limits:
-            arrays = limit.array.reshape(len(points), len(CROSS), -1)
-            left = limit.left.reshape(len(points), len(CROSS), -1)[:, 0]
-            for c in range(len(points)):
-                if not closed[c].all():
-                    continue
-                value = arrays[c] @ left[c]
-                slope = (value[1:4] - value[4:7]) / (2 * step)
-                rows.append(np.array([*slope, slope @ self.touched[c] / 2]))
-                room.append(limit.most - value[0])
-        if not rows:
+        all_closed = closed.reshape(len(points), -1).all(axis=1)
+        if not (limits and all_closed.any()):
             return None
-        finite = [bool(np.isfinite(r).all() and np.isfinite(v)) for r, v in zip(rows, room, strict=True)]
-        rows = [r for r, ok in zip(rows, finite, strict=True) if ok]
-        room = [v for v, ok in zip(room, finite, strict=True) if ok]
-        inside = [
-            (max(-reach, lo), min(reach, hi))
-            for lo, hi in zip(self.low - centre, self.high - centre, strict=True)
-        ]
-        for axis in range(3):  # stays in the region
-            for sign in (1.0, -1.0):
-                row = np.zeros(4)
-                row[axis], row[3] = sign, 0.5
-                rows.append(row)
-                space = (self.high - centre)[axis] if sign > 0 else (centre - self.low)[axis]
-                room.append(space - edge / 2)
+        rows, room = [], []
+        for limit in limits:
+            arrays = limit.array.reshape(len(points), len(CROSS), -1)[all_closed]
+            left = limit.left.reshape(len(points), len(CROSS), -1)[all_closed, 0]
+            with np.errstate(invalid="ignore"):
+                value = (arrays @ left[:, :, None])[..., 0]
+                slope = (value[:, 1:4] - value[:, 4:7]) / (2 * step)
+                rows.append(np.column_stack([slope, (slope * self.touched[all_closed]).sum(axis=1) / 2]))
+            room.append(limit.most - value[:, 0])
+        table, space = np.concatenate(rows), np.concatenate(room)
+        finite = np.isfinite(table).all(axis=1) & np.isfinite(space)
+        below, above = self.low - centre, self.high - centre
+        sides = np.column_stack([np.kron(np.eye(3), [[1.0], [-1.0]]), np.full(6, 0.5)])  # stays in the region
         answer = linprog(
-            [0, 0, 0, -1], A_ub=np.array(rows), b_ub=np.array(room), bounds=[*inside, (-edge, reach)]
+            [0, 0, 0, -1],
+            A_ub=np.vstack([table[finite], sides]),
+            b_ub=np.concatenate([space[finite], np.column_stack([above, -below]).ravel() - edge / 2]),
+            bounds=[*np.clip(np.column_stack([below, above]), -reach, reach).tolist(), (-edge, reach)],
         )
         if answer.status != 0:
             return None

@@ -91,15 +91,11 @@ def halved(low: Floats, high: Floats, bend: Floats) -> tuple[Floats, Floats]:
     weight = np.where(weight.max(axis=1, keepdims=True) > 0, weight, size)
     cut: NDArray[np.bool_] = np.greater_equal(weight, HALVED * weight.max(axis=1, keepdims=True))
     for axis in range(3):
-        chosen = np.asarray(cut)[:, axis]
+        chosen, n = np.flatnonzero(cut[:, axis]), len(low)
         middle = (low[chosen, axis] + high[chosen, axis]) / 2
-        upper_low = low[chosen].copy()
-        upper_low[:, axis] = middle
-        upper_high = high[chosen].copy()
-        high = high.copy()
-        high[chosen, axis] = middle
-        low, high = np.concatenate([low, upper_low]), np.concatenate([high, upper_high])
+        low, high = (np.concatenate([a, a[chosen]]) for a in (low, high))
         cut = np.concatenate([cut, cut[chosen]])
+        high[chosen, axis] = low[n:, axis] = middle
     return low, high
 
 

@@ -44,13 +44,6 @@ class Judged:
     broken: dict[str, NDArray[np.bool_]]
     """(n,) by limit: who breaks it."""
 
-    @classmethod
-    def of(cls, position: Floats, coordinates: int) -> Judged:
-        """Nothing known yet."""
-        n = len(position)
-        none = np.zeros(n, dtype=bool)
-        return cls(position, none.copy(), none.copy(), np.full((n, coordinates), np.nan), {})
-
     def mark(self, name: str, rows: NDArray[np.int64], bad: NDArray[np.bool_]) -> None:
         """These of the rows break a limit, or its other end."""
         self.broken.setdefault(name, np.zeros(len(self.position), dtype=bool))[rows] |= bad
@@ -78,7 +71,10 @@ class Inside:
     def __call__(self, position: Floats, known: Judged | None = None) -> Judged:
         """Judges poses (n, 3): each begins at a neighbour that closed, the first ones at the middle of the workspace;
         or all of them at the nearest one of poses that are known."""
-        out = Judged.of(position, len(self.bounds.machine.compiled.names.coordinates))
+        n, size = len(position), len(self.bounds.machine.compiled.names.coordinates)
+        out = Judged(
+            position, np.zeros(n, dtype=bool), np.zeros(n, dtype=bool), np.full((n, size), np.nan), {}
+        )
         if known is not None:
             if known.closed.any():
                 nearest = cKDTree(known.position[known.closed]).query(position)[1]
@@ -97,7 +93,9 @@ class Inside:
             lit = new[near]
             rows = np.flatnonzero(~out.closed & lit.any(axis=1))
             before = out.closed.copy()
-            self._judge(out, rows, *self._beside(out, near[rows, lit[rows].argmax(axis=1)], position[rows]))
+            at = near[rows, lit[rows].argmax(axis=1)]
+            k = self._from(position[rows], out.coordinates[at])
+            self._judge(out, rows, k, self._sound(out, at, k))
             new = out.closed & ~before
             if new.any():
                 continue
@@ -121,15 +119,9 @@ class Inside:
         """The nearest closed neighbour of each."""
         return np.asarray(near[rows, out.closed[near[rows]].argmax(axis=1)])
 
-    def _beside(
-        self, out: Judged, neighbour: NDArray[np.int64], p: Floats
-    ) -> tuple[DriveKinematics, NDArray[np.bool_]]:
-        """Poses from closed neighbours, and whether the way back ends where it began: else Newton's method has
-        fallen into another working mode."""
-        k = self._from(p, out.coordinates[neighbour])
-        return k, self._sound(out, neighbour, k)
-
     def _sound(self, out: Judged, neighbour: NDArray[np.int64], k: DriveKinematics) -> NDArray[np.bool_]:
+        """Whether the way back to closed neighbours ends where it began: else Newton's method has fallen into another
+        working mode."""
         start, same = out.coordinates[neighbour], np.zeros(len(neighbour), dtype=bool)
         rows = np.flatnonzero(k.status == Status.CONVERGED)
         back = self._from(out.position[neighbour[rows]], k.coordinates[rows])

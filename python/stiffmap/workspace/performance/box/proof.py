@@ -85,11 +85,6 @@ SAFETY = 2.0
 """On second derivatives, which are second differences between the nodes of each cell."""
 _NODES = np.array(list(product((-1.0, 0.0, 1.0), repeat=3)))
 _MIDDLE = 13
-_LINES = [
-    [[int(np.ravel_multi_index(tuple(np.insert(rest, axis, v)), (3, 3, 3))) for v in (0, 1, 2)]
-     for rest in product((0, 1, 2), repeat=2)]
-    for axis in range(3)
-]  # fmt: skip
 
 
 def sample(bounds: Bounds, centre: Floats, half: Floats, axes: Floats) -> Cells:
@@ -105,15 +100,13 @@ def sample(bounds: Bounds, centre: Floats, half: Floats, axes: Floats) -> Cells:
     )
     bend = np.zeros((n, 3))
     for limit in limits:
-        values = limit.array.reshape(n, 27, -1)
+        values = limit.array.reshape(n, 3, 3, 3, -1)
         nodes = limit.value.reshape(n, 27)
         size = max(abs(limit.most), 1e-9)
         error = np.zeros(n)
-        for axis, lines in enumerate(_LINES):
-            bends = [
-                np.linalg.norm(values[:, a] - 2 * values[:, b] + values[:, c], axis=-1) for a, b, c in lines
-            ]
-            share = np.max(bends, axis=0) / 8  # of the node spacing's second difference h² f''
+        for axis in range(3):
+            bends = np.linalg.norm(np.diff(values, 2, axis=axis + 1), axis=-1).reshape(n, -1)
+            share = bends.max(axis=1) / 8  # of the node spacing's second difference h² f''
             bend[:, axis] += share / size
             error += SAFETY * share
         with np.errstate(invalid="ignore"):
@@ -195,14 +188,20 @@ def _factors_over(
     from W = J^-1 (n, d, d), its change to the cell's faces (n, 3, d, d), the Frobenius norm of the rest (n,)."""
     low, high = transmission
     n, d = len(w), w.shape[-1]
+    sphere, sort = factors == "sphere", "transmission" if factors == "sphere" else "cube factor"
     out = []
-    sphere = factors == "sphere"
+
+    def add(name: str, ok: NDArray[np.bool_], values: Floats, rest: Floats, bound: float) -> None:
+        """Of the cells that are `ok`: values (k, 8) at the corners."""
+        value, miss, corner = np.full(n, np.nan), np.full(n, np.inf), np.zeros(n, dtype=np.int64)
+        value[ok], miss[ok], corner[ok] = values.max(axis=1), rest, values.argmax(axis=1)
+        out.append((f"{sort} {name}", value, miss, bound, corner))
+
     ok = np.isfinite(w).all(axis=(1, 2)) & np.isfinite(slack)
     if low > 0:
         at = w[ok][:, None] + np.einsum("ck,nkab->ncab", BOX, step[ok])
         values = _largest(at) if sphere else np.linalg.norm(at, axis=3).max(axis=2)
-        name = "transmission below" if sphere else "cube factor below"
-        out.append((name, *_spread(n, ok, values, slack[ok]), 1 / low, _worst(n, ok, values)))
+        add("below", ok, values, slack[ok], 1 / low)
     if not np.isfinite(high):
         return out
     ok = ok & (np.abs(np.linalg.det(np.where(ok[:, None, None], w, np.eye(d)))) > 1e-12)
@@ -218,20 +217,7 @@ def _factors_over(
         values = _largest(at)
     else:
         values, rest = np.linalg.norm(at @ corners(d).T, axis=2).max(axis=2), rest * np.sqrt(d)
-    name = "transmission above" if sphere else "cube factor above"
-    out.append((name, *_spread(n, ok, values, rest), high, _worst(n, ok, values)))
-    return out
-
-
-def _spread(n: int, ok: NDArray[np.bool_], values: Floats, rest: Floats) -> tuple[Floats, Floats]:
-    value, slack = np.full(n, np.nan), np.full(n, np.inf)
-    value[ok], slack[ok] = values.max(axis=1), rest
-    return value, slack
-
-
-def _worst(n: int, ok: NDArray[np.bool_], values: Floats) -> NDArray[np.int64]:
-    out = np.zeros(n, dtype=np.int64)
-    out[ok] = values.argmax(axis=1)
+    add("above", ok, values, rest, high)
     return out
 
 

@@ -129,15 +129,15 @@ def workspace_volume(
     if region is None:
         low, high, grown = _extent(ask, low, high, axes, rng)
     while True:
-        drawn = _draw(ask, low, high, axes, cells, rng)
-        if not drawn.touched.any() or grown == 0:
+        drawn, touched = _draw(ask, low, high, axes, cells, rng)
+        if not touched.any() or grown == 0:
             break
         grown -= 1
         step = (high - low) / 4
-        low, high = low - step * drawn.touched[0], high + step * drawn.touched[1]
+        low, high = low - step * touched[0], high + step * touched[1]
     cell = float(np.prod((high - low)[axes] / cells))
-    pairs = drawn.judged.inside.reshape(-1, 2)
-    kept = drawn.judged.position[drawn.judged.inside]
+    pairs = drawn.inside.reshape(-1, 2)
+    kept = drawn.position[drawn.inside]
     box = np.stack([kept.min(axis=0), kept.max(axis=0)]) if len(kept) else np.full((2, 3), np.nan)
     with judge_on(bounds, scheduler) as judge:
         proven = _proven(judge, bounds.unproven, drawn, low, high, axes, cells, prove)
@@ -145,16 +145,9 @@ def workspace_volume(
         volume=cell * float(pairs.mean(axis=1).sum()),
         error=cell * float(np.sqrt((pairs[:, 0] != pairs[:, 1]).sum() / 4)),
         dimension=len(axes), proven=proven, box=box,
-        region=np.stack([low, high]), cut=bool(drawn.touched.any()), limited_by=_limiting(drawn),
-        drawn=drawn.judged, ask=ask,
+        region=np.stack([low, high]), cut=bool(touched.any()), limited_by=_limiting(drawn),
+        drawn=drawn, ask=ask,
     )  # fmt: skip
-
-
-@dataclass(frozen=True, eq=False)
-class _Drawn:
-    judged: Judged
-    touched: NDArray[np.bool_]
-    """(2, 3) at which end of each axis a cell of the region's border holds a pose inside."""
 
 
 def _begun(machine: Machine, region: ArrayLike | None, axes: list[int]) -> tuple[Floats, Floats]:
@@ -172,21 +165,22 @@ def _extent(
 ) -> tuple[Floats, Floats, int]:
     """A region about all that is found, and how many times it may still grow."""
     for left in range(GROWN, -1, -1):
-        drawn = _draw(ask, low, high, axes, FIRST[len(axes)], rng)
-        if not drawn.judged.inside.any() or not drawn.touched.any() or left == 0:
+        drawn, touched = _draw(ask, low, high, axes, FIRST[len(axes)], rng)
+        if not drawn.inside.any() or not touched.any() or left == 0:
             break
         step = (high - low) / 2
-        low, high = low - step * drawn.touched[0], high + step * drawn.touched[1]
-    if drawn.judged.inside.any():
-        kept, step = drawn.judged.position[drawn.judged.inside], (high - low) / FIRST[len(axes)]
+        low, high = low - step * touched[0], high + step * touched[1]
+    if drawn.inside.any():
+        kept, step = drawn.position[drawn.inside], (high - low) / FIRST[len(axes)]
         low, high = np.maximum(kept.min(axis=0) - step, low), np.minimum(kept.max(axis=0) + step, high)
     return low, high, left
 
 
 def _draw(
     ask: Inside, low: Floats, high: Floats, axes: list[int], cells: int, rng: np.random.Generator
-) -> _Drawn:
-    """Two random poses in each of cells^axes cells, neighbours in memory."""
+) -> tuple[Judged, NDArray[np.bool_]]:
+    """Two random poses in each of cells^axes cells, neighbours in memory; (2, 3) at which end of each axis a cell of
+    the region's border holds a pose inside."""
     grid = np.stack(np.meshgrid(*[np.arange(cells)] * len(axes), indexing="ij"), axis=-1)
     corner = np.repeat(grid.reshape(-1, len(axes)), 2, axis=0)
     p = np.tile((low + high) / 2, (len(corner), 1))
@@ -197,19 +191,19 @@ def _draw(
     for i, axis in enumerate(axes):
         touched[0, axis] = inside[corner[:, i] == 0].any()
         touched[1, axis] = inside[corner[:, i] == cells - 1].any()
-    return _Drawn(judged, touched)
+    return judged, touched
 
 
-def _limiting(drawn: _Drawn) -> tuple[tuple[str, float], ...]:
+def _limiting(drawn: Judged) -> tuple[tuple[str, float], ...]:
     """What the poses break that are outside but have one inside for a neighbour."""
-    if not drawn.judged.inside.any() or drawn.judged.inside.all():
+    if not drawn.inside.any() or drawn.inside.all():
         return ()
-    step = np.median(cKDTree(drawn.judged.position).query(drawn.judged.position, 2)[0][:, 1])
-    far = cKDTree(drawn.judged.position[drawn.judged.inside]).query(drawn.judged.position)[0]
-    border = ~drawn.judged.inside & (far < 2 * step)
+    step = np.median(cKDTree(drawn.position).query(drawn.position, 2)[0][:, 1])
+    far = cKDTree(drawn.position[drawn.inside]).query(drawn.position)[0]
+    border = ~drawn.inside & (far < 2 * step)
     if not border.any():
         return ()
-    shares = {name: float(bad[border].mean()) for name, bad in drawn.judged.causes().items()}
+    shares = {name: float(bad[border].mean()) for name, bad in drawn.causes().items()}
     found = [(name, share) for name, share in shares.items() if share > 0]
     return tuple(sorted(found, key=lambda f: -f[1]))
 
@@ -217,7 +211,7 @@ def _limiting(drawn: _Drawn) -> tuple[tuple[str, float], ...]:
 def _proven(
     judge: Judge,
     unproven: str,
-    drawn: _Drawn,
+    drawn: Judged,
     low: Floats,
     high: Floats,
     axes: list[int],
@@ -228,7 +222,7 @@ def _proven(
     if work <= 0 or unproven or len(axes) != 3:
         return float("nan")
     step = (high - low) / cells
-    number = np.flatnonzero(drawn.judged.inside.reshape(-1, 2).all(axis=1))
+    number = np.flatnonzero(drawn.inside.reshape(-1, 2).all(axis=1))
     corner = np.stack(np.unravel_index(number, (cells,) * 3), axis=1)
     a = low + corner * step
     b, total, left = a + step, 0.0, work

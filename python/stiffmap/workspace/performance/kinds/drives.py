@@ -9,7 +9,7 @@ from stiffmap.workspace.performance.motion.efforts import acceleration_of
 from stiffmap.workspace.performance.motion.force import accuracy_of
 from stiffmap.workspace.performance.motion.inertia import need_masses, rest_efforts
 from stiffmap.workspace.performance.motion.scaling import drive_values
-from stiffmap.workspace.performance.motion.tensions import held, in_cables, pushes
+from stiffmap.workspace.performance.motion.tensions import PUSHES, held, in_cables
 from stiffmap.workspace.performance.motion.zonotopes import inner_radius
 from stiffmap.workspace.performance.registry import Case, Found, Measure, over_poses
 
@@ -25,7 +25,7 @@ def force(case: Case) -> Found:
     """Over all poses of the box, drives within the efforts that the machine file declares."""
     most = drive_values(case.machine, "force", None, "N or N·m")
     if (h := in_cables(case.machine, "the force that is held")) is not None:
-        rows, limits, offset = held(case.machine, h, case.coarse_kinematics, pushes(h), most, case.gravity)
+        rows, limits, offset = held(case.machine, h, case.coarse_kinematics, PUSHES, most, case.gravity)
         radii = inner_radius(rows[..., list(plane_axes(case.plane))], limits, offset)
         return over_poses(
             case.coarse_positions, radii, "high", note="cables: over the coarse grid, any tensions"

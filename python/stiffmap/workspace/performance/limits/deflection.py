@@ -113,43 +113,36 @@ class _Ask:
     linear: bool
     turns: int
 
-    def solve(self, p: Floats, unit: Floats | None, stiffness: bool) -> Solution:
-        wrench = np.zeros((len(p), 6))
-        if unit is not None:
-            wrench[:, :3] = self.force * unit
+    def _solve(self, p: Floats, unit: Floats, stiffness: bool) -> Solution:
+        wrench = np.concatenate([self.force * unit, np.zeros_like(unit)], axis=1)
         return self.loading.solve(p, wrench, stiffness=stiffness)
 
     def at(self, p: Floats) -> tuple[Floats, Floats, NDArray[np.uint8]]:
         """Largest deflections, their directions and the status at poses (n, 3)."""
-        axes = list(self.axes)
-        start = self.solve(p, None, stiffness=True)
-        c = start.compliance[:, :3, :3]
-        rest = start.displacement[:, :3]
+        axes, unit = list(self.axes), np.zeros((len(p), 3))
+        start = self._solve(p, unit, stiffness=True)
         if self.direction is not None:
             unit = np.broadcast_to(real_array(self.direction, "direction"), p.shape)
             unit = unit / np.linalg.norm(unit, axis=1, keepdims=True)
-            return self._loaded(p, unit, c, rest, start.status)
-        block = np.nan_to_num(c[:, axes][:, :, axes])
-        *_, vh = np.linalg.svd(block)
-        unit = np.zeros((len(p), 3))
-        unit[:, axes] = vh[:, 0]
-        value, way, status = self._loaded(p, unit, c, rest, start.status)
+            return self._loaded(p, unit, start)
+        unit[:, axes] = np.linalg.svd(np.nan_to_num(start.compliance[:, axes][:, :, axes]))[2][:, 0]
+        value, way, status = self._loaded(p, unit, start)
         if self.turns == 0:
             return value, way, status
-        other = self._loaded(p, -unit, c, rest, start.status)
+        other = self._loaded(p, -unit, start)
         flip = other[0] > value
         value, way = np.where(flip, other[0], value), np.where(flip[:, None], -unit, way)
         status = np.maximum(status, other[2])
         return (value, way, status) if self.linear else self._turned(p, value, way, status)
 
-    def _loaded(
-        self, p: Floats, unit: Floats, c: Floats, rest: Floats, status: NDArray[np.uint8]
-    ) -> tuple[Floats, Floats, NDArray[np.uint8]]:
+    def _loaded(self, p: Floats, unit: Floats, start: Solution) -> tuple[Floats, Floats, NDArray[np.uint8]]:
+        """Under the force along `unit`, the compliance being that of another equilibrium there."""
         if self.linear:
-            d = rest + self.force * (c @ unit[..., None])[..., 0]
+            moved = (start.compliance[:, :3, :3] @ unit[..., None])[..., 0]
+            d, status = start.displacement[:, :3] + self.force * moved, start.status
         else:
-            s = self.solve(p, unit, stiffness=False)
-            d, status = s.displacement[:, :3], np.maximum(status, s.status)
+            s = self._solve(p, unit, stiffness=False)
+            d, status = s.displacement[:, :3], np.maximum(start.status, s.status)
         return np.linalg.norm(d[:, list(self.axes)], axis=1), unit, status
 
     def _turned(
@@ -158,7 +151,7 @@ class _Ask:
         """Turns each force to where the loaded compliance says that the deflection grows."""
         axes = list(self.axes)
         for _ in range(self.turns):
-            s = self.solve(p, unit, stiffness=True)
+            s = self._solve(p, unit, stiffness=True)
             d = s.displacement[:, axes]
             grow = (np.swapaxes(s.compliance[:, axes][:, :, axes], 1, 2) @ d[..., None])[..., 0]
             with np.errstate(invalid="ignore", divide="ignore"):
@@ -166,7 +159,7 @@ class _Ask:
             turned = unit.copy()
             turned[:, axes] = np.where(np.isfinite(grow), grow, unit[:, axes])
             far = np.linalg.norm(turned - unit, axis=1)
-            now, _, state = self._loaded(p, turned, s.compliance, d, s.status)
+            now, _, state = self._loaded(p, turned, s)
             better = now > value
             value, unit = np.where(better, now, value), np.where(better[:, None], turned, unit)
             status = np.maximum(status, state)

@@ -23,7 +23,7 @@ from stiffmap.workspace.performance.motion.scaling import (
     drive_values,
     weighted,
 )
-from stiffmap.workspace.performance.motion.tensions import as_tensions, held, in_cables, pushes
+from stiffmap.workspace.performance.motion.tensions import PUSHES, as_tensions, held, in_cables
 from stiffmap.workspace.performance.motion.velocity import of_motions, singular_values
 from stiffmap.workspace.performance.motion.zonotopes import (
     Polygon,
@@ -170,11 +170,14 @@ def force_transmission(
     else:
         if velocity is not None:
             raise StiffmapError(f"{machine.name}: velocity: for cables the force is known at rest alone")
-        found = held(machine, h, k, pushes(h), most, gravity)
+        found = held(machine, h, k, PUSHES, most, gravity)
         still = rest_efforts(machine, k, gravity=gravity, velocity=None)
         bias = as_tensions(machine, h, k, still, most, sharing)
     rows, room, offset = found
-    least, largest = _spheres(machine, k, length)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        j = weighted(machine, k.jacobian, characteristic_length(machine, length), "all")
+        s, last = of_motions(machine, k, singular_values(j))
+        least, largest = 1 / s[..., 0], 1 / last
     return ForceTransmission(
         sphere_min=least,
         sphere_max=largest,
@@ -184,11 +187,3 @@ def force_transmission(
         limits=most,
         status=k.status,
     )
-
-
-def _spheres(machine: Machine, k: DriveKinematics, length: float | None) -> tuple[Floats, Floats]:
-    """(...) smallest and largest singular values of the efforts' transmission."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        j = weighted(machine, k.jacobian, characteristic_length(machine, length), "all")
-        s, last = of_motions(machine, k, singular_values(j))
-        return 1 / s[..., 0], 1 / last

@@ -17,13 +17,13 @@ from stiffmap.common.broadcasting import (
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.short import short_repr
 from stiffmap.model.description import Body
-from stiffmap.model.description.tree import all_elements, core_name, joints
+from stiffmap.model.description.tree import all_elements, core_name
 from stiffmap.solve.compiled.machine import CompiledMachine
 from stiffmap.solve.compiled.names import Role
 from stiffmap.solve.machine import Machine, takes_machine
 from stiffmap.solve.results import OverPoses
 from stiffmap.workspace.performance.motion.closing import DriveKinematics
-from stiffmap.workspace.performance.motion.scaling import declared
+from stiffmap.workspace.performance.motion.scaling import declared, revolute_drives
 from stiffmap.workspace.performance.motion.sharing import drive_weights, followed
 from stiffmap.workspace.performance.poses import loaded_poses
 
@@ -99,10 +99,9 @@ def motion_friction(machine: Machine, rates: Floats) -> Floats:
 
     Where a drive declares no speed, its own largest rate along the motion, and that of the fastest drive of its kind, stand in.
     """
-    named = joints(machine.description)
-    kinds = [named[name].kind == "prismatic" for name in machine.actuators]
+    turn = revolute_drives(machine)
     own = np.abs(rates).reshape(-1, rates.shape[-1]).max(axis=0, initial=0.0)
-    fastest = np.array([max(v for v, other in zip(own, kinds, strict=True) if other == k) for k in kinds])
+    fastest = np.where(turn, own.max(where=turn, initial=0.0), own.max(where=~turn, initial=0.0))
     speed = declared(machine, "speed", 0.0)
     limit = SLOW * np.where(speed > 0.0, speed, fastest)
     return _friction(machine, rates, np.clip(rates / np.where(limit > 0.0, limit, 1.0), -1.0, 1.0))

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from os import PathLike
 from pathlib import Path as FilePath
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -32,9 +30,8 @@ from stiffmap.workspace.performance.motion.trajectory import (
     timed,
     way_along,
 )
-from stiffmap.workspace.performance.quantities import quantity_in, under
+from stiffmap.workspace.performance.quantities import Force, Length, Speed, Time, under
 
-Written = str | float | int
 LEAST_ROWS = 6
 """Of a table over time: its spline of degree 5 wants that many."""
 
@@ -42,15 +39,15 @@ LEAST_ROWS = 6
 class LineModel(FileModel):
     """Straight path."""
 
-    start: list[Written] = Field(min_length=3, max_length=3)
-    end: list[Written] = Field(min_length=3, max_length=3)
+    start: list[Length] = Field(min_length=3, max_length=3)
+    end: list[Length] = Field(min_length=3, max_length=3)
 
 
 class CircleModel(FileModel):
     """One turn."""
 
-    centre: list[Written] = Field(min_length=3, max_length=3)
-    radius: Written
+    centre: list[Length] = Field(min_length=3, max_length=3)
+    radius: Length
     plane: Literal["xy", "xz", "yz"] = "xy"
 
 
@@ -60,11 +57,11 @@ class MotionFile(FileModel):
     name: Name
     line: LineModel | None = None
     circle: CircleModel | None = None
-    points: list[list[Written]] | None = None
+    points: list[list[Length]] | None = None
     samples: int = Field(default=401, ge=5)
-    duration: Written | None = None
-    speed: Written | None = None
-    force: list[Written] = Field(default=["0 N", "0 N", "0 N"], min_length=3, max_length=3)
+    duration: Time | None = None
+    speed: Speed | None = None
+    force: list[Force] = Field(default=[0.0, 0.0, 0.0], min_length=3, max_length=3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,11 +152,6 @@ def near_or_shipped(name: str, folder: FilePath) -> str:
 def _described(document: Document, file: str) -> Motion:
     expected = "a motion file is a mapping with name and line, circle or points"
     m = validated(MotionFile, document, file, expected)
-    si = partial(quantity_in, document, file)
-
-    def row(values: Sequence[Any], unit: str, *keys: str | int) -> list[float]:
-        return [si(v, unit, *keys, i) for i, v in enumerate(values)]
-
     given = [k for k in ("line", "circle", "points") if getattr(m, k) is not None]
     if len(given) != 1:
         found = " and ".join(given) or "none"
@@ -168,20 +160,16 @@ def _described(document: Document, file: str) -> Motion:
         raise FileError("give duration or speed, not both", file=file, line=document.line(("speed",)))
     with under(document, file, given[0]):
         if m.line is not None:
-            start, end = row(m.line.start, "m", "line", "start"), row(m.line.end, "m", "line", "end")
-            path = line(start, end, m.samples)
+            path = line(m.line.start, m.line.end, m.samples)
         elif m.circle is not None:
-            centre = row(m.circle.centre, "m", "circle", "centre")
-            radius = si(m.circle.radius, "m", "circle", "radius")
-            path = circle(centre, radius, m.circle.plane, m.samples)
+            path = circle(m.circle.centre, m.circle.radius, m.circle.plane, m.samples)
         else:
-            path = through([row(p, "m", "points", i) for i, p in enumerate(m.points or [])], m.samples)
-    span = None if m.duration is None else si(m.duration, "s", "duration")
-    speed = np.inf if m.speed is None else si(m.speed, "m/s", "speed")
-    for name, value in (("duration", span), ("speed", speed)):
+            path = through(m.points or [], m.samples)
+    for name, value in (("duration", m.duration), ("speed", m.speed)):
         if value is not None and not value > 0:
             raise FileError(f"expected a positive {name}", file=file, line=document.line((name,)), key=name)
-    return Motion(m.name, path, None, span, speed, np.array(row(m.force, "N", "force")))
+    speed = np.inf if m.speed is None else m.speed
+    return Motion(m.name, path, None, m.duration, speed, np.array(m.force))
 
 
 def _table(place: FilePath) -> Motion:
@@ -194,7 +182,10 @@ def _table(place: FilePath) -> Motion:
         if feed is not None and not (feed > 0).all():
             line = table.lines[int(np.argmax(~(feed > 0)))]
             raise FileError("expected a feed above zero", file=file, line=line, key="feed")
-        path = _through(p, file)
+        try:
+            path = through(p)
+        except StiffmapError as error:
+            raise FileError(str(error), file=file) from None
         along = way_along(p) / way_along(p)[-1]
         force = f[0] if not np.ptp(f, axis=0).any() else _between(path.s, along, f)
         if feed is None:
@@ -223,10 +214,3 @@ def _table(place: FilePath) -> Motion:
 def _between(s: Floats, at: Floats, values: Floats) -> Floats:
     """(n, 3) values given at some places of a path, straight between them."""
     return np.stack([np.interp(s, at, v) for v in values.T], axis=1)
-
-
-def _through(points: Floats, file: str) -> Path:
-    try:
-        return through(points)
-    except StiffmapError as error:
-        raise FileError(str(error), file=file) from None

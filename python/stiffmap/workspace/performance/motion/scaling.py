@@ -41,14 +41,14 @@ def drive_values(machine: Machine, field: str, given: ArrayLike | None, unit: st
                 f"not negative, {unit}; got {given!r}"
             )
         return np.broadcast_to(out, (n,)).copy()
-    values = [getattr(d, field) for d in drive_table(machine)]
-    missing = [a for a, v in zip(machine.actuators, values, strict=True) if v is None]
+    values = declared(machine, field, np.nan)
+    missing = [a for a, v in zip(machine.actuators, values, strict=True) if np.isnan(v)]
     if missing:
         raise StiffmapError(
             f"{machine.name}: no {field} declared for {', '.join(missing)}; add it to the machine file or "
             f"give {field}= ({unit})"
         )
-    return np.array(values, dtype=float)
+    return values
 
 
 def drive_limits(machine: Machine, field: str, limits: ArrayLike | str, unit: str) -> Floats:
@@ -76,11 +76,5 @@ def weighted(machine: Machine, jacobian: Floats, length: float, part: str) -> Fl
         raise StiffmapError(f"part: expected one of {', '.join(PARTS)}, got {part!r}")
     out = jacobian.copy()
     out[..., 3:, :] *= length
-    if mixes_units(machine):
-        out[..., revolute_drives(machine)] /= length
+    out[..., revolute_drives(machine)] /= length
     return out[..., PARTS[part], :]
-
-
-def mixes_units(machine: Machine) -> bool:
-    """Whether drives turn as well as slide, or turn while the platform translates: always if any turns."""
-    return bool(revolute_drives(machine).any())

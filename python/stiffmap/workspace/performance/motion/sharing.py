@@ -114,37 +114,34 @@ def followed(
     accelerations F'' twice times it and F' times its rate, by differences of fourth order of the closed joints about
     each pose. NaN where a pose near by does not close.
     """
-    along = _Along(machine, coordinates, thread_count(threads))
-    rate, bend = along(twist)
-    pull, _ = along(twist_rate)
-    return rate, bend + pull
+    compiled, drives, cores = machine.compiled, list(machine.compiled.drives), thread_count(threads)
+    unit = np.array([1.0] * 3 + [compiled.length] * 3)
+    h = STRIDE * compiled.length
+    closed = np.asarray(np.isfinite(coordinates).all(axis=1))[:, None]
+    _, p, r, _, _ = compiled.close_actuators(np.ascontiguousarray(coordinates[:, drives]), cores, coordinates)
 
+    def joints_at(moved: Floats) -> Floats:
+        turned = Rotation.from_rotvec(moved[:, 3:]).as_matrix() @ r
+        out = compiled.rates(
+            p + moved[:, :3],
+            turned,
+            coordinates,
+            weights=np.zeros(0),
+            patient=False,
+            only=True,
+            threads=cores,
+        )
+        return np.asarray(out["coordinates"][:, drives])
 
-class _Along:
-    """First and second derivatives of the nearest joints along straight ways from closed coordinates."""
-
-    def __init__(self, machine: Machine, coordinates: Floats, threads: int) -> None:
-        self.compiled, self.coordinates, self.threads = machine.compiled, coordinates, threads
-        self.drives = list(machine.compiled.drives)
-        actuators = np.ascontiguousarray(coordinates[:, self.drives])
-        _, self.p, self.r, _, _ = self.compiled.close_actuators(actuators, threads, coordinates)
-
-    def __call__(self, twist: Floats) -> tuple[Floats, Floats]:
-        unit = np.array([1.0] * 3 + [self.compiled.length] * 3)
+    def along(twist: Floats) -> tuple[Floats, Floats]:
+        """First and second derivatives of the nearest joints along a straight way."""
         size = np.linalg.norm(unit * twist, axis=1)[:, None]
-        closed = np.asarray(np.isfinite(self.coordinates).all(axis=1))
-        moving = (size > 0) & closed[:, None]
-        h = STRIDE * self.compiled.length
+        moving = (size > 0) & closed
         step = np.where(moving, h * twist / np.where(moving, size, 1.0), 0.0)
-        a, b, c, d, e = (self._joints(k * step) for k in (-2.0, -1.0, 0.0, 1.0, 2.0))
+        a, b, c, d, e = (joints_at(k * step) for k in (-2.0, -1.0, 0.0, 1.0, 2.0))
         first = (8 * (d - b) - (e - a)) / (12 * h)
         second = (16 * (b + d) - (a + e) - 30 * c) / (12 * h**2)
         return np.where(moving, first * size, 0.0), np.where(moving, second * size**2, 0.0)
 
-    def _joints(self, moved: Floats) -> Floats:
-        turned = Rotation.from_rotvec(moved[:, 3:]).as_matrix() @ self.r
-        out = self.compiled.rates(
-            self.p + moved[:, :3], turned, self.coordinates, weights=np.zeros(0), patient=False, only=True,
-            threads=self.threads,
-        )  # fmt: skip
-        return np.asarray(out["coordinates"][:, self.drives])
+    rate, bend = along(twist)
+    return rate, bend + along(twist_rate)[0]

@@ -17,6 +17,8 @@ from stiffmap.workspace.performance.motion.zonotopes import inner_radius, invers
 
 Held = tuple[Floats, Floats, Floats]
 """Rows (..., f, c), limits (..., f), offsets (..., f): what is held is all v with |rows v + offsets| <= limits."""
+PUSHES = np.vstack([np.eye(3), np.zeros((3, 3))])
+"""(6, 3) wrenches at the tcp of unit forces on it."""
 
 
 def in_cables(machine: Machine, what: str) -> Hanging | None:
@@ -42,21 +44,12 @@ def held(
         raise StiffmapError(
             f"{machine.name}: {len(most)} cables for {len(h.rows)} freedoms hold no force in every direction"
         )
-    a = matrix(*lines(h, k.position, k.rotation))
     load = weight(h, k.rotation, machine.compiled.gravity(gravity))
-    size = np.where(np.arange(6) < 3, 1.0, 1.0 / h.length)
-    a, load = scaled(h, a, load)
-    wanted = (np.broadcast_to(columns, (*a.shape[:-2], *columns.shape[-2:])) * size[:, None])[
-        ..., list(h.rows), :
-    ]
+    wanted, _ = scaled(h, columns, load)
+    a, load = scaled(h, matrix(*lines(h, k.position, k.rotation)), load)
     normals, distance = sides(a * (most / 2), len(h.rows))
     offset = np.einsum("...fr,...r->...f", normals, load + (a * (most / 2)).sum(axis=-1))
     return normals @ wanted, distance, offset
-
-
-def pushes(h: Hanging) -> Floats:
-    """(6, 3) wrenches at the tcp of unit forces on it."""
-    return np.vstack([np.eye(3), np.zeros((3, 3))])
 
 
 def inertia_columns(h: Hanging, rotation: Floats) -> Floats:

@@ -6,6 +6,8 @@ sample the drives' limits are half-planes in (path acceleration u, squared path 
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -15,7 +17,7 @@ from stiffmap.solve.machine import Machine
 from stiffmap.workspace.performance.motion.closing import drive_kinematics, place_text, refuse_failed
 from stiffmap.workspace.performance.motion.inertia import friction_efforts, need_masses, rigid_dynamics
 from stiffmap.workspace.performance.motion.scaling import drive_values
-from stiffmap.workspace.performance.motion.tensions import held, in_cables, inertia_columns, pushes
+from stiffmap.workspace.performance.motion.tensions import PUSHES, held, in_cables, inertia_columns
 from stiffmap.workspace.performance.motion.trajectory import Path, Trajectory, run_along
 
 BISECTIONS = 60
@@ -54,7 +56,7 @@ def fastest(
     # the speed is not known yet: friction counts where it hinders, at its largest, and where it helps, at its least
     if h is not None:
         moved = inertia_columns(h, k.rotation) @ np.stack([path.first, path.second], axis=-1)
-        pushed = np.broadcast_to((pushes(h) @ force)[:, None], (*moved.shape[:-1], 1))
+        pushed = np.broadcast_to((PUSHES @ force)[:, None], (*moved.shape[:-1], 1))
         rows, room, offset = held(machine, h, k, np.concatenate([-moved, pushed], axis=-1), limits, gravity)
         a, b, c = rows[..., 0], rows[..., 1], rows[..., 2] + offset
         low, high = -room - c, room - c
@@ -108,9 +110,8 @@ def _range(x: Floats | float, a: Floats, b: Floats, low: Floats, high: Floats) -
     return float(least), float(most)
 
 
-def _largest(top: float, fits: object) -> float:
+def _largest(top: float, fits: Callable[[float], bool]) -> float:
     """Largest x in [0, top] that fits, the set being an interval that starts at 0."""
-    assert callable(fits)
     if fits(top):
         return top
     inside, outside = 0.0, top

@@ -16,14 +16,12 @@ from stiffmap.workspace.performance.motion.closing import DriveKinematics, drive
 from stiffmap.workspace.performance.motion.scaling import (
     characteristic_length,
     drive_limits,
-    mixes_units,
     weighted,
 )
 from stiffmap.workspace.performance.motion.sharing import facets, motions, sides
 from stiffmap.workspace.performance.motion.zonotopes import (
     Polygon,
     farthest_vertex,
-    inscribed_sphere,
     inverse_rows,
     rows_limit,
     section_polygon,
@@ -102,23 +100,20 @@ def transmission_of(
     length: float | None = None,
     limits: ArrayLike | str = "unit",
     part: str = "all",
-    inverse: Floats | None = None,
 ) -> VelocityTransmission:
-    """The same from kinematics that are at hand, and perhaps the inverse (..., drives, 6) of their Jacobian."""
+    """The same from kinematics that are at hand."""
     speeds = drive_limits(machine, "speed", limits, "m/s or rad/s")
     size = characteristic_length(machine, length)
     j = weighted(machine, k.jacobian, size, part)
     driven = j * speeds
     s, low = of_motions(machine, k, singular_values(j))
     high = s[..., 0]
-    if part == "all" and machine.compiled.redundancy:
-        rank = int((np.isfinite(s) & (s > 0)).sum(axis=-1).max(initial=1))
-        slowest = facets(driven, rank)[1].min(axis=-1)
-    elif part == "all":
-        same = inverse is not None and not mixes_units(machine) and _translates(k.jacobian)
-        slowest = rows_limit(inverse if same and inverse is not None else inverse_rows(j), speeds)
+    if part == "translation" or (part == "all" and machine.compiled.redundancy):
+        rank = 3 if part == "translation" else _rank(s)
+        slowest = facets(driven, rank)[1].min(axis=-1, initial=np.inf)
+        slowest = np.where(np.isinf(slowest), 0.0, slowest)  # no facets: some motion has no drive
     else:
-        slowest = inscribed_sphere(driven) if part == "translation" else rows_limit(inverse_rows(j), speeds)
+        slowest = rows_limit(inverse_rows(j), speeds)
     with np.errstate(invalid="ignore", divide="ignore"):
         return VelocityTransmission(
             sphere_min=low, sphere_max=high, cube_min=slowest, cube_max=farthest_vertex(driven),
@@ -140,25 +135,21 @@ def of_motions(machine: Machine, k: DriveKinematics, values: Floats) -> tuple[Fl
     return np.where(np.arange(values.shape[-1]) < count[..., None], values, np.nan), last
 
 
-def _translates(jacobian: Floats) -> bool:
-    """Whether the platform turns nowhere, so that weights of rotations change nothing."""
-    turning, moving = (np.abs(jacobian[..., rows, :]) for rows in (slice(3, 6), slice(3)))
-    return bool(np.nanmax(turning, initial=0.0) <= 1e-13 * np.nanmax(moving, initial=0.0))
+def _rank(values: Floats) -> int:
+    """The most singular values (..., n) that a pose has above zero."""
+    return int((np.isfinite(values) & (values > 0)).sum(axis=-1).max(initial=1))
 
 
 def singular_values(j: Floats) -> Floats:
     """(..., min(rows, drives)) largest first; NaN rows where the matrix is NaN."""
     out = np.full((*j.shape[:-2], min(j.shape[-2:])), np.nan)
     ok = np.isfinite(j).all(axis=(-2, -1))
+    poor = ok
     if j.shape[-1] <= j.shape[-2]:  # the small symmetric problem is several times quicker
         gram = np.swapaxes(j[ok], -1, -2) @ j[ok]
-        values = np.linalg.eigvalsh(gram)[..., ::-1]
-        out[ok] = np.sqrt(np.maximum(values, 0.0))
+        out[ok] = np.sqrt(np.maximum(np.linalg.eigvalsh(gram)[..., ::-1], 0.0))
         poor = ok & (out[..., -1] < 1e-5 * out[..., 0])  # squaring lost their digits
-        if poor.any():
-            out[poor] = np.linalg.svd(j[poor], compute_uv=False)
-        return out
-    out[ok] = np.linalg.svd(j[ok], compute_uv=False)
+    out[poor] = np.linalg.svd(j[poor], compute_uv=False)
     return out
 
 
@@ -182,8 +173,7 @@ def velocity_section(
     j = weighted(machine, k.jacobian, 1.0, "all")
     axes = list(plane_axes(plane))
     if machine.compiled.redundancy:
-        s = of_motions(machine, k, singular_values(j))[0]
-        rank = int((np.isfinite(s) & (s > 0)).sum(axis=-1).max(initial=1))
+        rank = _rank(of_motions(machine, k, singular_values(j))[0])
         rows, most = sides(k.jacobian * speeds, rank)
         return section_polygon(rows[..., axes], most, k.status)
     return section_polygon(inverse_rows(j)[..., axes], speeds, k.status)
