@@ -28,7 +28,7 @@ from stiffmap.identification.inference.amplitudes import Fit
 from stiffmap.identification.inference.chosen import Chosen
 from stiffmap.identification.inference.columns import Columns
 from stiffmap.identification.inference.constants import RARE
-from stiffmap.identification.inference.corrected import Corrected, Term, corrected
+from stiffmap.identification.inference.corrected import Corrected, Term, corrected, instead
 from stiffmap.identification.inference.inference import Inferred, terms
 from stiffmap.identification.inference.machines import (
     CALIBRATED,
@@ -65,7 +65,7 @@ def answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, cross
     best = models.get(CORRECTED)
     each, gap = shares(columns, fit), gap_of(columns, fit)
     effects = _effects(predictor, v, best, each, fit)
-    others = _alternatives(predictor, found, v, given, best, clock) if effects else []
+    others = _alternatives(predictor, found, v, best, clock) if effects else []
     before, after = (left_by(e, sigma, p, ~listed) for p in (base, made.prediction))
     held = made.held_out
     noise = _noise(found, before, after, best, listed)
@@ -178,7 +178,6 @@ def _alternatives(
     predictor: Predictor,
     found: Inferred,
     v: Verdict,
-    given: Readings,
     best: Corrected | None,
     clock: Clock,
 ) -> list[tuple[list[Effect], Corrected]]:
@@ -195,7 +194,7 @@ def _alternatives(
             start = Term.of(place.candidate, terms([other])[0])
             kept = [start if i == k else t for i, t in enumerate(best.terms)]
             try:
-                fitted = corrected(given, kept)
+                fitted = instead(best, kept)
             except StiffmapError:
                 continue
             aliases = [shows_same(m.chosen.place if i != k else place) for i, m in enumerate(v.named)]

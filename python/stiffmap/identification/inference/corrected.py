@@ -19,7 +19,7 @@ from scipy.optimize import least_squares
 from scipy.stats import norm
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.experiment.experiment import Floats
+from stiffmap.experiment.experiment import Floats, Mask
 from stiffmap.experiment.noise.outliers import MANY
 from stiffmap.identification.candidates.candidates import Candidate
 from stiffmap.identification.inference.constants import DEGREES, STANDS_OUT
@@ -92,6 +92,8 @@ class Corrected:
     readings do not determine."""
     prediction: Floats
     """(n, c) m, rad."""
+    slopes: Floats
+    """(k, n, c) change of the prediction per scale of each value of the terms, m or rad; zero where the machine cannot be."""
     given: Readings
     """What it was fitted to, with the weights and the columns at the optimum."""
     travel: Floats = field(default_factory=lambda: np.zeros(0))
@@ -121,18 +123,25 @@ class Corrected:
         return tuple(t.effect(t.values) for t in self.terms)
 
 
-def corrected(
-    given: Readings, terms: Sequence[Term], start: Corrected | None = None, steps: int = STEPS
-) -> Corrected:
-    """The optimum, from the values of the terms and the declared numbers, or from another optimum."""
-    found = _optimum(given, terms, start, steps)
-    if start is not None:
-        return found
+def without(found: Corrected, keep: Mask) -> Corrected:
+    """The optimum of the readings in some rows (n,) alone, with the slopes of the whole: other readings move it by a part of a
+    standard deviation."""
+    return _optimum(found.given.only(keep), (), found, found.slopes)
+
+
+def instead(found: Corrected, terms: Sequence[Term]) -> Corrected:
+    """The optimum with other terms under the same weights, from the same numbers."""
+    return _optimum(found.given, (), replace(found, terms=tuple(terms)))
+
+
+def corrected(given: Readings, terms: Sequence[Term]) -> Corrected:
+    """The optimum, from the values of the terms and the declared numbers."""
+    found = _optimum(given, terms)
     for _ in range(WEIGHINGS):
         if _bends(given, found):
             anew = sensitivity_at(given.predictor, given.sensitivity, found.numbers)
             given = replace(given, sensitivity=anew)
-            found = _optimum(given, terms, found, steps)
+            found = _optimum(given, terms, found)
         left = given.white(np.nan_to_num(given.predictor.experiment.reading - found.prediction))
         q = given.frames(found.prediction)
         noise = (
@@ -143,7 +152,7 @@ def corrected(
             break
         weights = (DEGREES + 1.0) / (DEGREES + (noise / given.kappa) ** 2)
         given = given.weighed(np.minimum(weights, 1.0))
-        found = _optimum(given, terms, found, steps)
+        found = _optimum(given, terms, found)
     return found
 
 
@@ -153,24 +162,49 @@ def _parts(terms: Sequence[Term], x: Floats) -> tuple[Term, ...]:
     return tuple(replace(t, values=x[a:b]) for t, a, b in zip(terms, ends[:-1], ends[1:], strict=True))
 
 
-def _optimum(given: Readings, terms: Sequence[Term], start: Corrected | None, steps: int) -> Corrected:
+def _remembered(function: Callable[[Floats], Floats]) -> Callable[[Floats], Floats]:
+    """The function with its last value kept, since a search asks again where it stands."""
+    last: dict[bytes, Floats] = {}
+
+    def value(x: Floats) -> Floats:
+        key = x.tobytes()
+        if key not in last:
+            found = function(x)
+            last.clear()
+            last[key] = found
+        return last[key]
+
+    return value
+
+
+def _optimum(
+    given: Readings, terms: Sequence[Term], start: Corrected | None = None, held: Floats | None = None
+) -> Corrected:
+    """The optimum under the weights of `given`, from that of a start with its terms or from `terms`; `held`: slopes (k, n, c) that
+    are taken wherever the search stands, in place of those there."""
+    steps = STEPS if held is None else STEPS_OF_A_FOLD
     e = given.predictor.experiment
     terms = tuple(terms) if start is None else start.terms
     k, p = sum(len(t.values) for t in terms), len(given.spread)
     columns, along = given.columns, given.along
     m = along.shape[1]
-    known: dict[bytes, Floats] = {}
 
     def effects(x: Floats) -> list[AppliedEffect]:
         return [t.effect(t.values) for t in _parts(terms, x)]
 
+    @_remembered
+    def at(x: Floats) -> Floats:
+        return given.predicted(x[k:] * given.spread, effects(x))
+
     def shown(x: Floats) -> Floats:
-        x = x[: k + p]
-        key = x.tobytes()
-        if key not in known:
-            known.clear()
-            known[key] = given.predicted(x[k:] * given.spread, effects(x))
-        return known[key]
+        return at(x[: k + p])
+
+    @_remembered
+    def slopes(x: Floats) -> Floats:
+        if held is not None:
+            return held
+        each = [_change(given, x, j, high, at(x), effects, k) for j in range(k)]
+        return np.array(each).reshape(k, *e.reading.shape)
 
     def raw(x: Floats) -> Floats:
         return given.white(e.reading - shown(x)) - along @ x[k + p :]
@@ -182,8 +216,7 @@ def _optimum(given: Readings, terms: Sequence[Term], start: Corrected | None, st
         return np.append(left - q @ (q.T @ left), x[k:])
 
     def jacobian(x: Floats, q: Floats) -> Floats:
-        each = [_change(given, x[: k + p], j, high, shown(x), effects, k) for j in range(k)]
-        whole = -np.column_stack([*(given.white(c) for c in each), columns, along])
+        whole = -np.column_stack([*(given.white(c) for c in slopes(x[: k + p])), columns, along])
         whole -= q @ (q.T @ whole)
         return np.vstack([whole, np.hstack([np.zeros((p + m, k)), np.eye(p + m)])])
 
@@ -212,30 +245,25 @@ def _optimum(given: Readings, terms: Sequence[Term], start: Corrected | None, st
         q = given.frames(shown(x))
         if np.linalg.norm(before @ (before.T @ left) - q @ (q.T @ left)) < SETTLED:
             break
-    j = jacobian(x, q)
-    spread = covariance(j)[0]
+    spread = covariance(jacobian(x, q))[0]
     numbers, travel = x[k : k + p] * given.spread, x[k + p :]
     found = profiles(given.drives, travel, spread[k + p :, k + p :])
     shows = given.predicted(numbers, effects(x), given.knots(found)) if found else shown(x)
-    return Corrected(_parts(terms, x), numbers, np.asarray(spread[:k, :k]), shows, given, travel, found)
+    own = np.asarray(spread[:k, :k])
+    return Corrected(_parts(terms, x), numbers, own, shows, slopes(x[: k + p]), given, travel, found)
 
 
 def columns_of(found: Corrected) -> tuple[Floats, Floats]:
     """(N, k + p + q) change of the readings, in noise, per unit of each effect's value, number and frame at an optimum, and (k + p +
     q,) the prior precision of these."""
     given = found.given
-    x = np.concatenate([*(t.values for t in found.terms), found.numbers / given.spread])
-    k = len(x) - len(given.spread)
-    high = np.concatenate([*(t.bounds[1] for t in found.terms), np.full(len(given.spread), np.inf)])
-
-    def effects(at: Floats) -> list[AppliedEffect]:
-        return [t.effect(t.values) for t in _parts(found.terms, at)]
-
-    each = [_change(given, x, j, high, found.prediction, effects, k) for j in range(k)]
     columns = np.hstack([given.columns, given.along])
     frames = given.frames(found.prediction)
-    whole = given.rest.coloured(np.hstack([*(given.white(c)[:, None] for c in each), columns, frames]))
-    return whole, np.concatenate([np.zeros(k), np.ones(columns.shape[1]), np.zeros(frames.shape[1])])
+    effects = [given.white(c)[:, None] for c in found.slopes]
+    whole = given.rest.coloured(np.hstack([*effects, columns, frames]))
+    return whole, np.concatenate(
+        [np.zeros(len(effects)), np.ones(columns.shape[1]), np.zeros(frames.shape[1])]
+    )
 
 
 def _change(

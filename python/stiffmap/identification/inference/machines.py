@@ -19,11 +19,10 @@ from stiffmap.identification.inference.amplitudes import Fit
 from stiffmap.identification.inference.columns import MOST_READINGS, Columns, drawn
 from stiffmap.identification.inference.constants import DEGREES, STANDS_OUT
 from stiffmap.identification.inference.corrected import (
-    STEPS_OF_A_FOLD,
     Corrected,
     columns_of,
-    corrected,
     machine_of,
+    without,
 )
 from stiffmap.identification.inference.readings import Readings
 from stiffmap.identification.validity import covered
@@ -94,7 +93,7 @@ def written(
         seen, own = ~test & ~listed, test & ~listed
         left[DECLARED][own] = left_unseen(e, sigma, declared, seen, own)[own]
         for name, whole in models.items():
-            part = corrected(whole.given.only(~test), (), whole, STEPS_OF_A_FOLD)
+            part = without(whole, ~test)
             shown = part.prediction + own_zeros(part, own)
             left[name][own] = left_unseen(e, sigma, shown, seen, own)[own]
     best = _best(left, last, sigma, e.groups)

@@ -100,12 +100,14 @@ class Readings:
     def predicted(
         self, numbers: Floats, effects: Sequence[AppliedEffect], travel: Mapping[str, Knots] | None = None
     ) -> Floats:
-        """(n, c) m, rad; NaN where the machine cannot be."""
+        """(n, c) m, rad, along straight lines of what a set-up has for itself; NaN where the machine cannot be."""
         p = self.predictor
+        own = np.array([bool(u.setup) for u in self.sensitivity.unknowns], dtype=bool)
+        of_setups = np.nan_to_num(self.sensitivity.columns[..., own]) @ numbers[own]
         try:
             if travel:
                 p = p.beside(machine=Machine(edited(p.machine.description, {}, travel), like=p.machine))
-            return predicted(p, self.sensitivity.unknowns, numbers, effects)
+            return predicted(p, self.sensitivity.unknowns, np.where(own, 0.0, numbers), effects) + of_setups
         except StiffmapError:
             return np.full_like(self.sigma, np.nan)
 
