@@ -135,7 +135,7 @@ class Assembly {
     m_.set_rest();
     for (Drive& d : m_.drives)
       for (DriveError& e : d.errors)
-        if (std::isnan(e.error.reference)) e.error.reference = m_.home_coordinates[d.coordinate];
+        if (std::isnan(e.error.reference)) e.error.reference = m_.home_coordinates[e.of];
     if (known_) {
       for (const Index j : known_->locked) m_.coordinates[at(j)].locked = true;
       m_.beside_home = known_->beside_home;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "stiffmap/command_error.hpp"
+#include "stiffmap/chain.hpp"
 
 #include <algorithm>
 #include <cmath>

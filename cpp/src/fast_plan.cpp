@@ -123,9 +123,9 @@ void fill_tables(const Mechanism& m, const CompiledChains& chains, FastPlanData&
   }
   for (std::size_t i = 0; i < m.drives.size(); ++i) {
     const Drive& k = m.drives[i];
-    for (const auto& [moves, e] : k.errors) {
-      d.errors.push_back({i32(moves), i32(k.coordinate), i32(d.error_knots.size() / 2), i32(e.knots.size()), e.offset,
-                          e.slope, e.amplitude, e.period, e.phase, e.reference});
+    for (const auto& [moves, of, e] : k.errors) {
+      d.errors.push_back({i32(moves), i32(of), i32(d.error_knots.size() / 2), i32(e.knots.size()), e.offset, e.slope,
+                          e.amplitude, e.period, e.phase, e.reference});
       for (const auto& [u, error] : e.knots) d.error_knots.insert(d.error_knots.end(), {u, error});
     }
     const bool cable = m.coordinates[static_cast<std::size_t>(k.coordinate)].cable >= 0;

@@ -92,7 +92,7 @@ Index Mechanism::add_joint(const Joint& joint, Index node, const std::string& pr
     for (std::size_t i = 1; i < e.knots.size(); ++i)
       require(e.knots[i].first > e.knots[i - 1].first, name + ".command_errors.knots", "rising coordinates",
               e.knots[i].first);
-    drive.errors.push_back({drive.coordinate, e});
+    drive.errors.push_back({drive.coordinate, drive.coordinate, e});
   }
   drives.push_back(drive);
   return add_guide_errors(joint, node, name);
@@ -106,7 +106,7 @@ Index Mechanism::add_guide_errors(const Joint& joint, Index node, const std::str
     node = add_coordinate(node, name + ".deviation" + std::to_string(i + 1), Role::spring, JointType::prismatic, e.axis,
                           0.0);
     coordinates.back().locked = true;
-    drives.back().errors.push_back({size() - 1, e.error});
+    drives.back().errors.push_back({size() - 1, drives.back().coordinate, e.error});
   }
   return node;
 }
@@ -187,23 +187,32 @@ Index Mechanism::point(const std::string& name) const {
   return -1;
 }
 
-/// The joint of a stroke: in the spring's own sequence, else in the nearest around it.
-void Mechanism::find_strokes() {
+/// In the sequence of the element `scope`, else in the nearest around it; -1: there is none.
+Index Mechanism::joint_near(const std::string& joint, std::string scope) const {
+  while (!scope.empty()) {
+    const std::size_t dot = scope.rfind('.');
+    scope = dot == std::string::npos ? "" : scope.substr(0, dot);
+    for (Index j = 0; j < size(); ++j) {
+      const Coordinate& c = coordinates[static_cast<std::size_t>(j)];
+      if (c.role != Role::spring && c.name == join(scope, joint)) return j;
+    }
+  }
+  return -1;
+}
+
+/// Joints that springs vary with, and that errors of drives are of.
+void Mechanism::find_joints() {
   for (SpringGroup& g : groups) {
     if (!g.stroke) continue;
     const bool whole = g.stroke->joint.front() == '.';  // a full name outside the legs
-    const std::string joint = whole ? g.stroke->joint.substr(1) : g.stroke->joint;
-    std::string scope = whole ? "outside" : g.name;
-    while (g.varies_with < 0 && !scope.empty()) {
-      const std::size_t dot = scope.rfind('.');
-      scope = dot == std::string::npos ? "" : scope.substr(0, dot);
-      for (Index j = 0; j < size(); ++j) {
-        const Coordinate& c = coordinates[static_cast<std::size_t>(j)];
-        if (c.role != Role::spring && c.name == join(scope, joint)) g.varies_with = j;
-      }
-    }
+    g.varies_with = joint_near(g.stroke->joint.substr(whole ? 1 : 0), whole ? "outside" : g.name);
     require(g.varies_with >= 0, g.name + ".stroke", "a joint of one axis", g.stroke->joint);
   }
+  for (Drive& d : drives)
+    for (DriveError& e : d.errors) {
+      if (!e.error.of.empty()) e.of = joint_near(e.error.of, d.name);
+      require(e.of >= 0, d.name + ".coupled", "a joint of one axis", e.error.of);
+    }
 }
 
 /// Its free length is a coordinate behind which nothing stands, held where it is commanded.
@@ -219,7 +228,7 @@ void Mechanism::add_cable(const ExternalSpring& spring) {
   c.cable = static_cast<Index>(external_springs.size()) - 1;
   c.actuator = static_cast<Index>(drives.size());
   Drive drive{spring.name, size() - 1, w.numbers, {}};
-  for (const CommandError& e : w.errors) drive.errors.push_back({drive.coordinate, e});
+  for (const CommandError& e : w.errors) drive.errors.push_back({drive.coordinate, drive.coordinate, e});
   drives.push_back(drive);
   external_springs.back().coordinate = size() - 1;
   cables.push_back(c.cable);
@@ -247,7 +256,7 @@ void Mechanism::finish(const std::vector<ExternalSpring>& springs) {
   home_coordinates = VecX::Zero(size());
   for (Index j = 0; j < size(); ++j) home_coordinates[j] = coordinates[static_cast<std::size_t>(j)].home;
   set_rest();
-  find_strokes();
+  find_joints();
   find_balls();
   set_scales();
 }

@@ -11,7 +11,7 @@ bool command(const Mechanism& m, const VecX& x, Problem& p) {
   for (const Drive& d : m.drives) {
     const double u = x[d.coordinate];
     p.drive_scale[d.coordinate] = 1 + d.numbers.compliance_slope * (u - m.home_coordinates[d.coordinate]);
-    for (const auto& [coordinate, error] : d.errors) p.base[coordinate] += error(u);
+    for (const auto& [coordinate, of, error] : d.errors) p.base[coordinate] += error(x[of]);
   }
   bool known = true;
   for (std::size_t i = 0; i < m.groups.size(); ++i) {

@@ -58,8 +58,8 @@ void bind_chain(py::module_& m) {
   py::class_<Law>(m, "Law").def(py::init<double, double, Table, double>(), "stiffness"_a, "cubic"_a, "knots"_a,
                                 "friction"_a = 0.0);
   py::class_<CommandError>(m, "CommandError")
-      .def(py::init<double, double, double, double, double, double, Table>(), "offset"_a, "slope"_a, "amplitude"_a,
-           "period"_a, "phase"_a, "reference"_a, "knots"_a);
+      .def(py::init<std::string, double, double, double, double, double, double, Table>(), "of"_a, "offset"_a,
+           "slope"_a, "amplitude"_a, "period"_a, "phase"_a, "reference"_a, "knots"_a);
   py::class_<Stroke>(m, "Stroke")
       .def(py::init<std::string, int, double, double, double, std::vector<std::pair<double, Mat6>>>(), "joint"_a,
            "along"_a, "at"_a, "length"_a, "rate"_a, "table"_a);

@@ -60,7 +60,7 @@ class Chain:
     def spring(self, name: str, matrix: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[6, 6]"], compliance: bool, rest: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[6, 1]"], laws: collections.abc.Sequence[tuple[typing.SupportsInt | typing.SupportsIndex, Law]], stroke: stiffmap._core.Stroke | None = None) -> None:
         ...
 class CommandError:
-    def __init__(self, offset: typing.SupportsFloat | typing.SupportsIndex, slope: typing.SupportsFloat | typing.SupportsIndex, amplitude: typing.SupportsFloat | typing.SupportsIndex, period: typing.SupportsFloat | typing.SupportsIndex, phase: typing.SupportsFloat | typing.SupportsIndex, reference: typing.SupportsFloat | typing.SupportsIndex, knots: collections.abc.Sequence[tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+    def __init__(self, of: str, offset: typing.SupportsFloat | typing.SupportsIndex, slope: typing.SupportsFloat | typing.SupportsIndex, amplitude: typing.SupportsFloat | typing.SupportsIndex, period: typing.SupportsFloat | typing.SupportsIndex, phase: typing.SupportsFloat | typing.SupportsIndex, reference: typing.SupportsFloat | typing.SupportsIndex, knots: collections.abc.Sequence[tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]]) -> None:
         ...
 class ExternalSpring:
     def __init__(self, name: str, point: str, anchor: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], stiffness: typing.SupportsFloat | typing.SupportsIndex, length: typing.SupportsFloat | typing.SupportsIndex, tension_only: bool, winch: stiffmap._core.Winch | None = None) -> None:

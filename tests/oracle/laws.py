@@ -13,6 +13,7 @@ Array = np.ndarray
 
 def command_error(c: Any, u: Array, e: Joint) -> Array:
     """Added to the command u."""
+    assert not c.of, "errors of another joint's coordinate are judged in Cartesian coordinates"
     v = u - (e.home[0] if c.reference is None else c.reference)
     out: Array = c.offset + c.slope * v + c.amplitude * np.sin(2 * np.pi * v / c.period + c.phase)
     return out + np.interp(u, *np.transpose(c.knots)) if c.knots else out

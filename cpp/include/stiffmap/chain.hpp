@@ -9,7 +9,6 @@
 #include <variant>
 #include <vector>
 
-#include "stiffmap/command_error.hpp"
 #include "stiffmap/law.hpp"
 #include "stiffmap/se3.hpp"
 #include "stiffmap/spring.hpp"
@@ -23,6 +22,17 @@ struct Offset {
 };
 
 enum class JointType : std::uint8_t { revolute, prismatic };
+
+/// Error of a commanded coordinate u, theory (G1): offset + slope (u - reference)
+/// + amplitude sin(2 pi (u - reference) / period + phase) + what `knots` say at u: (coordinate, error) by rising
+/// coordinate, straight between them and level beyond the ends. u is that of the joint `of`; empty: the drive's own.
+struct CommandError {
+  std::string of;
+  double offset = 0, slope = 0, amplitude = 0, period = 1, phase = 0, reference = 0;
+  std::vector<std::pair<double, double>> knots;
+
+  double operator()(double u) const;
+};
 
 /// Deviation of a guide across its stroke, theory (G3): a translation along `axis` of the carriage.
 struct GuideError {

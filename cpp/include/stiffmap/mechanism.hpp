@@ -76,9 +76,9 @@ struct SpringGroup {
   Index varies_with = -1;  ///< coordinate of the stroke
 };
 
-/// Error of a drive's commanded coordinate, which moves `coordinate`: its own, or one across the guide.
+/// Error of the coordinate `of`, which moves `coordinate`: the drive's own, or one across its guide.
 struct DriveError {
-  Index coordinate = -1;
+  Index coordinate = -1, of = -1;
   CommandError error;
 };
 
@@ -181,7 +181,8 @@ class Mechanism {
   Index add_joint(const Joint& joint, Index node, const std::string& prefix);
   Index add_guide_errors(const Joint& joint, Index node, const std::string& name);
   Index add_spring(const Spring& spring, Index node, const std::string& prefix);
-  void find_strokes();
+  Index joint_near(const std::string& joint, std::string scope) const;
+  void find_joints();
   void finish(const std::vector<ExternalSpring>& springs);
   void add_cable(const ExternalSpring& spring);
   bool floats() const;

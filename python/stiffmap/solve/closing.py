@@ -71,16 +71,22 @@ def close_actuators(
     x = None if start is None else start_coordinates(machine, start)
     shape = batch(a.shape[:-1], *(() if x is None else (x.shape[:-1],)))
     from_x = None if x is None else rows(x, shape, x.shape[-1:])
-    out = machine.close_actuators(rows(a, shape, (n,)), thread_count(threads), from_x)
+    of_joints = rows(a, shape, (n,)) @ np.linalg.inv(machine.coupling).T
+    out = machine.close_actuators(of_joints, thread_count(threads), from_x)
     return _kinematics(machine, out, shape)
+
+
+def of_drives(machine: CompiledMachine, coordinates: Floats) -> Floats:
+    """(..., actuators) what the controller shows of all joint coordinates (..., coordinates)."""
+    index = [machine.names.joints[a] for a in machine.names.actuators]
+    return np.asarray(coordinates[..., index] @ machine.coupling.T)
 
 
 def _kinematics(machine: CompiledMachine, out: tuple[Any, ...], shape: tuple[int, ...]) -> Kinematics:
     x, p, r, status, flags = out
-    names = machine.names
-    index = [names.joints[a] for a in names.actuators]
+    shown = of_drives(machine, x)
     return Kinematics(
-        actuators=x[:, index].reshape((*shape, len(index))),
+        actuators=shown.reshape((*shape, shown.shape[-1])),
         position=p.reshape((*shape, 3)),
         rotation=r.reshape((*shape, 3, 3)),
         status=status.reshape(shape),

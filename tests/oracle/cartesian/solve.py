@@ -132,7 +132,13 @@ class Machine:
                 target[i] = e.rest[p.axis] if e.rest is not None else home[i]
                 if e.actuated:
                     u = measured[i]
-                    target[i] = u + sum(error(c, u, home[i]) for c in e.command_errors)
+                    follows = [
+                        s.names.index(f"{p.name.rpartition('.')[0]}.{c.of}") if c.of else i
+                        for c in e.command_errors
+                    ]
+                    target[i] = u + sum(
+                        error(c, measured[k], home[k]) for c, k in zip(e.command_errors, follows, strict=True)
+                    )
                     soft[i] = 1.0 + e.compliance_slope * (u - home[i])
                     if e.guide_errors:
                         beside[p.name] = sum(

@@ -13,7 +13,7 @@ HEADERS = sorted((ROOT / "cpp/include/stiffmap").glob("*.hpp"))
 
 # A header may include headers of earlier ranks only.
 RANKS = (
-    ("types", "check", "parallel", "command_error", "kept_memory"),
+    ("types", "check", "parallel", "kept_memory"),
     ("dense", "se3", "answers"),
     ("law", "spring", "load", "chatter"),
     ("chain",),

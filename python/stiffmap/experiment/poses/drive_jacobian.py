@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.poses.configuration import coordinates_of, poses_once
 from stiffmap.experiment.poses.once import Once
+from stiffmap.solve.closing import of_drives
 from stiffmap.solve.kinematics import forward_kinematics
 from stiffmap.solve.machine import Machine
 
@@ -29,11 +30,11 @@ _KNOWN: Once[Floats] = Once()
 def _found(machine: Machine, plan: Experiment) -> Floats:
     plan, back = poses_once(plan)
     start = coordinates_of(machine, plan)
-    drives = [machine.compiled.names.joints[a] for a in machine.actuators]
+    drives = of_drives(machine.compiled, start)
     columns = []
-    for k in range(len(drives)):
-        unit = STEP * np.eye(len(drives))[k]
-        up, down = (forward_kinematics(machine, start[:, drives] + s * unit, start=start) for s in (1, -1))
+    for k in range(drives.shape[-1]):
+        unit = STEP * np.eye(drives.shape[-1])[k]
+        up, down = (forward_kinematics(machine, drives + s * unit, start=start) for s in (1, -1))
         between = up.rotation @ np.swapaxes(down.rotation, 1, 2)
         lost = ~np.asarray(np.isfinite(between).all(axis=(1, 2)))[:, None, None]
         turn = Rotation.from_matrix(np.where(lost, np.eye(3), between)).as_rotvec()

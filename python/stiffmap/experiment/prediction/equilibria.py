@@ -17,6 +17,7 @@ from stiffmap.experiment.prediction.metrology_loop import carrier, rigged, targe
 from stiffmap.experiment.prediction.unloaded_state import lagging, lags, signs
 from stiffmap.experiment.readings import Seen, kind_of
 from stiffmap.model.description.strain import rests_at_command
+from stiffmap.solve.closing import of_drives
 from stiffmap.solve.machine import Machine, solve_with
 from stiffmap.solve.options import SolveOptions
 from stiffmap.solve.solution import Solution
@@ -197,9 +198,8 @@ def solved(machine: Machine, plan: Experiment, options: SolveOptions) -> Solutio
         options = replace(options, rotation=plan.rotation, start=start)
         return solve_with(machine, plan.position, plan.wrench, options)
     start = coordinates_of(machine, plan)
-    drives = [machine.compiled.names.joints[a] for a in machine.actuators]
     call = Call(machine.description.home.p, plan.wrench, replace(options, start=start))
-    return solve_joints(machine.compiled, start[:, drives], call)
+    return solve_joints(machine.compiled, of_drives(machine.compiled, start), call)
 
 
 def _in_play(solution: Solution, plan: Experiment) -> Mask:

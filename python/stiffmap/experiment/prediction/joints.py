@@ -27,7 +27,7 @@ def joint_motions(machine: Machine, plan: Experiment, coordinates: Floats, names
     for c in joint_channels(plan):
         i = names.index(c.joint)
         moved = coordinates[:, i] - rigid[:, i]
-        out.append(moved - _command_error(machine, c, rigid[:, i]) if c.side == "motor" else moved)
+        out.append(moved - _command_error(machine, c.joint, rigid) if c.side == "motor" else moved)
     return np.column_stack(out)
 
 
@@ -36,14 +36,14 @@ def joint_channels(plan: Experiment) -> list[Channel]:
     return [c for c in plan.extra if c.joint]
 
 
-def _command_error(machine: Machine, channel: Channel, u: Floats) -> Floats:
-    joint = joints(machine.description).get(channel.joint)
-    errors = joint.command_errors if joint else ()
-    if not errors:
-        return np.zeros_like(u)
-    compiled = machine.compiled
-    home = float(compiled.home_coordinates()[compiled.names.joints[channel.joint]])
-    return np.asarray(sum((_error(e, u, home) for e in errors), np.zeros_like(u)))
+def _command_error(machine: Machine, name: str, rigid: Floats) -> Floats:
+    """(n,) m, rad: the errors of a drive's command where all joints stand without load (n, coordinates)."""
+    joint, out = joints(machine.description).get(name), np.zeros(len(rigid))
+    for e in joint.command_errors if joint else ():
+        of = f"{name.rpartition('.')[0]}.{e.of}".lstrip(".") if e.of else name
+        i = machine.compiled.names.joints[of]
+        out = out + _error(e, rigid[:, i], float(machine.compiled.home_coordinates()[i]))
+    return out
 
 
 def _error(e: CommandError, u: Floats, home: float) -> Floats:

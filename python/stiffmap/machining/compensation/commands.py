@@ -26,6 +26,7 @@ from stiffmap.experiment.poses.drive_jacobian import drive_jacobian
 from stiffmap.experiment.poses.orientation import against_base
 from stiffmap.experiment.prediction.equilibria import motions
 from stiffmap.model.description import TASK
+from stiffmap.solve.closing import of_drives
 from stiffmap.solve.kinematics import (
     Kinematics,
     forward_kinematics,
@@ -164,8 +165,7 @@ def compensate(
     wanted_p, wanted_r = plan.position, _turns(machine, plan)
     chosen = _components(machine, components)
     start = coordinates_of(machine, plan)
-    drives = [machine.compiled.names.joints[a] for a in machine.actuators]
-    declared = start[:, drives]
+    declared = of_drives(machine.compiled, start)
     valid = Validity.of_machine(machine)
     lost = np.asarray(~np.isfinite(start).all(axis=1))
     u = np.where(lost[:, None], np.nan, declared)

@@ -104,6 +104,7 @@ class Joint:
         "loss_factor", "Structural loss factor of its compliance.", lower=0.0, passive=True
     )
     command_errors: tuple[CommandError, ...] = ()
+    coupled: tuple[tuple[str, float], ...] = ()
     guide_errors: tuple[GuideError, ...] = ()
     friction: JointFriction | None = None
     limits: tuple[float, float] | None = interval("limits", "Range of the coordinate.", passive=True)

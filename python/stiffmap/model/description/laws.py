@@ -51,7 +51,8 @@ class CommandError:
     ``offset + slope * (u - reference) + amplitude * sin(2 pi (u - reference) / period + phase)``
 
     and what ``knots`` say at u: pairs (coordinate, error) by rising coordinate, straight between them, level
-    beyond the ends. ``reference=None``: the coordinate of the closed home configuration.
+    beyond the ends. ``reference=None``: the coordinate of the closed home configuration. With ``of``, u is the coordinate
+    of another joint, of its own sequence or the nearest around it, as it stands without load.
     """
 
     offset: float = number("offset", default=0.0, coordinate=1)
@@ -61,6 +62,7 @@ class CommandError:
     phase: float = number("phase", default=0.0, fixed=ANGLE)
     reference: float | None = number("reference", default=0.0, coordinate=1)
     knots: tuple[Knot, ...] = number("knots", default=(), coordinate=1, shape="knots", address=False)
+    of: str = ""
 
 
 @dataclass(frozen=True)

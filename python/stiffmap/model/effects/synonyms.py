@@ -14,6 +14,13 @@ SYNONYMS = {
     "gravity": ("sag", "weight", "droop", "Durchhang", "Schwerkraft", "Gewicht"),
     "payload": ("mass on the tool", "tool weight", "Nutzlast"),
     "thermal_growth": ("heat", "warm-up", "expansion", "temperature", "Wärmedehnung"),
+    "joint_coupling": (
+        "gear coupling",
+        "wrist coupling",
+        "screw turns along",
+        "Koppelfehler",
+        "Achskopplung",
+    ),
     "lead_error": ("pitch error", "screw error", "scale error", "Steigungsfehler", "Spindelsteigung"),
     "periodic_error": ("cyclic error", "wobble", "interpolation error", "Periodenfehler"),
     "zero_offset": ("homing error", "reference offset", "encoder offset", "Nullpunkt", "Referenzfehler"),

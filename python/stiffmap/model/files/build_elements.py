@@ -86,7 +86,7 @@ def build_element(
         case JointModel():
             return _joint(model, here)
         case ActuatorModel():
-            return _actuator(model, here)
+            return _actuator(model, here, among[1])
         case CableModel():
             return _cable(model, here)
         case SpringModel():
@@ -142,8 +142,12 @@ def _linear_law(key: str, number: Number, angular: bool, context: Context, axis:
     return Law(context.si(number, dimension, f"stiffness{axis}"))
 
 
-def _actuator(model: ActuatorModel, context: Context) -> Joint:
+def _actuator(model: ActuatorModel, context: Context, models: Sequence[ElementModel]) -> Joint:
     angular = model.kind == "revolute"
+    alike = {m.actuator for m in models if isinstance(m, ActuatorModel) and m.kind == model.kind}
+    for name in model.coupled or {}:
+        if name not in alike - {model.actuator}:
+            context.at("coupled").fail(f"expected {model.kind} drives of the same sequence; found '{name}'")
     drive = Drive(**build_numbers(model, Drive, angular, context))
     return Joint(
         model.actuator,
@@ -153,6 +157,7 @@ def _actuator(model: ActuatorModel, context: Context) -> Joint:
         actuated=True,
         **_laws(model, angular, context),
         command_errors=_command_errors(model, angular, context),
+        coupled=tuple((model.coupled or {}).items()),
         **build_numbers(model, Joint, angular, context),
         drive=drive,
     )

@@ -83,7 +83,7 @@ def _axis(axis: tuple[float, float, float]) -> Any:
 
 def _refuse_unsaved(joint: Joint) -> None:
     """Files hold these as effects only: nothing may be lost in silence."""
-    if joint.guide_errors or joint.friction or any(e.reference is None for e in joint.command_errors):
+    if joint.guide_errors or joint.friction or any(e.reference is None or e.of for e in joint.command_errors):
         raise StiffmapError(
             f"{joint.name}: friction, straightness and errors counted from home are saved as effects; "
             "use with_effect"
@@ -118,6 +118,7 @@ def _actuator(joint: Joint) -> Plain:
         "home": numbers.pop("home"),
         **(_law(joint.law) or {"rigid": True}),
         **numbers,
+        **({"coupled": dict(joint.coupled)} if joint.coupled else {}),
         **_drive(joint),
     }
 

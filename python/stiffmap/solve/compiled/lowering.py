@@ -231,7 +231,9 @@ def drive_numbers(e: Joint) -> dict[str, float]:
 def command_error(c: CommandError) -> _core.CommandError:
     """Compiled error of a commanded coordinate."""
     reference = np.nan if c.reference is None else c.reference  # NaN: where home closes
-    return _core.CommandError(c.offset, c.slope, c.amplitude, c.period, c.phase, reference, list(c.knots))
+    return _core.CommandError(
+        c.of, c.offset, c.slope, c.amplitude, c.period, c.phase, reference, list(c.knots)
+    )
 
 
 def sliding_friction(friction: JointFriction | None) -> float:

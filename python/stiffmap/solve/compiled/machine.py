@@ -13,6 +13,7 @@ from stiffmap import _core
 from stiffmap.common.broadcasting import Floats, real_array
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.description import MachineDescription
+from stiffmap.model.description.tree import joints
 from stiffmap.model.home import Gap
 from stiffmap.solve.compiled.lowering import build_mechanism, home_gaps
 from stiffmap.solve.compiled.names import Names, names_of
@@ -36,6 +37,16 @@ class CompiledMachine:
     def names(self) -> Names:
         """Names of everything in the mechanism."""
         return names_of(self._mechanism)
+
+    @cached_property
+    def coupling(self) -> Floats:
+        """(a, a) what a controller shows of the coordinates of its drives."""
+        names, drives = self.names.actuators, joints(self.description)
+        out = np.eye(len(names))
+        for i, name in enumerate(names):
+            for other, share in drives[name].coupled if name in drives else ():
+                out[i, names.index(f"{name.rpartition('.')[0]}.{other}".lstrip("."))] -= share
+        return out
 
     @cached_property
     def home_rotation(self) -> Floats:

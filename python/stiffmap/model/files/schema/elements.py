@@ -111,6 +111,10 @@ class ActuatorModel(_numbers(Joint, Drive)):  # type: ignore[misc]
     law: LawModel | None = None
     rigid: Literal[True] | None = None
     command_errors: list[CommandErrorModel] | None = None
+    coupled: dict[Name, float] | None = Field(
+        default=None,
+        description="What the controller shows of this joint is its coordinate less these shares of other drives' coordinates.",
+    )
 
     @model_validator(mode="after")
     def _one_law(self) -> ActuatorModel:
