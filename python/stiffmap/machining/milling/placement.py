@@ -14,6 +14,7 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.tasks import workers
 from stiffmap.machining.milling.equilibrium import equilibrium
+from stiffmap.machining.milling.limits import RANGES
 from stiffmap.machining.milling.plant import Plant
 from stiffmap.machining.milling.reach import astray, followed, must_follow
 from stiffmap.machining.milling.setting import Setting, setting
@@ -21,7 +22,6 @@ from stiffmap.machining.process.description import Process
 from stiffmap.machining.toolpath import Placement, Toolpath, sampled
 from stiffmap.machining.toolpath.sampling import Points
 from stiffmap.solve.machine import Machine
-from stiffmap.solve.status import Flag
 
 AT_ONCE = 200_000
 """Poses of one call; on a cluster, of one task as many as `IN_A_TASK`."""
@@ -29,7 +29,6 @@ IN_A_TASK = 10_000
 NORM = 12
 """Power of the mean that stands for the largest error while it is refined."""
 REFINED = 3
-LIMITS = int(Flag.JOINT_LIMIT | Flag.DRIVE_RANGE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -219,7 +218,7 @@ class Search:
         bent = np.matmul(s.compliance[..., :3, :3], slope[..., None])[..., 0]
         loop = 1 - np.einsum("nmi,nmi->nm", off, bent)  # 1 + kp/k
         good = (
-            s.ok & (s.flags & LIMITS == 0) & (loop > 0) & followed(astray(self.job, position, self.threads))
+            s.ok & (s.flags & RANGES == 0) & (loop > 0) & followed(astray(self.job, position, self.threads))
         ).all(axis=1)
         error = np.einsum("nmi,nmi->nm", s.displacement[..., :3], off)
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -234,10 +233,9 @@ class Search:
         """(k,) m across the wall at the points of the search; infinite where one fails."""
         job = self.at_place(place)
         e = equilibrium(Plant(job, threads=self.threads), job.position)
-        fine = np.isfinite(e.error).all(axis=1) & (e.flags & LIMITS == 0)
+        fine = np.isfinite(e.error).all(axis=1) & (e.flags & RANGES == 0)
         fine &= followed(astray(job, job.position, self.threads))
-        normal = np.where(fine, np.nan_to_num(job.across(e.error)), np.inf)
-        return np.asarray(normal)
+        return np.where(fine, np.nan_to_num(job.across(e.error)), np.inf)
 
     def refined(
         self, at: Floats, turn: float, low: Floats, high: Floats, turns: tuple[float, float]
