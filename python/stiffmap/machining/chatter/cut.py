@@ -15,7 +15,7 @@ import numpy as np
 from stiffmap.common.broadcasting import Floats, real_number
 from stiffmap.common.errors import StiffmapError
 from stiffmap.machining.process import EndMill, Process, load_process
-from stiffmap.machining.process.mean import engaged, widened, with_coefficients
+from stiffmap.machining.process.mean import own_arc, with_coefficients
 
 GivenProcess = Process | str | PathLike[str] | Mapping[str, Any]
 
@@ -37,7 +37,7 @@ def chips(process: Process, intervals: int) -> Floats:
     p = process
     law = p.law
     assert isinstance(law, EndMill)
-    first, last = (float(v) for v in engaged(p, widened(p, p.cut.radial)))
+    first, last = own_arc(p)
     pitch = 2 * pi / p.tool.teeth
     edges = pitch * np.arange(intervals + 1) / intervals
     out = np.zeros((intervals, 3, 2))
