@@ -19,7 +19,7 @@ from stiffmap.machining.milling.equilibrium import Equilibrium, equilibrium
 from stiffmap.machining.milling.plant import Plant
 from stiffmap.machining.milling.program import WITHIN, Program, program
 from stiffmap.machining.milling.reach import must_reach
-from stiffmap.machining.milling.setting import Setting, scaled, setting
+from stiffmap.machining.milling.setting import Setting, setting
 from stiffmap.machining.milling.speed import Feeds, best_feeds
 from stiffmap.machining.milling.stability import PathStability, path_stability
 from stiffmap.machining.milling.verdict import verdict
@@ -107,9 +107,8 @@ def mill_job(
         ds["error_normal_passes"] = (("passes", "point"), after_passes(job, before, passes, threads))
     if band:
         for name, share in (("low", 1 - BAND), ("high", 1 + BAND)):
-            ds[f"error_normal_after_{name}"] = along(
-                job, run(scaled(job, share), made, step=step, threads=threads)
-            )
+            again = run(replace(job, scale=share * job.scale), made, step=step, threads=threads)
+            ds[f"error_normal_after_{name}"] = along(job, again)
     stability = path_stability(job, threads)
     if isinstance(stability, PathStability):
         ds["multiplier"] = ("point", np.interp(job.points.way, stability.way, stability.multiplier))

@@ -16,7 +16,7 @@ from stiffmap.common.tasks import workers
 from stiffmap.machining.milling.equilibrium import equilibrium
 from stiffmap.machining.milling.limits import RANGES
 from stiffmap.machining.milling.plant import Plant
-from stiffmap.machining.milling.reach import astray, followed, must_follow
+from stiffmap.machining.milling.reach import followed, must_follow
 from stiffmap.machining.milling.setting import Setting, setting
 from stiffmap.machining.process.description import Process
 from stiffmap.machining.toolpath import Placement, Toolpath, sampled
@@ -217,13 +217,11 @@ class Search:
         slope = np.einsum("nij,mj->nmi", r, self.slope)
         bent = np.matmul(s.compliance[..., :3, :3], slope[..., None])[..., 0]
         loop = 1 - np.einsum("nmi,nmi->nm", off, bent)  # 1 + kp/k
-        good = (
-            s.ok & (s.flags & RANGES == 0) & (loop > 0) & followed(astray(self.job, position, self.threads))
-        ).all(axis=1)
+        good = s.ok & (s.flags & RANGES == 0) & (loop > 0) & followed(self.job, position, self.threads)
         error = np.einsum("nmi,nmi->nm", s.displacement[..., :3], off)
         with np.errstate(divide="ignore", invalid="ignore"):
             error = np.abs(error / loop).max(axis=1)
-        return np.asarray(np.where(good, error, np.inf))
+        return np.asarray(np.where(good.all(axis=1), error, np.inf))
 
     def exact(self, place: Placement) -> float:
         """m: largest error, cut and deflection solved together; infinite where a point fails."""
@@ -234,7 +232,7 @@ class Search:
         job = self.at_place(place)
         e = equilibrium(Plant(job, threads=self.threads), job.position)
         fine = np.isfinite(e.error).all(axis=1) & (e.flags & RANGES == 0)
-        fine &= followed(astray(job, job.position, self.threads))
+        fine &= followed(job, job.position, self.threads)
         return np.where(fine, np.nan_to_num(job.across(e.error)), np.inf)
 
     def refined(

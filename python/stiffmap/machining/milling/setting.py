@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -182,8 +182,3 @@ def orientations(machine: Machine, tool: Floats, angle: Floats | None) -> Floats
     if angle is None:
         return np.asarray(base)
     return np.asarray(Rotation.from_rotvec(np.asarray(angle)[:, None] * tool).as_matrix() @ base)
-
-
-def scaled(job: Setting, scale: float) -> Setting:
-    """The same with the whole force scaled."""
-    return replace(job, scale=scale * job.scale)
