@@ -2,7 +2,6 @@
 
 from stiffmap.common.outputs.alone import only_job, reserved
 from stiffmap.common.outputs.keeping import asked_to_replace, new_file, one_command
-from stiffmap.common.outputs.pictures import write_picture
 from stiffmap.common.outputs.space import bytes_text, mapped_array, needs_space
 from stiffmap.common.outputs.tables import guarded, unguarded, write_rows
 from stiffmap.common.outputs.writing import (
@@ -10,6 +9,7 @@ from stiffmap.common.outputs.writing import (
     make_folder,
     put_folder,
     putting,
+    write_picture,
     write_text,
     writing,
 )

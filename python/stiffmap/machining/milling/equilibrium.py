@@ -11,11 +11,12 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.machining.milling.plant import Plant
 from stiffmap.machining.milling.setting import Setting
 from stiffmap.machining.toolpath import Engagement
-from stiffmap.solve.status import Status
+from stiffmap.solve.status import Flag, Status
 
 STEPS, INNER = 30, 40
 DONE = 1e-11
 """m: change of the tool's position below which an equilibrium stands."""
+RANGES = int(Flag.JOINT_LIMIT | Flag.DRIVE_RANGE)
 LONGEST = 0.05
 """m: no deflection of interest is longer."""
 
@@ -80,6 +81,13 @@ def equilibrium(plant: Plant, command: Floats, rows: NDArray[np.int64] | None = 
         error * blank, force * blank, np.where(np.isfinite(error).all(axis=1), gain, np.nan), status, s.flags,
         s.effort * blank, s.compliance, s.turned * blank, steps,
     )  # fmt: skip
+
+
+def wall_errors(job: Setting, threads: int | None = None) -> Floats:
+    """(m,) m across the wall as the cut is, before compensation; infinite where a point has no answer or leaves a range of the drives."""
+    e = equilibrium(Plant(job, threads=threads), job.position)
+    good = np.isfinite(e.error).all(axis=1) & (e.flags & RANGES == 0)
+    return np.where(good, np.nan_to_num(job.across(e.error)), np.inf)
 
 
 def _together(job: Setting, error: Floats, compliance: Floats, force: Floats, away: Floats) -> Floats:

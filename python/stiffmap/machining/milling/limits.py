@@ -12,7 +12,6 @@ from stiffmap.solve.machine import Machine
 from stiffmap.solve.status import Flag
 from stiffmap.workspace.performance.motion.scaling import drive_table
 
-RANGES = int(Flag.JOINT_LIMIT | Flag.DRIVE_RANGE)
 BROKEN = {"joint range": Flag.JOINT_LIMIT, "drive range": Flag.DRIVE_RANGE, "drive effort": Flag.DRIVE_FORCE}
 
 

@@ -13,9 +13,7 @@ from scipy.stats import qmc
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.tasks import workers
-from stiffmap.machining.milling.equilibrium import equilibrium
-from stiffmap.machining.milling.limits import RANGES
-from stiffmap.machining.milling.plant import Plant
+from stiffmap.machining.milling.equilibrium import RANGES, wall_errors
 from stiffmap.machining.milling.reach import followed, must_follow
 from stiffmap.machining.milling.setting import Setting, setting
 from stiffmap.machining.process.description import Process
@@ -230,10 +228,7 @@ class Search:
     def errors(self, place: Placement) -> Floats:
         """(k,) m across the wall at the points of the search; infinite where one fails."""
         job = self.at_place(place)
-        e = equilibrium(Plant(job, threads=self.threads), job.position)
-        fine = np.isfinite(e.error).all(axis=1) & (e.flags & RANGES == 0)
-        fine &= followed(job, job.position, self.threads)
-        return np.where(fine, np.nan_to_num(job.across(e.error)), np.inf)
+        return np.where(followed(job, job.position, self.threads), wall_errors(job, self.threads), np.inf)
 
     def refined(
         self, at: Floats, turn: float, low: Floats, high: Floats, turns: tuple[float, float]
@@ -244,11 +239,9 @@ class Search:
         def cost(x: Floats) -> float:
             e = self.errors(Placement(x[:3] * scale[:3], float(x[3])))
             top = float(np.abs(e).max())
-            return (
-                1e3
-                if not np.isfinite(top)
-                else 1e3 * top * float(((np.abs(e) / top) ** NORM).mean() ** (1 / NORM))
-            )
+            if not np.isfinite(top):
+                return 1e3
+            return 1e3 * top * float(((np.abs(e) / top) ** NORM).mean() ** (1 / NORM))
 
         a, b = self._extent(np.array([turn]))
         first, last = np.minimum(low - a[0], at), np.maximum(high - b[0], at)

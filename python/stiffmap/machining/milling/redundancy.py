@@ -11,10 +11,8 @@ from numpy.typing import NDArray
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.tasks import workers
-from stiffmap.machining.milling.equilibrium import equilibrium
-from stiffmap.machining.milling.limits import RANGES
+from stiffmap.machining.milling.equilibrium import wall_errors
 from stiffmap.machining.milling.limits import fastest as fastest_drives
-from stiffmap.machining.milling.plant import Plant
 from stiffmap.machining.milling.setting import Setting, orientations
 from stiffmap.solve.kinematics import inverse_kinematics
 
@@ -102,10 +100,8 @@ def _turned(shared: tuple[Setting, int | None], angle: float) -> tuple[Floats, F
     """(m,) m and (m, actuators) of one turn all along, as a task."""
     job, threads = shared
     turned = replace(job, rotation=orientations(job.machine, job.tool, np.full(len(job), angle)))
-    e = equilibrium(Plant(turned, threads=threads), job.position)
-    good = np.isfinite(e.error).all(axis=1) & (e.flags & RANGES == 0)
-    error = np.where(good, np.nan_to_num(job.across(e.error)), np.inf)
-    return error, inverse_kinematics(job.machine, job.position, turned.rotation, threads=threads).actuators
+    drives = inverse_kinematics(job.machine, job.position, turned.rotation, threads=threads).actuators
+    return wall_errors(turned, threads), drives
 
 
 @dataclass(frozen=True, eq=False)

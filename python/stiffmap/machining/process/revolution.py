@@ -39,11 +39,10 @@ def revolution(process: Process, steps: int = STEPS, slices: int = SLICES) -> tu
     cuts = (phi >= first) & (phi <= last)
     chip = np.where(cuts, chip_thickness(p, phi, inside), 0.0)
     cuts &= chip > 0
-    law = p.law.values()
+    law = vars(p.law)
     s, c, dz = np.sin(phi), np.cos(phi), p.cut.axial / slices
-    t, r, a = (
-        np.where(cuts, law[f"K{n}e"] + law[f"K{n}c"] * chip, 0.0) * dz for n in ("t", "r", "a")
-    )  # N of each slice of each tooth
+    # N of each slice of each tooth
+    t, r, a = (np.where(cuts, law[f"K{n}e"] + law[f"K{n}c"] * chip, 0.0) * dz for n in "tra")
     force = np.stack([(-t * c - r * s).sum((1, 2)), (t * s - r * c).sum((1, 2)), a.sum((1, 2))], axis=-1)
     return angle, force
 
@@ -92,8 +91,7 @@ def mean_with_runout(process: Process) -> Floats:
     """(3,) N: the mean where run-out may lift teeth out of the cut."""
     p = with_coefficients(process)
     assert isinstance(p.law, EndMill)
-    v = p.law.values()
-    values = np.array([v[n] for n in ("Ktc", "Kte", "Krc", "Kre", "Kac", "Kae")])
+    values = np.array([vars(p.law)[n] for n in ("Ktc", "Kte", "Krc", "Kre", "Kac", "Kae")])
     return np.asarray(mean_basis_with_runout(p) @ values)
 
 
