@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from functools import cached_property, wraps
 from os import PathLike
 from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar, Unpack
@@ -15,7 +15,7 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError, frames_of_this_package
 from stiffmap.common.from_above import from_above
 from stiffmap.common.html import machine_html
-from stiffmap.common.kept import Recent
+from stiffmap.common.kept import Kept
 from stiffmap.model.addresses import Listed, listed
 from stiffmap.model.description import MachineDescription
 from stiffmap.model.effects import add_effect
@@ -71,8 +71,8 @@ class Machine:
         return self._compiled
 
     @cached_property
-    def _derivable(self) -> Recent[Prepared]:
-        return Recent(MOST_PREPARED)
+    def _derivable(self) -> Kept[Hashable, Prepared]:
+        return Kept(MOST_PREPARED)
 
     @property
     def fast(self) -> str:
@@ -176,7 +176,7 @@ class Machine:
         if not derivatives:
             return solve_with(self, position, wrench, options_of(given))
         requests = read_requests(derivatives, derivatives_of)
-        ready = self._derivable.get(requests.key, lambda: prepare(self._compiled, requests))
+        ready = self._derivable.made(requests.key, lambda: prepare(self._compiled, requests))
         return differentiate(ready, Call(position, wrench, options_of(given)), requests)
 
     @spelled_out(SolveKeywords)

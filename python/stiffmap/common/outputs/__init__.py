@@ -1,8 +1,7 @@
 """The one place that writes files: whole or not at all, one job at a time, space asked for before."""
 
 from stiffmap.common.outputs.alone import only_job, reserved
-from stiffmap.common.outputs.keeping import asked_to_replace, check_replaceable, new_file, one_command
-from stiffmap.common.outputs.pictures import write_picture
+from stiffmap.common.outputs.keeping import asked_to_replace, new_file, one_command
 from stiffmap.common.outputs.space import bytes_text, mapped_array, needs_space
 from stiffmap.common.outputs.tables import guarded, unguarded, write_rows
 from stiffmap.common.outputs.writing import (
@@ -10,7 +9,7 @@ from stiffmap.common.outputs.writing import (
     make_folder,
     put_folder,
     putting,
-    synced,
+    write_picture,
     write_text,
     writing,
 )
@@ -19,7 +18,6 @@ __all__ = [
     "add_lines",
     "asked_to_replace",
     "bytes_text",
-    "check_replaceable",
     "guarded",
     "make_folder",
     "mapped_array",
@@ -30,7 +28,6 @@ __all__ = [
     "put_folder",
     "putting",
     "reserved",
-    "synced",
     "unguarded",
     "write_picture",
     "write_rows",

@@ -8,8 +8,9 @@ import tempfile
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
-from stiffmap.common.errors import FileError
+from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.outputs.alone import is_device, only_job, refused, reserved, short
 from stiffmap.common.outputs.keeping import check_replaceable, note_written
 
@@ -80,6 +81,22 @@ def write_text(
     with writing(path) as fresh:
         fresh.write_text(text, encoding=encoding, errors=errors)
     return Path(path)
+
+
+def write_picture(path: str | os.PathLike[str], figure: Any, dpi: int) -> Path:
+    """Write a figure of matplotlib in the format that the file's name says; the same picture gives the same bytes.
+
+    Raises FileError where it cannot be written, StiffmapError for an unknown format.
+    """
+    target = Path(path)
+    try:
+        with writing(target) as fresh:
+            figure.savefig(fresh, dpi=dpi, metadata={"Software": None} if target.suffix == ".png" else None)
+    except StiffmapError:
+        raise
+    except ValueError as error:
+        raise StiffmapError(f"{target}: {error}") from error
+    return target
 
 
 def make_folder(path: str | os.PathLike[str]) -> Path:

@@ -22,7 +22,7 @@ def header_of(
 
     `known`: whether a name without its unit has a meaning of its own, without the group that stands over it.
     """
-    width = _width(first)
+    width = sum(bool(c.strip()) for c in first)
     lines = [(n, [_plain(c) for c in cells]) for n, cells in above]
     lines = [(n, cells) for n, cells in lines if any(c.strip("-=_–—: ") for c in cells)][-MOST_LINES:]
     units: list[str] = []
@@ -84,10 +84,6 @@ def _plain(cell: str) -> str:
 
 def _commented(above: Sequence[Line], number: int) -> bool:
     return any(n == number and c[0].strip().startswith(("#", "%", "//")) for n, c in above)
-
-
-def _width(cells: Sequence[str]) -> int:
-    return sum(bool(c.strip()) for c in cells)
 
 
 def fits(cells: Sequence[str], width: int) -> bool:

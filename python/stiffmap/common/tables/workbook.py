@@ -69,9 +69,7 @@ def _opened(path: Path, sheet: str | None) -> tuple[list[str], list[tuple[int, l
         raise
     except FileNotFoundError:
         raise FileError("there is no such file", file=str(path)) from None
-    except (
-        Exception
-    ) as error:  # openpyxl and zipfile raise many kinds for what is no workbook, or a damaged one
+    except Exception as error:  # many kinds for what is no workbook, or a damaged one
         what = " ".join(str(error).split()) or type(error).__name__
         raise FileError(f"cannot be read as an Excel workbook ({what})", file=str(path)) from error
     return names, lines

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
+from dataclasses import dataclass
 from itertools import islice
 from multiprocessing import get_context
-from typing import Any, Protocol
+from typing import Any
 
 from stiffmap.common.one_thread import on_one_thread
 from stiffmap.common.tasks.cluster import OnCluster, client_of
@@ -17,14 +18,17 @@ Function = Callable[[Any, Any], Any]
 WAITING_PER_PROCESS = 4
 
 
-class Workers(Protocol):
+@dataclass(frozen=True)
+class Workers:
     """Does the same function of many items."""
 
-    def as_done(self, items: Iterable[Any]) -> Iterator[tuple[int, Any]]:
-        """(number, result) of each item as they come, in any order."""
+    as_done: Callable[[Iterable[Any]], Iterator[tuple[int, Any]]]
+    """(number, result) of each item as they come, in any order."""
 
     def in_order(self, items: Iterable[Any]) -> list[Any]:
         """Results of all items, in their order."""
+        found = dict(self.as_done(items))
+        return [found[i] for i in range(len(found))]
 
 
 @contextmanager
@@ -43,26 +47,15 @@ def workers(
     """
     if scheduler is not None:
         with client_of(scheduler) as client:
-            yield _Base(OnCluster(client, function, shared).as_done)
+            yield Workers(OnCluster(client, function, shared).as_done)
     elif processes == 1:
         here = on_one_thread(function)
-        yield _Base(lambda items: ((i, here(shared, item)) for i, item in enumerate(items)))
+        yield Workers(lambda items: ((i, here(shared, item)) for i, item in enumerate(items)))
     else:
         with ProcessPoolExecutor(
             processes, mp_context=get_context("spawn"), initializer=_begin, initargs=(function, shared)
         ) as pool:
-            yield _Base(lambda items: _pooled(pool, items, WAITING_PER_PROCESS * processes))
-
-
-class _Base:
-    """Workers, from what gives numbered results."""
-
-    def __init__(self, as_done: Callable[[Iterable[Any]], Iterator[tuple[int, Any]]]) -> None:
-        self.as_done = as_done
-
-    def in_order(self, items: Iterable[Any]) -> list[Any]:
-        found = dict(self.as_done(items))
-        return [found[i] for i in range(len(found))]
+            yield Workers(lambda items: _pooled(pool, items, WAITING_PER_PROCESS * processes))
 
 
 _GIVEN: list[tuple[Function, Any]] = []

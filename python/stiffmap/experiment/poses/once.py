@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from typing import Any, Generic, TypeVar
 from weakref import WeakKeyDictionary
 
 from numpy.typing import NDArray
 
-from stiffmap.common.kept import Recent
+from stiffmap.common.kept import Kept
 from stiffmap.experiment.experiment import Experiment
 from stiffmap.model.description.rigid import nominal_geometry
 from stiffmap.solve.machine import Machine
@@ -24,12 +24,12 @@ class Once(Generic[Array]):
     """Arrays by plan, geometry and name, the last ones as long as the plan lives; not to be written to."""
 
     def __init__(self) -> None:
-        self._known: WeakKeyDictionary[Experiment, Recent[Array]] = WeakKeyDictionary()
+        self._known: WeakKeyDictionary[Experiment, Kept[Hashable, Array]] = WeakKeyDictionary()
 
     def get(self, plan: Experiment, machine: Machine, make: Callable[[], Array], name: str = "") -> Array:
         """The array of these; `make` is called where it is not known."""
         key = name, nominal_geometry(machine.description)
-        return self._known.setdefault(plan, Recent(KEPT)).get(key, lambda: _frozen(make()))
+        return self._known.setdefault(plan, Kept(KEPT)).made(key, lambda: _frozen(make()))
 
 
 def _frozen(made: Array) -> Array:

@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.kept import MOST_BYTES, Kept, Recent
+from stiffmap.common.kept import MOST_BYTES, Kept
 from stiffmap.experiment.experiment import Experiment, Floats, Mask
 from stiffmap.experiment.poses.against_command import resolved
 from stiffmap.experiment.poses.commanded import OUT_OF_REACH, located, without
@@ -47,8 +47,8 @@ class Predictor:
         self._work = Work()
         self._memory: Kept[tuple[Terms, Terms], Floats] = Kept()
         self._changes: Kept[tuple[Terms, Terms], Floats] = Kept()
-        self._machines: Recent[Machine] = Recent(MACHINES)
-        self._others: Recent[Predictor] = Recent(OTHERS)
+        self._machines: Kept[Hashable, Machine] = Kept(MACHINES)
+        self._others: Kept[Hashable, Predictor] = Kept(OTHERS)
         self._drives: dict[tuple[Terms, Terms], Drives] = {}
         self._set_aside()
         self._close_from_here()
@@ -133,13 +133,13 @@ class Predictor:
         out.machine = machine or self.machine
         out.experiment = self.experiment if rows is None else self.experiment.rows(rows)
         room = MOST_BYTES // OTHERS  # all that are kept together need no more than one predictor may
-        out._memory, out._changes, out._machines = Kept(room), Kept(room), Recent(MACHINES)
-        out._others, out._drives = Recent(OTHERS), {}
+        out._memory, out._changes, out._machines = Kept(room), Kept(room), Kept(MACHINES)
+        out._others, out._drives = Kept(OTHERS), {}
         return out
 
     def kept(self, key: Hashable, make: Callable[[], Predictor]) -> Predictor:
         """That of another machine or of some rows that was made for the key, or is made now; the last few are kept."""
-        return self._others.get(key, make)
+        return self._others.made(key, make)
 
     def under(self, wrench: Floats) -> Floats:
         """(n, c) m, rad: the same readings under other wrenches (n, 6); NaN where the machine fails under them."""
@@ -174,7 +174,7 @@ class Predictor:
         mechanical = _parts(terms)[0]
         if not mechanical:
             return self.machine
-        return self._machines.get(
+        return self._machines.made(
             mechanical,
             lambda: Machine(self._described(mechanical), like=self.machine),
         )

@@ -49,7 +49,7 @@ def plan_of(predictor: Predictor, clock: Clock | None = None) -> Plan:
         found, whole = _compute(predictor, clock)
         if not whole:
             return replace(found, digest=f"{key}, the first {len(found.variants)}")
-        plan = _PLANS.put(key, replace(found, digest=key), 1)
+        plan = _PLANS.put(key, replace(found, digest=key))
     return plan
 
 

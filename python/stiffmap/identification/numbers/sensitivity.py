@@ -109,7 +109,7 @@ def sensitivity(
     if known is not None:
         return known
     found = _differences(predictor, unknowns, until, progress)
-    return found if found.stopped else _KEPT.put(key, found, 1)
+    return found if found.stopped else _KEPT.put(key, found)
 
 
 def bends(

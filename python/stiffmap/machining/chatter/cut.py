@@ -15,7 +15,7 @@ import numpy as np
 from stiffmap.common.broadcasting import Floats, real_number
 from stiffmap.common.errors import StiffmapError
 from stiffmap.machining.process import EndMill, Process, load_process
-from stiffmap.machining.process.mean import engaged, widened, with_coefficients
+from stiffmap.machining.process.mean import own_arc, with_coefficients
 
 GivenProcess = Process | str | PathLike[str] | Mapping[str, Any]
 
@@ -34,34 +34,23 @@ def milling_process(process: GivenProcess) -> Process:
 def chips(process: Process, intervals: int) -> Floats:
     """(intervals, 3, 2) N/m² on the tool: force per depth by what two passes differ by along feed and normal, exact
     means over equal parts of a tooth period. Helix and run-out are left out."""
-    p = process
-    law = p.law
+    p, law = process, process.law
     assert isinstance(law, EndMill)
-    first, last = (float(v) for v in engaged(p, widened(p, p.cut.radial)))
+    first, last = own_arc(p)
+    t, r, a = law.Ktc, law.Krc, law.Kac
     pitch = 2 * pi / p.tool.teeth
     edges = pitch * np.arange(intervals + 1) / intervals
     out = np.zeros((intervals, 3, 2))
     for tooth in range(p.tool.teeth):
         at = edges + tooth * pitch
         low, high = np.clip(at[:-1], first, last), np.clip(at[1:], first, last)
-        sc, ss, cc, s, c = _integrals(low, high)
-        t, r, a = law.Ktc, law.Krc, law.Kac
-        out[:, 0, 0] += -t * sc - r * ss
-        out[:, 0, 1] += -t * cc - r * sc
-        out[:, 1, 0] += t * ss - r * sc
-        out[:, 1, 1] += t * sc - r * cc
-        out[:, 2, 0] += a * s
-        out[:, 2, 1] += a * c
+        # integrals of sin cos, sin², cos², sin, cos
+        half, twice = (high - low) / 2, (np.sin(2 * high) - np.sin(2 * low)) / 4
+        sc, ss, cc = (np.sin(high) ** 2 - np.sin(low) ** 2) / 2, half - twice, half + twice
+        s, c = np.cos(low) - np.cos(high), np.sin(high) - np.sin(low)
+        rows = [[-t * sc - r * ss, -t * cc - r * sc], [t * ss - r * sc, t * sc - r * cc], [a * s, a * c]]
+        out += np.moveaxis(np.array(rows), 2, 0)
     return out / (pitch / intervals)
-
-
-def _integrals(low: Floats, high: Floats) -> tuple[Floats, ...]:
-    """Of sin cos, sin², cos², sin, cos."""
-    half, twice = (high - low) / 2, (np.sin(2 * high) - np.sin(2 * low)) / 4
-    return (
-        (np.sin(high) ** 2 - np.sin(low) ** 2) / 2, half - twice, half + twice,
-        np.cos(low) - np.cos(high), np.sin(high) - np.sin(low),
-    )  # fmt: skip
 
 
 def mean_chips(process: Process) -> Floats:

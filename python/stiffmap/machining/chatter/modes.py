@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,11 @@ from stiffmap.common.broadcasting import Floats, instance_of, real_array, real_n
 from stiffmap.common.errors import StiffmapError
 from stiffmap.workspace.vibration.modes import TipModes
 
-WAYS = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+WAYS = {
+    f"{sign}{axis}": one * way
+    for sign, one in (("", 1), ("-", -1))
+    for axis, way in zip("xyz", np.eye(3), strict=True)
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +48,7 @@ class ToolModes:
 
     def turned(self, axes: Floats) -> ToolModes:
         """The same along the rows of `axes` (3, 3)."""
-        return ToolModes(self.frequency, self.ratio, self.mass, self.way @ axes.T, axes @ self.rest @ axes.T)
+        return replace(self, way=self.way @ axes.T, rest=axes @ self.rest @ axes.T)
 
     def receptance(self, frequency: Floats) -> np.ndarray:
         """(frequencies, 3, 3) m/N at Hz."""
@@ -105,12 +109,7 @@ def _row(i: int, row: Any) -> tuple[float, float, float, Floats]:
 
 
 def _direction(name: str, way: Any) -> Floats:
-    if isinstance(way, str):
-        sign, axis = (-1.0, way[1:]) if way[:1] == "-" else (1.0, way)
-        if axis not in WAYS:
-            raise StiffmapError(f"{name}: expected a direction x, y, z or three numbers, got {way!r}")
-        return sign * np.array(WAYS[axis])
-    v = real_array(way, name, "a direction")
+    v = np.array(WAYS.get(way, ())) if isinstance(way, str) else real_array(way, name, "a direction")
     if v.shape == (2,):
         v = np.append(v, 0.0)
     if v.shape != (3,) or not np.isfinite(v).all() or not np.linalg.norm(v) > 0:

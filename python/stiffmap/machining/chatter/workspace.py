@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from os import PathLike
 from typing import Any
 
@@ -136,10 +137,8 @@ def _around(found: TipModes) -> Floats:
 
 
 def _only(m: TipModes, rows: np.ndarray) -> TipModes:
-    return TipModes(
-        (len(rows),), m.square[rows], m.tip[rows], m.viscous[rows], m.loss[rows], m.rest[rows], m.unsymmetric[rows],
-        m.status[rows], m.flags[rows], m.damping,
-    )  # fmt: skip
+    arrays = ("square", "tip", "viscous", "loss", "rest", "unsymmetric", "status", "flags")
+    return replace(m, shape=(len(rows),), **{n: getattr(m, n)[rows] for n in arrays})
 
 
 def _real(v: np.ndarray) -> Floats:

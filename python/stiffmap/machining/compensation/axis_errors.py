@@ -38,7 +38,7 @@ class AxisErrors:
     """m: what linear interpolation between the positions leaves of the positioning error, at most."""
     interpolation_checked: bool = True
     """Solved half way between the positions; False: estimated from their second differences."""
-    through: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    through: tuple[float, ...] = (0.0, 0.0, 0.0)
     """m: a point of the line; its coordinate along the axis does not count."""
     machine: str = ""
 
@@ -125,7 +125,7 @@ def axis_errors(
         errors[0][:n],
         errors[1][:n],
         float(np.abs(half_way).max()),
-        through=(float(point[0]), float(point[1]), float(point[2])),
+        through=tuple(point.tolist()),
         machine=machine.name,
     )
     return made if zero is None else made.zeroed(zero)
@@ -149,10 +149,9 @@ def axis_errors_of_map(
         ds = read_dataset(ds)
     if "case" in ds.dims:
         names = [str(c) for c in ds.case.values]
-        if case is None and len(names) > 1:
-            raise StiffmapError(f"case: expected one of {', '.join(names)}")
-        if case is not None and case not in names:
-            raise StiffmapError(f"case: expected one of {', '.join(names)}, got '{case}'")
+        if (case is None and len(names) > 1) or (case is not None and case not in names):
+            found = "" if case is None else f", got '{case}'"
+            raise StiffmapError(f"case: expected one of {', '.join(names)}{found}")
         ds = ds.sel(case=case or names[0])
     middle = [float(ds[a].values[ds[a].size // 2]) for a in "xyz"]
     point = middle if through is None else [float(v) for v in np.asarray(through, dtype=float)]
@@ -168,7 +167,7 @@ def axis_errors_of_map(
     bend = errors[1:-1, i] - (
         errors[:-2, i] * (nodes[2:] - nodes[1:-1]) + errors[2:, i] * (nodes[1:-1] - nodes[:-2])
     ) / (nodes[2:] - nodes[:-2])
-    at = [nodes[0] if k == i else float(line[a]) for k, a in enumerate("xyz")]
+    at = tuple(float(nodes[0] if k == i else line[a]) for k, a in enumerate("xyz"))
     made = AxisErrors(
         axis,
         nodes,
@@ -176,7 +175,7 @@ def axis_errors_of_map(
         errors.copy(),
         float(np.abs(bend).max()) / 4,  # a linear interpolant over half the step
         interpolation_checked=False,
-        through=(at[0], at[1], at[2]),
+        through=at,
         machine=str(ds.attrs.get("machine", "")),
     )
     return made if zero is None else made.zeroed(zero)

@@ -8,6 +8,7 @@ is solved with the declared machine's Jacobian; the deviations change it little,
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import isfinite
 from os import PathLike
 from pathlib import Path
 
@@ -27,12 +28,7 @@ from stiffmap.experiment.poses.orientation import against_base
 from stiffmap.experiment.prediction.equilibria import motions
 from stiffmap.model.description import TASK
 from stiffmap.solve.closing import of_drives
-from stiffmap.solve.kinematics import (
-    Kinematics,
-    forward_kinematics,
-    inverse_kinematics,
-    must_take,
-)
+from stiffmap.solve.kinematics import Kinematics, forward_kinematics, inverse_kinematics, must_take
 from stiffmap.solve.machine import Machine, takes_machine
 from stiffmap.solve.validity import Validity
 
@@ -104,10 +100,8 @@ class Commands:
             columns |= {f"{word}_{a}_mm": values[:, i] * MM for i, a in enumerate(AXES[:3])}
         if self.beyond is not None:
             columns["beyond_calibration"] = self.beyond.astype(float)
-        rows = zip(*columns.values(), strict=True)
-        write_rows(
-            path, list(columns), (["" if not np.isfinite(v) else f"{v:.9g}" for v in row] for row in rows)
-        )
+        rows = np.column_stack([*columns.values()]).tolist()
+        write_rows(path, list(columns), ([f"{v:.9g}" if isfinite(v) else "" for v in row] for row in rows))
 
 
 @takes_machine
@@ -162,7 +156,8 @@ def compensate(
         position, rotation, approach, ids = read.position, read.rotation, read.approach, read.ids
         wrench = read.wrench if read.wrench.any() else wrench
     plan = _plan(machine, position, rotation, actuators, wrench, approach, gravity, point)
-    wanted_p, wanted_r = plan.position, _turns(machine, plan)
+    wanted_p, wanted_r = plan.position, plan.rotation
+    assert wanted_r is not None  # as the kinematics has it
     chosen = _components(machine, components)
     start = coordinates_of(machine, plan)
     declared = of_drives(machine.compiled, start)
@@ -241,11 +236,6 @@ def _plan(
     return replace(plan, approach=np.broadcast_to(way, (n, 3)).copy())
 
 
-def _turns(machine: Machine, plan: Experiment) -> Floats:
-    home = machine.description.home.r
-    return np.tile(home, (len(plan), 1, 1)) if plan.rotation is None else plan.rotation
-
-
 def _components(machine: Machine, given: tuple[str, ...] | None) -> list[int]:
     wrong = [c for c in given or () if c not in TASK]
     if wrong:
@@ -274,10 +264,8 @@ def _error(
     if not good.size:
         return out
     joints = at.coordinates[:, list(machine.compiled.names.joints.values())]
-    now = replace(plan, position=at.position, rotation=at.rotation, joints=joints, command=at.actuators).rows(
-        good
-    )
-    moved, _ = motions(machine, now, threads)
+    now = replace(plan, position=at.position, rotation=at.rotation, joints=joints, command=at.actuators)
+    moved, _ = motions(machine, now.rows(good), threads)
     shift = moved[:, :3] + at.position[good] - wanted_p[good]
     turned = Rotation.from_rotvec(np.nan_to_num(moved[:, 3:])).as_matrix() @ at.rotation[good]
     turn = Rotation.from_matrix(turned @ np.swapaxes(wanted_r[good], 1, 2)).as_rotvec()

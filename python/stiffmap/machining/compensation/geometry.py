@@ -65,7 +65,6 @@ def corrected_geometry(description: MachineDescription) -> tuple[MachineDescript
         platform=part(description.platform, "platform"),
         effects=(),
         declared=None,
-        home=description.home,
     )
     return made, left
 
@@ -80,12 +79,9 @@ def _joint(e: Joint, name: str, left: list[str]) -> list[Element]:
     if not offset:
         return [plain]
     axis = np.array(e.axes[0])
-    pose = Pose.of(offset * axis) if e.kind == "prismatic" else Pose.of(rotation=_about(axis, offset))
+    turn = Rotation.from_rotvec(offset * axis / np.linalg.norm(axis)).as_matrix()
+    pose = Pose.of(offset * axis) if e.kind == "prismatic" else Pose.of(rotation=turn)
     return [Offset(f"{e.name}_zero", pose), plain]
-
-
-def _about(axis: Floats, angle: float) -> Floats:
-    return np.asarray(Rotation.from_rotvec(angle * axis / np.linalg.norm(axis)).as_matrix())
 
 
 def serial_joints(description: MachineDescription) -> tuple[list[tuple[Joint, Frame, Floats]], Frame]:
@@ -117,9 +113,8 @@ def dh_list(description: MachineDescription) -> tuple[Frame, list[DhRow], Frame]
     """Base frame, one row per joint but the last, whose frame and the tool's are left: (p, R) of the first
     frame in base axes, rows, and (p, R) of the tool in the last row's frame turned by the last joint."""
     joints, (tool_p, tool_r) = serial_joints(description)
-    (first, (p, _), axis) = joints[0]
-    frame = (p, _with_z(axis))
-    base = frame
+    _, (p, _), axis = joints[0]
+    base = frame = (p, _with_z(axis))
     rows = []
     for k, (joint, _, _) in enumerate(joints[:-1]):
         _, (q, _), ahead = joints[k + 1]
@@ -129,7 +124,6 @@ def dh_list(description: MachineDescription) -> tuple[Frame, list[DhRow], Frame]
         frame = (o + x @ step[0], x @ step[1])
     o, x = frame
     rows.append(DhRow(joints[-1][0].name, 0.0, 0.0, 0.0, 0.0, None, joints[-1][0].kind == "prismatic"))
-    assert first is joints[0][0]
     return base, rows, (x.T @ (tool_p - o), x.T @ tool_r)
 
 
@@ -171,28 +165,14 @@ def _row(joint: Joint, q: Floats, z: Floats) -> tuple[DhRow, Frame]:
     if size < np.sin(PARALLEL):
         foot = q - z * (q[2] / z[2])
         theta, a = float(np.arctan2(foot[1], foot[0])), float(np.hypot(foot[0], foot[1]))
-        turned = _rz(theta).T @ z
+        turned = Rotation.from_euler("z", theta).inv().apply(z)
         beta, alpha = float(np.arcsin(turned[0])), float(np.arctan2(-turned[1], turned[2]))
-        r = _rz(theta) @ _rx(alpha) @ _ry(beta)
+        r = Rotation.from_euler("ZXY", [theta, alpha, beta]).as_matrix()
         return DhRow(joint.name, theta, 0.0, a, alpha, beta, slides), (foot, r)
     x = across / size
     # o + d z0 + a x = q + s z
     d, a, _ = np.linalg.solve(np.column_stack([[0.0, 0.0, 1.0], x, -z]), q)
     theta, alpha = float(np.arctan2(x[1], x[0])), float(np.arctan2(size, z[2]))
-    r = _rz(theta) @ _rx(alpha)
-    return DhRow(joint.name, theta, float(d), float(a), alpha, None, slides), (
-        d * np.array([0, 0, 1.0]) + a * x,
-        r,
-    )
-
-
-def _rx(t: float) -> Floats:
-    return np.asarray(Rotation.from_euler("x", t).as_matrix())
-
-
-def _ry(t: float) -> Floats:
-    return np.asarray(Rotation.from_euler("y", t).as_matrix())
-
-
-def _rz(t: float) -> Floats:
-    return np.asarray(Rotation.from_euler("z", t).as_matrix())
+    r = Rotation.from_euler("ZX", [theta, alpha]).as_matrix()
+    row = DhRow(joint.name, theta, float(d), float(a), alpha, None, slides)
+    return row, (np.array([0.0, 0.0, d]) + a * x, r)

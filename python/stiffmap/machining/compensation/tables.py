@@ -7,7 +7,6 @@ Signs and reference points are conventions of each control's version: try a tabl
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from os import PathLike
 from pathlib import Path
 
@@ -89,12 +88,7 @@ def _csv(e: AxisErrors) -> str:
     return "\n".join([*lines, ",".join(head), *(",".join(f"{v:.10g}" for v in row) for row in rows)]) + "\n"
 
 
-FORMATS: dict[str, Callable[[AxisErrors], str]] = {
-    "csv": _csv,
-    "linuxcnc": _linuxcnc,
-    "siemens": _siemens,
-    "heidenhain": _heidenhain,
-}
+FORMATS = {"csv": _csv, "linuxcnc": _linuxcnc, "siemens": _siemens, "heidenhain": _heidenhain}
 
 
 def compensation_table(errors: AxisErrors, form: str) -> str:
@@ -121,10 +115,9 @@ def read_table(path: str | PathLike[str], form: str) -> tuple[Floats, Floats, Fl
     except OSError as error:
         raise FileError(f"cannot be read: {error.strerror}", file=str(path)) from error
     try:
-        columns = READERS[form](text)
+        x, forward, backward = READERS[form](text)
     except (ValueError, IndexError, KeyError) as problem:
         raise FileError(f"no {form} table: {problem}", file=str(path)) from None
-    x, forward, backward = columns
     if x.size < 2 or not (np.diff(x) > 0).all():
         raise FileError(f"no {form} table: expected two or more rising positions", file=str(path))
     return x / MM, forward / MM, backward / MM
@@ -171,9 +164,4 @@ def _read_heidenhain(text: str) -> Columns:
     return values[:, 1], values[:, 3], values[:, 3] + values[:, 2]
 
 
-READERS: dict[str, Callable[[str], Columns]] = {
-    "csv": _read_csv,
-    "linuxcnc": _read_linuxcnc,
-    "siemens": _read_siemens,
-    "heidenhain": _read_heidenhain,
-}
+READERS = dict(zip(FORMATS, (_read_csv, _read_linuxcnc, _read_siemens, _read_heidenhain), strict=True))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from os import PathLike
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -70,22 +70,22 @@ def choices(
     path: Toolpath | str | PathLike[str],
     process: Process | str | PathLike[str] | Mapping[str, Any],
     *,
-    at: ArrayLike | None,
-    turn: float,
-    size: tuple[float, ...] | None,
-    offset: Mapping[str, ArrayLike] | None,
-    tolerance: float | None,
-    reverse: bool,
-    place: int | None,
-    entry: float | str | None,
-    redundancy: int | None,
-    angle: Floats | None,
+    at: ArrayLike | None = None,
+    turn: float = 0.0,
+    stock: Box | ArrayLike | None = None,
+    angle: Floats | None = None,
+    size: tuple[float, ...] | None = None,
+    offset: Mapping[str, ArrayLike] | None = None,
+    tolerance: float | None = None,
+    place: int | None = None,
+    reverse: bool = False,
+    entry: float | Literal["best"] | None = None,
+    redundancy: int | None = None,
+    scheduler: Any = None,
+    progress: Callable[[int], None] | None = None,
     step: float,
-    stock: Box | ArrayLike | None,
     thickness: float | None,
     threads: int | None,
-    scheduler: Any,
-    progress: Callable[[int], None] | None,
 ) -> Choices:
     """In this order: the sense, the placement, the entry, the turns; arguments as of `mill`. Raises StiffmapError."""
     cut = process if isinstance(process, Process) else load_process(process)
@@ -135,11 +135,8 @@ def choices(
     turns = turned(p)
     here = None
     if entry is not None:
-        here = (
-            best_entry(job(p, angle if turns is None else turns.angle), threads)
-            if isinstance(entry, str)
-            else Entry(entry)
-        )
+        now = angle if turns is None else turns.angle
+        here = best_entry(job(p, now), threads) if isinstance(entry, str) else Entry(entry)
         p = entered_at(p, here.way)
         turns = turned(p)
     return Choices(

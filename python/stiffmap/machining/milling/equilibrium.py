@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,11 +10,13 @@ from numpy.typing import NDArray
 from stiffmap.common.broadcasting import Floats
 from stiffmap.machining.milling.plant import Plant
 from stiffmap.machining.milling.setting import Setting
-from stiffmap.solve.status import Status
+from stiffmap.machining.toolpath import Engagement
+from stiffmap.solve.status import Flag, Status
 
 STEPS, INNER = 30, 40
 DONE = 1e-11
 """m: change of the tool's position below which an equilibrium stands."""
+RANGES = int(Flag.JOINT_LIMIT | Flag.DRIVE_RANGE)
 LONGEST = 0.05
 """m: no deflection of interest is longer."""
 
@@ -59,7 +61,7 @@ def equilibrium(plant: Plant, command: Floats, rows: NDArray[np.int64] | None = 
         new = job.force(away)
         # how far the tool goes on under the force of where it now stands
         onward = np.einsum("mij,mj->mi", np.nan_to_num(s.compliance), new - force)
-        if not np.nan_to_num(np.abs(onward), nan=0.0).max(initial=0.0) > DONE:
+        if not np.nan_to_num(np.abs(onward)).max(initial=0.0) > DONE:
             break
         force = new
     assert s is not None
@@ -71,7 +73,9 @@ def equilibrium(plant: Plant, command: Floats, rows: NDArray[np.int64] | None = 
     status[unstable] = Status.UNSTABLE
     lost = unstable | ~np.isfinite(error).all(axis=1)
     status[lost & (status == Status.CONVERGED)] = Status.NOT_CONVERGED
-    gain = _strongest(loop)
+    values = np.linalg.eigvals(loop)
+    strongest = np.abs(values).argmax(axis=1)[:, None]
+    gain = np.take_along_axis(values, strongest, axis=1)[:, 0].real
     blank = np.where(lost[:, None], np.nan, 1.0)
     return Equilibrium(
         error * blank, force * blank, np.where(np.isfinite(error).all(axis=1), gain, np.nan), status, s.flags,
@@ -79,35 +83,27 @@ def equilibrium(plant: Plant, command: Floats, rows: NDArray[np.int64] | None = 
     )  # fmt: skip
 
 
-def _strongest(loop: Floats) -> Floats:
-    """(m,) real part of the eigenvalue of largest size."""
-    values = np.linalg.eigvals(loop)
-    at = np.abs(values).argmax(axis=1)
-    return np.asarray(np.take_along_axis(values, at[:, None], axis=1)[:, 0].real)
+def wall_errors(job: Setting, threads: int | None = None) -> Floats:
+    """(m,) m across the wall as the cut is, before compensation; infinite where a point has no answer or leaves a range of the drives."""
+    e = equilibrium(Plant(job, threads=threads), job.position)
+    good = np.isfinite(e.error).all(axis=1) & (e.flags & RANGES == 0)
+    return np.where(good, np.nan_to_num(job.across(e.error)), np.inf)
 
 
 def _together(job: Setting, error: Floats, compliance: Floats, force: Floats, away: Floats) -> Floats:
     """(m, 2) m: the cut and the linear machine about the state (error, force) solved together."""
     if not any(job.coupled):
         return away
-    c = np.nan_to_num(np.einsum("mki,mij->mkj", job.ways, compliance))
+    soft = np.nan_to_num(np.einsum("mki,mij->mkj", job.ways, compliance))
     base = np.nan_to_num(np.einsum("mki,mi->mk", job.ways, error))
     x = base.copy()
     for _ in range(INNER):
-        rest = x - base - np.einsum("mkj,mj->mk", c, job.force(x) - force)
-        slope = np.eye(2) - np.einsum("mkj,mjl->mkl", c, job.force_slopes(x))
-        det = slope[:, 0, 0] * slope[:, 1, 1] - slope[:, 0, 1] * slope[:, 1, 0]
+        rest = x - base - np.einsum("mkj,mj->mk", soft, job.force(x) - force)
+        slope = np.eye(2) - np.einsum("mkj,mjl->mkl", soft, job.force_slopes(x))
+        (a, b, c, d), (u, v) = slope.reshape(-1, 4).T, rest.T
+        det = a * d - b * c
         det = np.where(np.abs(det) > 1e-6, det, np.inf)
-        move = (
-            np.stack(
-                [
-                    slope[:, 1, 1] * rest[:, 0] - slope[:, 0, 1] * rest[:, 1],
-                    slope[:, 0, 0] * rest[:, 1] - slope[:, 1, 0] * rest[:, 0],
-                ],
-                axis=1,
-            )
-            / det[:, None]
-        )
+        move = np.stack([d * u - b * v, a * v - c * u], axis=1) / det[:, None]
         # the force has a root of the width in it where the cut ends: no step across more than half of what is left
         room = np.maximum(job.engaged.radial - x[:, 0], 0.0) / 2
         size = np.abs(move[:, 0])
@@ -121,15 +117,6 @@ def _together(job: Setting, error: Floats, compliance: Floats, force: Floats, aw
 
 def of_rows(job: Setting, rows: NDArray[np.int64]) -> Setting:
     """A job of some of the points."""
-    from dataclasses import fields, replace
-
-    m = len(job)
-    engaged = replace(
-        job.engaged, **{f.name: getattr(job.engaged, f.name)[rows] for f in fields(job.engaged)}
-    )
-    arrays = {
-        n: getattr(job, n)[rows]
-        for n in ("position", "tangent", "off", "tool", "rotation", "feed", "faster")
-        if len(getattr(job, n)) == m
-    }
-    return replace(job, engaged=engaged, **arrays)
+    engaged = Engagement(*(getattr(job.engaged, f.name)[rows] for f in fields(Engagement)))
+    names = ("position", "tangent", "off", "tool", "rotation", "feed", "faster")
+    return replace(job, engaged=engaged, **{n: getattr(job, n)[rows] for n in names})

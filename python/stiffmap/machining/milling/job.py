@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from os import PathLike
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
@@ -20,14 +19,14 @@ from stiffmap.machining.milling.equilibrium import Equilibrium, equilibrium
 from stiffmap.machining.milling.plant import Plant
 from stiffmap.machining.milling.program import WITHIN, Program, program
 from stiffmap.machining.milling.reach import must_reach
-from stiffmap.machining.milling.setting import Setting, scaled, setting
+from stiffmap.machining.milling.setting import Setting, setting
 from stiffmap.machining.milling.speed import Feeds, best_feeds
 from stiffmap.machining.milling.stability import PathStability, path_stability
 from stiffmap.machining.milling.verdict import verdict
 from stiffmap.machining.milling.verify import Run, run
 from stiffmap.machining.milling.warnings import Warned, warned
 from stiffmap.machining.process import Process, cutting_force
-from stiffmap.machining.toolpath import Box, Toolpath, sampled
+from stiffmap.machining.toolpath import Toolpath, sampled
 from stiffmap.solve.machine import Machine, as_machine
 from stiffmap.solve.options import keywords_of
 from stiffmap.solve.status import Status
@@ -51,8 +50,6 @@ class Milled:
     dataset: xr.Dataset
     stability: PathStability | str
     """Whether the cut chatters along the path; a sentence where that cannot be judged."""
-    true_before: Equilibrium | None = None
-    true_after: Run | None = None
     feeds: Feeds | None = None
     warnings: tuple[Warned, ...] = ()
     """What is to be watched, and at which points."""
@@ -68,55 +65,40 @@ class Milled:
         return bool((states != Status.CONVERGED).any() or beyond or any(w.finding for w in self.warnings))
 
 
+@keywords_of(choices)
 def mill_job(
     machine: Machine,
     path: Toolpath | str | PathLike[str],
     process: Process | str | PathLike[str] | Mapping[str, Any],
     *,
-    at: ArrayLike | None = None,
-    turn: float = 0.0,
     true_machine: Machine | str | PathLike[str] | None = None,
     step: float = 2e-3,
     within: float = WITHIN,
-    stock: Box | ArrayLike | None = None,
     thickness: float | None = None,
     passes: int = 1,
     band: bool = False,
-    angle: Floats | None = None,
     feeds: bool = False,
-    size: tuple[float, ...] | None = None,
-    offset: Mapping[str, ArrayLike] | None = None,
-    tolerance: float | None = None,
-    place: int | None = None,
-    reverse: bool = False,
-    entry: float | Literal["best"] | None = None,
-    redundancy: int | None = None,
     threads: int | None = None,
-    scheduler: Any = None,
-    progress: Callable[[int], None] | None = None,
+    **chosen: Any,
 ) -> Milled:
     """The same with the program and all states, for reports."""
     if passes < 1:
         raise StiffmapError(f"passes: expected 1 or more, got {passes}")
-    made_of = choices(
-        machine, path, process, at=at, turn=turn, size=size, offset=offset, tolerance=tolerance, reverse=reverse, place=place,
-        entry=entry, redundancy=redundancy, angle=angle, step=step, stock=stock, thickness=thickness, threads=threads,
-        scheduler=scheduler, progress=progress,
-    )  # fmt: skip
+    made_of = choices(machine, path, process, step=step, thickness=thickness, threads=threads, **chosen)
     p, cut, where, box, angle = made_of.path, made_of.process, made_of.place, made_of.stock, made_of.angle
     if angle is not None:
         p = replace(p, turn=None)
     job = setting(machine, p, cut, sampled(p, step), where, stock=box, thickness=thickness, angle=angle)
     must_reach(job, threads)
-    chosen = best_feeds(job, threads=threads) if feeds else None
-    if chosen is not None:
-        p = replace(p, feed=chosen.feed)
+    best = best_feeds(job, threads=threads) if feeds else None
+    if best is not None:
+        p = replace(p, feed=best.feed)
         job = setting(machine, p, cut, sampled(p, step), where, stock=box, thickness=thickness, angle=angle)
     plant = Plant(job, threads=threads)
     before = equilibrium(plant, job.position)
     found = commanded(plant, before)
     command = np.where(np.isfinite(found.position), found.position, job.position)
-    made = program(job, command, within, None if chosen is None else chosen.feed)
+    made = program(job, command, within, None if best is None else best.feed)
     after = run(job, made, step=step, threads=threads)
     mirrored = equilibrium(plant, np.where(np.isfinite(found.mirror), found.mirror, job.position))
     ds = dataset_of(job, before, found.position, found.left, after, mirrored)
@@ -125,30 +107,27 @@ def mill_job(
         ds["error_normal_passes"] = (("passes", "point"), after_passes(job, before, passes, threads))
     if band:
         for name, share in (("low", 1 - BAND), ("high", 1 + BAND)):
-            ds[f"error_normal_after_{name}"] = along(
-                job, run(scaled(job, share), made, step=step, threads=threads)
-            )
+            again = run(replace(job, scale=share * job.scale), made, step=step, threads=threads)
+            ds[f"error_normal_after_{name}"] = along(job, again)
     stability = path_stability(job, threads)
     if isinstance(stability, PathStability):
         ds["multiplier"] = ("point", np.interp(job.points.way, stability.way, stability.multiplier))
         ds["multiplier"].attrs["said"] = stability.sentence(job.process.spindle)
     ds.attrs |= {"program": made.text, "verdict": verdict(ds), **made_of.said}
-    out = Milled(
-        job, before, found.position, made, after, ds, stability, feeds=chosen, warnings=warned(job, ds), choices=made_of
+    found_warnings = warned(job, ds)
+    if true_machine is not None:
+        true_machine = as_machine(true_machine)
+        if true_machine.actuators != machine.actuators:
+            raise StiffmapError(
+                f"true_machine: expected the actuators {', '.join(machine.actuators)}, "
+                f"got {', '.join(true_machine.actuators)}"
+            )
+        real = equilibrium(Plant(job, true_machine, threads), job.position)
+        ds["true_error_normal"] = ("point", job.across(real.error))
+        ds["true_error_normal_after"] = along(job, run(job, made, true_machine, step=step, threads=threads))
+    return Milled(
+        job, before, found.position, made, after, ds, stability, feeds=best, warnings=found_warnings, choices=made_of
     )  # fmt: skip
-    if true_machine is None:
-        return out
-    true_machine = as_machine(true_machine)
-    if true_machine.actuators != machine.actuators:
-        raise StiffmapError(
-            f"true_machine: expected the actuators {', '.join(machine.actuators)}, "
-            f"got {', '.join(true_machine.actuators)}"
-        )
-    real = equilibrium(Plant(job, true_machine, threads), job.position)
-    real_after = run(job, made, true_machine, step=step, threads=threads)
-    ds["true_error_normal"] = ("point", job.across(real.error))
-    ds["true_error_normal_after"] = along(job, real_after)
-    return replace(out, true_before=real, true_after=real_after)
 
 
 @keywords_of(mill_job)
@@ -227,12 +206,9 @@ def after_passes(job: Setting, first: Equilibrium, passes: int, threads: int | N
     wall = job.across(first.error)
     out = [wall]
     for _ in range(passes - 1):
-        engaged = replace(
-            job.engaged, radial=np.maximum(np.nan_to_num(wall), 0.0), corner=0 * job.engaged.corner
-        )
-        rest = replace(job, engaged=engaged)
-        e = equilibrium(Plant(rest, threads=threads), job.position)
-        wall = np.minimum(wall, job.across(e.error))
+        radial = np.maximum(np.nan_to_num(wall), 0.0)
+        rest = replace(job, engaged=replace(job.engaged, radial=radial, corner=0 * job.engaged.corner))
+        wall = np.minimum(wall, job.across(equilibrium(Plant(rest, threads=threads), job.position).error))
         out.append(wall)
     return np.array(out)
 
@@ -249,13 +225,8 @@ def ripple(job: Setting, state: Equilibrium) -> Floats:
         return np.zeros(len(job))
     force = cutting_force(job.process)
     try:
-        lowest = float(
-            np.min(
-                natural_frequencies(
-                    job.machine, job.position[:1], modes=1, rotation=job.rotation[:1]
-                ).frequency
-            )
-        )
+        modes = natural_frequencies(job.machine, job.position[:1], modes=1, rotation=job.rotation[:1])
+        lowest = float(np.min(modes.frequency))
     except StiffmapError:
         lowest = 0.0
     if not lowest > SLOW * teeth * force.spindle_frequency:

@@ -13,15 +13,13 @@ from scipy.stats import qmc
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.tasks import workers
-from stiffmap.machining.milling.equilibrium import equilibrium
-from stiffmap.machining.milling.plant import Plant
-from stiffmap.machining.milling.reach import astray, followed, must_follow
+from stiffmap.machining.milling.equilibrium import RANGES, wall_errors
+from stiffmap.machining.milling.reach import followed, must_follow
 from stiffmap.machining.milling.setting import Setting, setting
 from stiffmap.machining.process.description import Process
 from stiffmap.machining.toolpath import Placement, Toolpath, sampled
 from stiffmap.machining.toolpath.sampling import Points
 from stiffmap.solve.machine import Machine
-from stiffmap.solve.status import Flag
 
 AT_ONCE = 200_000
 """Poses of one call; on a cluster, of one task as many as `IN_A_TASK`."""
@@ -29,7 +27,6 @@ IN_A_TASK = 10_000
 NORM = 12
 """Power of the mean that stands for the largest error while it is refined."""
 REFINED = 3
-LIMITS = int(Flag.JOINT_LIMIT | Flag.DRIVE_RANGE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,13 +215,11 @@ class Search:
         slope = np.einsum("nij,mj->nmi", r, self.slope)
         bent = np.matmul(s.compliance[..., :3, :3], slope[..., None])[..., 0]
         loop = 1 - np.einsum("nmi,nmi->nm", off, bent)  # 1 + kp/k
-        good = (
-            s.ok & (s.flags & LIMITS == 0) & (loop > 0) & followed(astray(self.job, position, self.threads))
-        ).all(axis=1)
+        good = s.ok & (s.flags & RANGES == 0) & (loop > 0) & followed(self.job, position, self.threads)
         error = np.einsum("nmi,nmi->nm", s.displacement[..., :3], off)
         with np.errstate(divide="ignore", invalid="ignore"):
             error = np.abs(error / loop).max(axis=1)
-        return np.asarray(np.where(good, error, np.inf))
+        return np.asarray(np.where(good.all(axis=1), error, np.inf))
 
     def exact(self, place: Placement) -> float:
         """m: largest error, cut and deflection solved together; infinite where a point fails."""
@@ -233,11 +228,7 @@ class Search:
     def errors(self, place: Placement) -> Floats:
         """(k,) m across the wall at the points of the search; infinite where one fails."""
         job = self.at_place(place)
-        e = equilibrium(Plant(job, threads=self.threads), job.position)
-        fine = np.isfinite(e.error).all(axis=1) & (e.flags & LIMITS == 0)
-        fine &= followed(astray(job, job.position, self.threads))
-        normal = np.where(fine, np.nan_to_num(job.across(e.error)), np.inf)
-        return np.asarray(normal)
+        return np.where(followed(job, job.position, self.threads), wall_errors(job, self.threads), np.inf)
 
     def refined(
         self, at: Floats, turn: float, low: Floats, high: Floats, turns: tuple[float, float]
@@ -248,11 +239,9 @@ class Search:
         def cost(x: Floats) -> float:
             e = self.errors(Placement(x[:3] * scale[:3], float(x[3])))
             top = float(np.abs(e).max())
-            return (
-                1e3
-                if not np.isfinite(top)
-                else 1e3 * top * float(((np.abs(e) / top) ** NORM).mean() ** (1 / NORM))
-            )
+            if not np.isfinite(top):
+                return 1e3
+            return 1e3 * top * float(((np.abs(e) / top) ** NORM).mean() ** (1 / NORM))
 
         a, b = self._extent(np.array([turn]))
         first, last = np.minimum(low - a[0], at), np.maximum(high - b[0], at)

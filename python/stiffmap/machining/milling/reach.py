@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import NoReturn
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,7 +15,7 @@ from stiffmap.solve.status import Status
 def reached(job: Setting, position: Floats, threads: int | None = None) -> NDArray[np.bool_]:
     """(...,) bool: poses (..., m, 3) that the machine takes without load."""
     s = job.machine.solve(position, rotation=job.rotation, stiffness=False, threads=threads)
-    return np.asarray((s.status != Status.UNREACHABLE) & followed(astray(job, position, threads)))
+    return np.asarray((s.status != Status.UNREACHABLE) & followed(job, position, threads))
 
 
 def astray(job: Setting, position: Floats, threads: int | None = None) -> Floats:
@@ -30,9 +28,9 @@ def astray(job: Setting, position: Floats, threads: int | None = None) -> Floats
     return gap
 
 
-def followed(gap: Floats) -> NDArray[np.bool_]:
-    """(...,) bool of gaps (..., 6) m, rad."""
-    return np.asarray((np.abs(gap) <= SAME).all(axis=-1))
+def followed(job: Setting, position: Floats, threads: int | None = None) -> NDArray[np.bool_]:
+    """(..., m) bool: positions (..., m, 3) m at which the machine does what the path asks for."""
+    return np.asarray((np.abs(astray(job, position, threads)) <= SAME).all(axis=-1))
 
 
 def must_follow(job: Setting, threads: int | None = None) -> None:
@@ -50,15 +48,11 @@ def must_reach(job: Setting, threads: int | None = None) -> None:
     """Raise StiffmapError naming the points out of reach, how far the part sticks out, and a place that holds it."""
     must_follow(job, threads)
     ok = reached(job, job.position, threads)
-    if not ok.all():
-        _refuse(job, ok, threads)
-
-
-def _refuse(job: Setting, ok: NDArray[np.bool_], threads: int | None) -> NoReturn:
+    if ok.all():
+        return
     lost = np.flatnonzero(~ok)
     lines = job.path.line[job.points.move[lost]]
-    first = 1e3 * job.position[lost[0]]
-    where = ", ".join(f"{v:.1f}" for v in first)
+    where = ", ".join(f"{v:.1f}" for v in 1e3 * job.position[lost[0]])
     text = (
         f"the path leaves the workspace of {job.machine.name}: {lost.size} of {len(job)} points, the first at ({where}) mm, "
         f"line {lines[0]} of the path"

@@ -11,14 +11,11 @@ from numpy.typing import NDArray
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.tasks import workers
-from stiffmap.machining.milling.equilibrium import equilibrium
+from stiffmap.machining.milling.equilibrium import wall_errors
 from stiffmap.machining.milling.limits import fastest as fastest_drives
-from stiffmap.machining.milling.plant import Plant
 from stiffmap.machining.milling.setting import Setting, orientations
 from stiffmap.solve.kinematics import inverse_kinematics
-from stiffmap.solve.status import Flag
 
-LIMITS = int(Flag.JOINT_LIMIT | Flag.DRIVE_RANGE)
 FASTEST = 3.0
 """rad/s of the turn about the tool."""
 IDLE = "no turn changes the error, as the last joint turns about the tool's own axis; a spindle across the flange would make use of it"
@@ -102,11 +99,9 @@ def grid_of(
 def _turned(shared: tuple[Setting, int | None], angle: float) -> tuple[Floats, Floats]:
     """(m,) m and (m, actuators) of one turn all along, as a task."""
     job, threads = shared
-    turned = replace(job, rotation=orientations(job.machine, job.tool, job.place, np.full(len(job), angle)))
-    e = equilibrium(Plant(turned, threads=threads), job.position)
-    good = np.isfinite(e.error).all(axis=1) & (e.flags & LIMITS == 0)
-    error = np.where(good, np.nan_to_num(job.across(e.error)), np.inf)
-    return error, inverse_kinematics(job.machine, job.position, turned.rotation, threads=threads).actuators
+    turned = replace(job, rotation=orientations(job.machine, job.tool, np.full(len(job), angle)))
+    drives = inverse_kinematics(job.machine, job.position, turned.rotation, threads=threads).actuators
+    return wall_errors(turned, threads), drives
 
 
 @dataclass(frozen=True, eq=False)

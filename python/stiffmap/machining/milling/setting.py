@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError, StiffmapError
@@ -134,7 +135,7 @@ def setting(
         place.vectors(points.tangent),
         -part_side(process) * place.vectors(points.normal),
         tool,
-        orientations(machine, tool, place, angle),
+        orientations(machine, tool, angle),
         np.where(np.isfinite(points.feed), points.feed, process.feed),
         _faster(points, process),
         angle,
@@ -167,32 +168,17 @@ def _faster(points: Points, process: Process) -> Floats:
     return np.asarray(feed / spindle / (process.feed / process.spindle))
 
 
-def orientations(machine: Machine, tool: Floats, place: Placement, angle: Floats | None) -> Floats:
+def orientations(machine: Machine, tool: Floats, angle: Floats | None) -> Floats:
     """(m, 3, 3): at home the tool stands along the base's z; elsewhere the smallest turn from there, then `angle` about it."""
     home = machine.description.home.r
     upright = np.array([0.0, 0.0, 1.0])
     if np.abs(tool - upright).max() < 1e-12:
         base = np.broadcast_to(home, (len(tool), 3, 3))
     else:
-        axis = np.cross(upright, tool)
         cosine = tool[:, 2]
         if (cosine < -1 + 1e-9).any():
             raise StiffmapError("tool axis: a tool that points upwards from below has no smallest turn")
-        skew = _skew(axis)
-        base = (np.eye(3) + skew + skew @ skew / (1 + cosine)[:, None, None]) @ home
+        base = Rotation.from_quat(np.column_stack([np.cross(upright, tool), 1 + cosine])).as_matrix() @ home
     if angle is None:
         return np.asarray(base)
-    skew = _skew(tool)
-    s, c = np.sin(angle)[:, None, None], np.cos(angle)[:, None, None]
-    return np.asarray((np.eye(3) + s * skew + (1 - c) * skew @ skew) @ base)
-
-
-def _skew(v: Floats) -> Floats:
-    out = np.zeros((len(v), 3, 3))
-    out[:, 0, 1], out[:, 0, 2], out[:, 1, 2] = -v[:, 2], v[:, 1], -v[:, 0]
-    return np.asarray(out - np.swapaxes(out, 1, 2))
-
-
-def scaled(job: Setting, scale: float) -> Setting:
-    """The same with the whole force scaled."""
-    return replace(job, scale=scale * job.scale)
+    return np.asarray(Rotation.from_rotvec(np.asarray(angle)[:, None] * tool).as_matrix() @ base)

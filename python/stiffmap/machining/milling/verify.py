@@ -14,7 +14,7 @@ from stiffmap.machining.milling.equilibrium import Equilibrium, equilibrium
 from stiffmap.machining.milling.plant import Plant
 from stiffmap.machining.milling.program import Program
 from stiffmap.machining.milling.setting import Setting, setting
-from stiffmap.machining.toolpath import Points, Toolpath
+from stiffmap.machining.toolpath import Engagement, Points, Toolpath
 from stiffmap.machining.toolpath.gcode.load import load_gcode
 from stiffmap.machining.toolpath.path import Kind
 from stiffmap.machining.toolpath.sampling import sampled
@@ -155,15 +155,7 @@ def _job(job: Setting, points: Points, angle: Floats | None) -> Setting:
     old = np.where(same, old, np.where(job.points.move[order[other]] == points.move, order[other], old))
     e = job.engaged
     bent = np.interp(points.way, way, e.curvature[order])
-    engaged = replace(
-        made.engaged,
-        radial=e.radial[old],
-        axial=e.axial[old],
-        corner=e.corner[old],
-        curvature=bent,
-        wall=e.wall[old],
-    )
-    return replace(made, engaged=engaged)
+    return replace(made, engaged=Engagement(e.radial[old], bent, e.corner[old], e.axial[old], e.wall[old]))
 
 
 def nearest(path: Toolpath, move: NDArray[np.int64], p: Floats) -> Floats:

@@ -12,8 +12,6 @@ SIDES = ("climb", "conventional", "slot")
 """Where the part's wall is: right of the travel, left of it, on both sides (clockwise spindle, from above)."""
 PRESSURES = ("Ktc", "Krc", "Kac")
 """N/m² of chip area: tangential, radial, axial."""
-EDGES = ("Kte", "Kre", "Kae")
-"""N/m of cutting edge."""
 
 
 @dataclass(frozen=True)
@@ -50,10 +48,6 @@ class EndMill:
     Kte: float = 0.0
     Kre: float = 0.0
     Kae: float = 0.0
-
-    def values(self) -> dict[str, float]:
-        """By name."""
-        return {n: getattr(self, n) for n in (*PRESSURES, *EDGES)}
 
 
 @dataclass(frozen=True)

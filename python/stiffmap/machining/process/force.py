@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import pi
 from os import PathLike
 from typing import Any
@@ -97,7 +97,6 @@ def cutting_force(process: Process | str | PathLike[str] | Mapping[str, Any]) ->
 
 def force_uncertainty(process: Process) -> Floats:
     """(3,) N, standard uncertainty of the mean force from those of the law's numbers (independent, to first order)."""
-    from dataclasses import replace
 
     base = mean_force(process, process.cut.radial, process.cut.axial)
     total = np.zeros(3)

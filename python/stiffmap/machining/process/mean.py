@@ -67,6 +67,12 @@ def engaged(process: Process, width: Floats) -> tuple[Floats, Floats]:
     return (zero, arc) if process.cut.side == "conventional" else (half - half, half)
 
 
+def own_arc(process: Process) -> tuple[float, float]:
+    """rad: first and last angle of the engaged arc of the process's own cut."""
+    first, last = engaged(process, widened(process, process.cut.radial))
+    return float(first), float(last)
+
+
 def mean_force(process: Process, width: ArrayLike, axial: ArrayLike, faster: ArrayLike = 1.0) -> Floats:
     """(..., 3) N, mean force for straight cuts of this width and depth (m); of a slot the width does not count.
 

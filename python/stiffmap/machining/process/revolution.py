@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
+from functools import cache
 from math import pi, tan
 
 import numpy as np
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.machining.process.description import EndMill, Process
-from stiffmap.machining.process.gauss import gauss
-from stiffmap.machining.process.mean import engaged, mean_force, widened, with_coefficients
+from stiffmap.machining.process.mean import mean_force, own_arc, with_coefficients
 
 STEPS = 720
 """Angles of a revolution, about; the nearest multiple of the teeth is taken."""
 SLICES = 60
+
+
+@cache
+def gauss(count: int) -> tuple[Floats, Floats]:
+    """Nodes (count,) of Gauss' rule on -1 … 1 and weights; not to be written to."""
+    node, weight = np.polynomial.legendre.leggauss(count)
+    return np.asarray(node, dtype=float), np.asarray(weight, dtype=float)
 
 
 def revolution(process: Process, steps: int = STEPS, slices: int = SLICES) -> tuple[Floats, Floats]:
@@ -26,21 +33,24 @@ def revolution(process: Process, steps: int = STEPS, slices: int = SLICES) -> tu
     count = tool.teeth * max(1, round(steps / tool.teeth))
     angle = 2 * pi * (np.arange(count) + 0.5) / count
     z = p.cut.axial * (np.arange(slices) + 0.5) / slices
-    tooth = np.arange(tool.teeth)
-    # position in the tool of each tooth at each height, against the rotation
-    inside = 2 * pi * tooth[:, None] / tool.teeth + 2 * z * tan(tool.helix) / tool.diameter
+    inside = _inside(p, z)
     phi = np.mod(angle[:, None, None] - inside, 2 * pi)
-    first, last = (float(v) for v in engaged(p, widened(p, p.cut.radial)))
+    first, last = own_arc(p)
     cuts = (phi >= first) & (phi <= last)
     chip = np.where(cuts, chip_thickness(p, phi, inside), 0.0)
     cuts &= chip > 0
-    law = p.law.values()
+    law = vars(p.law)
     s, c, dz = np.sin(phi), np.cos(phi), p.cut.axial / slices
-    t, r, a = (
-        np.where(cuts, law[f"K{n}e"] + law[f"K{n}c"] * chip, 0.0) * dz for n in ("t", "r", "a")
-    )  # N of each slice of each tooth
+    # N of each slice of each tooth
+    t, r, a = (np.where(cuts, law[f"K{n}e"] + law[f"K{n}c"] * chip, 0.0) * dz for n in "tra")
     force = np.stack([(-t * c - r * s).sum((1, 2)), (t * s - r * c).sum((1, 2)), a.sum((1, 2))], axis=-1)
     return angle, force
+
+
+def _inside(p: Process, z: Floats) -> Floats:
+    """(teeth, z) rad: position in the tool of each tooth at heights (z,) m, against the rotation."""
+    tool = p.tool
+    return 2 * pi * np.arange(tool.teeth)[:, None] / tool.teeth + 2 * z * tan(tool.helix) / tool.diameter
 
 
 def chip_thickness(p: Process, phi: Floats, inside: Floats) -> Floats:
@@ -62,14 +72,12 @@ ARC_NODES, HEIGHT_NODES = 160, 8
 def mean_basis_with_runout(process: Process) -> Floats:
     """(3, 6) N per unit of Ktc Kte Krc Kre Kac Kae: the mean where run-out may lift teeth out of the cut, by quadrature
     over angle and height; the law itself does not count."""
-    p, tool = process, process.tool
+    p = process
     node, weight = gauss(ARC_NODES)
-    first, last = (float(v) for v in engaged(p, widened(p, p.cut.radial)))
+    first, last = own_arc(p)
     phi = (first + (last - first) * (node + 1) / 2)[:, None, None]
     zn, zw = gauss(HEIGHT_NODES)
-    z = p.cut.axial * (zn + 1) / 2
-    inside = 2 * pi * np.arange(tool.teeth)[:, None] / tool.teeth + 2 * z * tan(tool.helix) / tool.diameter
-    chip = chip_thickness(p, phi, inside)
+    chip = chip_thickness(p, phi, _inside(p, p.cut.axial * (zn + 1) / 2))
     w = (last - first) / 2 * weight[:, None, None] * (p.cut.axial / 2 * zw) / (2 * pi)
     # a tooth's chip and edge parts summed over height and teeth, over the angle
     parts = [(chip * w).sum((1, 2)), ((chip > 0) * w).sum((1, 2))]
@@ -83,8 +91,7 @@ def mean_with_runout(process: Process) -> Floats:
     """(3,) N: the mean where run-out may lift teeth out of the cut."""
     p = with_coefficients(process)
     assert isinstance(p.law, EndMill)
-    v = p.law.values()
-    values = np.array([v[n] for n in ("Ktc", "Kte", "Krc", "Kre", "Kac", "Kae")])
+    values = np.array([vars(p.law)[n] for n in ("Ktc", "Kte", "Krc", "Kre", "Kac", "Kae")])
     return np.asarray(mean_basis_with_runout(p) @ values)
 
 
@@ -93,11 +100,8 @@ def leaves_cut(process: Process) -> bool:
     p = with_coefficients(process)
     if not isinstance(p.law, EndMill) or p.tool.runout == 0.0:
         return False
-    first, last = (float(v) for v in engaged(p, widened(p, p.cut.radial)))
+    first, last = own_arc(p)
     phi = np.linspace(first, last, 721)[1:-1, None, None]
-    z = np.linspace(0, p.cut.axial, 31)
-    tool = p.tool
-    inside = 2 * pi * np.arange(tool.teeth)[:, None] / tool.teeth + 2 * z * tan(tool.helix) / tool.diameter
-    radius = tool.runout * np.cos(tool.runout_angle - inside)
+    radius = p.tool.runout * np.cos(p.tool.runout_angle - _inside(p, np.linspace(0, p.cut.axial, 31)))
     single = p.chip * np.sin(phi) + radius - np.roll(radius, 1, axis=0)
     return bool((single < 0).any())

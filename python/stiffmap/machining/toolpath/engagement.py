@@ -89,9 +89,7 @@ def _over_contact(points: Points, process: Process, curvature: Floats) -> Floats
     stock at the front end of the contact leaves the line by the double integral of the curvature (theory.md, M5)."""
     way, step = points.way, np.diff(points.way, append=points.way[-1:])
     after = np.r_[curvature[1:], curvature[-1:]]
-    bent = np.divide(
-        after - curvature, step, out=np.zeros_like(step), where=step > 0
-    )  # linear between points
+    bent = np.divide(after - curvature, step, out=np.zeros_like(step), where=step > 0)  # linear in between
     turned = np.r_[0.0, np.cumsum(step * (curvature + after) / 2)[:-1]]
     aside = np.r_[0.0, np.cumsum(step * (turned + step * (curvature / 2 + step * bent / 6)))[:-1]]
     end = np.minimum(way + process.tool.diameter / 2 * np.sin(process.arc), way[-1])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from math import isnan, nan, pi
 
 import numpy as np
@@ -11,6 +10,7 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.machining.toolpath.gcode.load import load_gcode
 from stiffmap.machining.toolpath.gcode.state import CENTRES
+from stiffmap.machining.toolpath.gcode.words import decimal
 from stiffmap.machining.toolpath.path import Kind, Toolpath
 
 CLOSED = 1e-6
@@ -53,7 +53,8 @@ def entered_at(path: Toolpath, way: float) -> Toolpath:
     loop = [*range(first + k, last + 1), *range(first, first + k)]
     here = first + k
     order = [*range(first), *loop, *([] if whole else [here]), *range(last + 1, len(path))]
-    start, end, sweep = path.start[order].copy(), path.end[order].copy(), path.sweep[order].copy()
+    made = path.only(order)
+    start, end, sweep = made.start, made.end, made.sweep
     place = path.start[here]
     if not whole:
         share = rest / length[k]
@@ -65,11 +66,6 @@ def entered_at(path: Toolpath, way: float) -> Toolpath:
     for part, old in ((pre, path.start[first]), (post, path.end[last])):
         start[part] = _moved(start[part], old, shift)
         end[part] = _moved(end[part], old, shift)
-    arrays = ("kind", "centre", "normal", "feed", "spindle", "line", "tool")
-    made = replace(
-        path, start=start, end=end, sweep=sweep, text=(),
-        turn=None if path.turn is None else path.turn[order], **{n: getattr(path, n)[order] for n in arrays},
-    )  # fmt: skip
     return with_lines(made, path)
 
 
@@ -83,22 +79,17 @@ def turned_round(path: Toolpath) -> Toolpath:
         raise StiffmapError(f"{path.name}: no move cuts (moves at a feed across the tool)")
     first, last = int(cuts[0]), int(cuts[-1])
     order = [*range(first), *range(last, first - 1, -1), *range(last + 1, len(path))]
-    start, end = path.start[order].copy(), path.end[order].copy()
-    sweep, centre = path.sweep[order].copy(), path.centre[order].copy()
+    made = path.only(order)
+    start, end, sweep, centre = made.start, made.end, made.sweep, made.centre
     middle, pre, post = slice(first, last + 1), slice(0, first), slice(last + 1, len(path))
     start[middle], end[middle] = end[middle].copy(), start[middle].copy()
     sweep[middle] *= -1
-    arcs = np.flatnonzero(path.kind[order] == Kind.ARC)
-    axis = np.eye(3)[path.normal[order][arcs]]
+    arcs = np.flatnonzero(made.kind == Kind.ARC)
+    axis = np.eye(3)[made.normal[arcs]]
     centre[arcs] = centre[arcs] * (1 - axis) + start[arcs] * axis
     shift = path.end[last] - path.start[first]
     for part, old, way in ((pre, path.start[first], shift), (post, path.end[last], -shift)):
         start[part], end[part] = _moved(start[part], old, way), _moved(end[part], old, way)
-    arrays = ("kind", "normal", "feed", "spindle", "line", "tool")
-    made = replace(
-        path, start=start, end=end, sweep=sweep, centre=centre, text=(),
-        turn=None if path.turn is None else path.turn[order], **{n: getattr(path, n)[order] for n in arrays},
-    )  # fmt: skip
     return with_lines(made, path)
 
 
@@ -127,7 +118,7 @@ def fresh_text(path: Toolpath) -> str:
         if path.spindle[i] != spindle and not isnan(path.spindle[i]):
             spindle = float(path.spindle[i])
             sense = "M5" if spindle == 0 else "M3" if spindle > 0 else "M4"
-            out.append(sense if spindle == 0 else f"S{_text(abs(spindle) * 30 / pi)} {sense}")
+            out.append(sense if spindle == 0 else f"S{decimal(abs(spindle) * 30 / pi, 7)} {sense}")
         kind, end = Kind(int(path.kind[i])), path.end[i]
         if kind == Kind.ARC and path.normal[i] != plane:
             plane = int(path.normal[i])
@@ -143,19 +134,19 @@ def fresh_text(path: Toolpath) -> str:
             a for a in range(3) if a not in free and (end[a] != at[a] or (kind == Kind.ARC and a != plane))
         ]
         axes = axes or [a for a in range(3) if a not in free]
-        words += [f"{'XYZ'[a]}{_text(1e3 * (end[a] - shift[a]))}" for a in axes]
+        words += [f"{'XYZ'[a]}{decimal(1e3 * (end[a] - shift[a]), 7)}" for a in axes]
         if kind == Kind.ARC:
             for word in CENTRES[plane]:
                 a = "IJK".index(word)
-                words.append(f"{word}{_text(1e3 * (path.centre[i, a] - path.start[i, a]))}")
+                words.append(f"{word}{decimal(1e3 * (path.centre[i, a] - path.start[i, a]), 7)}")
             turns = int(np.ceil(abs(path.sweep[i]) / (2 * pi) - 1e-6))
             words += [f"P{turns}"] if turns > 1 else []
         if path.turn is not None and path.turn[i] != turn:
             turn = float(path.turn[i])
-            words.append(f"C{_text(np.degrees(turn))}")
+            words.append(f"C{decimal(np.degrees(turn), 7)}")
         if kind != Kind.RAPID and path.feed[i] != feed:
             feed = float(path.feed[i])
-            words.append(f"F{_text(6e4 * feed)}")
+            words.append(f"F{decimal(6e4 * feed, 7)}")
         out.append(" ".join(words))
         at = np.where([a in free for a in range(3)], at, end)
     return "\n".join([*out, *(["M9"] if cooled else []), "M5", "M2"]) + "\n"
@@ -166,8 +157,3 @@ def with_lines(path: Toolpath, like: Toolpath) -> Toolpath:
     if not like.text:
         return path
     return load_gcode(fresh_text(path).splitlines(), name=path.name, offsets=like.offsets or None)
-
-
-def _text(value: float) -> str:
-    text = f"{value:.7f}".rstrip("0").rstrip(".")
-    return "0" if text in ("-0", "") else text

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from math import isfinite, nan, pi
 from os import PathLike
 from pathlib import Path
+from typing import NoReturn
 
 import numpy as np
 
@@ -88,12 +89,9 @@ def read_points(path: Path) -> Toolpath:
     if axes and len(axes) < 3:
         t.fail("the tool's axis needs the columns i, j and k")
     tool: Floats = t.block("ijk") if axes else np.array([0.0, 0.0, 1.0])
-    if axes and not (np.linalg.norm(tool, axis=1) > 0).all():
-        t.fail(
-            "expected a direction of the tool that is not zero",
-            "i",
-            int(np.argmin(np.linalg.norm(tool, axis=1))),
-        )
+    none = np.flatnonzero(~np.atleast_2d(tool).any(axis=1))
+    if none.size:
+        t.fail("expected a direction of the tool that is not zero", "i", int(none[0]))
     unknown = np.full(n, nan)
     return path_of(
         t.block("xyz"), feed=t.values.get("feed", unknown), spindle=t.values.get("spindle", unknown), tool=tool,
@@ -101,34 +99,12 @@ def read_points(path: Path) -> Toolpath:
     )  # fmt: skip
 
 
-def _number(text: str, column: str, file: str, line: int) -> float:
-    try:
-        value = number_in(text)
-    except ValueError:
-        value = nan
-    if not isfinite(value) or abs(value) > 1e9:
-        raise FileError(
-            f"{column.strip()}: expected a number, found {text.strip()[:30]!r}", file=file, line=line
-        )
-    return value
-
-
 SILENT = (
-    "PARTNO",
-    "PPRINT",
-    "REMARK",
-    "$$",
-    "TOOLNO",
-    "LOADTL",
-    "LOAD",
-    "CUTTER",
-    "COOLNT",
-    "MACHIN",
-    "MULTAX",
-    "CLRSRF",
-    "FROM/NONE",
-)
+    "PARTNO", "PPRINT", "REMARK", "TOOLNO", "LOADTL", "LOAD", "CUTTER", "COOLNT", "MACHIN", "MULTAX", "CLRSRF",
+)  # fmt: skip
 ENDS = ("FINI", "END", "STOP", "REWIND")
+UNITS = {"MM": 1e-3, "INCHES": 25.4e-3, "INCH": 25.4e-3, "CM": 1e-2}
+Fail = Callable[[str], NoReturn]
 
 
 def read_cl(path: Path) -> Toolpath:
@@ -136,11 +112,13 @@ def read_cl(path: Path) -> Toolpath:
 
     Raises FileError naming the line; what is not understood is refused.
     """
-    file = str(path)
     unit, feed, spindle, rapid = 0.0, nan, nan, False
-    points: list[list[float]] = []
-    tools, feeds, spindles, lines, rapids = [], [], [], [], []
-    pending = ""
+    number, pending = 0, ""
+    rows: list[tuple[list[float], list[float], float, float, int, bool]] = []
+
+    def fail(message: str) -> NoReturn:
+        raise FileError(message, file=str(path), line=number)
+
     for number, raw in enumerate(lines_of(path), 1):
         text = pending + raw.split("$$")[0].strip()
         if text.endswith("$"):
@@ -154,58 +132,59 @@ def read_cl(path: Path) -> Toolpath:
         if word in ENDS:
             break
         if word == "UNITS":
-            names = {"MM": 1e-3, "INCHES": 25.4e-3, "INCH": 25.4e-3, "CM": 1e-2}
-            if not values or values[0] not in names:
-                raise FileError(f"UNITS: expected MM or INCHES, found {rest[:20]!r}", file=file, line=number)
-            unit = names[values[0]]
+            if not values or values[0] not in UNITS:
+                fail(f"UNITS: expected MM or INCHES, found {rest[:20]!r}")
+            unit = UNITS[values[0]]
         elif word in ("GOTO", "FROM"):
             if not unit:
-                raise FileError(
-                    "the unit is missing: expected UNITS/MM before the first point", file=file, line=number
-                )
-            v = [_number(t, word, file, number) for t in values]
+                fail("the unit is missing: expected UNITS/MM before the first point")
+            v = [_number(t, word, fail) for t in values]
             if len(v) not in (3, 6):
-                raise FileError(f"{word}: expected 3 or 6 numbers, found {len(v)}", file=file, line=number)
+                fail(f"{word}: expected 3 or 6 numbers, found {len(v)}")
             axis = v[3:] or [0.0, 0.0, 1.0]
             if not any(axis):
-                raise FileError(
-                    f"{word}: expected a direction of the tool that is not zero", file=file, line=number
-                )
-            points.append([unit * c for c in v[:3]])
-            tools.append(axis)
-            feeds.append(feed)
-            spindles.append(spindle)
-            lines.append(number)
-            rapids.append(rapid or word == "FROM")
+                fail(f"{word}: expected a direction of the tool that is not zero")
+            rows.append(([unit * c for c in v[:3]], axis, feed, spindle, number, rapid or word == "FROM"))
             rapid = False
         elif word == "RAPID":
             rapid = True
         elif word == "FEDRAT":
-            feed = _feedrate(values, unit, file, number)
+            feed = _feedrate(values, unit, fail)
         elif word == "SPINDL":
-            spindle = _spindle(values, file, number, spindle)
+            spindle = _spindle(values, spindle, fail)
         else:
-            raise FileError(f"unknown word {word[:30]!r}", file=file, line=number)
-    if len(points) < 2:
-        raise FileError("expected two or more points (GOTO)", file=file)
+            fail(f"unknown word {word[:30]!r}")
+    if len(rows) < 2:
+        raise FileError("expected two or more points (GOTO)", file=str(path))
+    points, tools, feeds, spindles, lines, rapids = zip(*rows, strict=True)
     p = path_of(points, feed=feeds, spindle=spindles, tool=tools, lines=lines, name=path.stem)
     p.kind[np.array(rapids[1:])] = 0
     return p
 
 
-def _feedrate(values: list[str], unit: float, file: str, line: int) -> float:
+def _number(text: str, column: str, fail: Fail) -> float:
+    try:
+        value = number_in(text)
+    except ValueError:
+        value = nan
+    if not isfinite(value) or abs(value) > 1e9:
+        fail(f"{column}: expected a number, found {text[:30]!r}")
+    return value
+
+
+def _feedrate(values: list[str], unit: float, fail: Fail) -> float:
     units = {"MMPM": 1e-3 / 60, "IPM": 25.4e-3 / 60, "PERMIN": unit / 60}
     named = [v for v in values if v in units]
     rest = [v for v in values if v not in units]
     if len(rest) != 1 or len(named) > 1 or (not named and not unit):
-        raise FileError("FEDRAT: expected a number with MMPM, IPM or PERMIN", file=file, line=line)
-    feed = _number(rest[0], "FEDRAT", file, line) * (units[named[0]] if named else unit / 60)
+        fail("FEDRAT: expected a number with MMPM, IPM or PERMIN")
+    feed = _number(rest[0], "FEDRAT", fail) * (units[named[0]] if named else unit / 60)
     if not feed > 0:
-        raise FileError("FEDRAT: expected a feed above zero", file=file, line=line)
+        fail("FEDRAT: expected a feed above zero")
     return feed
 
 
-def _spindle(values: list[str], file: str, line: int, before: float) -> float:
+def _spindle(values: list[str], before: float, fail: Fail) -> float:
     if values in (["OFF"], []):
         return 0.0
     if values == ["ON"]:
@@ -214,7 +193,5 @@ def _spindle(values: list[str], file: str, line: int, before: float) -> float:
         return -1.0
     rest = [v for v in values if v not in ("CLW", "RPM", "ON")]
     if len(rest) != 1:
-        raise FileError(
-            "SPINDL: expected a number of revolutions per minute, CLW or OFF", file=file, line=line
-        )
-    return _number(rest[0], "SPINDL", file, line) * pi / 30
+        fail("SPINDL: expected a number of revolutions per minute, CLW or OFF")
+    return _number(rest[0], "SPINDL", fail) * pi / 30

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.machining.toolpath.gcode.load import load_gcode
+from stiffmap.machining.toolpath.gcode.words import decimal
 from stiffmap.machining.toolpath.path import Toolpath
 
 
@@ -37,9 +38,7 @@ def rectangle(width: float, depth: float, corner: float) -> Outline:
         (-a + r, -b, -a + r, -b + r, -a, -b + r),
         (-a, b - r, -a + r, b - r, -a + r, b),
     ):
-        out.append(Piece(x, y))
-        if r > 0:
-            out.append(Piece(ex, ey, cx, cy, -1))
+        out += [Piece(x, y), *([Piece(ex, ey, cx, cy, -1)] if r > 0 else [])]
     return (0.0, b), [*out, Piece(0.0, b)]
 
 
@@ -144,8 +143,7 @@ def outline(name: str, size: tuple[float, ...] | None = None, **speeds: float) -
 
 
 def _mm(v: float) -> str:
-    text = f"{1e3 * v:.6f}".rstrip("0").rstrip(".")
-    return "0" if text == "-0" else text
+    return decimal(1e3 * v, 6)
 
 
 def _positive(**sizes: float) -> None:

@@ -70,9 +70,11 @@ class Toolpath:
         arcs = self.kind == Kind.ARC
         if not arcs.any():
             return np.asarray(straight)
-        radius = np.nan_to_num(self._radius(np.zeros(len(self))) + self._radius(np.ones(len(self)))) / 2
+        flat = 1.0 - np.eye(3)[self.normal]
+        ends = [np.linalg.norm((p - self.centre) * flat, axis=1) for p in (self.start, self.end)]
+        radius = (ends[0] + ends[1]) / 2
         rise = np.take_along_axis(self.end - self.start, self.normal[:, None].astype(int), 1)[:, 0]
-        return np.where(arcs, np.hypot(radius * self.sweep, rise), straight)
+        return np.asarray(np.where(arcs, np.hypot(radius * self.sweep, rise), straight))
 
     @cached_property
     def cuts(self) -> NDArray[np.bool_]:
@@ -89,16 +91,6 @@ class Toolpath:
             return None
         before = np.r_[self.turn[:1], self.turn[:-1]][move]
         return np.asarray(before + share * (self.turn[move] - before))
-
-    def _radius(self, s: Floats) -> Floats:
-        a, b = self._spokes()
-        ra, rb = np.linalg.norm(a, axis=1), np.linalg.norm(b, axis=1)
-        return np.asarray(ra + (rb - ra) * s)
-
-    def _spokes(self) -> tuple[Floats, Floats]:
-        """(n, 3) from the centre to start and end, in the plane."""
-        flat = 1.0 - np.eye(3)[self.normal]
-        return (self.start - self.centre) * flat, (self.end - self.centre) * flat
 
     def at(self, move: ArrayLike, s: ArrayLike) -> tuple[Floats, Floats, Floats]:
         """Positions (m, 3), unit tangents (m, 3) and curvature vectors (m, 3) 1/m at shares s (m,) of the moves (m,)."""
@@ -141,8 +133,9 @@ class Toolpath:
             )
         return Placement(where, float(turn))
 
-    def only(self, chosen: NDArray[np.bool_]) -> Toolpath:
-        """Some of the moves."""
+    def only(self, chosen: ArrayLike) -> Toolpath:
+        """Some of the moves, by a mask (n,) or by their numbers in any order; the arrays are copies."""
+        chosen = np.asarray(chosen)
         arrays = ("kind", "start", "end", "centre", "normal", "sweep", "feed", "spindle", "line", "tool")
         turn = None if self.turn is None else self.turn[chosen]
         return replace(self, **{n: getattr(self, n)[chosen] for n in arrays}, turn=turn)

@@ -71,9 +71,8 @@ def sampled(path: Toolpath, step: float = 2e-3) -> Points:
         raise StiffmapError(f"{path.name}: no move cuts (moves at a feed across the tool)")
     length = path.length[cuts]
     count = np.maximum(1, np.ceil(length / step - 1e-9))
-    arcs = (
-        path.kind[cuts] == Kind.ARC
-    )  # an even number of intervals, and enough for an arc through three of their ends
+    # of arcs an even number of intervals, and enough for an arc through three of their ends
+    arcs = path.kind[cuts] == Kind.ARC
     turns = np.maximum(1, np.ceil(np.abs(path.sweep[cuts]) / (2 * np.pi) - 1e-9))
     count = np.where(arcs, np.maximum(2 * np.ceil(count / 2), 8 * turns), count) + 1
     if count.sum() > MOST:
@@ -90,9 +89,8 @@ def sampled(path: Toolpath, step: float = 2e-3) -> Points:
         turn = path.at(cuts[1:], np.zeros(len(cuts) - 1))[1] - path.at(cuts[:-1], np.ones(len(cuts) - 1))[1]
         bent = turn / ((length[1:] + length[:-1]) / 2)[:, None]
         last, opens = np.cumsum(n) - 1, np.cumsum(n) - n
-        bend[last[1:][smooth]] = bent[
-            smooth
-        ]  # the end of a curve bends like its last joint, its start like its first
+        # the end of a curve bends like its last joint, its start like its first
+        bend[last[1:][smooth]] = bent[smooth]
         bend[opens[:-1][smooth]] = bent[smooth]
         bend[last[:-1][smooth]] = bent[smooth]
         keep[opens[1:][smooth]] = False

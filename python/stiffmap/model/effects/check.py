@@ -8,7 +8,7 @@ from difflib import get_close_matches
 from typing import Any
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.kept import Recent
+from stiffmap.common.kept import Kept
 from stiffmap.model.description import AppliedEffect, MachineDescription
 from stiffmap.model.effects import registry
 from stiffmap.model.effects.types import EffectType, Parameter, Place
@@ -64,13 +64,13 @@ def place_of(
     return element, tuple(n for n in order if n in wanted)
 
 
-_PLACES = Recent[tuple[EffectType, MachineDescription, list[Place]]](256)
+_PLACES = Kept[tuple[int, int], tuple[EffectType, MachineDescription, list[Place]]](256)
 
 
 def _places(effect: EffectType, machine: MachineDescription) -> list[Place]:
     """Where a machine may have an effect; asked once for the last few, since fits add the same effects again and again."""
     key = (id(effect), id(machine))  # both are held, so that their numbers stay theirs
-    return _PLACES.get(key, lambda: (effect, machine, effect.places(machine)))[2]
+    return _PLACES.made(key, lambda: (effect, machine, effect.places(machine)))[2]
 
 
 def _element(effect: EffectType, names: list[str], element: str | None) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,7 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.kept import Recent
+from stiffmap.common.kept import Kept
 from stiffmap.solve.closing import Kinematics
 from stiffmap.solve.compiled import Role, Status
 from stiffmap.solve.kinematics import inverse_kinematics
@@ -34,7 +35,7 @@ class Model:
         """`file`: where the machine was read from, for commands that make the same picture and for reloading."""
         self.file = None if file is None else Path(file)
         self.declared = machine
-        self._machines: Recent[Machine] = Recent(KEPT_MACHINES)
+        self._machines: Kept[Hashable, Machine] = Kept(KEPT_MACHINES)
         home = machine.description.home.p
         first = State((float(home[0]), float(home[1]), float(home[2])), plane=first_plane(machine))
         self.history = History(checked(state) if state else first)
@@ -59,7 +60,7 @@ class Model:
     def _with(self, changes: tuple[tuple[str, float], ...]) -> Machine:
         declared = self.declared
         key = (id(declared), changes)
-        return self._machines.get(key, lambda: changed(declared, dict(changes)))
+        return self._machines.made(key, lambda: changed(declared, dict(changes)))
 
     def _check(self, state: State) -> None:
         k = inverse_kinematics(

@@ -11,10 +11,9 @@ from scipy.stats import t as student
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.machining.process.description import EndMill, Process
-from stiffmap.machining.process.gauss import gauss
 from stiffmap.machining.process.identify.table import ForceTable
-from stiffmap.machining.process.mean import engaged, mean_force, widened
-from stiffmap.machining.process.revolution import mean_basis_with_runout
+from stiffmap.machining.process.mean import mean_force, own_arc
+from stiffmap.machining.process.revolution import gauss, mean_basis_with_runout
 
 NAMES = ("Ktc", "Kte", "Krc", "Kre", "Kac", "Kae")
 REFERENCE = 1e-3
@@ -35,7 +34,7 @@ def straight_basis(p: Process) -> Floats:
 def power_basis(p: Process, exponents: Floats) -> Floats:
     """(3, 3) mean force per unit of three chip pressures K (h / REFERENCE)^-m, tangential, radial, axial (theory.md, M7)."""
     node, weight = gauss(100)
-    first, last = (float(v) for v in engaged(p, widened(p, p.cut.radial)))
+    first, last = own_arc(p)
     phi = first + (last - first) * (node + 1) / 2
     s, c, w = np.sin(phi), np.cos(phi), weight * (last - first) / 2 * p.tool.teeth * p.cut.axial / (2 * np.pi)
     h = p.chip * s

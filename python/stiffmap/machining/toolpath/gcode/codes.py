@@ -103,7 +103,6 @@ class Codes:
         s = self.state
         if value in meaning.PLANES:
             s.plane = meaning.PLANES[value]
-            s.said.add("plane")
         elif value in (20.0, 21.0):
             unit = INCH if value == 20.0 else MM
             if s.unit and s.feed is not None and not s.inverse_time:
@@ -111,17 +110,13 @@ class Codes:
             s.unit = unit
         elif value in (90.0, 91.0):
             s.absolute = value == 90.0
-            s.said.add("distance")
         elif value in (90.1, 91.1):
             s.absolute_centres = value == 90.1
-            s.said.add("centres")
         elif value in (93.0, 94.0):
-            s.said.add("feed mode")
             s.inverse_time, s.feed = value == 93.0, None
         elif value in meaning.OFFSETS:
             s.breaks += s.offset != f"G{value:g}" or "offset" not in s.said
             s.offset = f"G{value:g}"
-            s.said.add("offset")
             if self.offsets and s.offset not in self.offsets:
                 self.fail(f"no work offset {s.offset}; given: {', '.join(self.offsets)}")
         elif value in (4.0, 28.0, 30.0, 43.0, 53.0):
@@ -133,6 +128,8 @@ class Codes:
             )
         elif value in (61.0, 61.1, 64.0):
             self.note(f"G{value:g}: how closely the controller tracks corners is not simulated")
+        if (group := meaning.GROUPS.get(value)) in meaning.STARTS:
+            s.said.add(group)
 
     def _m(self, value: float, turning: bool) -> None:
         if meaning.GROUPS_M.get(value) == "stop":

@@ -52,6 +52,12 @@ def bare(text: str) -> str:
     return (_COMMENT.sub("", text) if "(" in text or ";" in text else text).translate(_BLANKS).upper()
 
 
+def decimal(value: float, digits: int) -> str:
+    """A number to so many decimals, one or more, without zeros at its end."""
+    text = f"{value:.{digits}f}".rstrip("0").rstrip(".")
+    return "0" if text == "-0" else text
+
+
 def fail(file: str, number: int, message: str) -> NoReturn:
     """Raise an error at a line."""
     raise FileError(message, file=file, line=number)

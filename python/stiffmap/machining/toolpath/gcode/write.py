@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from math import nan
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from stiffmap.common.broadcasting import Floats
 from stiffmap.machining.toolpath.gcode.read import Reader, read_moves
 from stiffmap.machining.toolpath.gcode.state import AXES, CENTRES, INCH, STARTS, State
-from stiffmap.machining.toolpath.gcode.words import bare, plain, tokens_of
+from stiffmap.machining.toolpath.gcode.words import bare, decimal, plain, tokens_of
 from stiffmap.machining.toolpath.path import Kind, Toolpath
 from stiffmap.machining.toolpath.pieces import MovedPiece
 
@@ -72,24 +72,16 @@ def rewritten(
         machine = "G53" in plainly
         shift = np.zeros(3) if machine else np.array(reader.offsets.get(state.offset, (0.0, 0.0, 0.0)))
         asked = np.array([i in pieces or any(t[0] == a for t in tokens) for a in AXES])
-        lines = []
-        for piece, start in _with_starts(new, written):
-            words, written, named = _words(
-                state,
-                path,
-                i,
-                piece,
-                written,
-                shift,
-                machine,
-                asked & ~held if state.absolute else asked & False,
-            )
+        lines, start = [], written
+        for piece in new:
+            needed = asked & ~held & state.absolute
+            words, written, named = _words(state, path, i, piece, written, shift, machine, needed)
             # without its offset a position in the axes of the machine says nothing in those of the part
             held = (held | (named & state.absolute)) & ~(named & (machine and not reader.offsets))
             if np.isfinite(piece.turn) and not abs(piece.turn - turned) <= SAME_TURN:
                 before = 0.0 if state.absolute or np.isnan(turned) else turned
                 angle = round(float(np.degrees(piece.turn - before)), 5)
-                words += f" C{_number(angle, 5)}"
+                words += f" C{decimal(angle, 5)}"
                 turned = before + float(np.radians(angle))
             feed = ""
             if path.kind[i] != Kind.RAPID:
@@ -98,11 +90,12 @@ def rewritten(
                     driven = (nan, 0.0)
                     size = _size(piece, start)
                     rate = 60 * speed[i] / size if speed[i] > 0 and size > 0 else state.feed or 1.0
-                    feed = f" F{_number(rate, 6)}"
+                    feed = f" F{decimal(rate, 6)}"
                 elif feeds is not None and now != driven:
-                    feed, driven = f" F{_number(60 * speed[i] / state.unit, 3)}", now
+                    feed, driven = f" F{decimal(60 * speed[i] / state.unit, 3)}", now
             lines.append(words + feed)
             origin.append(i)
+            start = piece.end
         out += _lines(tokens, lines, state.inverse_time or feeds is not None)
     return "\n".join(out) + "\n", origin
 
@@ -115,12 +108,6 @@ def _starts(path: Toolpath) -> str:
     if not (path.kind == Kind.ARC).any():
         silent = [w for w in silent if w not in ("G17", "G91.1")]
     return " ".join(w for w in silent if w != "G54" or path.offsets)
-
-
-def _with_starts(pieces: Sequence[MovedPiece], start: Floats) -> Iterator[tuple[MovedPiece, Floats]]:
-    for piece in pieces:
-        yield piece, start
-        start = piece.end
 
 
 def _size(piece: MovedPiece, start: Floats) -> float:
@@ -161,17 +148,16 @@ def _words(
     words = ["G53", code] if machine else [code]
     changed = needed | (np.abs(now - written) > 0.5 * 10.0**-digits * state.unit)
     if piece.kind == Kind.ARC:
-        flat = [a for a in range(3) if a != plane]
-        changed[flat] = True
+        changed[[a for a in range(3) if a != plane]] = True
     if not changed.any():
         changed[:] = True
-    words += [f"{AXES[a]}{_number(values[a], digits)}" for a in range(3) if changed[a]]
+    words += [f"{AXES[a]}{decimal(values[a], digits)}" for a in range(3) if changed[a]]
     now = np.where(changed, now, written)
     if piece.kind == Kind.ARC:
         origin = shift if state.absolute_centres else written
         for word in CENTRES[plane]:
             a = "IJK".index(word)
-            words.append(f"{word}{_number((piece.centre[a] - origin[a]) / state.unit, digits)}")
+            words.append(f"{word}{decimal((piece.centre[a] - origin[a]) / state.unit, digits)}")
     return " ".join(words), now, changed
 
 
@@ -197,8 +183,3 @@ def _lines(tokens: list[str], pieces: list[str], feed: bool) -> list[str]:
         comment = next((k for k, t in enumerate(own) if k >= placed and t[0] in "(;"), len(own))
         out = [" ".join([*own[:placed], pieces[0], *own[placed:comment], *stops, *own[comment:]])]
     return ["/" + line for line in out] if "/" in tokens else out
-
-
-def _number(value: float, digits: int) -> str:
-    text = f"{value:.{digits}f}".rstrip("0").rstrip(".")
-    return "0" if text in ("-0", "") else text
