@@ -26,6 +26,7 @@ from stiffmap.model.description import (
 )
 from stiffmap.model.effects import apply_records
 from stiffmap.model.effects.edit import built as as_built
+from stiffmap.model.effects.edit import shifted
 from stiffmap.model.effects.library.geometry import about, home_position
 
 FRAME = ("x", "y", "z", "rx", "ry", "rz")
@@ -101,9 +102,7 @@ def _changed(e: Element, change: Mapping[str, Any]) -> Element:
 
 def _length(e: Element, by: float) -> Element:
     assert isinstance(e, Offset)
-    now = e.actual or e.nominal
-    along = e.nominal.p / np.linalg.norm(e.nominal.p)
-    return replace(e, actual=Pose.of(now.p + by * along, now.r))
+    return shifted(e, by * (e.nominal.p / np.linalg.norm(e.nominal.p)))
 
 
 def _with_error(e: Element, error: CommandError) -> Element:

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from stiffmap.model.description import MachineDescription, Offset, Pose
 from stiffmap.model.description.tree import Elements
-from stiffmap.model.effects.edit import built, splice
+from stiffmap.model.effects.edit import built, edit_chains, splice
 from stiffmap.model.effects.library.geometry import names_of, rotation_of, rotations
 from stiffmap.model.effects.sites import per_leg
 from stiffmap.model.effects.types import EffectType, Parameter, Placed
@@ -22,11 +20,7 @@ def apply(description: MachineDescription, placed: Placed) -> MachineDescription
         i = next((i for i, e in enumerate(elements) if not isinstance(e, Offset)), 0)
         return splice(elements, i, (turn, elements[i]))
 
-    legs = tuple(
-        replace(leg, elements=tilted(leg.elements)) if leg.name in placed.legs else leg
-        for leg in description.legs
-    )
-    return replace(description, legs=legs)
+    return edit_chains(description, placed.legs, tilted)
 
 
 EFFECT = EffectType(

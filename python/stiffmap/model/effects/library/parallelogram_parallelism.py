@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from stiffmap.model.description import Block, Branch, Joint, MachineDescription, Pose
+from stiffmap.model.description import Branch, Joint, MachineDescription, Pose
 from stiffmap.model.effects.edit import built, splice
 from stiffmap.model.effects.library.bars import change_branches, spread_blocks
 from stiffmap.model.effects.library.geometry import names_of, rotation_of, rotations
@@ -16,11 +16,7 @@ PARAMETERS: tuple[Parameter, ...] = rotations("angle of the second pin against t
 
 def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
     """Half of the angle on each pin; only the pins' directions change."""
-
-    def change(block: Block, b: Branch, share: float) -> Branch:
-        return _turned(b, placed, share)
-
-    return change_branches(description, placed, change)
+    return change_branches(description, placed, lambda block, b, share: _turned(b, placed, share))
 
 
 def _turned(b: Branch, placed: Placed, share: float) -> Branch:
