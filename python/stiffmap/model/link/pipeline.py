@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.model.link.arrays import Floats, Ints
+from stiffmap.model.link.arrays import Floats, Ints, standard_errors
 from stiffmap.model.link.calculix import has_ccx, solve_ccx
 from stiffmap.model.link.identify import identify_link
 from stiffmap.model.link.linkfile import LinkFile
@@ -32,8 +32,7 @@ class Budget:
 
     def standard_error(self, source: str | None = None) -> Floats:
         """(6, 6) standard uncertainty of one source, or of all."""
-        V = self.total if source is None else self.parts[source]
-        return np.sqrt(np.maximum(np.diag(V), 0.0)).reshape(6, 6)
+        return standard_errors(self.total if source is None else self.parts[source])
 
     def table(self, compliance: Floats) -> str:
         """Relative standard uncertainty of the diagonal entries, a line per source."""
@@ -194,17 +193,14 @@ def _region_covariance(
     corners = np.unique(mesh.face(setup.loaded)[:, :3])
     far = np.linalg.norm(mesh.nodes[nodes] - setup.reference, axis=1)
     choices: Sequence[Ints] = (corners, nodes[far <= np.median(far)])
-    found = [
-        _identify(mesh, c, field, setup, wrenches).compliance for c in choices if _is_spread(mesh.nodes[c])
-    ]
+    found = []
+    for c in choices:
+        s = np.linalg.svd(mesh.nodes[c] - mesh.nodes[c].mean(axis=0), compute_uv=False)
+        if len(c) > 8 and s[1] > 0.05 * s[0]:  # enough nodes, not along one line
+            found.append(_identify(mesh, c, field, setup, wrenches).compliance)
     motion = mean_motion(mesh, setup.loaded, setup.reference, field)
     weighted = np.linalg.lstsq(wrenches, motion, rcond=None)[0].T
     return shift_covariance([C - link.compliance for C in [*found, (weighted + weighted.T) / 2]])
-
-
-def _is_spread(points: Floats) -> bool:
-    s = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-    return len(points) > 8 and bool(s[1] > 0.05 * s[0])
 
 
 def _refined(
