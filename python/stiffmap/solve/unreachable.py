@@ -106,11 +106,7 @@ def _beyond(machine: Machine, coordinates: Floats) -> list[str]:
     out, named = [], joints(machine.description)
     for name, value in zip(machine.compiled.names.coordinates, coordinates, strict=True):
         joint = named.get(name)
-        ends = (
-            None
-            if joint is None
-            else (joint.drive.range if joint.drive and joint.drive.range else joint.limits)
-        )
+        ends = None if joint is None else joint.ends
         if joint is None or ends is None or ends[0] <= value <= ends[1]:
             continue
         unit, factor = ("mm", 1e3) if joint.kind == "prismatic" else ("deg", float(np.rad2deg(1.0)))

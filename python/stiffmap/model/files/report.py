@@ -25,12 +25,7 @@ def validated(model: type[M], document: Document, file: str, expected: str) -> M
     try:
         return model.model_validate(document.data)
     except ValidationError as error:
-        raise file_error(error, document, file) from error
-
-
-def file_error(error: ValidationError, document: Document, file: str) -> FileError:
-    """All of pydantic's errors."""
-    return together([_one(e, document, file) for e in error.errors(include_url=False)])
+        raise together([_one(e, document, file) for e in error.errors(include_url=False)]) from error
 
 
 def _one(error: Any, document: Document, file: str) -> FileError:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -76,7 +76,7 @@ class PartLink:
     material: Material
     setup: Setup
 
-    def file(self, name: str, provenance: dict[str, Any] | None = None) -> LinkFile:
+    def file(self, name: str) -> LinkFile:
         """The link file: compliance, total covariance, and where both come from."""
         source = {
             "mesh": {
@@ -94,9 +94,7 @@ class PartLink:
             "standard_error": {k: self.budget.standard_error(k).tolist() for k in self.budget.parts},
         }  # fmt: skip
         C = self.link.compliance
-        return LinkFile(
-            (C + C.T) / 2, self.budget.total, self.link.reference, source | (provenance or {}), name
-        )
+        return LinkFile((C + C.T) / 2, self.budget.total, self.link.reference, source, name)
 
 
 def link_from_part(
