@@ -24,6 +24,7 @@ from stiffmap.model.description import (
     Pose,
     Spring,
 )
+from stiffmap.model.description.strokes import as_rows
 from stiffmap.model.effects import apply_records
 from stiffmap.model.effects.edit import built as as_built
 from stiffmap.model.effects.edit import shifted
@@ -123,9 +124,8 @@ def _compliance(e: Element, by: float) -> Element:
         return replace(e, law=replace(e.law, stiffness=e.law.stiffness / factor))
     assert isinstance(e, Spring)
     if e.compliance is not None:
-        return replace(e, compliance=tuple(tuple(v * factor for v in row) for row in e.compliance))
-    assert e.stiffness is not None
-    return replace(e, stiffness=tuple(tuple(v / factor for v in row) for row in e.stiffness))
+        return replace(e, compliance=as_rows(np.array(e.compliance) * factor))
+    return replace(e, stiffness=as_rows(np.array(e.stiffness) / factor))
 
 
 def _mass(e: Element, by: float) -> Element:
