@@ -11,6 +11,7 @@ import numpy as np
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.link.arrays import Floats, Ints, standard_errors
 from stiffmap.model.link.calculix import has_ccx, solve_ccx
+from stiffmap.model.link.checks import spread
 from stiffmap.model.link.identify import identify_link
 from stiffmap.model.link.linkfile import LinkFile
 from stiffmap.model.link.mesh import SolidMesh
@@ -56,6 +57,7 @@ def shift_covariance(shifts: list[Floats]) -> Floats:
 
 Solver = Literal["auto", "ccx", "skfem"]
 Support = Literal["bed", "soft"]
+Solve = Callable[[SolidMesh, Material, Setup, Floats], Floats]
 COARSER = (2.0, 1.41)  # sizes of the refinement study over the finest
 COARSE_ENOUGH = 1.05
 FEWEST_PATCHES = 16  # a bootstrap over fewer says little
@@ -136,7 +138,14 @@ def link_from_part(
         "fit": _fit_covariance(link, wrenches),
         "region": _region_covariance(mesh, nodes, field, setup, wrenches, link),
     }
-    refinement = _refined(mesher, mesh, material, setup, wrenches, solve, link) if refine else None
+
+    def another(m: SolidMesh, s: Setup, by: Solve) -> Floats:
+        """Compliance (6, 6) on another mesh, or of a part that is held or loaded otherwise."""
+        return _identify(m, m.face_nodes(s.loaded), by(m, material, s, wrenches), s, wrenches).compliance
+
+    refinement = None
+    if refine:
+        refinement = _refined(mesher, mesh, lambda m: another(m, setup, solve), link.compliance)
     if refinement is not None:
         shift = np.where(
             refinement.estimate == link.compliance, refinement.error, refinement.estimate - link.compliance
@@ -144,11 +153,7 @@ def link_from_part(
         parts["mesh"] = shift_covariance([shift])
     if study:
         others = (setup._replace(head="rigid"), setup._replace(support=other_support))
-        shifts = [
-            _identify(mesh, nodes, solve_skfem(mesh, material, s, wrenches), s, wrenches).compliance
-            - link.compliance
-            for s in others
-        ]
+        shifts = [another(mesh, s, solve_skfem) - link.compliance for s in others]
         # Head and support are two questions: their shares add.
         parts["boundary"] = np.sum([shift_covariance([s]) for s in shifts], axis=0)
     return PartLink(link, Budget(parts), refinement, mesh, nodes, field, wrenches, chosen, material, setup)
@@ -193,7 +198,7 @@ def _region_covariance(
     choices: Sequence[Ints] = (corners, nodes[far <= np.median(far)])
     found = []
     for c in choices:
-        s = np.linalg.svd(mesh.nodes[c] - mesh.nodes[c].mean(axis=0), compute_uv=False)
+        s = spread(mesh.nodes[c])
         if len(c) > 8 and s[1] > 0.05 * s[0]:  # enough nodes, not along one line
             found.append(_identify(mesh, c, field, setup, wrenches).compliance)
     motion = mean_motion(mesh, setup.loaded, setup.reference, field)
@@ -204,11 +209,8 @@ def _region_covariance(
 def _refined(
     mesher: Callable[[float | None], SolidMesh],
     finest: SolidMesh,
-    material: Material,
-    setup: Setup,
-    wrenches: Floats,
-    solve: Callable[[SolidMesh, Material, Setup, Floats], Floats],
-    link: Link,
+    compliance_on: Callable[[SolidMesh], Floats],
+    compliance: Floats,
 ) -> Refinement:
     meshes = [mesher(factor * finest.size()) for factor in COARSER]
     # A thin part keeps its elements small whatever is asked: only meshes that came out coarser count.
@@ -220,11 +222,5 @@ def _refined(
             f"refinement: elements of {1e3 * finest.size():.3g} mm are as large as the part allows; choose a "
             "smaller --size, or --quick without the mesh's share of the uncertainty"
         )
-    found = [
-        _identify(
-            m, m.face_nodes(setup.loaded), solve(m, material, setup, wrenches), setup, wrenches
-        ).compliance
-        for m in distinct
-    ]
     sizes = np.array([m.size() for m in [*distinct, finest]])
-    return richardson(sizes, np.array([*found, link.compliance]))
+    return richardson(sizes, np.array([*map(compliance_on, distinct), compliance]))

@@ -127,14 +127,10 @@ def node_patches(points: Floats, patches: int) -> Ints:
     order = np.lexsort(points.T)
     groups = [order]
     while 2 * len(groups) <= patches:
-        groups = [half for g in groups for half in _halves(points, g)]
+        sides = [int(np.argmax(np.ptp(points[g], axis=0))) for g in groups]
+        ranked = [g[np.argsort(points[g, i], kind="stable")] for g, i in zip(groups, sides, strict=True)]
+        groups = [half for g in ranked for half in (g[: len(g) // 2], g[len(g) // 2 :])]
     label = np.empty(len(points), dtype=np.int64)
     for number, group in enumerate(groups):
         label[group] = number
     return label
-
-
-def _halves(points: Floats, group: Ints) -> tuple[Ints, Ints]:
-    axis = int(np.argmax(np.ptp(points[group], axis=0)))
-    ranked = group[np.argsort(points[group, axis], kind="stable")]
-    return ranked[: len(ranked) // 2], ranked[len(ranked) // 2 :]

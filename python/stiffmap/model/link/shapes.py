@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from stiffmap.model.link.arrays import Floats
-from stiffmap.model.link.gmshmesh import Faces, mesh_model
+from stiffmap.model.link.gmshmesh import Faces, mesh_model, with_others
 from stiffmap.model.link.mesh import SolidMesh
 
 Length = Field(gt=0)
@@ -223,8 +223,7 @@ def _end_faces(gmsh: Any, axis: int, fixed: float, loaded: float) -> Faces:
         for name, place in (("fixed", fixed), ("loaded", loaded)):
             if flat and abs(low - place) < 1e-3:
                 names[name].append(tag)
-    used = {t for tags in names.values() for t in tags}
-    return names | {f"face{t}": [t] for _, t in gmsh.model.getEntities(2) if t not in used}
+    return with_others(gmsh, names)
 
 
 def _hole_faces(gmsh: Any) -> list[tuple[int, float]]:
