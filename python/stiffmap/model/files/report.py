@@ -69,7 +69,8 @@ def _message(error: Any) -> str:
     if kind == "finite_number":
         return f"expected a finite number; found {found}"
     if kind == "literal_error":
-        near = suggestion(str(found), _choices(context))
+        choices = str(context["expected"]).replace(" or ", ",").split(",")
+        near = suggestion(str(found), [choice.strip(" '") for choice in choices])
         return f"expected {context['expected']}; found {describe(found)}{near}"
     if kind == "string_pattern_mismatch":
         return f"a name has letters, digits, '_' and '-' only; found {describe(found)}"
@@ -80,7 +81,3 @@ def _message(error: Any) -> str:
         sorts = {"list": "a list", "dict": "a mapping", "string": "text", "bool": "true or false"}
         return f"expected {sorts.get(kind.removesuffix('_type'), 'a number')}; found {describe(found)}"
     return str(context["error"] if kind == "value_error" else error["msg"])
-
-
-def _choices(context: dict[str, Any]) -> list[str]:
-    return [part.strip(" '") for part in str(context["expected"]).replace(" or ", ",").split(",")]
