@@ -30,14 +30,8 @@ class Section(NamedTuple):
     about_height: float
 
 
-def round_section(diameter: float) -> Section:
-    """Solid circle."""
-    second = math.pi * diameter**4 / 64
-    return Section(math.pi * diameter**2 / 4, 2 * second, second, second)
-
-
-def tube_section(outer: float, inner: float) -> Section:
-    """Circular tube of outer and inner diameter."""
+def tube_section(outer: float, inner: float = 0.0) -> Section:
+    """Circular tube of outer and inner diameter; solid without the inner one."""
     second = math.pi * (outer**4 - inner**4) / 64
     return Section(math.pi * (outer**2 - inner**2) / 4, 2 * second, second, second)
 
@@ -90,7 +84,7 @@ def cantilever_compliance(
 
 
 SECTIONS: dict[str, tuple[tuple[str, ...], Callable[..., Section]]] = {
-    "round": (("diameter",), round_section),
+    "round": (("diameter",), tube_section),
     "tube": (("outer", "inner"), tube_section),
     "rectangle": (("width", "height"), rectangle_section),
     "hollow": (("width", "height", "wall"), hollow_section),

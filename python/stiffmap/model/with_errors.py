@@ -24,8 +24,10 @@ from stiffmap.model.description import (
     Pose,
     Spring,
 )
+from stiffmap.model.description.strokes import as_rows
 from stiffmap.model.effects import apply_records
 from stiffmap.model.effects.edit import built as as_built
+from stiffmap.model.effects.edit import shifted
 from stiffmap.model.effects.library.geometry import about, home_position
 
 FRAME = ("x", "y", "z", "rx", "ry", "rz")
@@ -101,9 +103,7 @@ def _changed(e: Element, change: Mapping[str, Any]) -> Element:
 
 def _length(e: Element, by: float) -> Element:
     assert isinstance(e, Offset)
-    now = e.actual or e.nominal
-    along = e.nominal.p / np.linalg.norm(e.nominal.p)
-    return replace(e, actual=Pose.of(now.p + by * along, now.r))
+    return shifted(e, by * (e.nominal.p / np.linalg.norm(e.nominal.p)))
 
 
 def _with_error(e: Element, error: CommandError) -> Element:
@@ -124,9 +124,8 @@ def _compliance(e: Element, by: float) -> Element:
         return replace(e, law=replace(e.law, stiffness=e.law.stiffness / factor))
     assert isinstance(e, Spring)
     if e.compliance is not None:
-        return replace(e, compliance=tuple(tuple(v * factor for v in row) for row in e.compliance))
-    assert e.stiffness is not None
-    return replace(e, stiffness=tuple(tuple(v / factor for v in row) for row in e.stiffness))
+        return replace(e, compliance=as_rows(np.array(e.compliance) * factor))
+    return replace(e, stiffness=as_rows(np.array(e.stiffness) / factor))
 
 
 def _mass(e: Element, by: float) -> Element:

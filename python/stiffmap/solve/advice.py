@@ -100,10 +100,9 @@ def _limits(machine: Machine) -> Iterator[str]:
     for name, e in all_elements(machine.description):
         if not isinstance(e, Joint) or len(e.home) != 1:
             continue
-        ends = (e.drive.range if e.drive else None) or e.limits
-        if ends is None:
+        if e.ends is None:
             continue
-        share = (e.home[0] - ends[0]) / (ends[1] - ends[0])
+        share = (e.home[0] - e.ends[0]) / (e.ends[1] - e.ends[0])
         if not 0.01 <= share <= 0.99:
             yield f"{name}: home lies {'outside' if not 0 <= share <= 1 else 'at the end'} of its range"
 
@@ -130,12 +129,12 @@ def _numbers(machine: Machine, path: str | PathLike[str]) -> Iterator[str]:
     if not {"length", "force"} <= set(units):
         return
     pascal = float(FORCES[units["force"]]) / float(LENGTHS[units["length"]]) ** 2
-    for key, part in _parts(data, ""):
-        modulus = _plain(part.get("E"))
+    for key, part in _walk(data, ""):
+        modulus = _plain(part.get("E")) if isinstance(part, dict) else None
         if modulus is not None and not SOLID[0] <= pascal * modulus <= SOLID[1]:
             unit = f"{units['force']}/{units['length']}²"
             yield f"{key}.E = {modulus:g} {unit} is no solid (steel: {2.1e11 / pascal:.3g} {unit})"
-    for key, sequence in _sequences(data, ""):
+    for key, sequence in _sequences(data):
         yield from _long_beams(key, sequence)
 
 
@@ -159,7 +158,7 @@ def _rams(machine: Machine, path: str | PathLike[str]) -> Iterator[str]:
     description = machine.description
     if any(isinstance(e, Joint) and not e.actuated for _, e in all_elements(description)):
         return
-    for key, sequence in _sequences(read(find(path)).data, ""):
+    for key, sequence in _sequences(read(find(path)).data):
         slide: tuple[str, Floats] | None = None
         for e in sequence:
             if e.get("kind") == "prismatic":
@@ -196,20 +195,16 @@ def _plain(value: Any) -> float | None:
     return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else None
 
 
-def _parts(data: Any, key: str) -> Iterator[tuple[str, dict[str, Any]]]:
-    if isinstance(data, dict):
-        yield key, data
-    for name, value in (
-        data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ()
-    ):
-        yield from _parts(value, f"{key}.{name}".strip("."))
+def _walk(data: Any, key: str) -> Iterator[tuple[str, Any]]:
+    """A file's data and everything in it, each with its key."""
+    yield key, data
+    inside = data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ()
+    for name, value in inside:
+        yield from _walk(value, f"{key}.{name}".strip("."))
 
 
-def _sequences(data: Any, key: str) -> Iterator[tuple[str, list[Any]]]:
-    for name, value in (
-        data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ()
-    ):
-        inner = f"{key}.{name}".strip(".")
+def _sequences(data: Any) -> Iterator[tuple[str, list[Any]]]:
+    """Lists of mappings, such as those of elements."""
+    for key, value in _walk(data, ""):
         if isinstance(value, list) and value and all(isinstance(v, dict) for v in value):
-            yield inner, value
-        yield from _sequences(value, inner)
+            yield key, value

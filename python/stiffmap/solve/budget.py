@@ -14,7 +14,7 @@ from stiffmap.common.html import table, titled
 from stiffmap.common.short import short_repr
 from stiffmap.model.description import Cable
 from stiffmap.model.description.sources import in_words, source_of
-from stiffmap.model.description.tree import joints
+from stiffmap.model.description.tree import joint_of, joints
 from stiffmap.solve.compiled import Role, Status
 from stiffmap.solve.machine import Machine, metres_expected, takes_machine
 from stiffmap.solve.options import SolveKeywords, options_of
@@ -198,17 +198,12 @@ def _unit_reactions(
 def _elements(machine: Machine) -> tuple[tuple[str, ...], list[list[int]]]:
     """Full names and the coordinates of what can deflect; free joints are none."""
     names = machine.compiled.names
+    named = joints(machine.description)
     parts: dict[str, list[int]] = {}
     for i, (name, role) in enumerate(zip(names.coordinates, names.roles, strict=True)):
         element = name.rpartition(".")[0] if role == Role.SPRING else name
-        if role == Role.PASSIVE and not _elastic(machine, name):
+        joint = joint_of(named, name)
+        if role == Role.PASSIVE and (joint is None or joint.law is None):
             continue
         parts.setdefault(element, []).append(i)
     return tuple(parts), list(parts.values())
-
-
-def _elastic(machine: Machine, name: str) -> bool:
-    return any(
-        j.law is not None and (name == n or name.rpartition(".")[0] == n)
-        for n, j in joints(machine.description).items()
-    )

@@ -14,7 +14,7 @@ from stiffmap.model.files.load import load_description
 from stiffmap.model.files.shipped import find
 from stiffmap.model.home import Gap, gap_text
 from stiffmap.solve.compiled import CompiledMachine
-from stiffmap.solve.home_changes import HomeChange, home_changes
+from stiffmap.solve.redesign import HomeChange, home_changes
 
 GAP_LIMIT, TURN_LIMIT = 1e-4, 1e-3
 """Gap of the home over the size of the machine, and rad, beyond which a number was probably mistyped; the

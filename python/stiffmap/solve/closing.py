@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,11 +10,14 @@ import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from stiffmap.common.broadcasting import Floats, batch, rows, thread_count, trailing
+from stiffmap.common.errors import StiffmapError
 from stiffmap.common.rotations import as_rotations
 from stiffmap.common.short import short_repr
-from stiffmap.solve.branches import Start, start_coordinates
 from stiffmap.solve.compiled import CompiledMachine
 from stiffmap.solve.results import OverPoses
+
+Start = ArrayLike | Mapping[str, ArrayLike]
+"""Coordinates (..., coordinates) as `Solution.coordinates` has them, or joint name -> (...) m or rad."""
 
 
 @short_repr
@@ -55,9 +59,7 @@ def close_poses(
 ) -> Kinematics:
     """See `stiffmap.inverse_kinematics`."""
     p, r = commanded(machine, position, rotation)
-    x = None if start is None else start_coordinates(machine, start)
-    shape = batch(p.shape[:-1], r.shape[:-2], *(() if x is None else (x.shape[:-1],)))
-    from_x = None if x is None else rows(x, shape, x.shape[-1:])
+    shape, from_x = _started(machine, start, p.shape[:-1], r.shape[:-2])
     out = machine.close_poses(rows(p, shape, (3,)), rows(r, shape, (3, 3)), thread_count(threads), from_x)
     return _kinematics(machine, out, shape)
 
@@ -68,9 +70,7 @@ def close_actuators(
     """See `stiffmap.forward_kinematics`."""
     n = len(machine.names.actuators)
     a = trailing(actuators, (n,), "actuators", f"{n} actuator coordinates")
-    x = None if start is None else start_coordinates(machine, start)
-    shape = batch(a.shape[:-1], *(() if x is None else (x.shape[:-1],)))
-    from_x = None if x is None else rows(x, shape, x.shape[-1:])
+    shape, from_x = _started(machine, start, a.shape[:-1])
     of_joints = rows(a, shape, (n,)) @ np.linalg.inv(machine.coupling).T
     out = machine.close_actuators(of_joints, thread_count(threads), from_x)
     return _kinematics(machine, out, shape)
@@ -80,6 +80,35 @@ def of_drives(machine: CompiledMachine, coordinates: Floats) -> Floats:
     """(..., actuators) what the controller shows of all joint coordinates (..., coordinates)."""
     index = [machine.names.joints[a] for a in machine.names.actuators]
     return np.asarray(coordinates[..., index] @ machine.coupling.T)
+
+
+def start_coordinates(machine: CompiledMachine, start: Start) -> Floats:
+    """(..., coordinates): joints that a mapping leaves out are as at home; StiffmapError for an unknown joint."""
+    names = machine.names
+    n = len(names.coordinates)
+    if not isinstance(start, Mapping):
+        return trailing(start, (n,), "start", f"{n} coordinates or joint name -> value")
+    values = {}
+    for name, value in start.items():
+        if name not in names.joints:
+            raise StiffmapError(f"start: expected joints among {', '.join(names.joints)}, got {name!r}")
+        values[name] = trailing(value, (), f"start[{name!r}]", "numbers (m or rad)")
+    shape = np.broadcast_shapes(*(v.shape for v in values.values()))
+    out = np.tile(machine.home_coordinates(), (*shape, 1))
+    for name, v in values.items():
+        out[..., names.joints[name]] = v
+    return out
+
+
+def _started(
+    machine: CompiledMachine, start: Start | None, *shapes: tuple[int, ...]
+) -> tuple[tuple[int, ...], Floats | None]:
+    """The batch shape of all that is given, and the rows (n, coordinates) to start from."""
+    if start is None:
+        return batch(*shapes), None
+    x = start_coordinates(machine, start)
+    shape = batch(*shapes, x.shape[:-1])
+    return shape, rows(x, shape, x.shape[-1:])
 
 
 def _kinematics(machine: CompiledMachine, out: tuple[Any, ...], shape: tuple[int, ...]) -> Kinematics:

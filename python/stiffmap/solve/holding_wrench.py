@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from stiffmap.common.broadcasting import Floats, batch, rows, thread_count, trailing
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.rotations import as_rotations
 from stiffmap.common.short import short_repr
+from stiffmap.solve.closing import commanded
 from stiffmap.solve.compiled import CompiledMachine, Status
 from stiffmap.solve.results import OverPoses
 
@@ -58,43 +58,14 @@ def holding_wrench(
     machine: CompiledMachine,
     position: ArrayLike,
     displacement: ArrayLike,
-    *,
-    rotation: ArrayLike | None = None,
-    point: str = "tcp",
-    gravity: ArrayLike | None = None,
-    threads: int | None = None,
+    rotation: ArrayLike | None,
+    point: str,
+    gravity: ArrayLike | None,
+    threads: int | None,
 ) -> HoldingWrench:
-    """Wrenches and stiffness of a machine whose `point` is held off its commanded pose.
-
-    Parameters
-    ----------
-    position
-        (..., 3) m, commanded TCP, base axes.
-    displacement
-        (..., 6) m, rad: of the point from where the command puts it; rotation as a rotation vector.
-    rotation
-        (..., 3, 3), commanded orientation; None: as at home.
-    point
-        Named point that is held; a free one is not touched.
-    gravity
-        (3,) m/s², base axes; None: what the machine file says.
-
-    Notes
-    -----
-    Loaded equilibrium, not stiffness times displacement. A displacement that rigid parts forbid is
-    NOT_CONVERGED.
-
-    Raises
-    ------
-    StiffmapError
-        For bad input.
-    """
-    p = trailing(position, (3,), "position", "positions (m)")
+    """See `Machine.wrench`."""
+    p, r = commanded(machine, position, rotation)
     d = trailing(displacement, (6,), "displacement", "displacements [dx dy dz rx ry rz] (m, rad)")
-    r = trailing(
-        machine.home_rotation if rotation is None else rotation, (3, 3), "rotation", "rotation matrices"
-    )
-    r = as_rotations(r)
     if point not in machine.names.points:
         raise StiffmapError(f"point: expected one of {', '.join(machine.names.points)}, got {point!r}")
     shape = batch(p.shape[:-1], d.shape[:-1], r.shape[:-2])

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from stiffmap.common.broadcasting import Floats, real_array, rows, thread_count
 from stiffmap.common.short import short_repr
-from stiffmap.model.description.tree import joints
+from stiffmap.model.description.tree import joint_of, joints
 from stiffmap.solve.machine import Machine, takes_machine
 from stiffmap.solve.results import OverPoses
 
@@ -80,7 +80,9 @@ def assembly_wrenches(
         threads=thread_count(threads),
     )
     force = force.reshape((*shape, force.shape[-1]))
-    elastic = {n: i for n, i in s.joint_index.items() if n in machine.actuators or _has_law(machine, n)}
+    named = joints(machine.description)
+    sprung = {n for n in s.joint_index if (joint := joint_of(named, n)) is not None and any(joint.laws)}
+    elastic = {n: i for n, i in s.joint_index.items() if n in machine.actuators or n in sprung}
     return InternalWrenches(
         springs={n: force[..., i : i + 6] for n, i in s.spring_index.items()},
         joints={n: force[..., i] for n, i in elastic.items()},
@@ -89,11 +91,4 @@ def assembly_wrenches(
         status=s.status,
         flags=s.flags,
         point=point,
-    )
-
-
-def _has_law(machine: Machine, name: str) -> bool:
-    return any(
-        any(j.laws) and (name == n or name.rpartition(".")[0] == n)
-        for n, j in joints(machine.description).items()
     )

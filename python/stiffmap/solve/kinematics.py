@@ -9,8 +9,7 @@ from scipy.spatial.transform import Rotation
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.description import TASK
-from stiffmap.solve.branches import Start
-from stiffmap.solve.closing import Kinematics, close_actuators, close_poses
+from stiffmap.solve.closing import Kinematics, Start, close_actuators, close_poses
 from stiffmap.solve.compiled import Status
 from stiffmap.solve.machine import Machine, hint_metres, takes_machine
 

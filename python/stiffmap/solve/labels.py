@@ -61,44 +61,27 @@ def solution_dataset(s: Any, dims: Sequence[str] | None, coords: Mapping[str, An
 
     b = batch_dims(s.status.ndim, dims)
     displacement = s.displacement
-    data: dict[str, Any] = {
-        "displacement": ((*b, "component"), displacement, meaning(TWIST_UNITS, f"displacement of {s.point}")),
+    twist, wrench = ("component",), ("wrench_component",)
+    effort = meaning("N or N m", "drive on the leg, positive along the coordinate")
+    own: dict[str, Any] = {
+        "displacement": (twist, displacement, meaning(TWIST_UNITS, f"displacement of {s.point}")),
         "deflection": (
-            b,
+            (),
             np.linalg.norm(displacement[..., :3], axis=-1),
             meaning("m", "norm of the translation"),
         ),
-        "stiffness": (
-            (*b, "wrench_component", "component"),
-            s.stiffness,
-            meaning(STIFFNESS_UNITS, "loaded stiffness"),
-        ),
-        "compliance": (
-            (*b, "component", "wrench_component"),
-            s.compliance,
-            meaning(COMPLIANCE_UNITS, "loaded compliance"),
-        ),
-        "status": (b, s.status, status_attrs("the pose under its load")),
-        "flags": (b, s.flags, flag_attrs()),
-        "iterations": (b, s.iterations, meaning("1", "Newton iterations")),
-        "actuator_effort": (
-            (*b, "actuator"),
-            s.actuator_effort,
-            meaning("N or N m", "drive on the leg, positive along the coordinate"),
-        ),
-        "leg_wrench": (
-            (*b, "leg", "wrench_component"),
-            s.leg_wrench,
-            meaning(WRENCH_UNITS, "leg on platform"),
-        ),
-        "coordinates": (
-            (*b, "coordinate"),
-            s.coordinates,
-            meaning("m or rad", "joint and spring coordinates"),
-        ),
+        "stiffness": (wrench + twist, s.stiffness, meaning(STIFFNESS_UNITS, "loaded stiffness")),
+        "compliance": (twist + wrench, s.compliance, meaning(COMPLIANCE_UNITS, "loaded compliance")),
+        "status": ((), s.status, status_attrs("the pose under its load")),
+        "flags": ((), s.flags, flag_attrs()),
+        "iterations": ((), s.iterations, meaning("1", "Newton iterations")),
+        "actuator_effort": (("actuator",), s.actuator_effort, effort),
+        "leg_wrench": (("leg", *wrench), s.leg_wrench, meaning(WRENCH_UNITS, "leg on platform")),
+        "coordinates": (("coordinate",), s.coordinates, meaning("m or rad", "joint and spring coordinates")),
     }
     if s.cables:
-        data["tension"] = ((*b, "cable"), s.tension, meaning("N", "tension of each cable"))
+        own["tension"] = (("cable",), s.tension, meaning("N", "tension of each cable"))
+    data = {name: ((*b, *axes), values, attrs) for name, (axes, values, attrs) in own.items()}
     labels: dict[str, Any] = {
         "component": list(COMPONENTS),
         "wrench_component": list(WRENCH),

@@ -205,19 +205,27 @@ class Machine:
         gravity: ArrayLike | None = None,
         threads: int | None = None,
     ) -> HoldingWrench:
-        """Wrenches (N, N·m) that hold the machine at a `displacement` (..., 6) m, rad from the commanded pose, eq. (10).
+        """Wrenches (N, N·m) and stiffness of the machine held off its commanded pose, eq. (10).
 
-        See `stiffmap.solve.holding_wrench.holding_wrench`.
+        Parameters
+        ----------
+        position
+            (..., 3) m, commanded TCP, base axes.
+        displacement
+            (..., 6) m, rad: of the point from where the command puts it; rotation as a rotation vector.
+        rotation
+            (..., 3, 3), commanded orientation; None: as at home.
+        point
+            Named point that is held; a free one is not touched.
+        gravity
+            (3,) m/s², base axes; None: what the machine file says.
+
+        Notes
+        -----
+        Loaded equilibrium, not stiffness times displacement. A displacement that rigid parts forbid is
+        NOT_CONVERGED. Raises StiffmapError for bad input.
         """
-        return holding_wrench(
-            self._compiled,
-            position,
-            displacement,
-            rotation=rotation,
-            point=point,
-            gravity=gravity,
-            threads=threads,
-        )
+        return holding_wrench(self._compiled, position, displacement, rotation, point, gravity, threads)
 
     def with_effect(
         self, kind: str, *, element: str | None = None, legs: Sequence[str] | None = None, **parameters: Any

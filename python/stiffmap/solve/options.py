@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from inspect import Parameter, signature
 from typing import Any, ParamSpec, TypedDict, TypeVar, get_type_hints
@@ -10,7 +10,7 @@ from typing import Any, ParamSpec, TypedDict, TypeVar, get_type_hints
 import numpy as np
 from numpy.typing import ArrayLike
 
-from stiffmap.solve.branches import Start
+from stiffmap.solve.closing import Start
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,26 +87,27 @@ def spelled_out(keywords: type) -> Callable[[Callable[P, R]], Callable[P, R]]:
     What is called stays the function itself; a call pays nothing.
     """
     defaults = SolveOptions()
-    hints = SolveOptions.__annotations__
-
-    def show(function: Callable[P, R]) -> Callable[P, R]:
-        own = signature(function)
-        shown = [p for p in own.parameters.values() if p.kind is not Parameter.VAR_KEYWORD]
-        names = (n for n in SolveOptions.__dataclass_fields__ if n in get_type_hints(keywords))
-        more = (
-            Parameter(n, Parameter.KEYWORD_ONLY, default=_default(defaults, n), annotation=hints[n])
-            for n in names
+    known = get_type_hints(keywords)
+    return _showing(
+        Parameter(
+            n,
+            Parameter.KEYWORD_ONLY,
+            default=None if n == "wrenches" else getattr(defaults, n),
+            annotation=hint,
         )
-        named = [p for p in more if p.name not in own.parameters]
-        function.__signature__ = own.replace(parameters=[*shown, *named])  # type: ignore[attr-defined]
-        return function
-
-    return show
+        for n, hint in SolveOptions.__annotations__.items()
+        if n in known
+    )
 
 
 def keywords_of(other: Callable[..., Any]) -> Callable[[Callable[P, R]], Callable[P, R]]:
     """Let `help` and editors show the keywords of another function, to which this one hands its ``**call`` on."""
-    more = [p for p in signature(other).parameters.values() if p.kind is Parameter.KEYWORD_ONLY]
+    return _showing(p for p in signature(other).parameters.values() if p.kind is Parameter.KEYWORD_ONLY)
+
+
+def _showing(keywords: Iterable[Parameter]) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """Let a function show these in the place of its ``**keywords``, those that it has itself apart."""
+    more = list(keywords)
 
     def show(function: Callable[P, R]) -> Callable[P, R]:
         own = signature(function)
@@ -116,10 +117,6 @@ def keywords_of(other: Callable[..., Any]) -> Callable[[Callable[P, R]], Callabl
         return function
 
     return show
-
-
-def _default(defaults: SolveOptions, name: str) -> Any:
-    return None if name == "wrenches" else getattr(defaults, name)
 
 
 def options_of(given: SolveKeywords | LoadingKeywords) -> SolveOptions:

@@ -69,17 +69,16 @@ class Solution(OverPoses):
     def _array(self, name: str) -> NDArray[Any]:
         if self._made is None:
             self._made = {}
-        made = self._made.get(name)
-        if made is None:
-            made = self._made[name] = self._make(name)
-        return made
-
-    def _make(self, name: str) -> NDArray[Any]:
-        a: NDArray[Any] = getattr(self._answer, name)
-        if a.shape[0] != self._answer.status.shape[0]:  # not asked for
-            fill = np.nan if a.dtype.kind == "f" else 0
-            return np.broadcast_to(np.asarray(fill, a.dtype), self._shape + a.shape[1:])
-        return a.reshape(self._shape + a.shape[1:])
+        if name not in self._made:
+            a: NDArray[Any] = getattr(self._answer, name)
+            shape = self._shape + a.shape[1:]
+            if a.shape[0] == self._answer.status.shape[0]:
+                self._made[name] = a.reshape(shape)
+            else:  # not asked for
+                self._made[name] = np.broadcast_to(
+                    np.asarray(np.nan if a.dtype.kind == "f" else 0, a.dtype), shape
+                )
+        return self._made[name]
 
     def _with_derivatives(self, slopes: Slopes) -> Solution:
         return Solution(

@@ -15,13 +15,11 @@ from stiffmap.common.broadcasting import (
     rows,
     rows_or_one,
     thread_count,
-    trailing,
     whole_number,
     wrench_array,
 )
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.rotations import as_rotations
-from stiffmap.solve.closing import Kinematics, close_actuators, close_poses
+from stiffmap.solve.closing import Kinematics, close_actuators, close_poses, commanded
 from stiffmap.solve.compiled import CompiledMachine
 from stiffmap.solve.compiled.machine import LOAD_TYPES
 from stiffmap.solve.options import SolveOptions
@@ -138,12 +136,8 @@ def _stacked(wrenches: Sequence[Floats], shape: tuple[int, ...]) -> Floats:
 
 
 def _arrays(machine: CompiledMachine, call: Call) -> tuple[Floats, Floats, Floats, dict[str, Floats]]:
-    p = trailing(call.position, (3,), "position", "positions (m)")
+    p, r = commanded(machine, call.position, call.options.rotation)
     w = wrench_array(call.wrench)
-    r = machine.home_rotation
-    if call.options.rotation is not None:
-        r = trailing(call.options.rotation, (3, 3), "rotation", "rotation matrices")
-        r = as_rotations(r)
     extra = {n: wrench_array(v, f"wrenches[{n!r}]") for n, v in call.options.wrenches.items()}
     return p, w, r, extra
 

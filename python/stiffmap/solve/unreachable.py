@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -54,7 +53,9 @@ def shortfalls(machine: Machine, position: ArrayLike, rotation: ArrayLike | None
         raise StiffmapError(
             f"expected a position of 3 finite numbers and a rotation (3, 3), got {position!r}, {rotation!r}"
         )
-    found = [_least(core, name, p, r) for name, core in _alone(machine)]
+    d = machine.description
+    alone = {g.name: replace(d, legs=(g,), external_springs=(), effects=()) for g in d.legs}
+    found = [_least(CompiledMachine(one), name, p, r) for name, one in alone.items()]
     short = [s for s in found if _is_short(s, machine)]
     if not short and len(found) != 1:
         short = [s for s in (_least(machine.compiled, "", p, r),) if _is_short(s, machine)]
@@ -106,11 +107,7 @@ def _beyond(machine: Machine, coordinates: Floats) -> list[str]:
     out, named = [], joints(machine.description)
     for name, value in zip(machine.compiled.names.coordinates, coordinates, strict=True):
         joint = named.get(name)
-        ends = (
-            None
-            if joint is None
-            else (joint.drive.range if joint.drive and joint.drive.range else joint.limits)
-        )
+        ends = None if joint is None else joint.ends
         if joint is None or ends is None or ends[0] <= value <= ends[1]:
             continue
         unit, factor = ("mm", 1e3) if joint.kind == "prismatic" else ("deg", float(np.rad2deg(1.0)))
@@ -121,36 +118,23 @@ def _beyond(machine: Machine, coordinates: Floats) -> list[str]:
 
 def _who(legs: list[str], machine: Machine) -> str:
     if not legs[0]:
-        return (
-            "each leg reaches it alone; all together they end"
-            if len(machine.legs) > 1
-            else "the machine ends"
-        )
-    return (
-        f"leg {legs[0]} ends"
-        if len(legs) == 1
-        else f"legs {', '.join(n for n in machine.legs if n in legs)} end"
-    )
+        together = "each leg reaches it alone; all together they end"
+        return together if len(machine.legs) > 1 else "the machine ends"
+    if len(legs) == 1:
+        return f"leg {legs[0]} ends"
+    return f"legs {', '.join(n for n in machine.legs if n in legs)} end"
 
 
 def _gap(s: Shortfall, length: float) -> str:
     # far out, the weights leave an angle in proportion to the distance, which is none that the pose asks for
-    if s.rotation > TURNED * max(
-        1.0, s.translation / length
-    ):  # where it would be if it could turn so is idle
+    far = max(1.0, s.translation / length)
+    if s.rotation > TURNED * far:  # where it would be if it could turn so is idle
         return f"{np.rad2deg(s.rotation):.4g} deg off the orientation"
     return f"{1e3 * s.translation:.4g} mm short of it"
 
 
 def _is_short(s: Shortfall, machine: Machine) -> bool:
     return s.translation > ENOUGH * machine.compiled.length or s.rotation > TURNED
-
-
-def _alone(machine: Machine) -> Iterator[tuple[str, CompiledMachine]]:
-    """Machines of one leg each, with the base and the platform."""
-    d = machine.description
-    for leg in d.legs:
-        yield leg.name, CompiledMachine(replace(d, legs=(leg,), external_springs=(), effects=()))
 
 
 def _least(core: CompiledMachine, name: str, p: Floats, r: Floats) -> Shortfall:
@@ -173,10 +157,13 @@ def _least(core: CompiledMachine, name: str, p: Floats, r: Floats) -> Shortfall:
         ]
         return np.where(mask, np.r_[p - positions[-1], turn], 0.0), np.concatenate([np.zeros(0), *loops])
 
-    def weighted(u: Floats, start: Floats) -> Any:
+    def moved(u: Floats, start: Floats) -> Floats:
         x = start.copy()
         x[free] += u * units
-        pose, loops = gap(x)
+        return x
+
+    def weighted(u: Floats, start: Floats) -> Any:
+        pose, loops = gap(moved(u, start))
         return np.r_[pose[:3] / core.length, TURNING * pose[3:], LOOPS * loops]
 
     tried = []
@@ -184,9 +171,7 @@ def _least(core: CompiledMachine, name: str, p: Floats, r: Floats) -> Shortfall:
         fit = least_squares(
             weighted, np.zeros(len(free)), args=(start,), xtol=1e-14, ftol=1e-14, gtol=1e-14, max_nfev=200
         )
-        x = start.copy()
-        x[free] += fit.x * units
-        pose, _ = gap(x)
+        pose, _ = gap(moved(fit.x, start))
         tried.append(Shortfall(name, float(np.linalg.norm(pose[:3])), float(np.linalg.norm(pose[3:]))))
     return min(
         tried, key=lambda s: s.translation / core.length + s.rotation, default=Shortfall(name, 0.0, 0.0)

@@ -59,15 +59,10 @@ def listed(description: MachineDescription) -> list[Listed]:
         source, note = (known.get(address, known.get(name, "")) for known in (sources, notes))
         return Listed(address, float(field.value), field.unit, uncertainty.get(address), source, note)
 
-    return [row(address, field) for address, field in _all_fields(description) if field.listed]
-
-
-def _all_fields(description: MachineDescription) -> Iterator[tuple[str, Field]]:
-    """Every number by its address, in the order of the machine's file."""
-    yield from machine_fields(description)
+    every = [*machine_fields(description)]
     for full, element in tree.all_elements(description):
-        for key, field in fields(element).items():
-            yield f"{full}/{key}", field
+        every += [(f"{full}/{key}", field) for key, field in fields(element).items()]
+    return [row(address, field) for address, field in every if field.listed]
 
 
 def number_at(

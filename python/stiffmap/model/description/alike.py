@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
 from dataclasses import replace
 
 from stiffmap.model.description.elements import Block, Body, Cable, Element, Joint, Offset, Point, Spring
@@ -23,10 +23,14 @@ def alike(one: MachineDescription, other: MachineDescription, *, heavy: bool) ->
         return False
     shared = len(one.legs) > 1 and any(isinstance(e, (Spring, Joint, Block)) for e in one.base)
     pairs = [(a.elements, b.elements) for a, b in zip(one.legs, other.legs, strict=True)]
+
+    def same(a: Elements, b: Elements, of: Callable[[Elements, bool], Hashable] = _solid) -> bool:
+        return a is b or of(a, heavy) == of(b, heavy)
+
     return (
-        _sequence(one.base, other.base, heavy)
-        and _sequence(one.platform, other.platform, heavy)
-        and all((_still if shared else _sequence)(a, b, heavy) for a, b in pairs)
+        same(one.base, other.base)
+        and same(one.platform, other.platform)
+        and all(same(a, b, _standing if shared else _solid) for a, b in pairs)
     )
 
 
@@ -34,20 +38,12 @@ def _whole(d: MachineDescription) -> tuple[object, ...]:
     return d.home, d.search_home, d.task, d.freedoms, d.gravity, d.external_springs
 
 
-def _sequence(one: Elements, other: Elements, heavy: bool) -> bool:
-    return one is other or _solid(one, heavy) == _solid(other, heavy)
-
-
-def _solid(elements: Elements, heavy: bool) -> list[Hashable]:
-    return [_fixed(e, heavy) for e in elements if not isinstance(e, (Offset, Point))]
-
-
-def _still(one: Elements, other: Elements, heavy: bool) -> bool:
-    """The same geometry, errors included."""
-    return one is other or _standing(one, heavy) == _standing(other, heavy)
+def _solid(elements: Elements, heavy: bool) -> Hashable:
+    return tuple(_fixed(e, heavy) for e in elements if not isinstance(e, (Offset, Point)))
 
 
 def _standing(elements: Elements, heavy: bool) -> Hashable:
+    """The geometry as well, errors included."""
     return elements if heavy else tuple((_fixed(e, heavy), _frame(e)) for e in elements)
 
 

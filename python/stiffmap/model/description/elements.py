@@ -120,6 +120,11 @@ class Joint:
         return self.axis_laws or (self.law,) * len(self.axes)
 
     @property
+    def ends(self) -> tuple[float, float] | None:
+        """Range of the drive, else limits of the coordinate (m, rad); ``None``: there are none."""
+        return (self.drive.range if self.drive else None) or self.limits
+
+    @property
     def free(self) -> bool:
         """Passive, and no spring about any axis."""
         return not self.actuated and not any(self.laws)

@@ -6,7 +6,7 @@ count: ``x.bar_low.bar``.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from typing import TypeVar
 
@@ -52,6 +52,11 @@ def core_name(full: str) -> str:
 def joints(description: MachineDescription) -> dict[str, Joint]:
     """The joints by the names that the core gives them."""
     return {core_name(n): e for n, e in all_elements(description) if isinstance(e, Joint)}
+
+
+def joint_of(named: Mapping[str, Joint], coordinate: str) -> Joint | None:
+    """The joint, among those that `joints` gives, of a coordinate: ``name``, or ``name.2`` where it has several."""
+    return named.get(coordinate) or named.get(coordinate.rpartition(".")[0])
 
 
 def find(description: MachineDescription, full: str) -> list[Element]:

@@ -6,12 +6,13 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from stiffmap.model.description import Element, MachineDescription, Offset, Pose
+from stiffmap.common.broadcasting import Floats
+from stiffmap.model.description import MachineDescription, Offset, Pose
 from stiffmap.model.description.tree import Edit, Elements, edit_sequences
 from stiffmap.model.effects.types import Apply, Placed
 
 Sites = Callable[[Elements], dict[str, tuple[int, ...]]]
-Change = Callable[[Element], Elements]
+Change = Callable[[Any], Elements]
 
 
 def edit_legs(description: MachineDescription, legs: tuple[str, ...], edit: Edit) -> MachineDescription:
@@ -19,11 +20,15 @@ def edit_legs(description: MachineDescription, legs: tuple[str, ...], edit: Edit
     if not legs:
         base, platform = (edit_sequences(e, edit) for e in (description.base, description.platform))
         return replace(description, base=base, platform=platform)
-    changed = tuple(
-        replace(leg, elements=edit_sequences(leg.elements, edit)) if leg.name in legs else leg
-        for leg in description.legs
+    return edit_chains(description, legs, lambda elements: edit_sequences(elements, edit))
+
+
+def edit_chains(description: MachineDescription, legs: tuple[str, ...], edit: Edit) -> MachineDescription:
+    """``edit`` on the whole chain of each of the legs named."""
+    changed = (
+        replace(leg, elements=edit(leg.elements)) if leg.name in legs else leg for leg in description.legs
     )
-    return replace(description, legs=changed)
+    return replace(description, legs=tuple(changed))
 
 
 def change_sites(
@@ -32,9 +37,8 @@ def change_sites(
     """Each element that ``sites`` finds under the name becomes the elements that ``change`` gives."""
 
     def edit(elements: Elements) -> Elements:
-        found = sites(elements).get(element, ())
         out = elements
-        for i in reversed(found):
+        for i in reversed(sites(elements).get(element, ())):
             out = splice(out, i, change(elements[i]))
         return out
 
@@ -69,3 +73,9 @@ def fresh(name: str, elements: Elements) -> str:
 def built(name: str, pose: Pose) -> Offset:
     """An error of the machine as built: nothing to the controller, ``pose`` in truth."""
     return Offset(name, Pose(), pose)
+
+
+def shifted(e: Offset, step: Floats) -> Offset:
+    """An offset built longer by a vector (3,) m than it is; the controller keeps the nominal one."""
+    actual = e.actual or e.nominal
+    return replace(e, actual=Pose.of(actual.p + step, actual.r))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.value_units import read_value
@@ -86,10 +87,8 @@ def _read(
 def _value(effect: EffectType, name: str, text: str, units: Sequence[str]) -> float:
     """The value in the unit of the parameter, or in the angular one of what turns."""
     for unit in units[1:]:
-        try:
+        with suppress(StiffmapError):
             return read_value(text, unit)
-        except StiffmapError:
-            continue
     try:
         return read_value(text, units[0])
     except StiffmapError as problem:
@@ -102,9 +101,6 @@ def effect_text(record: AppliedEffect, machine: MachineDescription | None = None
     units = _units(effect, machine, record.element, record.legs)
     place = [record.element] if record.element else []
     place += [",".join(record.legs)] if record.legs else []
-    numbers = [f"{n}={v!r}{_shown(units[n][0])}" for n, v in record.parameters]
+    after = {n: "" if known[0] == "1" else f" {known[0]}" for n, known in units.items()}
+    numbers = [f"{n}={v!r}{after[n]}" for n, v in record.parameters]
     return " ".join([record.kind, *place, *numbers, *(f"{n}={w}" for n, w in record.options)])
-
-
-def _shown(unit: str) -> str:
-    return "" if unit == "1" else f" {unit}"

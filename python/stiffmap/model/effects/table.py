@@ -9,15 +9,12 @@ from stiffmap.model.effects.types import EffectType, Parameter
 
 def overview() -> str:
     """One row per kind: name, title, parameters with units."""
-    rows = [
-        f"| [`{kind}`](#{kind}) | {effect.title} | {', '.join(_short(p) for p in effect.parameters)} |"
-        for kind, effect in ((k, registry.get(k)) for k in registry.kinds())
-    ]
-    return "\n".join(["| kind | what | parameters |", "|---|---|---|", *rows])
-
-
-def _short(p: Parameter) -> str:
-    return f"`{p.name}`" + ("" if p.unit == "1" else f" ({p.unit})")
+    rows = ["| kind | what | parameters |", "|---|---|---|"]
+    for kind in registry.kinds():
+        effect = registry.get(kind)
+        numbers = (f"`{p.name}`" + ("" if p.unit == "1" else f" ({p.unit})") for p in effect.parameters)
+        rows.append(f"| [`{kind}`](#{kind}) | {effect.title} | {', '.join(numbers)} |")
+    return "\n".join(rows)
 
 
 def section(effect: EffectType) -> str:

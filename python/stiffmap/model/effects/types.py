@@ -7,19 +7,8 @@ from dataclasses import dataclass
 
 from stiffmap.model.description import MachineDescription
 from stiffmap.model.effects.evidence import Drive, Load, Plan, Reading, Signatures
-from stiffmap.model.effects.parameter import Option, Parameter
-
-__all__ = [
-    "Apply",
-    "Derived",
-    "EffectType",
-    "Option",
-    "Parameter",
-    "ParametersAt",
-    "Place",
-    "Placed",
-    "Places",
-]
+from stiffmap.model.effects.parameter import Option as Option
+from stiffmap.model.effects.parameter import Parameter as Parameter
 
 Place = tuple[str, tuple[str, ...]]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from stiffmap.common.errors import FileError
-from stiffmap.model.description import Element, Joint, Leg, Offset, Pose
+from stiffmap.model.description import Joint, Leg, Offset, Pose
 from stiffmap.model.description.tree import ENDS, Elements, edit_path, walk
 from stiffmap.model.files.build_elements import HOME, build_elements
 from stiffmap.model.files.build_geometry import build_pose
@@ -37,31 +37,21 @@ def build_leg(name: str, leg: LegModel, templates: dict[str, list[ElementModel]]
         context.raise_problems()  # what follows refers to the elements
     for joint, home in (leg.home or {}).items():
         elements = with_home(elements, joint, home, here.at("home", joint).inside(joint))
-    return Leg(name, (*_frame(leg, here, elements), *elements, *_attach(leg, here, elements)))
+    first, last = (_end(end, leg, here, elements) for end in ("frame", "attach"))
+    return Leg(name, (*first, *elements, *last))
 
 
-def _frame(leg: LegModel, context: Context, elements: tuple[Element, ...]) -> tuple[Element, ...]:
-    if leg.frame is None:
+def _end(name: str, leg: LegModel, context: Context, elements: Elements) -> Elements:
+    """The offset that a leg begins (``frame``) or ends with (``attach``); none where the file gives none."""
+    given, here = getattr(leg, name), context.at(name)
+    if given is None:
         return ()
-    here = context.at("frame")
-    _refuse_taken("frame", elements, here)
-    return (Offset("frame", build_pose(leg.frame, here.inside("frame"))),)
-
-
-def _attach(leg: LegModel, context: Context, elements: tuple[Element, ...]) -> tuple[Element, ...]:
-    if leg.attach is None:
-        return ()
-    here = context.at("attach")
-    _refuse_taken("attach", elements, here)
-    if leg.attach != "base_axes":
-        return (Offset("attach", build_pose(leg.attach, here.inside("attach"))),)
-    turned = build_pose(leg.frame, replace(context, gathered=Gathered()).at("frame"))
-    return (Offset("attach", Pose(rotation=turned.inverse().rotation)),)
-
-
-def _refuse_taken(name: str, elements: tuple[Element, ...], context: Context) -> None:
     if any(element.name == name for element in elements):
-        context.fail(f"the leg already has an element called '{name}', which is the name of this offset")
+        here.fail(f"the leg already has an element called '{name}', which is the name of this offset")
+    if given != "base_axes":
+        return (Offset(name, build_pose(given, here.inside(name))),)
+    turned = build_pose(leg.frame, replace(context, gathered=Gathered()).at("frame"))
+    return (Offset(name, Pose(rotation=turned.inverse().rotation)),)
 
 
 Home = Number | list[Number]

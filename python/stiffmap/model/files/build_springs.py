@@ -79,8 +79,9 @@ def _check(matrix: NDArray[np.float64], word: str, context: Context) -> None:
             f"the {word} is not symmetric: k{i + 1}{j + 1} and k{j + 1}{i + 1} differ by {size:.3g} "
             "of the geometric mean of their diagonal terms"
         )
-    lowest = lowest_eigenvalue(matrix)
-    if lowest < 0.0:
+    scale = _scale(matrix)
+    lowest = float(np.linalg.eigvalsh(matrix / np.outer(scale, scale))[0])
+    if lowest < -EIGENVALUE_TOLERANCE:
         context.fail(
             f"the {word} is indefinite: its lowest eigenvalue, scaled to unit diagonal, is {lowest:.3g}; "
             "it must not be negative"
@@ -200,10 +201,3 @@ def asymmetry(matrix: NDArray[np.float64]) -> tuple[float, int, int]:
     i, j = np.unravel_index(int(np.argmax(difference)), difference.shape)
     size = float(difference[i, j])
     return (size if size > SYMMETRY_TOLERANCE else 0.0), int(i), int(j)
-
-
-def lowest_eigenvalue(matrix: NDArray[np.float64]) -> float:
-    """Lowest eigenvalue of the scaled matrix, where negative beyond rounding; else 0."""
-    scale = _scale(matrix)
-    lowest = float(np.linalg.eigvalsh(matrix / np.outer(scale, scale))[0])
-    return lowest if lowest < -EIGENVALUE_TOLERANCE else 0.0

@@ -42,7 +42,7 @@ def _stroke(description: MachineDescription, use: StrokeUse) -> BeamStroke | Tab
         build_matrix(row.compliance, "compliance", quiet.at("table", i, "compliance"))
         for i, row in enumerate(model.table)
     )
-    for end in ends(joint):
+    for end in (*joint.home, *(joint.ends or ())):
         if not at[0] <= end <= at[-1]:
             say = context.units.say
             context.at("table").fail(
@@ -65,7 +65,7 @@ def _beam(use: StrokeUse, joint: Joint, coordinate: Dimension) -> BeamStroke:
         at=0.0 if model.at is None else context.at("at").si(model.at, coordinate),
         rate=context.at("rate").si(model.rate or Number(value=1.0), per),
     )
-    for end in ends(joint):
+    for end in (*joint.home, *(joint.ends or ())):
         left = out.length + out.rate * (end - out.at)
         if left <= 0.0:
             say = context.units.say
@@ -73,11 +73,6 @@ def _beam(use: StrokeUse, joint: Joint, coordinate: Dimension) -> BeamStroke:
                 f"with '{model.joint}' at {say(end, coordinate)} the beam would be {say(left, LENGTH)} long"
             )
     return out
-
-
-def ends(joint: Joint) -> tuple[float, ...]:
-    """Coordinates at which a stroke must be declared: home, and the ends of the range."""
-    return (*joint.home, *((joint.drive.range if joint.drive else None) or joint.limits or ()))
 
 
 def stroke_joint(description: MachineDescription, full: str, name: str, context: Context) -> Joint:

@@ -22,7 +22,7 @@ from stiffmap.model.description import (
     TableStroke,
 )
 from stiffmap.model.description.numbers import DIRECTIONS, numbers_of
-from stiffmap.model.description.pose import IDENTITY, Rows
+from stiffmap.model.description.pose import IDENTITY
 from stiffmap.model.description.strokes import present_rows
 from stiffmap.model.files.schema.geometry import NAMED
 
@@ -65,16 +65,9 @@ def dump_pose(pose: Pose) -> Plain:
     """Translation and, where there is one, rotation: by axis names where it permutes the axes."""
     plain: Plain = {"translation": floats(pose.translation)}
     if pose.rotation != IDENTITY:
-        plain.update(dump_rotation(pose.rotation))
+        names = [_NAMES.get(column) for column in zip(*pose.rotation, strict=True)]
+        plain |= {"rotation": floats(pose.rotation)} if None in names else {"axes": "".join(map(str, names))}
     return plain
-
-
-def dump_rotation(rotation: Rows) -> Plain:
-    """``axes`` or ``rotation``."""
-    columns = list(zip(*rotation, strict=True))
-    if all(column in _NAMES for column in columns):
-        return {"axes": "".join(_NAMES[column] for column in columns)}
-    return {"rotation": floats(rotation)}
 
 
 def _axis(axis: tuple[float, float, float]) -> Any:
@@ -101,11 +94,10 @@ def _joint(joint: Joint) -> Plain:
 
 
 def _axis_laws(joint: Joint) -> Plain:
-    if not joint.axis_laws:
-        return {}
     if any(set(dump_numbers(one)) != {"stiffness"} for one in joint.axis_laws):
         raise StiffmapError(f"{joint.name}: a file holds one stiffness per axis, no other laws")
-    return {"stiffness": [float(one.stiffness) for one in joint.axis_laws]}
+    each = [float(one.stiffness) for one in joint.axis_laws]
+    return {"stiffness": each} if each else {}
 
 
 def _actuator(joint: Joint) -> Plain:
@@ -179,12 +171,8 @@ def _stroke(spring: Spring) -> Plain:
         case TableStroke() as s:
             assert spring.compliance is not None
             rows = zip(s.at, present_rows(s, spring.compliance), strict=True)
-            return {
-                "stroke": {
-                    "joint": s.joint,
-                    "table": [{"at": u, "compliance": dump_matrix(c)} for u, c in rows],
-                }
-            }
+            table = [{"at": u, "compliance": dump_matrix(c)} for u, c in rows]
+            return {"stroke": {"joint": s.joint, "table": table}}
     return {}
 
 

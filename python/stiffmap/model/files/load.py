@@ -61,9 +61,9 @@ def _plain(data: Any) -> Any:
     return data
 
 
-def description_from_text(text: str, file: str = "text", folder: Path = Path()) -> MachineDescription:
-    """Description from the text of a machine file; ``folder`` is where its link files are."""
-    return describe_document(parse(text, file), file, folder)
+def description_from_text(text: str, file: str = "text") -> MachineDescription:
+    """Description from the text of a machine file, whose link files are in the working directory."""
+    return describe_document(parse(text, file), file, Path())
 
 
 def describe_document(document: Document, file: str, folder: Path) -> MachineDescription:

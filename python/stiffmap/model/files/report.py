@@ -25,12 +25,7 @@ def validated(model: type[M], document: Document, file: str, expected: str) -> M
     try:
         return model.model_validate(document.data)
     except ValidationError as error:
-        raise file_error(error, document, file) from error
-
-
-def file_error(error: ValidationError, document: Document, file: str) -> FileError:
-    """All of pydantic's errors."""
-    return together([_one(e, document, file) for e in error.errors(include_url=False)])
+        raise together([_one(e, document, file) for e in error.errors(include_url=False)]) from error
 
 
 def _one(error: Any, document: Document, file: str) -> FileError:
@@ -74,7 +69,8 @@ def _message(error: Any) -> str:
     if kind == "finite_number":
         return f"expected a finite number; found {found}"
     if kind == "literal_error":
-        near = suggestion(str(found), _choices(context))
+        choices = str(context["expected"]).replace(" or ", ",").split(",")
+        near = suggestion(str(found), [choice.strip(" '") for choice in choices])
         return f"expected {context['expected']}; found {describe(found)}{near}"
     if kind == "string_pattern_mismatch":
         return f"a name has letters, digits, '_' and '-' only; found {describe(found)}"
@@ -85,7 +81,3 @@ def _message(error: Any) -> str:
         sorts = {"list": "a list", "dict": "a mapping", "string": "text", "bool": "true or false"}
         return f"expected {sorts.get(kind.removesuffix('_type'), 'a number')}; found {describe(found)}"
     return str(context["error"] if kind == "value_error" else error["msg"])
-
-
-def _choices(context: dict[str, Any]) -> list[str]:
-    return [part.strip(" '") for part in str(context["expected"]).replace(" or ", ",").split(",")]

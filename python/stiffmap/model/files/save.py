@@ -15,7 +15,6 @@ from stiffmap.model.description import (
     TASK,
     AppliedEffect,
     Element,
-    ExternalSpring,
     Joint,
     Leg,
     MachineDescription,
@@ -80,12 +79,19 @@ def dump(description: MachineDescription) -> Plain:
         "home": {**dump_pose(declared.home), **({"solve": True} if declared.search_home else {})},
         "task": None if declared.task == TASK else list(declared.task),
         "freedoms": None if declared.freedoms == TASK else list(declared.freedoms),
-        "workspace": None if declared.workspace is None else _box(declared.workspace),
+        "workspace": declared.workspace
+        and {
+            axis: floats(ends)
+            for axis, ends in zip("xyz", zip(*declared.workspace, strict=True), strict=True)
+        },
         **_legs(declared.legs),
         "base": dump_elements(declared.base),
         "platform": dump_elements(declared.platform),
         "modal_damping": floats(declared.modal_damping),
-        "external_springs": {spring.name: _external_spring(spring) for spring in declared.external_springs},
+        "external_springs": {
+            s.name: {"point": s.point, **dump_numbers(s), "tension_only": bool(s.tension_only)}
+            for s in declared.external_springs
+        },
         "effects": [_effect(effect) for effect in description.effects],
         "uncertainty": {key: float(value) for key, value in description.uncertainty},
         "sources": dict(description.sources),
@@ -93,19 +99,6 @@ def dump(description: MachineDescription) -> Plain:
         "extra": {key: _lists(value) for key, value in description.extra},
     }
     return {key: value for key, value in plain.items() if value not in (None, "", [], {})}
-
-
-def _box(box: Any) -> Plain:
-    low, high = box
-    return {axis: floats((low[i], high[i])) for i, axis in enumerate("xyz")}
-
-
-def _external_spring(spring: ExternalSpring) -> Plain:
-    return {
-        "point": spring.point,
-        **dump_numbers(spring),
-        "tension_only": bool(spring.tension_only),
-    }
 
 
 def _effect(effect: AppliedEffect) -> Plain:

@@ -1,4 +1,4 @@
-"""Array alias and the cross-product matrix that the link modules share."""
+"""Array aliases, the cross-product matrix and the scales of a matrix that the link modules share."""
 
 from __future__ import annotations
 
@@ -18,3 +18,15 @@ def skew(vectors: Floats) -> Floats:
     out[..., 1, 0], out[..., 1, 2] = v[..., 2], -v[..., 0]
     out[..., 2, 0], out[..., 2, 1] = -v[..., 1], v[..., 0]
     return out
+
+
+def standard_errors(covariance: Floats) -> Floats:
+    """(6, 6) standard errors of the entries whose covariance (36, 36), row-major, is given."""
+    return np.asarray(np.sqrt(np.maximum(np.diag(covariance), 0.0)).reshape(6, 6))
+
+
+def unit_diagonal(matrix: Floats) -> Floats:
+    """(6, 6) matrix over the square roots of its diagonal terms; those that are zero count as one."""
+    size = np.sqrt(np.abs(np.diag(matrix)))
+    size = np.where(size > 0, size, 1.0)
+    return np.asarray(matrix / np.outer(size, size))

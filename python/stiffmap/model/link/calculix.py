@@ -45,7 +45,9 @@ def solve_ccx(mesh: SolidMesh, material: Material, setup: Setup, wrenches: Float
         )
         errors = [line.strip() for line in done.stdout.splitlines() if "*ERROR" in line]
         if done.returncode or errors or not job.with_suffix(".dat").is_file():
-            raise StiffmapError(f"ccx stopped (code {done.returncode}): {_first(errors)}")
+            more = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
+            first = errors[0] if errors else "no message"
+            raise StiffmapError(f"ccx stopped (code {done.returncode}): {first}{more}")
         numbers, fields = read_dat(job.with_suffix(".dat"))
     if len(fields) != len(wrenches) or len(numbers) < len(mesh.nodes):
         raise StiffmapError(f"ccx: not converged, {len(fields)} of {len(wrenches)} load cases solved")
@@ -53,11 +55,6 @@ def solve_ccx(mesh: SolidMesh, material: Material, setup: Setup, wrenches: Float
     out = np.empty((len(wrenches), len(mesh.nodes), 3))
     out[:, numbers[keep] - 1] = fields[:, keep]
     return out
-
-
-def _first(errors: list[str]) -> str:
-    more = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
-    return errors[0] + more if errors else "no message"
 
 
 def ccx_input(mesh: SolidMesh, material: Material, setup: Setup, wrenches: Floats) -> str:

@@ -50,20 +50,21 @@ def check_points(points: Floats) -> None:
     if len(points) < 3:
         raise StiffmapError(f"points: expected at least 3 to fit a rigid-body motion, got {len(points)}")
     if on_one_line(points):
-        spread = _spread(points)
+        s = spread(points)
         raise StiffmapError(
             "points: expected points that are not on one line (the turn about it cannot be seen), "
-            f"got a spread of {spread[0]:.3g} m along and {spread[1]:.1g} m across"
+            f"got a spread of {s[0]:.3g} m along and {s[1]:.1g} m across"
         )
 
 
 def on_one_line(points: Floats) -> bool:
     """Whether points (n, 3) m, three or more, show no turn about a line on which they all lie."""
-    spread = _spread(points)
-    return bool(spread[1] <= COLLINEAR * spread[0])
+    s = spread(points)
+    return bool(s[1] <= COLLINEAR * s[0])
 
 
-def _spread(points: Floats) -> Floats:
+def spread(points: Floats) -> Floats:
+    """(3,) m: root of the sum of squares of points (n, 3) about their centre, along their three main axes."""
     return np.asarray(np.linalg.svd(points - points.mean(axis=0), compute_uv=False))
 
 

@@ -8,14 +8,13 @@ from typing import NamedTuple
 import numpy as np
 from scipy.stats import chi2, t
 
-from stiffmap.model.link.arrays import Bools, Floats, Ints
+from stiffmap.model.link.arrays import Bools, Floats, Ints, standard_errors, unit_diagonal
 from stiffmap.model.link.checks import Field
 from stiffmap.model.link.correlation import Correlation
 from stiffmap.model.link.noise import Noise
 from stiffmap.model.link.regression import Regression
 from stiffmap.model.link.rigidfit import RigidFit
 from stiffmap.model.link.transport import stiffness_covariance, transport_compliance
-from stiffmap.model.link.zeros import critical_multiple
 
 
 class Evidence(NamedTuple):
@@ -58,15 +57,14 @@ class Estimate:
     @property
     def stiffness(self) -> Floats:
         """(6, 6) inverse of the compliance; NaN where the compliance is not fully identified."""
-        if np.isnan(self.compliance).any() or np.linalg.matrix_rank(_scaled(self.compliance)) < 6:
+        if np.isnan(self.compliance).any() or np.linalg.matrix_rank(unit_diagonal(self.compliance)) < 6:
             return np.full((6, 6), np.nan)
         return np.asarray(np.linalg.inv(self.compliance))
 
     @property
     def standard_error(self) -> Floats:
         """(6, 6) standard errors of the compliance entries."""
-        variance: Floats = np.maximum(np.diag(self.covariance), 0.0)
-        return np.asarray(np.sqrt(variance).reshape(6, 6), dtype=np.float64)
+        return standard_errors(self.covariance)
 
     @property
     def stiffness_covariance(self) -> Floats:
@@ -127,7 +125,10 @@ class Estimate:
         return transport_compliance(self.compliance, self.covariance, shift)
 
 
-def _scaled(C: Floats) -> Floats:
-    size = np.sqrt(np.abs(np.diag(C)))
-    size = np.where(size > 0, size, 1.0)
-    return np.asarray(C / np.outer(size, size))
+def critical_multiple(level: float, tests: int, dof: Floats | float) -> Floats:
+    """The paper's k of "k sigma": |entry| below k standard errors is not distinguishable from zero, link (8).
+
+    Bonferroni over ``tests`` entries (21 under symmetry, else 36): the probability that any entry that is truly zero
+    is taken for non-zero stays below ``level`` whatever the correlation of the entries.
+    """
+    return np.asarray(t.isf(level / (2 * tests), dof))

@@ -74,13 +74,16 @@ def default_size(gmsh: Any) -> float:
 def named_surfaces(gmsh: Any) -> Faces:
     """Surface tags by physical group name; surfaces in no named group are ``face<tag>``."""
     names: Faces = {}
-    taken: set[int] = set()
     for dim, group in gmsh.model.getPhysicalGroups(2):
         tags = [int(t) for t in gmsh.model.getEntitiesForPhysicalGroup(dim, group)]
         names[gmsh.model.getPhysicalName(dim, group) or f"group{group}"] = tags
-        taken |= set(tags)
-    names |= {f"face{t}": [t] for _, t in gmsh.model.getEntities(2) if t not in taken}
-    return names
+    return with_others(gmsh, names)
+
+
+def with_others(gmsh: Any, names: Faces) -> Faces:
+    """The named faces, and every other surface as ``face<tag>``."""
+    used = {t for tags in names.values() for t in tags}
+    return names | {f"face{t}": [t] for _, t in gmsh.model.getEntities(2) if t not in used}
 
 
 def _generate(gmsh: Any, size: float) -> None:

@@ -32,10 +32,7 @@ LOAD_UNITS = {u: size_of(u, FORCES, MOMENTS) for u in ("N", "kN", "N*m", "Nm", "
 UNIT_WRENCHES = np.diag([100.0, 100.0, 100.0, 10.0, 10.0, 10.0])  # linear solver: the size does not matter
 
 _BY_NAME: dict[str, type[BaseModel]] = {
-    "bar": Bar,
-    "hollow-bar": HollowBar,
-    "fork-bar": ForkBar,
-    "foot": Foot,
+    s.model_fields["shape"].default: s for s in (Bar, HollowBar, ForkBar, Foot)
 }
 
 

@@ -12,7 +12,7 @@ import yaml
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs import write_text
 from stiffmap.common.yaml_text import read
-from stiffmap.model.link.arrays import Floats
+from stiffmap.model.link.arrays import Floats, standard_errors, unit_diagonal
 
 SYMMETRY = 1e-6  # of sqrt(C_ii C_jj)
 UNITS = {"length": "m", "force": "N", "angle": "rad"}
@@ -31,7 +31,7 @@ class LinkFile:
     @property
     def standard_error(self) -> Floats:
         """(6, 6) standard errors of the entries."""
-        return np.sqrt(np.maximum(np.diag(self.covariance), 0.0)).reshape(6, 6)
+        return standard_errors(self.covariance)
 
 
 def save_link(link: LinkFile, path: str | Path) -> None:
@@ -102,9 +102,8 @@ def _check_spring(path: str | Path, C: Floats) -> None:
         raise StiffmapError(
             f"{path}: compliance: expected a diagonal that is not negative, got {d.min():.3g}"
         )
-    size = np.where(d > 0, np.sqrt(d), 1.0)
     with np.errstate(over="ignore", invalid="ignore"):  # numbers of 1e308 have no finite ratio
-        scaled = C / np.outer(size, size)
+        scaled = unit_diagonal(C)
         gap = float(np.abs(scaled - scaled.T).max())
     if not gap <= SYMMETRY:
         raise StiffmapError(

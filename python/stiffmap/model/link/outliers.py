@@ -19,9 +19,7 @@ SMALLEST_FIELD = 9  # below this the residuals cannot tell an outlier from noise
 ROUNDS = 50
 
 
-def find_outliers(
-    points: Floats, displacements: Floats, level: float = LEVEL, sigma: float | None = None
-) -> Bools:
+def find_outliers(points: Floats, displacements: Floats, level: float, sigma: float | None) -> Bools:
     """(n,) bool, True for a node that leaves the rigid motion of the others.
 
     A node is an outlier when its residual, standardised by its own covariance (leverage included),

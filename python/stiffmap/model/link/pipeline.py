@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.model.link.arrays import Floats, Ints
+from stiffmap.model.link.arrays import Floats, Ints, standard_errors
 from stiffmap.model.link.calculix import has_ccx, solve_ccx
+from stiffmap.model.link.checks import spread
 from stiffmap.model.link.identify import identify_link
 from stiffmap.model.link.linkfile import LinkFile
 from stiffmap.model.link.mesh import SolidMesh
@@ -32,8 +33,7 @@ class Budget:
 
     def standard_error(self, source: str | None = None) -> Floats:
         """(6, 6) standard uncertainty of one source, or of all."""
-        V = self.total if source is None else self.parts[source]
-        return np.sqrt(np.maximum(np.diag(V), 0.0)).reshape(6, 6)
+        return standard_errors(self.total if source is None else self.parts[source])
 
     def table(self, compliance: Floats) -> str:
         """Relative standard uncertainty of the diagonal entries, a line per source."""
@@ -57,6 +57,7 @@ def shift_covariance(shifts: list[Floats]) -> Floats:
 
 Solver = Literal["auto", "ccx", "skfem"]
 Support = Literal["bed", "soft"]
+Solve = Callable[[SolidMesh, Material, Setup, Floats], Floats]
 COARSER = (2.0, 1.41)  # sizes of the refinement study over the finest
 COARSE_ENOUGH = 1.05
 FEWEST_PATCHES = 16  # a bootstrap over fewer says little
@@ -77,7 +78,7 @@ class PartLink:
     material: Material
     setup: Setup
 
-    def file(self, name: str, provenance: dict[str, Any] | None = None) -> LinkFile:
+    def file(self, name: str) -> LinkFile:
         """The link file: compliance, total covariance, and where both come from."""
         source = {
             "mesh": {
@@ -95,9 +96,7 @@ class PartLink:
             "standard_error": {k: self.budget.standard_error(k).tolist() for k in self.budget.parts},
         }  # fmt: skip
         C = self.link.compliance
-        return LinkFile(
-            (C + C.T) / 2, self.budget.total, self.link.reference, source | (provenance or {}), name
-        )
+        return LinkFile((C + C.T) / 2, self.budget.total, self.link.reference, source, name)
 
 
 def link_from_part(
@@ -139,7 +138,14 @@ def link_from_part(
         "fit": _fit_covariance(link, wrenches),
         "region": _region_covariance(mesh, nodes, field, setup, wrenches, link),
     }
-    refinement = _refined(mesher, mesh, material, setup, wrenches, solve, link) if refine else None
+
+    def another(m: SolidMesh, s: Setup, by: Solve) -> Floats:
+        """Compliance (6, 6) on another mesh, or of a part that is held or loaded otherwise."""
+        return _identify(m, m.face_nodes(s.loaded), by(m, material, s, wrenches), s, wrenches).compliance
+
+    refinement = None
+    if refine:
+        refinement = _refined(mesher, mesh, lambda m: another(m, setup, solve), link.compliance)
     if refinement is not None:
         shift = np.where(
             refinement.estimate == link.compliance, refinement.error, refinement.estimate - link.compliance
@@ -147,11 +153,7 @@ def link_from_part(
         parts["mesh"] = shift_covariance([shift])
     if study:
         others = (setup._replace(head="rigid"), setup._replace(support=other_support))
-        shifts = [
-            _identify(mesh, nodes, solve_skfem(mesh, material, s, wrenches), s, wrenches).compliance
-            - link.compliance
-            for s in others
-        ]
+        shifts = [another(mesh, s, solve_skfem) - link.compliance for s in others]
         # Head and support are two questions: their shares add.
         parts["boundary"] = np.sum([shift_covariance([s]) for s in shifts], axis=0)
     return PartLink(link, Budget(parts), refinement, mesh, nodes, field, wrenches, chosen, material, setup)
@@ -194,27 +196,21 @@ def _region_covariance(
     corners = np.unique(mesh.face(setup.loaded)[:, :3])
     far = np.linalg.norm(mesh.nodes[nodes] - setup.reference, axis=1)
     choices: Sequence[Ints] = (corners, nodes[far <= np.median(far)])
-    found = [
-        _identify(mesh, c, field, setup, wrenches).compliance for c in choices if _is_spread(mesh.nodes[c])
-    ]
+    found = []
+    for c in choices:
+        s = spread(mesh.nodes[c])
+        if len(c) > 8 and s[1] > 0.05 * s[0]:  # enough nodes, not along one line
+            found.append(_identify(mesh, c, field, setup, wrenches).compliance)
     motion = mean_motion(mesh, setup.loaded, setup.reference, field)
     weighted = np.linalg.lstsq(wrenches, motion, rcond=None)[0].T
     return shift_covariance([C - link.compliance for C in [*found, (weighted + weighted.T) / 2]])
 
 
-def _is_spread(points: Floats) -> bool:
-    s = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-    return len(points) > 8 and bool(s[1] > 0.05 * s[0])
-
-
 def _refined(
     mesher: Callable[[float | None], SolidMesh],
     finest: SolidMesh,
-    material: Material,
-    setup: Setup,
-    wrenches: Floats,
-    solve: Callable[[SolidMesh, Material, Setup, Floats], Floats],
-    link: Link,
+    compliance_on: Callable[[SolidMesh], Floats],
+    compliance: Floats,
 ) -> Refinement:
     meshes = [mesher(factor * finest.size()) for factor in COARSER]
     # A thin part keeps its elements small whatever is asked: only meshes that came out coarser count.
@@ -226,11 +222,5 @@ def _refined(
             f"refinement: elements of {1e3 * finest.size():.3g} mm are as large as the part allows; choose a "
             "smaller --size, or --quick without the mesh's share of the uncertainty"
         )
-    found = [
-        _identify(
-            m, m.face_nodes(setup.loaded), solve(m, material, setup, wrenches), setup, wrenches
-        ).compliance
-        for m in distinct
-    ]
     sizes = np.array([m.size() for m in [*distinct, finest]])
-    return richardson(sizes, np.array([*found, link.compliance]))
+    return richardson(sizes, np.array([*map(compliance_on, distinct), compliance]))

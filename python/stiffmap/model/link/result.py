@@ -9,13 +9,12 @@ import numpy as np
 from stiffmap.common.broadcasting import random_numbers
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.html import table, titled
-from stiffmap.model.link.arrays import Bools, Floats, Ints
-from stiffmap.model.link.estimate import Estimate, Evidence
+from stiffmap.model.link.arrays import Bools, Floats, Ints, standard_errors
+from stiffmap.model.link.estimate import Estimate, Evidence, critical_multiple
 from stiffmap.model.link.noise import Noise
 from stiffmap.model.link.regression import constrain, structure
 from stiffmap.model.link.report import unit_factor, unit_name, write_report
 from stiffmap.model.link.rigidfit import design_matrix
-from stiffmap.model.link.zeros import insignificant_entries
 
 
 @dataclass(frozen=True)
@@ -30,12 +29,28 @@ class Link(Estimate):
         )
 
     def bootstrap(self, patches: int = 32, samples: int = 500, seed: int = 0) -> Floats:
-        """(36, 36) covariance of the entries from resampled patches of nodes (block bootstrap)."""
-        e = self.evidence
+        """(36, 36) covariance of the entries from resampled patches of nodes (block bootstrap).
+
+        The same patches are drawn for every load case, so correlation between cases is kept. Patches must
+        be larger than the correlation length and at least about twenty for the estimate to be good to 20 %.
+        """
+        e, f = self.evidence, self.evidence.field
         P = _projection(e, self.symmetric, self.insignificant if self.zeros_applied else None)
         gain = np.einsum("ef,kfa->kea", P, e.regression.gain)
-        f = e.field
-        return block_bootstrap(f.points, f.displacements, gain, f.reference, e.kept, patches, samples, seed)
+        label = node_patches(f.points, min(patches, len(f.points) // 3))
+        count, cases, kept = int(label.max()) + 1, len(f.displacements), e.kept.astype(float)
+        A = design_matrix(f.points, f.reference)
+        scale = np.array([1.0] * 3 + [1 / max(float(np.abs(A[:, :, 3:]).max()), 1e-300)] * 3)
+        A = A * scale
+        normal, right = np.zeros((count, cases, 6, 6)), np.zeros((count, cases, 6))
+        np.add.at(normal, label, np.einsum("kn,nia,nib->nkab", kept, A, A))
+        np.add.at(right, label, np.einsum("kn,nia,kni->nka", kept, A, f.displacements))
+        drawn = random_numbers(seed).multinomial(count, np.full(count, 1 / count), size=samples)
+        times = drawn.astype(float)
+        M, b = np.einsum("sp,pkab->skab", times, normal), np.einsum("sp,pka->ska", times, right)
+        solvable = np.linalg.cond(M).max(axis=1) < 1e8
+        twists = np.linalg.solve(M[solvable], b[solvable][..., None])[..., 0] * scale
+        return np.asarray(np.cov(np.einsum("kea,ska->se", gain, twists).T))
 
     def _repr_html_(self) -> str:
         c, s, f = self.compliance, self.standard_error, unit_factor("mm")
@@ -79,8 +94,8 @@ def build_link(evidence: Evidence, symmetric: bool, level: float, zeros: Bools |
     gain = np.einsum("ef,kfa->kea", P, r.gain)
     share = np.einsum("kea,kab,keb->ke", gain, e.twist_covariance, gain)
     dof = _satterthwaite(share, e.noise)
-    error = np.sqrt(np.maximum(np.diag(V), 0)).reshape(6, 6)
-    insignificant = insignificant_entries(C, error, dof, level, 21 if symmetric else 36) & known
+    least = critical_multiple(level, 21 if symmetric else 36, dof) * standard_errors(V)
+    insignificant = (np.abs(C) <= least) & known
     V = np.where(np.outer(known.ravel(), known.ravel()), V, np.nan)
     return Link(
         C, V, e.noise.dof, e.noise.sigma, insignificant, level, ~e.kept, raw, r.covariance, dof, symmetric,
@@ -112,52 +127,10 @@ def node_patches(points: Floats, patches: int) -> Ints:
     order = np.lexsort(points.T)
     groups = [order]
     while 2 * len(groups) <= patches:
-        groups = [half for g in groups for half in _halves(points, g)]
+        sides = [int(np.argmax(np.ptp(points[g], axis=0))) for g in groups]
+        ranked = [g[np.argsort(points[g, i], kind="stable")] for g, i in zip(groups, sides, strict=True)]
+        groups = [half for g in ranked for half in (g[: len(g) // 2], g[len(g) // 2 :])]
     label = np.empty(len(points), dtype=np.int64)
     for number, group in enumerate(groups):
         label[group] = number
     return label
-
-
-def block_bootstrap(
-    points: Floats,
-    displacements: Floats,
-    gain: Floats,
-    reference: Floats,
-    kept: Bools,
-    patches: int = 32,
-    samples: int = 500,
-    seed: int = 0,
-) -> Floats:
-    """(36, 36) covariance of the compliance entries from resampled patches of nodes.
-
-    The same patches are drawn for every load case, so correlation between cases is kept. Patches must
-    be larger than the correlation length and at least about twenty for the estimate to be good to 20 %.
-
-    Args:
-        points: (n, 3) m; displacements: (cases, n, 3) m; reference: (3,) m.
-        gain: (cases, 36, 6) from twists to entries; kept: (cases, n) nodes in the fit.
-        patches, samples, seed: size of the bootstrap.
-    """
-    label = node_patches(points, min(patches, len(points) // 3))
-    count = int(label.max()) + 1
-    A = design_matrix(points, reference)
-    scale = np.array([1.0] * 3 + [1 / max(float(np.abs(A[:, :, 3:]).max()), 1e-300)] * 3)
-    A = A * scale
-    normal = np.zeros((count, len(displacements), 6, 6))
-    right = np.zeros((count, len(displacements), 6))
-    np.add.at(normal, label, np.einsum("kn,nia,nib->nkab", kept.astype(float), A, A))
-    np.add.at(right, label, np.einsum("kn,nia,kni->nka", kept.astype(float), A, displacements))
-    rng = random_numbers(seed)
-    times = rng.multinomial(count, np.full(count, 1 / count), size=samples).astype(float)
-    M, b = np.einsum("sp,pkab->skab", times, normal), np.einsum("sp,pka->ska", times, right)
-    solvable = np.linalg.cond(M).max(axis=1) < 1e8
-    twists = np.linalg.solve(M[solvable], b[solvable][..., None])[..., 0] * scale
-    entries = np.einsum("kea,ska->se", gain, twists)
-    return np.asarray(np.cov(entries.T))
-
-
-def _halves(points: Floats, group: Ints) -> tuple[Ints, Ints]:
-    axis = int(np.argmax(np.ptp(points[group], axis=0)))
-    ranked = group[np.argsort(points[group, axis], kind="stable")]
-    return ranked[: len(ranked) // 2], ranked[len(ranked) // 2 :]

@@ -10,6 +10,7 @@ from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 from stiffmap.model.link.arrays import Floats, skew
+from stiffmap.model.link.transport import twist_transport
 
 
 class RigidFit(NamedTuple):
@@ -43,8 +44,7 @@ def fit_factor(points: Floats, reference: Floats) -> Floats:
     at_centroid = np.zeros((6, 6))
     at_centroid[:3, :3] = np.eye(3) / len(points)
     at_centroid[3:, 3:] = np.linalg.inv(np.einsum("nki,nkj->ij", S, S))
-    T = np.eye(6)
-    T[:3, 3:] = -skew(reference - centre)
+    T = twist_transport(reference - centre)
     return np.asarray(T @ at_centroid @ T.T)
 
 

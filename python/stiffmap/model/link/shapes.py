@@ -12,10 +12,11 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from stiffmap.model.link.arrays import Floats
-from stiffmap.model.link.gmshmesh import Faces, mesh_model
+from stiffmap.model.link.gmshmesh import Faces, mesh_model, with_others
 from stiffmap.model.link.mesh import SolidMesh
 
 Length = Field(gt=0)
+Vector = tuple[float, float, float]
 
 
 class _Shape(BaseModel):
@@ -147,14 +148,8 @@ class ForkBar(_Shape):
             for side in (-1, 1):
                 y = side * (self.gap + self.prong) / 2
                 prongs += _box(gmsh, start, end, self.prong, self.height, y)
-                holes.append(
-                    (
-                        3,
-                        occ.addCylinder(
-                            mm * axis, mm * (y - self.prong), 0, 0, 2 * mm * self.prong, 0, mm * self.hole / 2
-                        ),
-                    )
-                )
+                start_y, along, radius = mm * (y - self.prong), 2 * mm * self.prong, mm * self.hole / 2
+                holes.append((3, occ.addCylinder(mm * axis, start_y, 0, 0, along, 0, radius)))
         solid, _ = occ.fuse(body, prongs)
         occ.cut(solid, holes)
         occ.synchronize()
@@ -195,22 +190,12 @@ class Foot(_Shape):
 
     def build(self, gmsh: Any) -> Faces:
         """Two boxes; the upright is centred on x = 0, the plate starts at its back."""
-        occ, mm = gmsh.model.occ, 1e3
-        back = -mm * self.upright / 2
-        plate = occ.addBox(
-            back, -mm * self.plate, -mm * self.depth / 2, mm * self.base, mm * self.plate, mm * self.depth
-        )
-        upright = occ.addBox(
-            back,
-            -mm * self.height,
-            -mm * self.depth / 2,
-            mm * self.upright,
-            mm * self.height,
-            mm * self.depth,
-        )
-        occ.fuse([(3, plate)], [(3, upright)])
-        occ.synchronize()
-        return _end_faces(gmsh, 1, 0.0, -mm * self.height)
+        back, side = -self.upright / 2, -self.depth / 2
+        plate = _cuboid(gmsh, (back, -self.plate, side), (self.base, self.plate, self.depth))
+        upright = _cuboid(gmsh, (back, -self.height, side), (self.upright, self.height, self.depth))
+        gmsh.model.occ.fuse(plate, upright)
+        gmsh.model.occ.synchronize()
+        return _end_faces(gmsh, 1, 0.0, -1e3 * self.height)
 
 
 Shape = Bar | HollowBar | ForkBar | Foot
@@ -219,9 +204,13 @@ Shape = Bar | HollowBar | ForkBar | Foot
 def _box(
     gmsh: Any, x0: float, x1: float, width: float, height: float, y: float = 0.0
 ) -> list[tuple[int, int]]:
-    """Box from x0 to x1, centred on (y, 0) in y and z; arguments in m, the model in mm."""
-    a = 1e3 * np.array([x0, y - width / 2, -height / 2, x1 - x0, width, height])
-    return [(3, gmsh.model.occ.addBox(*a))]
+    """Box from x0 to x1, centred on (y, 0) in y and z."""
+    return _cuboid(gmsh, (x0, y - width / 2, -height / 2), (x1 - x0, width, height))
+
+
+def _cuboid(gmsh: Any, low: Vector, size: Vector) -> list[tuple[int, int]]:
+    """Box by its lowest corner and its size; arguments in m, the model in mm."""
+    return [(3, gmsh.model.occ.addBox(*(1e3 * np.array([*low, *size]))))]
 
 
 def _end_faces(gmsh: Any, axis: int, fixed: float, loaded: float) -> Faces:
@@ -234,8 +223,7 @@ def _end_faces(gmsh: Any, axis: int, fixed: float, loaded: float) -> Faces:
         for name, place in (("fixed", fixed), ("loaded", loaded)):
             if flat and abs(low - place) < 1e-3:
                 names[name].append(tag)
-    used = {t for tags in names.values() for t in tags}
-    return names | {f"face{t}": [t] for _, t in gmsh.model.getEntities(2) if t not in used}
+    return with_others(gmsh, names)
 
 
 def _hole_faces(gmsh: Any) -> list[tuple[int, float]]:

@@ -62,15 +62,20 @@ def solve_skfem(mesh: SolidMesh, material: Material, setup: Setup, wrenches: Flo
     if setup.support == "bed":
         return _solve_bed(mesh, K, material, setup, wrenches)
     held = _dofs(mesh.face_nodes(setup.fixed))
-    free = np.setdiff1d(np.arange(K.shape[0]), held)
     if setup.head == "rigid":
-        T = _rigid_head(mesh, setup, free)
+        T = _rigid_head(mesh, setup, np.setdiff1d(np.arange(K.shape[0]), held))
         q = _factorised(T.T @ K @ T)(np.vstack([np.zeros((T.shape[1] - 6, len(wrenches))), wrenches.T]))
         return _field(T @ q, mesh)
     f = nodal_loads(mesh, setup.loaded, setup.reference, wrenches).reshape(-1, len(wrenches))
+    return _field(_held(K, held, f), mesh)
+
+
+def _held(K: Any, held: Ints, f: Floats) -> Floats:
+    """(3 n, cases) m under the forces f, with these degrees of freedom at zero."""
+    free = np.setdiff1d(np.arange(len(f)), held)
     u = np.zeros_like(f)
     u[free] = _factorised(K[free][:, free])(f[free])
-    return _field(u, mesh)
+    return u
 
 
 def stiffness_matrix(mesh: SolidMesh, material: Material) -> Any:
@@ -94,10 +99,7 @@ def _solve_soft(mesh: SolidMesh, K: Any, setup: Setup, wrenches: Floats) -> Floa
     modes = design_matrix(mesh.nodes, centre).reshape(-1, 6)
     reaction = -(modes.T @ f).T
     f = f + nodal_loads(mesh, setup.fixed, centre, reaction).reshape(f.shape)
-    held = _three_two_one(mesh)
-    free = np.setdiff1d(np.arange(len(f)), held)
-    u = np.zeros_like(f)
-    u[free] = _factorised(K[free][:, free])(f[free])
+    u = _held(K, _three_two_one(mesh), f)
     return _less_mean_motion(mesh, setup.fixed, centre, _field(u, mesh))
 
 

@@ -12,7 +12,7 @@ from stiffmap.model.description import TASK, Leg, MachineDescription, Offset
 from stiffmap.model.files.save import description_text
 from stiffmap.model.files.schema.base import suggestion
 from stiffmap.model.urdf.chains import Chains, ball, end_pose, plain_name
-from stiffmap.model.urdf.model import UrdfJoint, UrdfModel
+from stiffmap.model.urdf.model import UrdfModel
 from stiffmap.model.urdf.reader import read_urdf
 from stiffmap.model.urdf.sidecar import Sidecar, read_sidecar
 from stiffmap.model.urdf.tip import find_tip
@@ -31,15 +31,6 @@ class Imported:
     """The link that is the tool."""
     choice: str = ""
     """The ends that it was chosen from, in words; empty where it was named, or is the only one."""
-
-
-@dataclass(frozen=True)
-class Loop:
-    """A closed loop: a frame of the platform's body and the end of a further leg."""
-
-    on_platform: str
-    end: str
-    free_to_turn: bool
 
 
 def import_urdf(
@@ -143,15 +134,20 @@ def _legs(
     first = chains.sequence(model.way(body))
     at = end_pose(first)
     legs = [Leg(plain_name(body), first)]
-    for loop in loops:
-        way = model.way(loop.end)
-        _check_apart(model.way(body), way, loop, file)
+    for on_platform, end, free_to_turn in loops:
+        way = model.way(end)
+        both = zip(model.way(body), way, strict=False)
+        shared = [j.name for j, k in both if j is k and j.kind != "fixed"]
+        if shared:
+            raise FileError(f"the loop at '{end}' does not reach the base: both sides hang on joint "
+                            f"'{shared[-1]}'; only legs between base and platform can be imported",
+                            file=file, key="closed_loop")  # fmt: skip
         elements = chains.sequence(way)
-        on_body = chains.between(body, loop.on_platform)
-        if loop.free_to_turn:
+        on_body = chains.between(body, on_platform)
+        if free_to_turn:
             turned = end_pose(elements).r.T @ (at @ on_body).r
-            elements = (*elements, ball(plain_name(f"{loop.end}_ball"), turned))
-        name = plain_name(model.body_of(loop.end))
+            elements = (*elements, ball(plain_name(f"{end}_ball"), turned))
+        name = plain_name(model.body_of(end))
         taken = [leg.name for leg in legs]
         name = name if name not in taken else f"{name}_{len(legs) + 1}"
         legs.append(Leg(name, (*elements, Offset("attach", on_body.inverse()))))
@@ -159,16 +155,9 @@ def _legs(
     return tuple(legs), chains.sequence(rest, tip)  # type: ignore[return-value]
 
 
-def _check_apart(one: list[UrdfJoint], other: list[UrdfJoint], loop: Loop, file: str) -> None:
-    shared = [j.name for j, k in zip(one, other, strict=False) if j is k and j.kind != "fixed"]
-    if shared:
-        raise FileError(f"the loop at '{loop.end}' does not reach the base: both sides hang on joint "
-                        f"'{shared[-1]}'; only legs between base and platform can be imported",
-                        file=file, key="closed_loop")  # fmt: skip
-
-
-def _loops(model: UrdfModel, side: Sidecar, tip: str, file: str) -> tuple[list[Loop], str]:
-    """Loops seen from the platform: the moving body that every loop closes upon and the tip hangs on."""
+def _loops(model: UrdfModel, side: Sidecar, tip: str, file: str) -> tuple[list[tuple[str, str, bool]], str]:
+    """Loops seen from the platform, the moving body that every loop closes upon and the tip hangs on: of each the
+    frame on it, the end of the further leg, and whether that is free to turn; then the body."""
     pairs = [tuple(model.link(f, "closed_loop", file) for f in pair) for pair in side.closed_loop]
     if not pairs:
         return [], tip
@@ -182,5 +171,5 @@ def _loops(model: UrdfModel, side: Sidecar, tip: str, file: str) -> tuple[list[L
     out = []
     for (a, b), kind in zip(pairs, side.type, strict=True):
         on, end = (a, b) if model.body_of(a) == body else (b, a)
-        out.append(Loop(on, end, kind.lower() == "3d"))
+        out.append((on, end, kind.lower() == "3d"))
     return out, body

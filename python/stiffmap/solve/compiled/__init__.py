@@ -2,7 +2,7 @@
 
 from stiffmap.solve.compiled.machine import Answer, CompiledMachine, kernel_levels, multipliers
 from stiffmap.solve.compiled.names import Names, Role
-from stiffmap.solve.compiled.status import Flag, Status, counted
+from stiffmap.solve.status import Flag, Status, counted
 
 __all__ = [
     "Answer",

@@ -211,11 +211,10 @@ def add_joint(out: _core.Chain, e: Joint) -> None:
 
 def limits_with_slack(e: Joint) -> tuple[float, float]:
     """Ends of a drive's range or a joint's limits, wider by what round-off makes of a pose at an end."""
-    ends = e.drive.range if e.drive and e.drive.range else e.limits
-    if ends is None:
+    if e.ends is None:
         return -UNLIMITED, UNLIMITED
-    slack = ROUND_OFF * max(map(abs, ends))
-    return ends[0] - slack, ends[1] + slack
+    slack = ROUND_OFF * max(map(abs, e.ends))
+    return e.ends[0] - slack, e.ends[1] + slack
 
 
 def drive_numbers(e: Joint) -> dict[str, float]:

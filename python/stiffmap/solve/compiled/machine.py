@@ -255,8 +255,12 @@ class CompiledMachine:
         start: (n, coordinates) near the answer, NaN where none is known. Not patient: a pose that straight
         continuation from home does not reach is out of reach. Only: so is one that its start does not lead to.
         """
-        begin = np.zeros((0, len(self.names.coordinates))) if start is None else start
+        begin = self._rows(start)
         return self._mechanism.kinematics(position, rotation, begin, weights, patient, only, threads)
+
+    def _rows(self, known: Floats | None) -> Floats:
+        """Coordinates (n, coordinates) as the core takes them; None: no rows."""
+        return np.zeros((0, len(self.names.coordinates))) if known is None else known
 
     @property
     def not_enclosed(self) -> str:
@@ -280,10 +284,8 @@ class CompiledMachine:
         start: (n, coordinates) near those of the centres, NaN where none is known. slopes: 3 columns
         (translations) or 6 (twists) of the coordinates' slopes. watched: frames whose motion is bounded.
         """
-        begin = np.zeros((0, len(self.names.coordinates))) if start is None else start
-        return self._mechanism.enclose(
-            centre, half, np.ascontiguousarray(axes), rotation, begin, slopes, list(watched), threads
-        )
+        columns, begin = np.ascontiguousarray(axes), self._rows(start)
+        return self._mechanism.enclose(centre, half, columns, rotation, begin, slopes, list(watched), threads)
 
     def dynamics(
         self,
@@ -333,11 +335,10 @@ class CompiledMachine:
         viscous, loss: (coordinates,). closed: (n, coordinates) closed at the poses. whole: of a tangent that is not symmetric as it
         is, with the motion of all coordinates.
         """
-        size = len(self.names.coordinates)
-        none, unknown = np.zeros(size), np.zeros((0, size))
+        none = np.zeros(len(self.names.coordinates))
         return self._mechanism.modes(
             inertias, none if viscous is None else viscous, none if loss is None else loss, position, rotation, wrench,
-            gravity, unknown if closed is None else closed, point, count, whole, threads,
+            gravity, self._rows(closed), point, count, whole, threads,
         )  # fmt: skip
 
     def frames(self, coordinates: Floats) -> tuple[Floats, Floats]:

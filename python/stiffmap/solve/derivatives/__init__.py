@@ -2,13 +2,11 @@
 
 from stiffmap.solve.derivatives.differentiate import differentiate
 from stiffmap.solve.derivatives.prepared import Prepared, prepare
-from stiffmap.solve.derivatives.requests import EffectRequest, Request, Requests, read_requests
+from stiffmap.solve.derivatives.requests import Request, read_requests
 
 __all__ = [
-    "EffectRequest",
     "Prepared",
     "Request",
-    "Requests",
     "differentiate",
     "prepare",
     "read_requests",

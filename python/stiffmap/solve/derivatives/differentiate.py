@@ -11,9 +11,8 @@ from scipy.spatial.transform import Rotation
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.rotations import rotation_about
 from stiffmap.solve.compiled import CompiledMachine
-from stiffmap.solve.derivatives.prepared import Prepared
+from stiffmap.solve.derivatives.prepared import Prepared, central, combine_all
 from stiffmap.solve.derivatives.requests import INPUTS, Requests
-from stiffmap.solve.derivatives.stencil import central, combine_all
 from stiffmap.solve.solution import Solution
 from stiffmap.solve.solving import Call, load_types, solve_call
 from stiffmap.solve.variants import solve_varied
@@ -28,10 +27,8 @@ def differentiate(ready: Prepared, call: Call, requests: Requests) -> Solution:
     table: Table = {q: {} for q in requests.of}
     solution = (_whole if requests.whole else _displacement)(ready, call, table)
     for name in requests.inputs:
-        if name == "wrench":
-            slopes = along_wrench(ready.base, call, solution, requests.of)
-        else:
-            slopes = along_input(ready.base, call, solution, name, requests.of)
+        given = (ready.base, call, solution, requests.of)
+        slopes = along_wrench(*given) if name == "wrench" else along_input(*given, name)
         for variable, values in slopes:
             for q in requests.of:
                 table[q][variable] = values[q]
@@ -69,7 +66,7 @@ POSE_STEP = 1e-4  # of the machine's length, rad
 
 
 def along_input(
-    machine: CompiledMachine, call: Call, base: Solution, name: str, of: tuple[str, ...]
+    machine: CompiledMachine, call: Call, base: Solution, of: tuple[str, ...], name: str
 ) -> Iterator[tuple[str, dict[str, Floats]]]:
     """For each component of an input: its name, and the derivative of each quantity.
 
@@ -77,8 +74,7 @@ def along_input(
     whole solution, of second order.
     """
     for i, component in enumerate(INPUTS[name]):
-        step = _step(machine, name)
-        stencil = central(step)
+        stencil = central(_step(machine, name))
         ends = [solve_call(machine, _moved(machine, call, name, i, h))[0] for h in stencil.offsets]
         yield (
             f"{name} {component}",
@@ -120,7 +116,9 @@ def along_wrench(
         wanted = [q for q in of if q != "displacement"]
         if wanted:
             h = steps(machine, base)[..., i]
-            ends = [solve_call(machine, _with_wrench(call, i, k * h))[0] for k in (1, -1, 2, -2)]
+            wrench = np.zeros(6) if call.wrench is None else np.asarray(call.wrench, dtype=float)
+            moved = [wrench + (k * h)[..., None] * np.eye(6)[i] for k in (1, -1, 2, -2)]
+            ends = [solve_call(machine, replace(call, wrench=w))[0] for w in moved]
             for q in wanted:
                 a, b, c, d = (getattr(s, q) for s in ends)
                 values[q] = (8 * (a - b) - (c - d)) / (12 * h[..., None, None])
@@ -169,8 +167,3 @@ def steps(machine: CompiledMachine, base: Solution) -> Floats:
     unit = np.array([1.0] * 3 + [machine.length] * 3)
     moved = np.sqrt(((unit[:, None] * base.compliance) ** 2).sum(axis=-2))
     return np.asarray(SHARE * machine.length / np.where(moved > 0, moved, 1 / (machine.stiffness * unit)))
-
-
-def _with_wrench(call: Call, i: int, h: Floats) -> Call:
-    given = np.zeros(6) if call.wrench is None else np.asarray(call.wrench, dtype=float)
-    return replace(call, wrench=given + h[..., None] * np.eye(6)[i])

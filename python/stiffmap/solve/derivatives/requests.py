@@ -48,16 +48,14 @@ def read_requests(given: Sequence[Request], of: Sequence[str]) -> Requests:
     effects, inputs = [], []
     for request in given:
         if isinstance(request, str):
-            inputs.append(_input(request))
+            if request not in INPUTS:
+                raise StiffmapError(
+                    f"derivatives: expected an effect or one of {', '.join(INPUTS)}, got {request!r}"
+                )
+            inputs.append(request)
         else:
             effects.append(_effect(request))
     return Requests(tuple(effects), tuple(dict.fromkeys(inputs)), tuple(dict.fromkeys(of)))
-
-
-def _input(name: str) -> str:
-    if name not in INPUTS:
-        raise StiffmapError(f"derivatives: expected an effect or one of {', '.join(INPUTS)}, got {name!r}")
-    return name
 
 
 def _effect(request: Any) -> EffectRequest:

@@ -12,8 +12,7 @@ import pytest
 import stiffmap as sm
 from stiffmap import _core
 from stiffmap.model.effects import get, kinds
-from stiffmap.solve.derivatives.prepared import Neighbours, with_requests
-from stiffmap.solve.derivatives.stencil import central, within
+from stiffmap.solve.derivatives.prepared import Neighbours, central, with_requests, within
 
 MACHINE = sm.load_machine("orthoglide-revised")
 POSES = np.array([[0.02, 0.05, 0.1], [-0.1, 0.2, 0.15], [0.25, -0.12, 0.0]])

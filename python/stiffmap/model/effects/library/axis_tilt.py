@@ -5,11 +5,9 @@ from __future__ import annotations
 from stiffmap.model.description import Joint, Pose
 from stiffmap.model.description.tree import Elements
 from stiffmap.model.effects.edit import built, changing
-from stiffmap.model.effects.library.geometry import about, home_position, names_of, rotation_of, rotations
+from stiffmap.model.effects.library.geometry import ANGLES, about, home_position, rotation_of, rotations
 from stiffmap.model.effects.sites import at_sites, joints
-from stiffmap.model.effects.types import EffectType, Parameter, Placed
-
-PARAMETERS: tuple[Parameter, ...] = rotations("rotation of the axis")
+from stiffmap.model.effects.types import EffectType, Placed
 
 
 def tilted(e: Joint, placed: Placed) -> Elements:
@@ -28,13 +26,13 @@ EFFECT = EffectType(
         "home position) whatever the joint carries stands as declared. A rotation about the axis itself "
         "does nothing."
     ),
-    parameters=PARAMETERS,
+    parameters=rotations("rotation of the axis"),
     places=at_sites(joints),
     apply=changing(joints, tilted),
     pivot="home position of the carriage; origin of a revolute joint",
     frame="local axes before the joint; about x, then the turned y, then the twice turned z",
     moves="the axis alone",
-    vector=names_of(PARAMETERS),
+    vector=ANGLES,
     excludes=("axis_tilt",),
     stage=45,
 )

@@ -57,8 +57,7 @@ def change_branches(
 ) -> MachineDescription:
     """``change`` on both branches, with the share -1/2 for the first and +1/2 for the second."""
 
-    def block(e: Element) -> Elements:
-        assert isinstance(e, Block)
+    def block(e: Block) -> Elements:
         pairs = zip(e.branches, (-0.5, 0.5), strict=True)
         return (replace(e, branches=tuple(change(e, b, share) for b, share in pairs)),)
 

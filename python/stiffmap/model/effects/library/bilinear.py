@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from functools import partial
 
 from stiffmap.model.description import Law
-from stiffmap.model.effects.evidence import Probe, Signature, Tried, shares_of_load
+from stiffmap.model.effects.evidence import shares_of_load
 from stiffmap.model.effects.library.drive_law import changing_law, in_unit_of_joint, linear
 from stiffmap.model.effects.sites import at_sites, elastic_directions, elastic_drives
 from stiffmap.model.effects.types import EffectType, Parameter, Placed
@@ -25,11 +25,6 @@ def law(old: Law, placed: Placed) -> Law:
     return old if ratio == 1.0 else Law(old.stiffness / ratio, knots=((-a, -knee), (a, knee)))
 
 
-def signature(probe: Probe, tried: Tried) -> Iterator[Signature]:
-    """A knee at a few shares of the largest load."""
-    return shares_of_load(probe, tried, "knee", KNEES)
-
-
 EFFECT = EffectType(
     kind="bilinear",
     precedence=40,
@@ -42,7 +37,7 @@ EFFECT = EffectType(
     parameters=PARAMETERS,
     places=at_sites(elastic_directions),
     apply=changing_law(law),
-    signature=signature,
+    signature=partial(shares_of_load, name="knee", shares=KNEES),
     tried=at_sites(elastic_drives),
     frame="the coordinate",
     excludes=("bilinear", "dead_zone", "hardening", "friction", "position_dependent_compliance", "tabulated"),

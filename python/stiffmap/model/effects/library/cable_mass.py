@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from stiffmap.model.description import Body, Cable, Element, MachineDescription
-from stiffmap.model.effects.edit import edit_legs, fresh
+from stiffmap.model.description import Body, Cable, MachineDescription
+from stiffmap.model.description.tree import Elements
+from stiffmap.model.effects.edit import change_sites
 from stiffmap.model.effects.sites import at_sites, cables
 from stiffmap.model.effects.types import EffectType, Parameter, Placed
 
@@ -14,17 +15,11 @@ def apply(description: MachineDescription, placed: Placed) -> MachineDescription
     """Half of the length at home hangs at the fixing point."""
     home = description.home
 
-    def edit(elements: tuple[Element, ...]) -> tuple[Element, ...]:
-        out = elements
-        for i in reversed(cables(elements).get(placed.element, ())):
-            e = elements[i]
-            assert isinstance(e, Cable)
-            length = float(np.linalg.norm(home.p + home.r @ np.array(e.at) - np.array(e.anchor)))
-            body = Body(fresh(f"{e.name}_weight", out), 0.5 * placed.values["density"] * length, e.at)
-            out = (*out[: i + 1], body, *out[i + 1 :])
-        return out
+    def hung(e: Cable) -> Elements:
+        length = float(np.linalg.norm(home.p + home.r @ np.array(e.at) - np.array(e.anchor)))
+        return (e, Body(f"{e.name}_weight", 0.5 * placed.values["density"] * length, e.at))
 
-    return edit_legs(description, placed.legs, edit)
+    return change_sites(description, placed.legs, placed.element, cables, hung)
 
 
 EFFECT = EffectType(

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.description import Element, Joint, Law, MachineDescription, Spring
+from stiffmap.model.description.strokes import as_rows
 from stiffmap.model.description.tree import Elements
 from stiffmap.model.effects.edit import change_sites
 from stiffmap.model.effects.sites import at_sites, found, joints, springs
@@ -47,10 +49,9 @@ def apply(description: MachineDescription, placed: Placed) -> MachineDescription
     """Scales the law, the matrix or one entry of it."""
     entry = placed.element.partition(".")[2]
 
-    def change(e: Element) -> Elements:
+    def change(e: Any) -> Elements:
         if isinstance(e, Joint):
             return (_joint(e, placed),)
-        assert isinstance(e, Spring)
         if "value" in placed.values:
             raise StiffmapError("value is for elements with one direction; use scale for a 6x6 spring")
         scale = placed.values["scale"]
@@ -72,24 +73,18 @@ def _whole(e: Spring, scale: float) -> Spring:
     if e.laws:
         raise StiffmapError(f"{e.name} has declared nonlinear laws; its compliance cannot be scaled")
     if e.stiffness is not None:
-        return replace(e, stiffness=_times(e.stiffness, 1.0 / scale))
-    assert e.compliance is not None
-    return replace(e, compliance=_times(e.compliance, scale))
-
-
-def _times(matrix: tuple[tuple[float, ...], ...], factor: float) -> tuple[tuple[float, ...], ...]:
-    return tuple(tuple(v * factor for v in row) for row in matrix)
+        return replace(e, stiffness=as_rows(np.array(e.stiffness) * (1.0 / scale)))
+    return replace(e, compliance=as_rows(np.array(e.compliance) * scale))
 
 
 def _entry(e: Spring, i: int, scale: float) -> Spring:
-    assert e.compliance is not None
     if scale < lowest_scale(e, i):
         raise StiffmapError(
             f"{e.name}.k{i + 1}{i + 1}: below scale {lowest_scale(e, i):.6g} the matrix is indefinite"
         )
-    rows = [list(row) for row in e.compliance]
-    rows[i][i] *= scale
-    return replace(e, compliance=tuple(tuple(row) for row in rows))
+    rows = np.array(e.compliance)
+    rows[i, i] *= scale
+    return replace(e, compliance=as_rows(rows))
 
 
 def lowest_scale(e: Spring, i: int) -> float:

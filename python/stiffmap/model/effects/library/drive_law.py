@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.model.description import Element, Joint, Law, MachineDescription, Spring
-from stiffmap.model.description.tree import Elements, sequences
+from stiffmap.model.description import Joint, Law, MachineDescription, Spring
+from stiffmap.model.description.tree import Elements, all_elements
 from stiffmap.model.effects.edit import change_sites
 from stiffmap.model.effects.sites import elastic_directions
 from stiffmap.model.effects.types import Apply, Parameter, ParametersAt, Placed
@@ -19,12 +20,13 @@ def change_law(
     """The machine with another law at each joint or spring direction of the place."""
     entry = placed.element.partition(".")[2]
 
-    def element(e: Element) -> Elements:
+    def element(e: Any) -> Elements:
         if isinstance(e, Joint):
             assert e.law is not None
             return (replace(e, law=change(e.law)),)
-        assert isinstance(e, Spring)
-        return (_with_direction(e, int(entry[1]) - 1, change),)
+        i = int(entry[1]) - 1
+        laws = {**dict(e.laws), i: change(dict(e.laws).get(i) or Law(_stiffness(e, i)))}
+        return (replace(e, laws=tuple(sorted(laws.items(), key=lambda pair: pair[0]))),)
 
     return change_sites(description, placed.legs, placed.element, elastic_directions, element)
 
@@ -32,12 +34,6 @@ def change_law(
 def changing_law(change: Callable[[Law, Placed], Law]) -> Apply:
     """The ``apply`` of an effect that makes another law of that at its place."""
     return lambda description, placed: change_law(description, placed, lambda old: change(old, placed))
-
-
-def _with_direction(e: Spring, i: int, change: Callable[[Law], Law]) -> Spring:
-    old = dict(e.laws).get(i) or Law(_stiffness(e, i))
-    laws = {**dict(e.laws), i: change(old)}
-    return replace(e, laws=tuple(sorted(laws.items(), key=lambda pair: pair[0])))
 
 
 def _stiffness(e: Spring, i: int) -> float:
@@ -59,23 +55,24 @@ def is_revolute(description: MachineDescription, element: str) -> bool:
     entry = element.partition(".")[2]
     if entry:
         return int(entry[1]) > 3
-    chains = [description.base, description.platform, *(leg.elements for leg in description.legs)]
-    named = [e for c in chains for seq in sequences(c) for e in seq if e.name == element]
+    named = [e for _, e in all_elements(description) if e.name == element]
     return any(isinstance(e, Joint) and e.kind != "prismatic" for e in named)
-
-
-def _turning(p: Parameter) -> Parameter:
-    """The parameter on a joint that turns: unit, bound and size of an angle."""
-    upper, scale = p.angular_upper or p.upper, p.angular_scale or p.scale
-    return replace(p, unit=p.angular or p.unit, upper=upper, scale=scale)
 
 
 def in_unit_of_joint(*parameters: Parameter) -> ParametersAt:
     """Parameters whose units become the angular ones where the joint turns."""
 
+    turning = tuple(
+        replace(
+            p,
+            unit=p.angular or p.unit,
+            upper=p.angular_upper or p.upper,
+            scale=p.angular_scale or p.scale,
+        )
+        for p in parameters
+    )
+
     def at(description: MachineDescription, element: str, legs: tuple[str, ...]) -> tuple[Parameter, ...]:
-        if not is_revolute(description, element):
-            return parameters
-        return tuple(map(_turning, parameters))
+        return turning if is_revolute(description, element) else parameters
 
     return at

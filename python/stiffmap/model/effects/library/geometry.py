@@ -10,6 +10,7 @@ from stiffmap.model.description import Joint, Pose
 from stiffmap.model.effects.types import Parameter, Placed
 
 AXES = "xyz"
+ERRORS, ANGLES = (tuple(f"{word}_{a}" for a in AXES) for word in ("error", "angle"))
 
 
 def translations(doc: str, prefix: str = "error_") -> tuple[Parameter, ...]:
@@ -35,9 +36,12 @@ def rotation_of(placed: Placed, share: float = 1.0) -> NDArray[np.float64]:
     return out
 
 
-def names_of(parameters: tuple[Parameter, ...]) -> tuple[str, ...]:
-    """Their names."""
-    return tuple(p.name for p in parameters)
+def point(prefix: str, doc: str, reach: float = 100.0) -> tuple[Parameter, ...]:
+    """``prefix_x``, ``prefix_y``, ``prefix_z`` (m) of a known point, at the origin where they are left out."""
+    return tuple(
+        Parameter(f"{prefix}_{a}", "m", -reach, reach, None, 0.1, f"{doc}, {a}", default=0.0, fitted=False)
+        for a in AXES
+    )
 
 
 def about(pivot: NDArray[np.float64], rotation: NDArray[np.float64]) -> Pose:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.model.description import Body, Element, MachineDescription
-from stiffmap.model.description.tree import Elements, sequences
+from stiffmap.model.description import Body, MachineDescription
+from stiffmap.model.description.tree import all_elements
 from stiffmap.model.effects.edit import change_sites
 from stiffmap.model.effects.sites import bodies, places
 from stiffmap.model.effects.types import EffectType, Parameter, Place, Placed
@@ -17,16 +17,10 @@ SCALE = Parameter("scale", "1", -10.0, 10.0, 0.0, 1.0, "factor on the declared m
 MASS = Parameter("mass", "kg", 0.0, 1e5, 0.0, 1.0, "mass of each body of that name", fitted=False)
 
 
-def masses(description: MachineDescription) -> list[float]:
-    """Masses of all bodies, kg."""
-    trunk = (*description.base, *description.platform)
-    chains = [trunk, *(leg.elements for leg in description.legs)]
-    return [e.mass for c in chains for seq in sequences(c) for e in seq if isinstance(e, Body)]
-
-
 def find(description: MachineDescription) -> list[Place]:
     """The whole machine where it declares masses and no gravity; else each body."""
-    if any(masses(description)) and description.gravity is None:
+    heavy = any(isinstance(e, Body) and e.mass for _, e in all_elements(description))
+    if heavy and description.gravity is None:
         return [("machine", ())]
     return places(description, bodies)
 
@@ -41,12 +35,8 @@ def apply(description: MachineDescription, placed: Placed) -> MachineDescription
         return replace(description, gravity=(x * s, y * s, z * s))
     if "mass" not in placed.values:
         raise StiffmapError("give mass (kg) for a body; scale is for the machine")
-
-    def change(e: Element) -> Elements:
-        assert isinstance(e, Body)
-        return (replace(e, mass=placed.values["mass"]),)
-
-    changed = change_sites(description, placed.legs, placed.element, bodies, change)
+    place, mass = (placed.legs, placed.element, bodies), placed.values["mass"]
+    changed = change_sites(description, *place, lambda e: (replace(e, mass=mass),))
     return replace(changed, gravity=description.gravity or DOWN)
 
 

@@ -7,13 +7,14 @@ own are a Prandtl-Ishlinskii model, which obeys Masing's rule.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import Floats
-from stiffmap.model.effects.evidence import Plan, Probe, Signature, Tried, shares_of_load
+from stiffmap.model.effects.evidence import shares_of_load
 from stiffmap.model.effects.library.drive_law import in_unit_of_joint
 from stiffmap.model.effects.sites import at_sites, elastic_drives
 from stiffmap.model.effects.types import EffectType, Parameter
@@ -73,16 +74,6 @@ def deflection(force: Floats, compliance: float, values: Mapping[str, float]) ->
     return np.asarray((compliance * bent + values["half_width"] * np.tanh(s / values["seat"])).mean(axis=1))
 
 
-def signature(probe: Probe, tried: Tried) -> Iterator[Signature]:
-    """Play that is crossed within a few shares of the largest load."""
-    return shares_of_load(probe, tried, "seat", SEATS)
-
-
-def jumps(plan: Plan) -> bool:
-    """Whether loads do not run in order of time: memory is then nothing that readings can determine."""
-    return plan.load_direction is None
-
-
 EFFECT = EffectType(
     kind="hysteresis",
     precedence=70,
@@ -98,8 +89,8 @@ EFFECT = EffectType(
     parameters=PARAMETERS,
     places=at_sites(elastic_drives),
     apply=None,
-    signature=signature,
-    hidden=jumps,
+    signature=partial(shares_of_load, name="seat", shares=SEATS),
+    hidden=lambda plan: plan.load_direction is None,  # memory is nothing to see where loads jump
     tried=at_sites(elastic_drives),
     moved=("level", "half_width", "seat"),
     frame="the drive's coordinate",

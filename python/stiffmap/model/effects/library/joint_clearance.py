@@ -7,8 +7,7 @@ from numpy.typing import NDArray
 
 from stiffmap.model.description import Joint, Law, MachineDescription, Offset, Pose, Spring
 from stiffmap.model.description.tree import Elements
-from stiffmap.model.effects.edit import edit_legs
-from stiffmap.model.effects.library.joint_compliance import insert_at, pins
+from stiffmap.model.effects.library.joint_compliance import insert, pins
 from stiffmap.model.effects.sites import at_sites, passive_joints
 from stiffmap.model.effects.types import EffectType, Parameter, Placed
 
@@ -45,7 +44,7 @@ def apply(description: MachineDescription, placed: Placed) -> MachineDescription
         turn = Pose.of(rotation=_axis_first(np.array(e.axes[0])))
         return (Offset("clearance_frame", turn), spring, Offset("clearance_back", turn.inverse()))
 
-    return edit_legs(description, placed.legs, lambda seq: insert_at(seq, placed.element, piece))
+    return insert(description, placed, piece)
 
 
 def _axis_first(axis: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -37,25 +37,28 @@ def _next(elements: Elements, k: int, way: int) -> int | None:
     return None
 
 
-def insert_at(elements: Elements, element: str, piece: Callable[[Joint], Elements]) -> Elements:
+def insert(
+    description: MachineDescription, placed: Placed, piece: Callable[[Joint], Elements]
+) -> MachineDescription:
     """``piece`` on the link's side of each pin: behind the pin unless the link comes before it."""
-    found = pins(elements).get(element, ())
-    link = [i for i, e in enumerate(elements) if isinstance(e, Spring) and e.name == element]
-    out = elements
-    for i in reversed(found):
-        pin = elements[i]
-        assert isinstance(pin, Joint)
-        new = tuple(replace(e, name=f"{pin.name}_{e.name}") for e in piece(pin))
-        out = splice(out, i, (*new, pin) if link and i > link[0] else (pin, *new))
-    return out
+
+    def edit(elements: Elements) -> Elements:
+        link = springs(elements).get(placed.element)
+        out = elements
+        for i in reversed(pins(elements).get(placed.element, ())):
+            pin = elements[i]
+            assert isinstance(pin, Joint)
+            new = tuple(replace(e, name=f"{pin.name}_{e.name}") for e in piece(pin))
+            out = splice(out, i, (*new, pin) if link and i > link[0] else (pin, *new))
+        return out
+
+    return edit_legs(description, placed.legs, edit)
 
 
 def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
     """An isotropic spring at each pin."""
     spring = Spring("compliance", compliance=isotropic(placed))
-    return edit_legs(
-        description, placed.legs, lambda seq: insert_at(seq, placed.element, lambda pin: (spring,))
-    )
+    return insert(description, placed, lambda pin: (spring,))
 
 
 EFFECT = EffectType(

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from stiffmap.model.description import Element, Joint, JointFriction, MachineDescription
-from stiffmap.model.description.tree import Elements
+from stiffmap.model.description import JointFriction, MachineDescription
 from stiffmap.model.effects.edit import change_sites
 from stiffmap.model.effects.library import friction
 from stiffmap.model.effects.sites import at_sites, free_joints
@@ -19,12 +18,8 @@ def apply(description: MachineDescription, placed: Placed) -> MachineDescription
     """Friction on each joint of the place; none at the level 0."""
     level = friction.level_of(description, placed)
     new = JointFriction(level, placed.options["branch"]) if level > 0.0 else None
-
-    def change(e: Element) -> Elements:
-        assert isinstance(e, Joint)
-        return (replace(e, friction=new),)
-
-    return change_sites(description, placed.legs, placed.element, free_joints, change)
+    place = (placed.legs, placed.element, free_joints)
+    return change_sites(description, *place, lambda e: (replace(e, friction=new),))
 
 
 EFFECT = EffectType(

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from stiffmap.model.description import MachineDescription, Offset, Pose
 from stiffmap.model.description.tree import Elements
-from stiffmap.model.effects.edit import built, splice
-from stiffmap.model.effects.library.geometry import names_of, rotation_of, rotations
+from stiffmap.model.effects.edit import built, edit_chains, splice
+from stiffmap.model.effects.library.geometry import ANGLES, rotation_of, rotations
 from stiffmap.model.effects.sites import per_leg
-from stiffmap.model.effects.types import EffectType, Parameter, Placed
-
-PARAMETERS: tuple[Parameter, ...] = rotations("rotation")
+from stiffmap.model.effects.types import EffectType, Placed
 
 
 def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
@@ -22,11 +18,7 @@ def apply(description: MachineDescription, placed: Placed) -> MachineDescription
         i = next((i for i, e in enumerate(elements) if not isinstance(e, Offset)), 0)
         return splice(elements, i, (turn, elements[i]))
 
-    legs = tuple(
-        replace(leg, elements=tilted(leg.elements)) if leg.name in placed.legs else leg
-        for leg in description.legs
-    )
-    return replace(description, legs=legs)
+    return edit_chains(description, placed.legs, tilted)
 
 
 EFFECT = EffectType(
@@ -34,13 +26,13 @@ EFFECT = EffectType(
     precedence=190,
     title="whole leg mounted askew",
     doc="The whole leg is mounted on the base turned about the origin of its frame.",
-    parameters=PARAMETERS,
+    parameters=rotations("rotation"),
     places=per_leg("base"),
     apply=apply,
     pivot="origin of the leg's frame on the base",
     frame="axes of the leg's frame; about x, then the turned y, then the twice turned z",
     moves="the whole leg up to the platform",
-    vector=names_of(PARAMETERS),
+    vector=ANGLES,
     excludes=("leg_tilt",),
     stage=25,
 )

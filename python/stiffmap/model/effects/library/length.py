@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
-from stiffmap.model.description import Element, Offset, Pose
+from stiffmap.model.description import Element, Offset
 from stiffmap.model.description.tree import Elements
-from stiffmap.model.effects.edit import changing
+from stiffmap.model.effects.edit import changing, shifted
 from stiffmap.model.effects.sites import at_sites, lengths
 from stiffmap.model.effects.types import EffectType, Parameter, Placed
 
@@ -16,9 +14,8 @@ from stiffmap.model.effects.types import EffectType, Parameter, Placed
 def longer(e: Element, error: float = 0.0, strain: float = 0.0) -> Offset:
     """An offset built longer along its own direction, by ``error`` (m) and by a share of its length."""
     assert isinstance(e, Offset)
-    actual, nominal = e.actual or e.nominal, e.nominal.p
-    step = (error / np.linalg.norm(nominal) + strain) * nominal
-    return replace(e, actual=Pose.of(actual.p + step, actual.r))
+    nominal = e.nominal.p
+    return shifted(e, (error / np.linalg.norm(nominal) + strain) * nominal)
 
 
 def changed(e: Element, placed: Placed) -> Elements:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from stiffmap.model.description import Block, Branch, MachineDescription, Spring
+from stiffmap.model.description.numbers import with_entry
 from stiffmap.model.description.tree import Elements
 from stiffmap.model.effects.library.bars import change_branches, spread_blocks
 from stiffmap.model.effects.library.length import longer
@@ -15,11 +14,8 @@ from stiffmap.model.effects.types import EffectType, Parameter, Placed
 def rod_blocks(elements: Elements) -> dict[str, tuple[int, ...]]:
     """Parallelograms whose bars have a length."""
     found = spread_blocks(elements)
-    return {n: at for n, at in found.items() if all(_has_rods(elements[i]) for i in at)}
-
-
-def _has_rods(e: object) -> bool:
-    return isinstance(e, Block) and all(_rod(b) is not None for b in e.branches)
+    rods = [all(_rod(b) is not None for b in e.branches) if isinstance(e, Block) else False for e in elements]
+    return {n: at for n, at in found.items() if all(rods[i] for i in at)}
 
 
 def _rod(b: Branch) -> int | None:
@@ -35,7 +31,8 @@ def apply(description: MachineDescription, placed: Placed) -> MachineDescription
         i = _rod(b)
         assert i is not None  # the place has been checked
         rod = longer(b.elements[i], share * placed.values["difference"])
-        return replace(b, elements=(*b.elements[:i], rod, *b.elements[i + 1 :]))
+        changed: Branch = with_entry(b, "elements", i, rod)
+        return changed
 
     return change_branches(description, placed, change)
 

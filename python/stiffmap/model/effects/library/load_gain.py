@@ -2,16 +2,7 @@
 
 from __future__ import annotations
 
-from stiffmap.common.broadcasting import Floats
-from stiffmap.model.description import AppliedEffect
-from stiffmap.model.effects.evidence import Plan
 from stiffmap.model.effects.library.measurement import gains, measured, scaled
-
-
-def load(wrench: Floats, plan: Plan, term: AppliedEffect) -> Floats:
-    """The wrench times the gains."""
-    return scaled(wrench, dict(term.parameters))
-
 
 EFFECT = measured(
     "load_gain",
@@ -20,5 +11,5 @@ EFFECT = measured(
     "load",
     gains("acting force over declared force"),
     330,
-    load=load,
+    load=lambda wrench, plan, term: scaled(wrench, dict(term.parameters)),
 )

@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 from stiffmap.common.broadcasting import Floats
 from stiffmap.model.description import AppliedEffect
 from stiffmap.model.effects.evidence import Plan, Reading
-from stiffmap.model.effects.library.geometry import AXES, names_of, rotations
+from stiffmap.model.effects.library.geometry import AXES, rotations
 from stiffmap.model.effects.sites import at
 from stiffmap.model.effects.types import EffectType, Parameter
 
@@ -97,7 +97,7 @@ def measured(
         precedence=precedence,
         frame=frame,
         moves="nothing of the machine",
-        vector=names_of(parameters),
+        vector=tuple(p.name for p in parameters),
         excludes=(kind,),
         **more,
     )

@@ -4,23 +4,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from stiffmap.model.description import Block, Branch, Joint, MachineDescription, Pose
+from stiffmap.model.description import Branch, Joint, MachineDescription, Pose
 from stiffmap.model.effects.edit import built, splice
 from stiffmap.model.effects.library.bars import change_branches, spread_blocks
-from stiffmap.model.effects.library.geometry import names_of, rotation_of, rotations
+from stiffmap.model.effects.library.geometry import ANGLES, rotation_of, rotations
 from stiffmap.model.effects.sites import at_sites
-from stiffmap.model.effects.types import EffectType, Option, Parameter, Placed
-
-PARAMETERS: tuple[Parameter, ...] = rotations("angle of the second pin against the first")
+from stiffmap.model.effects.types import EffectType, Option, Placed
 
 
 def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
     """Half of the angle on each pin; only the pins' directions change."""
-
-    def change(block: Block, b: Branch, share: float) -> Branch:
-        return _turned(b, placed, share)
-
-    return change_branches(description, placed, change)
+    return change_branches(description, placed, lambda block, b, share: _turned(b, placed, share))
 
 
 def _turned(b: Branch, placed: Placed, share: float) -> Branch:
@@ -41,14 +35,14 @@ EFFECT = EffectType(
         "The axes of the two pins at one `end` are not parallel: the second branch's pin is turned by half "
         "of the angles, the first one's by minus half. The directions of the axes alone change."
     ),
-    parameters=PARAMETERS,
+    parameters=rotations("angle of the second pin against the first"),
     places=at_sites(spread_blocks),
     apply=apply,
     pivot="centre of each pin",
     frame="local axes before the pin",
     moves="nothing: the bars stay where they are at home",
     options=(Option("end", ("proximal", "distal"), "which pins"),),
-    vector=names_of(PARAMETERS),
+    vector=ANGLES,
     excludes=("parallelogram_parallelism",),
     stage=40,
 )

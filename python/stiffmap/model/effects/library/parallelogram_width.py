@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
-from stiffmap.model.description import Block, Branch, MachineDescription, Offset, Pose
+from stiffmap.model.description import Block, Branch, MachineDescription, Offset
+from stiffmap.model.description.numbers import with_entry
+from stiffmap.model.effects.edit import shifted
 from stiffmap.model.effects.library.bars import change_branches, end_index, spread_blocks, width
 from stiffmap.model.effects.sites import at_sites
 from stiffmap.model.effects.types import EffectType, Option, Parameter, Placed
@@ -18,21 +18,14 @@ def apply(description: MachineDescription, placed: Placed) -> MachineDescription
 
     def change(block: Block, b: Branch, share: float) -> Branch:
         for one in ("proximal", "distal") if end == "both" else (end,):
-            b = _moved(block, b, one, share * placed.values["error"])
+            apart, i = width(block, one), end_index(b, one)
+            size = share * placed.values["error"] * (1.0 if one == "proximal" else -1.0)
+            pin = b.elements[i]
+            assert isinstance(pin, Offset)
+            b = with_entry(b, "elements", i, shifted(pin, size * apart / np.linalg.norm(apart)))
         return b
 
     return change_branches(description, placed, change)
-
-
-def _moved(block: Block, b: Branch, end: str, step: float) -> Branch:
-    i = end_index(b, end)
-    e = b.elements[i]
-    assert isinstance(e, Offset)
-    apart = width(block, end)
-    towards = step * apart / np.linalg.norm(apart) * (1.0 if end == "proximal" else -1.0)
-    actual = e.actual or e.nominal
-    moved = replace(e, actual=Pose.of(actual.p + towards, actual.r))
-    return replace(b, elements=(*b.elements[:i], moved, *b.elements[i + 1 :]))
 
 
 EFFECT = EffectType(

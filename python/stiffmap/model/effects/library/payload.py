@@ -7,24 +7,20 @@ from dataclasses import replace
 import numpy as np
 
 from stiffmap.model.description import Body, ExternalSpring, MachineDescription, Point
+from stiffmap.model.description.pose import vector
 from stiffmap.model.effects.edit import fresh
+from stiffmap.model.effects.library.geometry import point, translation_of
 from stiffmap.model.effects.library.gravity import DOWN
 from stiffmap.model.effects.sites import at
 from stiffmap.model.effects.types import EffectType, Parameter, Placed
 
-COM = tuple(
-    Parameter(
-        f"com_{a}", "m", -10.0, 10.0, None, 0.1, f"its centre from the TCP, {a}", default=0.0, fitted=False
-    )
-    for a in "xyz"
-)
+COM = point("com", "its centre from the TCP", reach=10.0)
 FAR = 1e9
 
 
 def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
     """A body where the machine has gravity, else a weight alone: the machine's own stays left out."""
-    com = tuple(placed.values[f"com_{a}"] for a in "xyz")
-    centre = (com[0], com[1], com[2])
+    centre = vector(translation_of(placed, "com_"))
     name = fresh("payload", description.platform)
     if description.gravity is not None:
         body = Body(name, placed.values["mass"], centre)
@@ -34,13 +30,13 @@ def apply(description: MachineDescription, placed: Placed) -> MachineDescription
     return replace(description, platform=platform, external_springs=(*description.external_springs, weight))
 
 
-def _weight(point: str, mass: float) -> ExternalSpring:
+def _weight(name: str, mass: float) -> ExternalSpring:
     """A dead force: a spring of no length to an anchor so far that neither size nor direction change
     (by 1e-9 per metre of motion)."""
     down = np.array(DOWN) / np.linalg.norm(DOWN) * FAR
     x, y, z = (float(v) for v in down)
     return ExternalSpring(
-        f"weight_{point}", f"platform.{point}", (x, y, z), mass * float(np.linalg.norm(DOWN)) / FAR, 0.0
+        f"weight_{name}", f"platform.{name}", (x, y, z), mass * float(np.linalg.norm(DOWN)) / FAR, 0.0
     )
 
 

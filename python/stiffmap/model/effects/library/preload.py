@@ -7,11 +7,9 @@ from dataclasses import replace
 from stiffmap.model.description import Spring
 from stiffmap.model.description.tree import Elements
 from stiffmap.model.effects.edit import changing
-from stiffmap.model.effects.library.geometry import names_of, translation_of, translations
+from stiffmap.model.effects.library.geometry import translation_of, translations
 from stiffmap.model.effects.sites import at_sites, springs
-from stiffmap.model.effects.types import EffectType, Parameter, Placed
-
-PARAMETERS: tuple[Parameter, ...] = translations("force-free deflection", "rest_")
+from stiffmap.model.effects.types import EffectType, Placed
 
 
 def pulled(e: Spring, placed: Placed) -> Elements:
@@ -29,10 +27,10 @@ EFFECT = EffectType(
         "The link is free of force not at zero deflection but at `rest`: mounted, it pulls the machine. In a "
         "parallelogram both bars alike."
     ),
-    parameters=PARAMETERS,
+    parameters=translations("force-free deflection", "rest_"),
     places=at_sites(springs),
     apply=changing(springs, pulled),
     frame="local axes of the spring",
     moves="all behind the link",
-    vector=names_of(PARAMETERS),
+    vector=("rest_x", "rest_y", "rest_z"),
 )

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from stiffmap.model.description import Element, Offset, Pose, Spring
+from stiffmap.model.description.strokes import Matrix6, as_rows
+from stiffmap.model.effects.library.geometry import point, translation_of
 from stiffmap.model.effects.types import Parameter, Placed
 
 PARAMETERS = (
@@ -12,23 +14,18 @@ PARAMETERS = (
     Parameter("rotation", "rad/(N·m)", 0.0, 1.0, 0.0, 1e-7, "compliance of each rotation"),
 )
 
-PIVOT = tuple(
-    Parameter(
-        f"pivot_{a}", "m", -100.0, 100.0, None, 0.1, f"where the spring sits, {a}", default=0.0, fitted=False
-    )
-    for a in "xyz"
-)
+PIVOT = point("pivot", "where the spring sits")
 
 
-def isotropic(placed: Placed) -> tuple[tuple[float, ...], ...]:
+def isotropic(placed: Placed) -> Matrix6:
     """6x6 compliance, diagonal; rigid at zero."""
     diagonal = [placed.values["translation"]] * 3 + [placed.values["rotation"]] * 3
-    return tuple(tuple(diagonal[i] if i == j else 0.0 for j in range(6)) for i in range(6))
+    return as_rows(np.diag(diagonal))
 
 
 def spring_about(name: str, placed: Placed) -> tuple[Element, ...]:
     """The isotropic spring at the pivot, seen from the frame where it is inserted."""
-    pivot = np.array([placed.values[f"pivot_{a}"] for a in "xyz"])
+    pivot = translation_of(placed, "pivot_")
     there, back = Pose.of(pivot), Pose.of(-pivot)
     spring = Spring(name, compliance=isotropic(placed))
     return (Offset(f"{name}_there", there), spring, Offset(f"{name}_back", back))

@@ -26,10 +26,7 @@ def law(old: Law, placed: Placed) -> Law:
     step, factors = placed.values["step"], [placed.values[p.name] for p in FACTORS]
     if all(f == 1.0 for f in factors):
         return linear(old)
-    return _odd([(i * step, f * linear(old).stiffness * i * step) for i, f in enumerate(factors, 1)])
-
-
-def _odd(points: list[tuple[float, float]]) -> Law:
+    points = [(i * step, f * linear(old).stiffness * i * step) for i, f in enumerate(factors, 1)]
     (a0, f0), (a1, f1) = points[-2:]
     if any(f <= before for (_, before), (_, f) in pairwise(points)):
         raise StiffmapError("the force must rise from point to point: factor_i times i")

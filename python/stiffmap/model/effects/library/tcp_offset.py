@@ -6,11 +6,9 @@ from dataclasses import replace
 
 from stiffmap.model.description import MachineDescription, Pose
 from stiffmap.model.effects.edit import built, fresh
-from stiffmap.model.effects.library.geometry import names_of, translation_of, translations
+from stiffmap.model.effects.library.geometry import ERRORS, translation_of, translations
 from stiffmap.model.effects.sites import at
-from stiffmap.model.effects.types import EffectType, Parameter, Placed
-
-PARAMETERS: tuple[Parameter, ...] = translations("displacement of the tool")
+from stiffmap.model.effects.types import EffectType, Placed
 
 
 def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
@@ -24,11 +22,11 @@ EFFECT = EffectType(
     precedence=220,
     title="position of the tool on the platform",
     doc="The tool (TCP) sits displaced on the platform; the external wrench acts at the displaced TCP.",
-    parameters=PARAMETERS,
+    parameters=translations("displacement of the tool"),
     places=at("platform"),
     apply=apply,
     frame="platform axes",
     moves="the TCP; other points and bodies of the platform stay",
-    vector=names_of(PARAMETERS),
+    vector=ERRORS,
     stage=60,
 )
