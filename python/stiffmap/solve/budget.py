@@ -203,7 +203,7 @@ def _elements(machine: Machine) -> tuple[tuple[str, ...], list[list[int]]]:
     for i, (name, role) in enumerate(zip(names.coordinates, names.roles, strict=True)):
         element = name.rpartition(".")[0] if role == Role.SPRING else name
         joint = joint_of(named, name)
-        if role == Role.PASSIVE and (joint is None or joint.law is None):
+        if role == Role.PASSIVE and (joint is None or not any(joint.laws)):
             continue
         parts.setdefault(element, []).append(i)
     return tuple(parts), list(parts.values())

@@ -41,6 +41,24 @@ def test_drive_and_beam_in_series() -> None:
     assert b.shares.sum() == pytest.approx(1.0, abs=1e-5)
 
 
+def test_each_axis_of_an_elastic_joint_has_its_share() -> None:
+    neck = "      - {joint: neck, kind: universal, axes: [y, z], home: [0, 0], stiffness: [2.0e6, 5.0e6]}\n"
+    lever = "      - {offset: nose, translation: [100, 0, 0]}\n"
+    text = PUSHER.replace("[500, 0, 0]}\nlegs", "[600, 0, 0]}\nlegs") + neck + lever
+    small = 1e-3
+    b = sm.deflection_budget(
+        sm.Machine(description_from_text(text)), None, small * np.array([0, 2.0, 4.0, 0, 0, 0])
+    )
+    parts = dict(zip(b.elements, b.contributions / small, strict=True))
+    np.testing.assert_allclose(
+        parts["arm.neck.1"], [0, 0, 4 * 0.1**2 / 2e3, 0, -4 * 0.1 / 2e3, 0], rtol=1e-4, atol=1e-10
+    )
+    np.testing.assert_allclose(
+        parts["arm.neck.2"], [0, 2 * 0.1**2 / 5e3, 0, 0, 0, 2 * 0.1 / 5e3], rtol=1e-4, atol=1e-10
+    )
+    assert b.shares.sum() == pytest.approx(1.0, abs=1e-5)
+
+
 @pytest.mark.parametrize("name", machine_names())
 def test_shares_sum_to_the_deflection(name: str) -> None:
     machine = sm.load_machine(name)

@@ -107,7 +107,8 @@ class Readings:
         try:
             if travel:
                 p = p.beside(machine=Machine(edited(p.machine.description, {}, travel), like=p.machine))
-            return predicted(p, self.sensitivity.unknowns, np.where(own, 0.0, numbers), effects) + of_setups
+            shared = predicted(p, self.sensitivity.unknowns, np.where(own, 0.0, numbers), effects)
+            return np.asarray(shared + of_setups)
         except StiffmapError:
             return np.full_like(self.sigma, np.nan)
 
