@@ -20,7 +20,6 @@ VALUES: dict[str, dict[str, object]] = {
     "zero_offset": {"error": 3e-4},
     "periodic_error": {"amplitude": 3e-5, "period": 0.02, "phase": 0.3},
     "lead_error": {"slope": 2e-4},
-    "joint_coupling": {"per_turn": 2e-3},
     "joint_friction": {"torque": 0.2, "force": 2.0, "branch": "loading"},
     "joint_compliance": {"translation": 1e-9, "rotation": 1e-7},
     "joint_clearance": {"radius": 5e-6},

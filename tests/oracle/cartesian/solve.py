@@ -133,7 +133,7 @@ class Machine:
                 if e.actuated:
                     u = measured[i]
                     follows = [
-                        s.names.index(f"{p.name.rpartition('.')[0]}.{c.of}") if c.of else i
+                        s.names.index(f"{p.name.rpartition('.')[0]}.{c.of}".lstrip(".")) if c.of else i
                         for c in e.command_errors
                     ]
                     target[i] = u + sum(

@@ -93,10 +93,10 @@ def test_warnings_of_a_command_are_one_line(
         warnings.warn("two\nlines", UserWarning, stacklevel=1)
         warnings.warn("of a library", RuntimeWarning, stacklevel=1)
 
-    monkeypatch.setattr("stiffmap.ui.cli.app._register", noisy)
+    monkeypatch.setattr("stiffmap.model.effects.load_effects", noisy)
     with warnings.catch_warnings():
         warnings.simplefilter("always")
-        assert main(["machines"]) == 0
+        assert main(["--effects-from", "mine.py", "machines"]) == 0
     assert capsys.readouterr().err == "stiffmap: two lines\n"
 
 

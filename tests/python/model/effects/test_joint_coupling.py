@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.oracle.check import checks
+from tests.oracle.classes import Classes
 
 import stiffmap as sm
 from stiffmap.experiment.prediction.joints import _command_error as error_in_python
@@ -87,6 +90,18 @@ def test_a_drive_that_turns_with_a_passive_joint_is_off_by_what_that_has_turned(
         assert one.status == other.status
         np.testing.assert_allclose(one.displacement, other.displacement, atol=1e-11)
         np.testing.assert_allclose(one.stiffness, other.stiffness, rtol=1e-7, atol=1e-3)
+
+
+@pytest.mark.parametrize("name", ["over-actuated", "gantry", "arm of axes", "hybrid", "springs outside"])
+def test_random_machines_agree_with_bodies_in_space(name: str) -> None:
+    task = Classes(4).task(name)
+    element, legs = get("joint_coupling").places(task.description)[0]
+    real = sm.Machine(task.description).with_effect(
+        "joint_coupling", element=element, legs=list(legs) or None, per_turn=PER_TURN
+    )
+    truth, found = checks(replace(task, description=real.description))
+    assert truth.found and len(found) >= 2
+    assert not [c.wrong for c in found if c.wrong]
 
 
 def test_a_motor_does_not_read_what_its_joint_moves_with_another() -> None:
