@@ -25,6 +25,8 @@ from stiffmap.model.description.tree import joints
 from stiffmap.model.with_errors import Knots, edited
 from stiffmap.solve.machine import Machine
 
+STRAIGHT = 1e-3
+"""m, rad: zeros of a set-up up to which a straight line does, within some micrometres; a machine for each set-up takes six times as long."""
 MOST_FITTED = 9000
 """Readings that a machine is fitted to; of more, whole poses are drawn. Effort only."""
 
@@ -100,14 +102,16 @@ class Readings:
     def predicted(
         self, numbers: Floats, effects: Sequence[AppliedEffect], travel: Mapping[str, Knots] | None = None
     ) -> Floats:
-        """(n, c) m, rad, along straight lines of what a set-up has for itself; NaN where the machine cannot be."""
-        p = self.predictor
-        own = np.array([bool(u.setup) for u in self.sensitivity.unknowns], dtype=bool)
+        """(n, c) m, rad, along straight lines of what a set-up has for itself as long as that is small; NaN where the machine cannot
+        be."""
+        p, names = self.predictor, self.sensitivity.unknowns
+        small = [bool(u.setup) and abs(v) * u.u < STRAIGHT for u, v in zip(names, numbers, strict=True)]
+        own = np.array(small, dtype=bool)
         of_setups = np.nan_to_num(self.sensitivity.columns[..., own]) @ numbers[own]
         try:
             if travel:
                 p = p.beside(machine=Machine(edited(p.machine.description, {}, travel), like=p.machine))
-            shared = predicted(p, self.sensitivity.unknowns, np.where(own, 0.0, numbers), effects)
+            shared = predicted(p, names, np.where(own, 0.0, numbers), effects)
             return np.asarray(shared + of_setups)
         except StiffmapError:
             return np.full_like(self.sigma, np.nan)

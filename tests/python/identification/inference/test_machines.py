@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -17,7 +18,7 @@ from stiffmap.identification.inference.corrected import Term, corrected
 from stiffmap.identification.inference.covariance import Covariance
 from stiffmap.identification.inference.readings import Readings
 from stiffmap.identification.numbers import unknowns
-from stiffmap.identification.numbers.sensitivity import predicted, sensitivity
+from stiffmap.identification.numbers.sensitivity import predicted, sensitivity, zeros_anew
 from stiffmap.model.effects import registry
 
 
@@ -79,6 +80,26 @@ def test_numbers_move_as_far_as_their_spread_allows(spread: float) -> None:
     a = s.columns[rows, channel] / e.sigma[rows, channel][:, None]
     expected = np.linalg.solve(a.T @ a + np.eye(3) / spread**2, a.T @ (a @ off))
     assert corrected(given, ()).numbers == pytest.approx(expected, abs=0.01)
+
+
+@pytest.mark.parametrize(("zero", "most"), [(0.9e-3, 3e-6), (0.02, 1e-15)])
+def test_zeros_of_a_set_up_are_straight_while_they_are_small(zero: float, most: float) -> None:
+    machine = sm.load_machine("ur10")
+    plan = random_plan(machine, "position", poses=12, seed=1)
+    plan = replace(plan, setup=tuple("ab"[int(g) % 2] for g in plan.groups))
+    p = Predictor(machine, plan)
+    e = p.experiment
+    wanted = [u for u in unknowns(machine.description, e) if u.group == "zeros"]
+    s = zeros_anew(sensitivity(p, wanted), e)
+    values = np.array([zero / u.u * (u.setup == "b") for u in s.unknowns])
+    rows, channel = np.nonzero(e.read)
+    noise = Covariance(np.ones(len(rows)), np.zeros((len(rows), 0)))
+    given = Readings(p, e.sigma, rows, channel, 1.0, np.ones(len(rows)), noise, s, np.ones(len(values)))
+    whole, declared = predicted(p, s.unknowns, values), p()
+    read = e.read[:, :3]
+    off = np.abs(given.predicted(values, ()) - whole)[:, :3][read].max()
+    assert off <= most
+    assert np.abs(whole - declared)[:, :3][read].max() > 1.5 * zero  # metres of an arm
 
 
 def test_what_is_far_off_in_rows_that_the_search_did_not_have_is_weighed_down() -> None:
