@@ -11,7 +11,7 @@ from stiffmap.experiment.channels import Channel
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.poses.configuration import coordinates_of
 from stiffmap.model.description import CommandError
-from stiffmap.model.description.tree import joints
+from stiffmap.model.description.tree import joints, of_same_sequence
 from stiffmap.solve.machine import Machine
 
 
@@ -40,7 +40,7 @@ def _command_error(machine: Machine, name: str, rigid: Floats) -> Floats:
     """(n,) m, rad: the errors of a drive's command where all joints stand without load (n, coordinates)."""
     joint, out = joints(machine.description).get(name), np.zeros(len(rigid))
     for e in joint.command_errors if joint else ():
-        of = f"{name.rpartition('.')[0]}.{e.of}".lstrip(".") if e.of else name
+        of = of_same_sequence(name, e.of) if e.of else name
         i = machine.compiled.names.joints[of]
         out = out + _error(e, rigid[:, i], float(machine.compiled.home_coordinates()[i]))
     return out

@@ -118,6 +118,11 @@ class Corrected:
         return least if size and size[least] < WIDE else None
 
     @property
+    def others(self) -> Floats:
+        """(p + K,) what is fitted besides the terms: numbers in standard deviations of the search, and errors along the travel."""
+        return np.append(self.numbers / self.given.spread, self.travel)
+
+    @property
     def effects(self) -> tuple[AppliedEffect, ...]:
         """With their values, SI."""
         return tuple(t.effect(t.values) for t in self.terms)
@@ -126,12 +131,12 @@ class Corrected:
 def without(found: Corrected, keep: Mask) -> Corrected:
     """The optimum of the readings in some rows (n,) alone, with the slopes of the whole: other readings move it by a part of a
     standard deviation."""
-    return _optimum(found.given.only(keep), (), found, found.slopes)
+    return _optimum(found.given.only(keep), found.terms, found.others, found.slopes)
 
 
 def instead(found: Corrected, terms: Sequence[Term]) -> Corrected:
     """The optimum with other terms under the same weights, from the same numbers."""
-    return _optimum(found.given, (), replace(found, terms=tuple(terms)))
+    return _optimum(found.given, terms, found.others)
 
 
 def corrected(given: Readings, terms: Sequence[Term]) -> Corrected:
@@ -141,7 +146,7 @@ def corrected(given: Readings, terms: Sequence[Term]) -> Corrected:
         if _bends(given, found):
             anew = sensitivity_at(given.predictor, given.sensitivity, found.numbers)
             given = replace(given, sensitivity=anew)
-            found = _optimum(given, terms, found)
+            found = _optimum(given, found.terms, found.others)
         left = given.white(np.nan_to_num(given.predictor.experiment.reading - found.prediction))
         q = given.frames(found.prediction)
         noise = (
@@ -152,7 +157,7 @@ def corrected(given: Readings, terms: Sequence[Term]) -> Corrected:
             break
         weights = (DEGREES + 1.0) / (DEGREES + (noise / given.kappa) ** 2)
         given = given.weighed(np.minimum(weights, 1.0))
-        found = _optimum(given, terms, found)
+        found = _optimum(given, found.terms, found.others)
     return found
 
 
@@ -178,13 +183,12 @@ def _remembered(function: Callable[[Floats], Floats]) -> Callable[[Floats], Floa
 
 
 def _optimum(
-    given: Readings, terms: Sequence[Term], start: Corrected | None = None, held: Floats | None = None
+    given: Readings, terms: Sequence[Term], others: Floats | None = None, held: Floats | None = None
 ) -> Corrected:
-    """The optimum under the weights of `given`, from that of a start with its terms or from `terms`; `held`: slopes (k, n, c) that
-    are taken wherever the search stands, in place of those there."""
+    """The optimum under the weights of `given`, from the values of the terms and of all `others` (p + m,), None: zero; `held`: slopes
+    (k, n, c) that are taken wherever the search stands, in place of those there."""
     steps = STEPS if held is None else STEPS_OF_A_FOLD
     e = given.predictor.experiment
-    terms = tuple(terms) if start is None else start.terms
     k, p = sum(len(t.values) for t in terms), len(given.spread)
     columns, along = given.columns, given.along
     m = along.shape[1]
@@ -222,9 +226,7 @@ def _optimum(
 
     low = np.concatenate([*(t.bounds[0] for t in terms), np.full(p + m, -np.inf)])
     high = np.concatenate([*(t.bounds[1] for t in terms), np.full(p + m, np.inf)])
-    begin = np.concatenate([*(t.values for t in terms), np.zeros(p + m)])
-    if start is not None:
-        begin[k:] = np.append(start.numbers / given.spread, start.travel)
+    begin = np.concatenate([*(t.values for t in terms), np.zeros(p + m) if others is None else others])
     inside = np.where(np.isfinite(high - low), 1e-9 * np.nan_to_num(high - low, posinf=0.0), 0.0)
     x = np.clip(begin, low + inside, high - inside)
     if not np.isfinite(raw(x)).all():

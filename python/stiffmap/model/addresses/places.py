@@ -24,7 +24,7 @@ from stiffmap.model.description import (
     tree,
 )
 from stiffmap.model.description.numbers import with_entry
-from stiffmap.model.description.tree import Elements
+from stiffmap.model.description.tree import Elements, of_same_sequence
 
 
 def split(address: str) -> tuple[str, str]:
@@ -138,7 +138,7 @@ def bar_offset(d: MachineDescription, full: str) -> str | None:
         length = dict(spring.beam.numbers)["length"]
         if abs(fields(before)["length"].value - length) > 1e-9 * length:
             return None
-    return f"{full.rpartition('.')[0]}.{before.name}"
+    return of_same_sequence(full, before.name)
 
 
 def _sequence_of(d: MachineDescription, full: str) -> Elements:

@@ -54,6 +54,11 @@ def joints(description: MachineDescription) -> dict[str, Joint]:
     return {core_name(n): e for n, e in all_elements(description) if isinstance(e, Joint)}
 
 
+def of_same_sequence(full: str, name: str) -> str:
+    """The full name of another element of the sequence that an element is in."""
+    return f"{full.rpartition('.')[0]}.{name}".lstrip(".")
+
+
 def joint_of(named: Mapping[str, Joint], coordinate: str) -> Joint | None:
     """The joint, among those that `joints` gives, of a coordinate: ``name``, or ``name.2`` where it has several."""
     return named.get(coordinate) or named.get(coordinate.rpartition(".")[0])

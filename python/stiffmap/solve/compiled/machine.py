@@ -13,7 +13,7 @@ from stiffmap import _core
 from stiffmap.common.broadcasting import Floats, real_array
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.description import MachineDescription
-from stiffmap.model.description.tree import joints
+from stiffmap.model.description.tree import joints, of_same_sequence
 from stiffmap.model.home import Gap
 from stiffmap.solve.compiled.lowering import build_mechanism, home_gaps
 from stiffmap.solve.compiled.names import Names, names_of
@@ -45,7 +45,7 @@ class CompiledMachine:
         out = np.eye(len(names))
         for i, name in enumerate(names):
             for other, share in drives[name].coupled if name in drives else ():
-                out[i, names.index(f"{name.rpartition('.')[0]}.{other}".lstrip("."))] -= share
+                out[i, names.index(of_same_sequence(name, other))] -= share
         return out
 
     @cached_property

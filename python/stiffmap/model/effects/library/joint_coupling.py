@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 
-from stiffmap.model.description import Cable, CommandError, Element, Joint, MachineDescription
+from stiffmap.model.description import Cable, CommandError, Joint, MachineDescription
 from stiffmap.model.description.tree import Elements
-from stiffmap.model.effects.edit import change_sites
+from stiffmap.model.effects.library.command import add_command_error
 from stiffmap.model.effects.library.drive_law import in_unit_of_joint
 from stiffmap.model.effects.sites import at_sites
 from stiffmap.model.effects.types import EffectType, Parameter, Placed
@@ -69,12 +68,7 @@ def apply(description: MachineDescription, placed: Placed) -> MachineDescription
     """A command error that grows with the other joint's coordinate."""
     slope = placed.values["per_turn"] / (2.0 * math.pi)
     error = CommandError(slope=slope, reference=None, of=placed.element.partition(".")[2])
-
-    def change(e: Element) -> Elements:
-        assert isinstance(e, Joint)
-        return (replace(e, command_errors=(*e.command_errors, error)),)
-
-    return change_sites(description, placed.legs, placed.element, pairs, change)
+    return add_command_error(description, placed, error, pairs)
 
 
 def _parameters(
