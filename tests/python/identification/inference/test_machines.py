@@ -14,7 +14,7 @@ from stiffmap.experiment import Predictor, random_plan
 from stiffmap.experiment.channels import AXIS_CHANNELS
 from stiffmap.identification.candidates.candidates import Candidate
 from stiffmap.identification.inference import machines
-from stiffmap.identification.inference.corrected import Term, corrected
+from stiffmap.identification.inference.corrected import Term, corrected, without
 from stiffmap.identification.inference.covariance import Covariance
 from stiffmap.identification.inference.readings import Readings
 from stiffmap.identification.numbers import unknowns
@@ -142,3 +142,26 @@ def test_a_turn_that_changes_nothing_is_not_determined() -> None:
     rest = Covariance(np.ones(n), np.zeros((n, 0)))
     found = corrected(Readings(p, e.sigma, rows, channel, 1.0, np.ones(n), rest, s, np.zeros(0)), (term,))
     assert np.isinf(np.diag(found.covariance)).tolist().count(True) == 1
+
+
+def test_a_fold_is_the_fit_of_its_own_readings() -> None:
+    """With the slopes of the whole; a strong effect, and half of the rows, so that the fold lies clearly beside the whole."""
+    machine = sm.load_machine("ur10")
+    p = Predictor(machine, random_plan(machine, "position", poses=16, seed=1))
+    kind = registry.get("tcp_offset")
+    element, legs = kind.places(machine.description)[0]
+    term = Term(Candidate(kind.kind, element, legs, kind.parameters), np.zeros(3))
+    true = Term(term.candidate, np.array([3.0, -2.0, 1.0]))
+    shown = p((true.effect(true.values),))
+    noise = np.nan_to_num(p.experiment.sigma) * np.random.default_rng(2).normal(size=shown.shape)
+    p = Predictor(machine, p.experiment.with_readings(shown + noise))
+    e, s = p.experiment, sensitivity(p, [])
+    rows, channel = np.nonzero(e.read)
+    n = len(rows)
+    rest = Covariance(np.ones(n), np.zeros((n, 0)))
+    whole = corrected(Readings(p, e.sigma, rows, channel, 1.0, np.ones(n), rest, s, np.zeros(0)), (term,))
+    keep = np.arange(len(e)) % 2 == 0
+    fold, own = without(whole, keep), corrected(whole.given.only(keep), (term,))
+    sd = np.sqrt(np.diag(own.covariance))
+    np.testing.assert_allclose(fold.terms[0].values, own.terms[0].values, atol=1e-2 * sd.min())
+    assert np.abs(fold.terms[0].values - whole.terms[0].values).max() > 0.1 * sd.min()
