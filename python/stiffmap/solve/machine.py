@@ -289,6 +289,7 @@ class Machine:
         experiment: Any = None,
         diagnosis: Any = None,
         path: Any = None,
+        meshes: str | PathLike[str] | None = None,
     ) -> Any:
         """Look at the machine and its map live in a browser; the view that is open is returned (``close()`` ends it).
 
@@ -301,7 +302,8 @@ class Machine:
         frequency, dynamic. tolerance m; magnification of the deflected machine; frequency (Hz) of the dynamic stiffness.
         start: all coordinates that name an assembly mode. changes: numbers by their addresses, such as
         ``{"x.foot/beam.EIx": 4000.0}``. Drawn as well: an experiment (or its folder), a diagnosis (or the folder of
-        one), a path of the tool (a `Toolpath`, its file, or positions (n, 3) m).
+        one), a path of the tool (a `Toolpath`, its file, or positions (n, 3) m), `meshes`: the URDF that the machine was
+        imported from, whose meshes are drawn.
 
         Raises MissingPartError without the extra ``[view]`` (viser), StiffmapError for bad input and for a pose that the
         machine cannot take.
@@ -310,6 +312,7 @@ class Machine:
             "rotation": rotation, "force": force, "moment": moment, "gravity": gravity, "plane": plane, "normal": normal,
             "quantity": quantity, "tolerance": tolerance, "magnification": magnification, "frequency": frequency,
             "start": start, "changes": changes, "experiment": experiment, "diagnosis": diagnosis, "path": path,
+            "meshes": meshes,
         }  # fmt: skip
         return from_above("Machine.view")(
             self, position, port=port, browser=browser, **{k: v for k, v in given.items() if v is not None}

@@ -68,6 +68,9 @@ def command(
     path: Annotated[
         str | None, typer.Option(help="Toolpath (G-code, CL, CSV, or an outline): wanted, cut, compensated.")
     ] = None,
+    meshes: Annotated[
+        Path | None, typer.Option(help="URDF that the machine was imported from, whose meshes are drawn.")
+    ] = None,
     html: Annotated[Path | None, written("--html", help="Write the scene as one page and end.")] = None,
     picture: Annotated[
         Path | None, written("--picture", help="Write a picture (PNG, SVG, PDF) and end.")
@@ -96,12 +99,14 @@ def command(
 
       [cyan]stiffmap view orthoglide-revised --experiment experiments/servo --diagnosis result[/cyan]
 
+      [cyan]stiffmap view calibrated_arm.yaml --meshes arm.urdf[/cyan]
+
       [cyan]stiffmap view orthoglide-revised --set x.foot/beam.EIx=4000 --no-browser --port 8090[/cyan]
     """
     from stiffmap.ui.view.serving import need_viser
 
     need_viser()
-    model = _model(machine, effect, link, at=at, rotation=rotation, force=force, moment=moment, gravity=gravity,
+    model = _model(machine, effect, link, meshes, at=at, rotation=rotation, force=force, moment=moment, gravity=gravity,
                    plane=plane, quantity=quantity, tolerance=tolerance, frequency=frequency, magnify=magnify,
                    changes=changes, start=start)  # fmt: skip
     from stiffmap.ui.view.open import data_of
@@ -113,7 +118,9 @@ def command(
     _serve(model, data, host, port, browser, as_json)
 
 
-def _model(machine: str, effect: list[str] | None, link: str | None, **given: Any) -> Any:
+def _model(
+    machine: str, effect: list[str] | None, link: str | None, meshes: Path | None, **given: Any
+) -> Any:
     from stiffmap.ui.view.model import Model
     from stiffmap.ui.view.state import from_permalink
 
@@ -123,10 +130,10 @@ def _model(machine: str, effect: list[str] | None, link: str | None, **given: An
         name, state = from_permalink(link.rpartition("state=")[2])
         if name not in (machine, m.name):
             raise StiffmapError(f"--link: is of the machine {name}, not of {machine}")
-        return Model(m, state, file=file)
+        return Model(m, state, file=file, meshes=meshes)
     from stiffmap.ui.view import model_of
 
-    return model_of(m, **_state(given), file=file)
+    return model_of(m, **_state(given), file=file, meshes=meshes)
 
 
 def _state(g: dict[str, Any]) -> dict[str, Any]:

@@ -41,6 +41,8 @@ class Skeleton:
     at home."""
     ends: tuple[int, ...]
     """The node of the mechanism at which each link but those of the rim ends."""
+    coordinates: Floats
+    """All of the machine, m and rad."""
 
     @property
     def bars(self) -> list[tuple[str, Floats]]:
@@ -117,7 +119,7 @@ def skeleton(machine: Machine, coordinates: Floats) -> Skeleton:
         legs += [""] * (len(corners) + 1)
     drives, passive = (np.array(marks[r]).reshape(-1, 3) for r in (Role.ACTUATOR, Role.PASSIVE))
     pieces, ways = (np.array(v).reshape(-1, 2, 3) for v in (links, guides))
-    return Skeleton(tuple(legs), pieces, ways, drives, passive, tcp, corners, tuple(ends))
+    return Skeleton(tuple(legs), pieces, ways, drives, passive, tcp, corners, tuple(ends), coordinates)
 
 
 def held_by(core: CompiledMachine) -> set[int]:

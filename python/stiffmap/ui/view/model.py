@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable
 from dataclasses import replace
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
@@ -30,10 +31,17 @@ class Model:
     """State, history and what they mean; every method that changes anything says what went wrong by StiffmapError."""
 
     def __init__(
-        self, machine: Machine, state: State | None = None, *, file: str | Path | None = None
+        self,
+        machine: Machine,
+        state: State | None = None,
+        *,
+        file: str | PathLike[str] | None = None,
+        meshes: Path | None = None,
     ) -> None:
-        """`file`: where the machine was read from, for commands that make the same picture and for reloading."""
+        """`file`: where the machine was read from, for commands that make the same picture and for reloading; `meshes`: the URDF
+        whose meshes are drawn."""
         self.file = None if file is None else Path(file)
+        self.meshes = meshes
         self.declared = machine
         self._machines: Kept[Hashable, Machine] = Kept(KEPT_MACHINES)
         home = machine.description.home.p
@@ -55,7 +63,7 @@ class Model:
     @property
     def moment(self) -> Moment:
         """What is on the screen now."""
-        return Moment(self.machine, self.state)
+        return Moment(self.machine, self.state, self.meshes)
 
     def _with(self, changes: tuple[tuple[str, float], ...]) -> Machine:
         declared = self.declared

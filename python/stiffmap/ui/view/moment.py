@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -33,6 +34,8 @@ class Moment:
 
     machine: Machine
     state: State
+    meshes: Path | None = None
+    """The URDF whose meshes are drawn."""
 
     def solve(self) -> Solution:
         """The tool's pose under the load."""

@@ -10,7 +10,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from stiffmap.common.broadcasting import real_array
+from stiffmap.common.broadcasting import given_path, real_array
 from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.machine import Machine
 from stiffmap.ui.view.data import Data, findings
@@ -125,11 +125,12 @@ def open_view(
     experiment: Any = None,
     diagnosis: Any = None,
     path: Any = None,
+    meshes: str | PathLike[str] | None = None,
     **state: Any,
 ) -> View:
     """See `Machine.view`."""
     data = data_of(machine, experiment, diagnosis, path)
-    view = View(model_of(machine, position, file, **state), port=port, data=data)
+    view = View(model_of(machine, position, file, meshes, **state), port=port, data=data)
     if browser:
         webbrowser.open(view.url)
     return view
@@ -164,16 +165,22 @@ def data_of(machine: Machine, experiment: Any = None, diagnosis: Any = None, pat
 
 
 def model_of(
-    machine: Machine, position: Any = None, file: str | PathLike[str] | None = None, **state: Any
+    machine: Machine,
+    position: Any = None,
+    file: str | PathLike[str] | None = None,
+    meshes: str | PathLike[str] | None = None,
+    **state: Any,
 ) -> Model:
     """A model in a state given by keywords; StiffmapError for bad ones."""
-    model = Model(machine, file=None if file is None else Path(file))
+    model = Model(
+        machine, file=file, meshes=None if meshes is None else given_path(meshes, "meshes", "a URDF file")
+    )
     given = {k: _listed(v) for k, v in state.items() if v is not None}
     if position is not None:
         given["position"] = _listed(position)
     if not given:
         return model
-    return Model(machine, from_plain(as_plain(model.state) | given), file=model.file)
+    return Model(machine, from_plain(as_plain(model.state) | given), file=model.file, meshes=model.meshes)
 
 
 def _listed(value: Any) -> Any:

@@ -206,8 +206,9 @@ def view_figure(moment: Moment) -> Figure:
         draw_force(ax, rest.tcp, np.array(s.force), rest.extent)
         finish(ax, (22, -50))
         if s.quantity != "status":
-            bar = ScalarMappable(Normalize(*limits), COLOURS)
-            figure.colorbar(bar, ax=ax, label=f"{q.title}, {q.unit}", shrink=0.6, location="bottom", pad=0.08)
+            unit, factor = q.shown(max(map(abs, limits)))
+            bar = ScalarMappable(Normalize(factor * limits[0], factor * limits[1]), COLOURS)
+            figure.colorbar(bar, ax=ax, label=f"{q.title}, {unit}", shrink=0.6, location="bottom", pad=0.08)
         _shares(figure.add_subplot(1, 2, 2), moment)
         at = ", ".join(f"{MM * v:.4g}" for v in s.position)
         moved = length_text(float(np.linalg.norm(solution.displacement[:3])))

@@ -55,6 +55,7 @@ def colour_bar(found: PlaneMap, limits: tuple[float, float], tolerance: float) -
         )
         return f'<div style="padding:.3em .6em" aria-label="status of the poses">{marks}</div>'
     low, high = limits
+    unit, factor = q.shown(max(map(abs, limits)))
     stops = "".join(
         f'<stop offset="{i / 15:.4f}" stop-color="rgb({r},{g},{b})"/>'
         for i, (r, g, b) in enumerate(table()[:: 255 // 15])
@@ -65,17 +66,17 @@ def colour_bar(found: PlaneMap, limits: tuple[float, float], tolerance: float) -
 
     ticks = "".join(
         f'<line x1="{at(v):.1f}" x2="{at(v):.1f}" y1="18" y2="36" stroke="white" stroke-width=".8"/>'
-        f'<text x="{at(v):.1f}" y="48" font-size="10" text-anchor="middle" fill="currentColor">{v:.5g}</text>'
+        f'<text x="{at(v):.1f}" y="48" font-size="10" text-anchor="middle" fill="currentColor">{factor * v:.5g}</text>'
         for v in levels(*limits)
     )
     level = tolerance_level(found.quantity, tolerance)
     if level is not None and low < level < high:
         ticks += f'<line x1="{at(level):.1f}" x2="{at(level):.1f}" y1="14" y2="40" stroke="{TOLERANCE}" stroke-width="2.5"/>'
-    words = f"{q.title}, {q.unit}"
+    words = f"{q.title}, {unit}"
     failed = int(found.failed.sum())
     which = "1 pose" if failed == 1 else f"{failed} poses"
     note = f'<div style="font-size:85%">hatched: {which} without an equilibrium</div>' if failed else ""
-    text = f"{low:.4g} to {high:.4g} {q.unit}"
+    text = f"{factor * low:.4g} to {factor * high:.4g} {unit}"
     return (
         f'<svg viewBox="0 0 300 54" width="100%" role="img" aria-label="{escape(words)}: {escape(text)}">'
         f'<defs><linearGradient id="scale">{stops}</linearGradient></defs>'
@@ -167,5 +168,6 @@ def probe_text(moment: Moment, point: Sequence[float]) -> str:
     value, status = moment.at(point)
     q = QUANTITIES[moment.state.quantity]
     at = ", ".join(f"{1e3 * v:.1f}" for v in point)
-    said = f"{value * q.factor:.5g} {q.unit}".strip() if np.isfinite(value) else status.name.lower()
+    unit, factor = q.shown(value * q.factor)
+    said = f"{value * q.factor * factor:.5g} {unit}".strip() if np.isfinite(value) else status.name.lower()
     return f"probe at ({at}) mm: {said}"

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiffmap.common.broadcasting import Floats
+from stiffmap.common.number_text import length_unit
 from stiffmap.solve.solution import Solution
 
 
@@ -24,6 +25,13 @@ class Quantity:
     """Of a solution, the size of the force (N) and the tolerance (m). None: needs the modes of the machine, many times dearer than a solution."""
     stiffness: bool = False
     """Whether the compliance is needed."""
+
+    def shown(self, largest: float) -> tuple[str, float]:
+        """Unit in which values of this size (in `unit`) are written, and their factor: lengths from 1 mm on in mm."""
+        if self.unit != "µm":
+            return self.unit, 1.0
+        unit, factor, _ = length_unit(largest / self.factor)
+        return unit, factor / self.factor
 
 
 def deflection(s: Solution, force: float, tolerance: float) -> Floats:

@@ -14,6 +14,7 @@ from stiffmap.ui.plot.scene import ARROW, FORCE, box_edges
 from stiffmap.ui.plot.skeleton import Skeleton
 from stiffmap.ui.plot.style import BLACK, ORANGE, SKY, TOLERANCE, leg_colours
 from stiffmap.ui.view.colours import plane_image, rgb
+from stiffmap.ui.view.meshes import Meshes
 from stiffmap.ui.view.moment import Moment
 from stiffmap.ui.view.place import box_of, moves, rotation_of, turns
 from stiffmap.ui.view.plane import NO_LINES, PlaneMap
@@ -55,6 +56,8 @@ class Scene:
         api.add_frame("/axes", axes_length=0.08 * self.extent, axes_radius=0.002 * self.extent)
         self._points = self.points("/joints/passive", rest.passive, rgb("#FFFFFF"), 0.008)
         self._drives = self.points("/joints/drives", rest.actuators, rgb(BLACK), 0.014, "square")
+        self._meshes = None if moment.meshes is None else Meshes(api, moment.machine, moment.meshes)
+        self.remark = "" if self._meshes is None else self._meshes.remark
         self._arrow: Any = None
         self._plate: Any = None
         self._surface: Any = None
@@ -107,6 +110,8 @@ class Scene:
         self.rest = rest
         for name, colour, thick, chosen in self._groups:
             self.lines(name, rest.links[chosen], colour, thick)
+        if self._meshes is not None:
+            self._meshes(rest.coordinates)
         self._points.points, self._drives.points = _seen(rest.passive), _seen(rest.actuators)
         if len(rest.plate):
             middle = np.concatenate([rest.plate, rest.plate.mean(axis=0)[None]])

@@ -56,6 +56,7 @@ class Viewer:
         self.dragging, self.pulling = False, 0.0
         """Whether the tool is in a hand; N of the force when its arrow was taken, 0 when it is not."""
         self.scene = Scene(server.scene, model.moment)
+        model.message = self.scene.remark
         self.controls = Controls(self)
         self.swing = Swing(self)
         self.worker = Worker([self.quick, self.fine, self.panels, self.cloud], self._fail)

@@ -10,7 +10,7 @@ import numpy as np
 import stiffmap as sm
 from stiffmap.machining.process.revolution import revolution
 
-ROBOT = """<robot name="arm"><link name="base"/><link name="upper"/><link name="tool"/>
+ROBOT = """<robot name="arm"><link name="base"><visual><geometry><box size="0.1 0.1 0.3"/></geometry></visual></link><link name="upper"/><link name="tool"/>
 <joint name="q1" type="revolute"><origin xyz="0 0 0.3"/><axis xyz="0 0 1"/><parent link="base"/><child link="upper"/>
 <limit lower="-2" upper="2" effort="100" velocity="2"/></joint>
 <joint name="q2" type="revolute"><origin xyz="0.4 0 0"/><axis xyz="0 1 0"/><parent link="upper"/><child link="tool"/>

@@ -130,6 +130,12 @@ def test_dynamic_stiffness_begins_at_the_static_one(machine: sm.Machine) -> None
     s = State(tuple(p), force=(0.0, 0.0, -1.0))  # type: ignore[arg-type]
     static = 1 / np.linalg.svd(machine.solve(p, s.wrench).compliance[:3, :3], compute_uv=False)[0]
     assert float(dynamic_stiffness(machine, s, p)[0]) == pytest.approx(static, rel=1e-9)
+    turned = replace(s, moment=(3.0, -2.0, 1.0))  # under a moment the compliance is no longer symmetric
+    k = machine.solve(p, turned.wrench).stiffness
+    c = np.linalg.inv((k + k.T) / 2)[:3, :3]
+    assert float(dynamic_stiffness(machine, turned, p)[0]) == pytest.approx(
+        1 / np.linalg.norm(c, 2), rel=1e-6
+    )
     first = float(sm.natural_frequencies(machine, p, s.wrench).frequency[0])
     value, status = Model(machine, replace(s, quantity="frequency")).moment.at(p)
     assert value == pytest.approx(first) and status == Status.CONVERGED

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import gc
+import io
 import json
+import re
 import subprocess
 import sys
 import threading
@@ -15,14 +17,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import stiffmap as sm
-from stiffmap.common.errors import MissingPartError, StiffmapError
+from stiffmap.common.errors import FileError, MissingPartError, StiffmapError
 from stiffmap.model.files.shipped import find
 from stiffmap.ui.cli import main
 from stiffmap.ui.view.colours import plane_image
 from stiffmap.ui.view.data import Data, path_errors, residual_arrows, thinned
 from stiffmap.ui.view.open import View, model_of
+from stiffmap.ui.view.outputs import write_page
 from stiffmap.ui.view.state import State, permalink
 
 pytest.importorskip("viser", reason="viser is not installed (pip install stiffmap[view])")
@@ -257,6 +261,82 @@ def test_rows_and_paths_are_drawn() -> None:
     with View(model, data=Data(experiment, path)) as v:
         assert v._viewer.worker.idle(60) and not v._viewer.error
         assert {"/rows/before", "/path/cut"} <= set(v._viewer.scene._lines)
+
+
+ARM = """<robot name="arm">
+<link name="base"><visual><geometry><box size="0.1 0.1 0.3"/></geometry></visual></link>
+<link name="upper"><visual><origin xyz="0.2 0 0.01" rpy="0.3 0 0"/>
+<geometry><mesh filename="package://arm_description/meshes/up.stl" scale="0.001 0.001 0.001"/></geometry></visual></link>
+<link name="tool"><visual><geometry><mesh filename="../meshes/tool.stl"/></geometry></visual></link><link name="finger"/>
+<joint name="q 1" type="revolute"><origin xyz="0 0 0.3"/><axis xyz="0 0 1"/><parent link="base"/><child link="upper"/></joint>
+<joint name="q2" type="revolute"><origin xyz="0.4 0 0"/><axis xyz="0 1 0"/><parent link="upper"/><child link="tool"/></joint>
+<joint name="q3" type="revolute"><parent link="tool"/><child link="finger"/><mimic joint="q2"/></joint></robot>"""
+
+
+@pytest.fixture
+def arm(tmp_path: Path) -> Path:
+    """A URDF with its meshes, a block of 300 mm x 40 mm x 20 mm, in millimetres, and a tool of 50 mm in metres."""
+    import trimesh
+
+    pytest.importorskip("yourdfpy")
+    file = tmp_path / "arm_description/urdf/arm.urdf"
+    file.parent.mkdir(parents=True)
+    (tmp_path / "arm_description/meshes").mkdir()
+    trimesh.creation.box((300, 40, 20)).export(tmp_path / "arm_description/meshes/up.stl")
+    trimesh.creation.box((0.05, 0.05, 0.05)).export(tmp_path / "arm_description/meshes/tool.stl")
+    file.write_text(ARM)
+    return file
+
+
+def test_meshes_of_a_urdf_stand_on_the_joints(arm: Path) -> None:
+    import trimesh
+
+    machine = sm.import_urdf(arm, tip="tool")
+    at = sm.forward_kinematics(machine, [0.5, -0.4])
+    turn = Rotation.from_matrix(at.rotation).as_rotvec()
+    with View(model_of(machine, at.position, rotation=turn, meshes=arm)) as v:
+        assert v._viewer.worker.idle(60) and not v._viewer.error and not v._viewer.model.message
+        handles = {h.name: h for h in v._viewer.scene._meshes._shown._joint_frames}
+        drawn = [
+            trimesh.load_mesh(io.BytesIO(m.glb_data), file_type="glb")
+            for m in v._viewer.scene._meshes._shown._meshes
+        ]
+        names = sorted(handles, key=len)
+        place = np.eye(4)
+        for name in names[:2]:  # base to upper to tool
+            step = np.eye(4)
+            w, x, y, z = handles[name].wxyz
+            step[:3, :3] = Rotation.from_quat((x, y, z, w)).as_matrix()
+            step[:3, 3] = handles[name].position
+            place = place @ step
+    np.testing.assert_allclose(place[:3, 3], at.position, atol=1e-9)
+    np.testing.assert_allclose(place[:3, :3], at.rotation, atol=1e-9)
+    volumes, middles = [m.volume for m in drawn], [m.centroid for m in drawn]
+    np.testing.assert_allclose(volumes, [0.1 * 0.1 * 0.3, 0.3 * 0.04 * 0.02, 0.05**3], rtol=1e-5)
+    np.testing.assert_allclose(middles, [(0, 0, 0), (0.2, 0, 0.01), (0, 0, 0)], atol=1e-7)
+    page = write_page(
+        model_of(machine, at.position, rotation=turn, meshes=arm).moment, arm.with_suffix(".html")
+    )
+    bare = write_page(model_of(machine, at.position, rotation=turn).moment, arm.with_name("bare.html"))
+    assert page.stat().st_size > bare.stat().st_size
+
+
+def test_meshes_that_cannot_be_drawn_are_said(arm: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    machine = sm.import_urdf(arm, tip="tool")
+    (arm.parents[1] / "meshes/tool.stl").unlink()
+    with View(model_of(machine, meshes=arm)) as v:
+        assert v._viewer.model.message == "meshes that were not found: ../meshes/tool.stl"
+    for text, message in {
+        ARM.replace("q2", "z2").replace("q 1", "z1"): "no joint of arm is in it",
+        re.sub(
+            "<visual>.*?</visual>", "", ARM, flags=re.DOTALL
+        ): "none of the meshes that it names can be read",
+        "<robot": "not XML",
+    }.items():
+        arm.write_text(text)
+        with pytest.raises(FileError, match=message):
+            View(model_of(machine, meshes=arm))
+    assert "Unable to resolve" not in capsys.readouterr().err
 
 
 def test_the_force_is_pulled_by_its_tail(view: View) -> None:
