@@ -15,7 +15,7 @@ from stiffmap.experiment.experiment import Experiment, Floats, Mask
 from stiffmap.experiment.poses.against_command import resolved
 from stiffmap.experiment.poses.commanded import OUT_OF_REACH, located, without
 from stiffmap.experiment.poses.configuration import coordinates_of
-from stiffmap.experiment.prediction.equilibria import Work, motions
+from stiffmap.experiment.prediction.equilibria import motions
 from stiffmap.experiment.prediction.history import Drives, drives_of, history_motion
 from stiffmap.experiment.prediction.joints import check_joints
 from stiffmap.experiment.prediction.measurement import readings, true_wrench
@@ -44,7 +44,6 @@ class Predictor:
         self.threads = threads
         self.machine, self.experiment = resolved(machine, located(machine, experiment))
         self.solved = 0
-        self._work = Work()
         self._memory: Kept[tuple[Terms, Terms], Floats] = Kept()
         self._changes: Kept[tuple[Terms, Terms], Floats] = Kept()
         self._machines: Kept[Hashable, Machine] = Kept(MACHINES)
@@ -124,7 +123,7 @@ class Predictor:
             else None
             for change, t in zip(told.changes(others), terms, strict=True)
         ]
-        self.solved += told.work.solved
+        self.solved += told.solved
         return out
 
     def beside(self, *, machine: Machine | None = None, rows: Mask | None = None) -> Predictor:
@@ -183,7 +182,6 @@ class Predictor:
         """(n, c) of the machine, remembered."""
         motion = self._memory.get((mechanical, load))
         if motion is None:
-            self._work = Work()
             motion = at_records(self._plan_under(load), mechanical, self._branches)
             self._memory.put((mechanical, load), motion, motion.nbytes)
         return motion
@@ -205,9 +203,8 @@ class Predictor:
         return out
 
     def _solve(self, plan: Experiment, terms: Terms) -> Floats:
-        out, work = motions(self.with_terms(terms), plan, self.threads)
-        self.solved += work.solved
-        self._work += work
+        out, solved = motions(self.with_terms(terms), plan, self.threads)
+        self.solved += solved
         return out
 
 
