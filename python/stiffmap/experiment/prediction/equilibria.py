@@ -10,8 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from stiffmap.experiment.experiment import Experiment, Floats, Integers
 from stiffmap.experiment.noise.level import Mask
-from stiffmap.experiment.poses.configuration import coordinates_of, in_reach
-from stiffmap.experiment.poses.point_kinematics import point_positions, positions_of
+from stiffmap.experiment.poses.configuration import coordinates_of, in_reach, point_positions, positions_of
 from stiffmap.experiment.prediction.joints import joint_channels, joint_motions
 from stiffmap.experiment.prediction.metrology_loop import carrier, rigged, targets
 from stiffmap.experiment.prediction.unloaded_state import lagging, lags, signs

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.experiment import Experiment, Floats
-from stiffmap.experiment.poses.point_kinematics import point_positions, positions_of
+from stiffmap.experiment.poses.configuration import point_positions, positions_of
 from stiffmap.experiment.prediction.equilibria import moves_unloaded
 from stiffmap.experiment.prediction.joints import joint_channels
 from stiffmap.experiment.prediction.metrology_loop import carrier, rigged, targets

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable, Iterable, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -18,7 +18,6 @@ from stiffmap.experiment.poses.configuration import coordinates_of
 from stiffmap.experiment.prediction.equilibria import motions
 from stiffmap.experiment.prediction.history import Drives, drives_of, history_motion
 from stiffmap.experiment.prediction.joints import check_joints
-from stiffmap.experiment.prediction.measurement import readings, true_wrench
 from stiffmap.experiment.prediction.nearby import Near, Nearby
 from stiffmap.experiment.prediction.recorded import at_records, records_of
 from stiffmap.model import effects
@@ -214,6 +213,26 @@ def predict(machine: Machine, experiment: Experiment, terms: Sequence[AppliedEff
     Raises StiffmapError for an unknown point or effect.
     """
     return Predictor(machine, experiment)(terms)
+
+
+def true_wrench(experiment: Experiment, terms: Iterable[AppliedEffect]) -> Floats:
+    """(n, 6) the wrench that acts, from the one that was noted."""
+    w = experiment.wrench
+    for term in terms:
+        load = effects.get(term.kind).load
+        w = w if load is None else load(w, experiment, term)
+    return w
+
+
+def readings(experiment: Experiment, motion: Floats, terms: Sequence[AppliedEffect]) -> Floats:
+    """(n, c) what the instruments show for the true `motion` (n, c). A motor stands, unless an effect says that part
+    of its drive yields before the encoder."""
+    seen = np.array([0.0 if c.side == "motor" else 1.0 for c in experiment.channels])
+    out: Floats = motion * seen
+    for term in terms:
+        reading = effects.get(term.kind).reading
+        out = out if reading is None else reading(out, motion, experiment, term)
+    return out
 
 
 def check_points(machine: Machine, experiment: Experiment) -> None:
