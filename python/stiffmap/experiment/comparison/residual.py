@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -57,15 +58,8 @@ class Residual:
         e = self.experiment
         out: dict[str, Any] = {f"{a}, mm": 1e3 * e.position[:, i] for i, a in enumerate("xyz")}
         out |= {f"f{a}, N": e.wrench[:, i] for i, a in enumerate("xyz")}
-        for i in np.flatnonzero(e.axis_read):
-            c = e.channels[int(i)]
-            unit, factor = ("µm", 1e6) if c.unit == "m" else ("mrad", 1e3)
-            for what, values in (
-                ("reading", e.reading),
-                ("prediction", self.prediction),
-                ("residual", self.values),
-            ):
-                out[f"{c.name} {what}, {unit}"] = factor * values[:, i]
+        for channel, what, unit, values in self._of_channels(("µm", 1e6), ("mrad", 1e3)):
+            out[f"{channel} {what}, {unit}"] = values
         return pd.DataFrame(out, index=pd.Index(e.ids, name="id"))
 
     def write_table(self, path: Path) -> None:
@@ -76,17 +70,22 @@ class Residual:
         e = self.experiment
         out: dict[str, list[Any]] = {"id": list(e.ids)}
         out |= {f"{c}_mm": number_cells(1e3 * e.position[:, i]) for i, c in enumerate("xyz")}
-        for i in np.flatnonzero(e.axis_read):
-            c = e.channels[int(i)]
-            unit, factor = ("mm", 1e3) if c.unit == "m" else ("rad", 1.0)
-            for what, values in (
-                ("", e.reading),
-                ("_predicted", self.prediction),
-                ("_residual", self.values),
-            ):
-                out[f"{c.name}{what}_{unit}"] = number_cells(factor * values[:, i])
+        names = {"reading": "", "prediction": "_predicted", "residual": "_residual"}
+        for channel, what, unit, values in self._of_channels(("mm", 1e3), ("rad", 1.0)):
+            out[f"{channel}{names[what]}_{unit}"] = number_cells(values)
         out["set_aside"] = ["yes" if s else "" for s in self.set_aside]
         write_rows(path, list(out), zip(*out.values(), strict=True))
+
+    def _of_channels(
+        self, lengths: tuple[str, float], angles: tuple[str, float]
+    ) -> Iterator[tuple[str, str, str, Floats]]:
+        """Channel that was read, what of it, unit and values (n,), in these units of lengths and angles (name, and how many are 1 in SI)."""
+        e = self.experiment
+        parts = {"reading": e.reading, "prediction": self.prediction, "residual": self.values}
+        for i in np.flatnonzero(e.axis_read):
+            c = e.channels[int(i)]
+            unit, factor = lengths if c.unit == "m" else angles
+            yield from ((c.name, what, unit, factor * values[:, i]) for what, values in parts.items())
 
     def worst(self, number: int = 10) -> list[tuple[str, str, float]]:
         """Rows by their worst reading, most noise floors first: id, channel, residual (m or rad)."""
