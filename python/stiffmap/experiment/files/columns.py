@@ -86,11 +86,10 @@ def seen_rotation(model: ExperimentFile, table: Table) -> Floats | None:
     return np.where(good[:, :, None], turned.as_matrix(), np.nan)
 
 
-def rotations(table: Table, model: OrientationModel | None = None) -> tuple[Floats | None, Floats | None]:
+def rotations(table: Table, model: OrientationModel) -> tuple[Floats | None, Floats | None]:
     """Orientations (n, 3, 3) of a row and of its second pose, against what `model` says; the second is
     as the first where the file does not say. Raises `FileError` naming column and row."""
-    given = model or OrientationModel()
-    first, second = (_orientation(table, given, second) for second in (False, True))
+    first, second = (_orientation(table, model, second) for second in (False, True))
     if second is not None and first is None:
         first = np.tile(np.eye(3), (len(table), 1, 1))
     return first, first if second is None else second
