@@ -3,14 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from os import PathLike
 
-from stiffmap.common.broadcasting import given_path, instance_of
-from stiffmap.experiment.comparison import residual as comparison
+import numpy as np
+from scipy.stats import chi2
+
+from stiffmap.common.broadcasting import given_path, instance_of, random_numbers
+from stiffmap.common.errors import StiffmapError
+from stiffmap.experiment.comparison.limitations import limitations, refuse_unreachable
 from stiffmap.experiment.comparison.residual import Residual
-from stiffmap.experiment.experiment import Experiment
+from stiffmap.experiment.comparison.summary import summary
+from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.files.load import load_experiment
-from stiffmap.experiment.virtual import simulate as virtual
+from stiffmap.experiment.noise.checks import checks
+from stiffmap.experiment.noise.nuisance import nuisance_columns
+from stiffmap.experiment.noise.outliers import without_suspects
+from stiffmap.experiment.noise.over_time import over_time
+from stiffmap.experiment.noise.whitening import Problem, nuisance_part
+from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.model.description import AppliedEffect
 from stiffmap.model.effects import parse_effect
 from stiffmap.model.effects.check import place_of
@@ -19,6 +30,8 @@ from stiffmap.model.files.load import Source
 from stiffmap.solve.machine import Machine, as_machine
 
 Effects = str | AppliedEffect | Sequence[str | AppliedEffect]
+UNKNOWN = 1e-4
+"""m, rad: standard deviation of an unknown frame, tool point or zero of a simulation."""
 EFFECTS = "effects, as text such as 'dead_zone actuator y half_width=10um' or records"
 """One effect or several, each as text (``compliance actuator x scale=1.2``) or as a record."""
 
@@ -45,7 +58,35 @@ def residual(
     out of reach, and an unknown noise.
     """
     m = as_machine(machine)
-    return comparison.residual(m, as_experiment(experiment), effects_of(m, effects), threads=threads)
+    predictor = Predictor(m, as_experiment(experiment), threads=threads)
+    e, base = predictor.experiment, predictor(effects_of(m, effects))
+    refuse_unreachable(e, base)
+    raw = e.reading - base
+    noise, out = without_suspects(e, base)
+    problem = Problem.of(e, noise.sigma, base, ~out)
+    part = nuisance_part(problem, raw)
+    kept = np.where(out[:, None], np.nan, raw - part)
+    white = problem.residual(base)
+    late = over_time(problem, white)
+    return Residual(
+        e,
+        base + part,
+        raw - part,
+        noise,
+        out,
+        summary(kept, noise.sigma, e.channels),
+        float(chi2.sf(float(white @ white), max(problem.freedom, 1))),
+        int(problem.nuisance.shape[1]),
+        _groups_off(problem, white),
+        checks(e, e.reading, noise.sigma, ~out),
+        [*limitations(e, noise, m), *([] if late is None else [str(late)])],
+    )
+
+
+def _groups_off(problem: Problem, white: Floats) -> int:
+    total, number = np.bincount(problem.groups, white**2), np.bincount(problem.groups)
+    p = chi2.sf(total[number > 0], number[number > 0])
+    return int((p < 1e-3 / max(len(p), 1)).sum())
 
 
 def simulate(
@@ -74,8 +115,23 @@ def simulate(
     Readings of the answer are (rows, axes) in m and rad. Raises StiffmapError where no noise is declared or the machine
     cannot be solved.
     """
-    m = as_machine(machine)
-    return virtual.simulate(m, as_experiment(plan), effects_of(m, effects), seed=seed, outliers=outlier_share)
+    m, plan = as_machine(machine), as_experiment(plan)
+    if np.isnan(plan.sigma[plan.read]).any():
+        raise StiffmapError(f"{plan.name}: a virtual experiment needs a declared noise for every axis read")
+    predictor = Predictor(m, plan)
+    exact = predictor(effects_of(m, effects))
+    plan = predictor.experiment
+    refuse_unreachable(plan, exact)
+    rng = random_numbers(seed)
+    reading = exact + np.nan_to_num(plan.sigma) * rng.standard_normal(exact.shape)
+    zeros = rng.standard_normal((int(plan.groups.max()) + 1, len(plan.channels))) * plan.zeros
+    unknown = nuisance_columns(plan, predictor())
+    unknown = unknown @ (UNKNOWN * rng.standard_normal(unknown.shape[-1]))
+    reading = reading + zeros[plan.groups] + unknown
+    wild = rng.random(len(plan)) < outlier_share
+    size = rng.uniform(5, 20, (int(wild.sum()), 1)) * plan.sigma[wild]
+    reading[wild] += rng.choice([-1, 1], (int(wild.sum()), exact.shape[1])) * size
+    return replace(plan, reading=np.where(plan.read, reading, np.nan), joints=None, other_joints=None)
 
 
 def as_experiment(given: Experiment | str | PathLike[str]) -> Experiment:

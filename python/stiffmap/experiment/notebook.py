@@ -19,15 +19,15 @@ def experiment_html(e: Any) -> str:
     return titled(e.name, table(("", ""), facts), table(*experiment_rows(e)))
 
 
-def experiment_rows(e: Any, count: int = 3) -> tuple[list[str], list[list[str]]]:
-    """Header and the first rows of an experiment in mm, N and µm (mrad)."""
+def experiment_rows(e: Any) -> tuple[list[str], list[list[str]]]:
+    """Header and the first three rows of an experiment in mm, N and µm (mrad)."""
     read = [i for i, any_ in enumerate(e.axis_read) if any_]
     forces = [i for i in range(6) if e.wrench[:, i].any()]
     units = [f"{'fff'[i]}{'xyz'[i]}, N" if i < 3 else f"m{'xyz'[i - 3]}, N·m" for i in forces]
     head = ["id", "x, mm", "y, mm", "z, mm", *units]
     head += [f"{e.channels[i].name}, {'µm' if e.channels[i].unit == 'm' else 'mrad'}" for i in read]
     rows = []
-    for n in range(min(count, len(e))):
+    for n in range(min(3, len(e))):
         cells = [
             e.ids[n],
             *(f"{1e3 * v:.6g}" for v in e.position[n]),

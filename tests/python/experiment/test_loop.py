@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 import stiffmap as sm
 from stiffmap.experiment import Experiment, Loop, predict, random_plan
 from stiffmap.experiment.calls import placed
-from stiffmap.experiment.poses.point_kinematics import point_positions
+from stiffmap.experiment.poses.configuration import point_positions
 from stiffmap.model.description import Point
 
 OFFSET = (0.01, 0.02, 0.03)

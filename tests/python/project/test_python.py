@@ -26,7 +26,7 @@ def test_dir_shows_the_public_names_only() -> None:
 
 def test_a_name_stays_a_function_whatever_was_imported_before() -> None:
     script = (
-        "import stiffmap.experiment.comparison.residual, stiffmap.experiment.virtual.simulate, stiffmap.solve.budget, stiffmap as sm; "
+        "import stiffmap.experiment.comparison.residual, stiffmap.experiment.virtual.plans, stiffmap.solve.budget, stiffmap as sm; "
         "assert callable(sm.residual) and callable(sm.simulate) and callable(sm.deflection_budget)"
     )
     assert subprocess.run([sys.executable, "-c", script], check=False).returncode == 0

@@ -3,7 +3,7 @@
 from stiffmap.common.outputs.alone import only_job, reserved
 from stiffmap.common.outputs.keeping import asked_to_replace, new_file, one_command
 from stiffmap.common.outputs.space import bytes_text, mapped_array, needs_space
-from stiffmap.common.outputs.tables import guarded, unguarded, write_rows
+from stiffmap.common.outputs.tables import guarded, number_cells, unguarded, write_rows
 from stiffmap.common.outputs.writing import (
     add_lines,
     make_folder,
@@ -23,6 +23,7 @@ __all__ = [
     "mapped_array",
     "needs_space",
     "new_file",
+    "number_cells",
     "one_command",
     "only_job",
     "put_folder",

@@ -28,6 +28,11 @@ def unguarded(cell: str) -> str:
     return cell[1:] if cell.startswith("'") and RUN.match(cell) else cell
 
 
+def number_cells(values: Iterable[float]) -> list[str]:
+    """Numbers (n,) as cells of nine digits, empty where they are NaN."""
+    return ["" if v != v else f"{v:.9g}" for v in values]
+
+
 def _counted(rows: Iterable[Sequence[Any]], count: Iterator[int]) -> Iterator[Sequence[Any]]:
     return (row for row, _ in zip(rows, count, strict=False))
 

@@ -88,3 +88,10 @@ def filled(row: Sequence[str]) -> bool:
 def row_numbers() -> array[int]:
     """An empty list of line numbers that takes eight bytes each."""
     return array("q")
+
+
+def numbered(rows: Iterable[tuple[int, Sequence[str]]], numbers: array[int]) -> Iterator[Sequence[str]]:
+    """Cells of rows; `numbers` gathers those of their lines."""
+    for n, cells in rows:
+        numbers.append(n)
+        yield cells

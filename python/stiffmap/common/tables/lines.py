@@ -63,6 +63,46 @@ def kept(lines: Iterable[tuple[int, list[str]]]) -> Iterator[tuple[int, list[str
     return ((n, c) for n, c in lines if filled(c) and not c[0].strip().startswith(COMMENTS))
 
 
+def rows_of(path: Path, sheet: str | None = None, *, remarks: bool = True) -> Iterator[tuple[int, list[str]]]:
+    """Lines of a table with something in them, the header first, with their cells: as many as the header has, with decimal points.
+
+    `remarks`: lines that begin with # are left out. Raises FileError.
+    """
+    source = lines_of(path, sheet)
+
+    def lines() -> Iterator[tuple[int, list[str]]]:
+        return kept(source.lines()) if remarks else ((n, c) for n, c in source.lines() if filled(c))
+
+    comma = source.separator not in ("", ",") and decimal_comma(c for _, c in islice(lines(), 1, None))
+    rows = lines()
+    header = next(rows, None)
+    if header is None:
+        raise FileError("the file is empty", file=str(path))
+    yield header
+    width = len(header[1])
+    for n, row in rows:
+        if not source.separator:  # a row of a workbook ends at its last cell
+            yield n, [*row, *[""] * width][:width]
+        elif len(row) != width:
+            found = f"values, found {len(row)}" if remarks else f"cells; found {len(row)}"
+            raise FileError(f"expected {width} {found}", file=str(path), line=n)
+        else:
+            yield n, [with_point(plain(c.strip())) for c in row] if comma else row
+
+
+def finite_number(cell: str, blank: Sequence[str] = ()) -> float:
+    """The finite number in a cell, NaN where it is one of `blank`; ValueError of what was expected and what was found."""
+    if cell.lower() in blank:
+        return math.nan
+    try:
+        value = number_in(cell)
+    except ValueError:
+        raise ValueError("a number", repr(cell) if cell else "an empty cell") from None
+    if not math.isfinite(value):
+        raise ValueError("a finite number", cell)
+    return value
+
+
 def plain(text: str) -> str:
     return text.replace("\u00a0", "").replace("−", "-")
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn
@@ -17,12 +17,11 @@ import numpy as np
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError, StiffmapError
-from stiffmap.common.number_text import number_in
-from stiffmap.common.tables.lines import EXCEL, decimal_comma, kept, lines_of, plain, with_point
+from stiffmap.common.tables.lines import finite_number, rows_of
 from stiffmap.common.units import name_and_unit, unit_of
 from stiffmap.common.value_units import read_value
 
-Rows = Sequence[tuple[int, Sequence[str]]]
+Rows = Iterable[tuple[int, Sequence[str]]]
 """Line and cells; the header comes first."""
 TURNING = {"rpm": math.pi / 30, "1/min": math.pi / 30, "rad/s": 1.0}
 PER = re.compile(r"_(?:per_)?(min|s|tooth)$")
@@ -83,26 +82,9 @@ class NamedTable:
             self.fail(f"expected {expected}, found {found:.12g}", name, int(wrong[0]))
 
 
-def read_named(path: Path, known: Known, sheet: str | None = None) -> NamedTable:
+def read_named(path: Path, known: Known) -> NamedTable:
     """A text or a workbook. Raises FileError naming file, line and column, what was expected and what was found."""
-    return named(rows_of(path, sheet), known, str(path))
-
-
-def rows_of(path: Path, sheet: str | None = None) -> Rows:
-    """Lines with their cells, without remarks and empty lines, all as long as the header, with decimal points; FileError."""
-    source = lines_of(path, sheet)
-    rows = list(kept(source.lines()))
-    if not rows:
-        raise FileError("the file is empty", file=str(path))
-    width = len(rows[0][1])
-    if path.suffix.lower() in EXCEL:
-        return [(n, (row + [""] * width)[:width]) for n, row in rows]
-    for line, row in rows:
-        if len(row) != width:
-            raise FileError(f"expected {width} values, found {len(row)}", file=str(path), line=line)
-    if source.separator != "," and decimal_comma(row for _, row in rows[1:]):
-        return [rows[0], *((n, [with_point(plain(c.strip())) for c in row]) for n, row in rows[1:])]
-    return rows
+    return named(rows_of(path), known, str(path))
 
 
 def named(rows: Rows, known: Known, file: str) -> NamedTable:
@@ -123,17 +105,13 @@ def named(rows: Rows, known: Known, file: str) -> NamedTable:
 
 
 def _numbers(cells: Sequence[str], name: str, table: NamedTable, blank: bool) -> Floats:
-    out = np.full(len(cells), math.nan)
+    out = np.empty(len(cells))
     for i, cell in enumerate(cells):
-        if blank and not cell:
-            continue
-        found = f"'{cell}'" if cell else "an empty cell"
         try:
-            out[i] = number_in(cell)
-        except ValueError:
-            table.fail(f"expected a number, found {found}", name, i)
-        if not math.isfinite(out[i]):
-            table.fail(f"expected a finite number, found {cell}", name, i)
+            out[i] = finite_number(cell, ("",) if blank else ())
+        except ValueError as problem:
+            expected, found = problem.args
+            table.fail(f"expected {expected}, found {found}", name, i)
     return out
 
 

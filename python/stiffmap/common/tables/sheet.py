@@ -8,14 +8,13 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import chain
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError, StiffmapError
-from stiffmap.common.tables.cells import Cells, filled, packed, row_numbers
+from stiffmap.common.tables.cells import Cells, filled, numbered, packed, row_numbers
 from stiffmap.common.tables.header import Line, fits, header_of, record_of, refuse_twice, split_unit
 from stiffmap.common.tables.lines import (
     COMMENTS,
@@ -159,11 +158,12 @@ def read_sheet(path: Path, sheet: str | None = None, layout: Layout = PLAIN) -> 
     names = _checked(header, str(path), number_)
     width = len(names)
     said = [*header, *(c.strip() for _, cells in above for c in cells)]
-    numbered, aside = row_numbers(), list[str]()
+    lines_, aside = row_numbers(), list[str]()
     data = _data(chain([first], kept(rows)), header, said, comma, aside, layout, str(path))
-    columns = packed(_even(data, width, numbered), width)
+    even = ((n, [*cells, *[""] * width][:width]) for n, cells in data)
+    columns = packed(numbered(even, lines_), width)
     file = f"{path}, sheet '{page}'" if page else str(path)
-    return Sheet(file, tuple(names), columns, numbered, comma, record_of(above), tuple(aside))
+    return Sheet(file, tuple(names), columns, lines_, comma, record_of(above), tuple(aside))
 
 
 def _checked(header: Sequence[str], file: str, line: int) -> list[str]:
@@ -278,10 +278,3 @@ def column_letter(index: int) -> str:
     """``A`` for 0, ``AB`` for 27, as spreadsheets name columns."""
     before, last = divmod(index, 26)
     return (column_letter(before - 1) if before else "") + chr(65 + last)
-
-
-def _even(rows: Iterable[Line], width: int, numbers: Any) -> Iterator[list[str]]:
-    """Rows as long as the header; `numbers` gathers those of their lines."""
-    for n, cells in rows:
-        numbers.append(n)
-        yield [*cells, *[""] * width][:width]

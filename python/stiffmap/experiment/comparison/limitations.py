@@ -7,6 +7,7 @@ import numpy as np
 from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.experiment import WRENCH, Experiment, Floats
 from stiffmap.experiment.noise.level import Noise
+from stiffmap.experiment.poses.commanded import rows_in_words
 from stiffmap.solve.machine import Machine
 
 FEWEST = 6
@@ -29,16 +30,10 @@ def refuse(experiment: Experiment, base: Floats) -> None:
 
 def refuse_unreachable(experiment: Experiment, base: Floats) -> None:
     """Raises StiffmapError naming the rows whose readings `base` (n, c) has no prediction for."""
-    failed = np.flatnonzero((experiment.read & ~np.isfinite(base)).any(axis=1))
-    if not failed.size:
-        return
-    rows = ", ".join(experiment.ids[i] for i in failed[:5]) + (" ..." if failed.size > 5 else "")
-    where = ", ".join(f"{1e3 * v:.1f}" for v in experiment.position[failed[0]])
-    raise StiffmapError(
-        f"{experiment.name}: the machine has no equilibrium at {failed.size} row"
-        f"{'s' if failed.size > 1 else ''} (id {rows}; first at ({where}) mm): "
-        "out of reach, or units are wrong"
-    )
+    failed = np.asarray((experiment.read & ~np.isfinite(base)).any(axis=1))
+    if failed.any():
+        told = rows_in_words(experiment, failed, "the machine has no equilibrium at")
+        raise StiffmapError(f"{experiment.name}: {told}")
 
 
 def limitations(experiment: Experiment, noise: Noise, machine: Machine) -> list[str]:

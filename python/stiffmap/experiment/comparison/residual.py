@@ -2,26 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.stats import chi2
 
+from stiffmap.common.outputs import number_cells, write_rows
 from stiffmap.common.short import short_repr
-from stiffmap.experiment.comparison.limitations import limitations, refuse_unreachable
-from stiffmap.experiment.comparison.summary import Summary, summary
+from stiffmap.experiment.comparison.summary import Summary
 from stiffmap.experiment.experiment import Experiment, Floats
-from stiffmap.experiment.noise.checks import Check, checks
+from stiffmap.experiment.noise.checks import Check
 from stiffmap.experiment.noise.level import Mask, Noise
-from stiffmap.experiment.noise.outliers import without_suspects
-from stiffmap.experiment.noise.over_time import over_time
-from stiffmap.experiment.noise.whitening import Problem, nuisance_part
 from stiffmap.experiment.notebook import residual_html
-from stiffmap.experiment.prediction.predict import Predictor
-from stiffmap.model.description import AppliedEffect
-from stiffmap.solve.machine import Machine, takes_machine
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -64,16 +58,34 @@ class Residual:
         e = self.experiment
         out: dict[str, Any] = {f"{a}, mm": 1e3 * e.position[:, i] for i, a in enumerate("xyz")}
         out |= {f"f{a}, N": e.wrench[:, i] for i, a in enumerate("xyz")}
+        for channel, what, unit, values in self._of_channels(("µm", 1e6), ("mrad", 1e3)):
+            out[f"{channel} {what}, {unit}"] = values
+        return pd.DataFrame(out, index=pd.Index(e.ids, name="id"))
+
+    def write_table(self, path: Path) -> None:
+        """CSV of id, x, y, z, of each channel reading, prediction and residual, and set_aside; mm and rad.
+
+        Raises `FileError` where it cannot be written.
+        """
+        e = self.experiment
+        out: dict[str, list[Any]] = {"id": list(e.ids)}
+        out |= {f"{c}_mm": number_cells(1e3 * e.position[:, i]) for i, c in enumerate("xyz")}
+        names = {"reading": "", "prediction": "_predicted", "residual": "_residual"}
+        for channel, what, unit, values in self._of_channels(("mm", 1e3), ("rad", 1.0)):
+            out[f"{channel}{names[what]}_{unit}"] = number_cells(values)
+        out["set_aside"] = ["yes" if s else "" for s in self.set_aside]
+        write_rows(path, list(out), zip(*out.values(), strict=True))
+
+    def _of_channels(
+        self, lengths: tuple[str, float], angles: tuple[str, float]
+    ) -> Iterator[tuple[str, str, str, Floats]]:
+        """Channel that was read, what of it, unit and values (n,), in these units of lengths and angles (name, and how many are 1 in SI)."""
+        e = self.experiment
+        parts = {"reading": e.reading, "prediction": self.prediction, "residual": self.values}
         for i in np.flatnonzero(e.axis_read):
             c = e.channels[int(i)]
-            unit, factor = ("µm", 1e6) if c.unit == "m" else ("mrad", 1e3)
-            for what, values in (
-                ("reading", e.reading),
-                ("prediction", self.prediction),
-                ("residual", self.values),
-            ):
-                out[f"{c.name} {what}, {unit}"] = factor * values[:, i]
-        return pd.DataFrame(out, index=pd.Index(e.ids, name="id"))
+            unit, factor = lengths if c.unit == "m" else angles
+            yield from ((c.name, what, unit, factor * values[:, i]) for what, values in parts.items())
 
     def worst(self, number: int = 10) -> list[tuple[str, str, float]]:
         """Rows by their worst reading, most noise floors first: id, channel, residual (m or rad)."""
@@ -101,47 +113,3 @@ class Residual:
             "worst": [{"id": i, "channel": c, "residual": v} for i, c, v in self.worst(rows)],
             "checks": [vars(c) for c in self.checks],
         }
-
-
-@takes_machine
-def residual(
-    machine: Machine,
-    experiment: Experiment,
-    effects: Sequence[AppliedEffect] = (),
-    *,
-    threads: int | None = None,
-) -> Residual:
-    """Residual of every reading, with `effects` in the prediction; those of the measurement may be
-    among them.
-
-    Raises StiffmapError for unknown points or joints, poses out of reach, and an unknown noise.
-    """
-    predictor = Predictor(machine, experiment, threads=threads)
-    e, base = predictor.experiment, predictor(tuple(effects))
-    refuse_unreachable(e, base)
-    raw = e.reading - base
-    noise, out = without_suspects(e, base)
-    problem = Problem.of(e, noise.sigma, base, ~out)
-    part = nuisance_part(problem, raw)
-    kept = np.where(out[:, None], np.nan, raw - part)
-    white = problem.residual(base)
-    late = over_time(problem, white)
-    return Residual(
-        e,
-        base + part,
-        raw - part,
-        noise,
-        out,
-        summary(kept, noise.sigma, e.channels),
-        float(chi2.sf(float(white @ white), max(problem.freedom, 1))),
-        int(problem.nuisance.shape[1]),
-        _groups_off(problem, white),
-        checks(e, e.reading, noise.sigma, ~out),
-        [*limitations(e, noise, machine), *([] if late is None else [str(late)])],
-    )
-
-
-def _groups_off(problem: Problem, white: Floats) -> int:
-    total, number = np.bincount(problem.groups, white**2), np.bincount(problem.groups)
-    p = chi2.sf(total[number > 0], number[number > 0])
-    return int((p < 1e-3 / max(len(p), 1)).sum())

@@ -1,4 +1,9 @@
-"""Columns of data.csv as arrays in SI, each with its own refusals."""
+"""Columns of data.csv as arrays in SI, each with its own refusals.
+
+Commanded orientations are a rotation vector, quaternion, Euler angles or a matrix, *against home* in base axes: a row without them
+stands as at home, and the commanded orientation is R = turn · R_home. A file that gives orientations of the tool itself says
+``orientation: {against: base}``. Only the machine knows its home, so `against_base` comes later.
+"""
 
 from __future__ import annotations
 
@@ -9,39 +14,41 @@ from scipy.spatial.transform import Rotation
 
 from stiffmap.common.errors import FileError
 from stiffmap.experiment.channels import Channel
-from stiffmap.experiment.experiment import BRANCHES, Floats, Integers
+from stiffmap.experiment.experiment import BRANCHES, Floats, Integers, Mask
 from stiffmap.experiment.files.fields import (
     APPROACH,
+    FORMS,
+    MATRIX,
     POSE,
     POSE2,
+    QUATERNION,
     SEEN,
     SEEN_QUATERNION,
     SEEN_TURNED,
     TURNED,
+    TURNED2,
+    VECTOR,
 )
-from stiffmap.experiment.files.schema import ExperimentFile, NoiseModel
+from stiffmap.experiment.files.schema import ExperimentFile, NoiseModel, OrientationModel
 from stiffmap.experiment.files.table import Table
-from stiffmap.experiment.files.units import Scales
+from stiffmap.experiment.files.units import Units
 from stiffmap.experiment.readings import kind_of
 
+UNIT_LENGTH, ORTHONORMAL = 1e-3, 1e-4
+"""How far a quaternion's length, or a matrix from a rotation, may be off: printed digits, no more."""
 
-def position(table: Table, scales: Scales, commanded: bool) -> Floats:
+
+def position(table: Table, commanded: bool) -> Floats:
     """(n, 3) m; NaN where actuator coordinates are commanded instead."""
     if commanded:
         twice = table.one_of((*POSE, *TURNED))
         if twice:
             table.fail(f"column '{twice}': actuators are commanded (command:), so the pose follows from them")
         return np.full((len(table), 3), np.nan)
-    if scales.length < 1e-5 and not set(POSE) & set(scales.own):
-        raise FileError(
-            "units: with length: um the poses x, y, z would be in µm as well; write their unit, as in "
-            "{length: mm, dx: um, dy: um, dz: um} (or x: um, if they are)",
-            file=scales.file,
-        )
-    return np.asarray(scales.lengths(POSE) * table.block(POSE, blank=False, missing=None))
+    return table.block(POSE, blank=False, missing=None)
 
 
-def command(model: ExperimentFile, table: Table, scales: Scales, behind: str = "") -> Floats | None:
+def command(model: ExperimentFile, table: Table, behind: str = "") -> Floats | None:
     """(n, actuators) m, rad, in the order of the file; None where nothing is commanded.
 
     `behind` the names of its columns: ``2`` for the second command of a distance, of which cells may be empty.
@@ -49,18 +56,18 @@ def command(model: ExperimentFile, table: Table, scales: Scales, behind: str = "
     names = [f"{c}{behind}" for c in model.command]
     if not names or (behind and not table.one_of(names)):
         return None
-    return np.asarray([scales.own[c] for c in names] * table.block(names, blank=bool(behind), missing=None))
+    return table.block(names, blank=bool(behind), missing=None)
 
 
-def seen(table: Table, scales: Scales) -> Floats | None:
+def seen(table: Table) -> Floats | None:
     """(n, 3) m: coordinates of the target in the instrument's frame."""
     if not table.one_of(SEEN):
         return None
-    out = scales.length * table.block(SEEN, blank=True, missing=None)
+    out = table.block(SEEN, blank=True, missing=None)
     return np.where(np.asarray(np.isfinite(out).all(axis=1))[:, None], out, np.nan)
 
 
-def seen_rotation(model: ExperimentFile, table: Table, scales: Scales) -> Floats | None:
+def seen_rotation(model: ExperimentFile, table: Table) -> Floats | None:
     """(n, 3, 3) of the target in the instrument's frame, from three angles or a quaternion; NaN where blank."""
     names = next((g for g in (SEEN_TURNED, SEEN_QUATERNION) if table.one_of(g)), None)
     if names is None:
@@ -73,10 +80,76 @@ def seen_rotation(model: ExperimentFile, table: Table, scales: Scales) -> Floats
         table.check(unit, lambda _: "columns 'pqx' to 'pqw': expected a quaternion of length 1, x y z w")
         turned = Rotation.from_quat(filled)
     else:
-        filled = scales.angle(names[0]) * np.where(good, values, 0.0)
+        filled = np.where(good, values, 0.0)
         word = model.target_orientation
         turned = Rotation.from_rotvec(filled) if word == "rotvec" else Rotation.from_euler(word, filled)
     return np.where(good[:, :, None], turned.as_matrix(), np.nan)
+
+
+def rotations(table: Table, model: OrientationModel) -> tuple[Floats | None, Floats | None]:
+    """Orientations (n, 3, 3) of a row and of its second pose, against what `model` says; the second is
+    as the first where the file does not say. Raises `FileError` naming column and row."""
+    first, second = (_orientation(table, model, second) for second in (False, True))
+    if second is not None and first is None:
+        first = np.tile(np.eye(3), (len(table), 1, 1))
+    return first, first if second is None else second
+
+
+def _orientation(table: Table, model: OrientationModel, second: bool) -> Floats | None:
+    names = dict(zip(TURNED, TURNED2 if second else TURNED, strict=True))
+    forms = [f for f in FORMS if table.one_of(names[c] for c in f)]
+    if not forms:
+        return None
+    if len(forms) > 1:
+        one, two = names[forms[0][0]], table.one_of(names[c] for c in forms[1])
+        table.fail(f"column '{two}': orientations are given twice, as {one} … and as {two} …; keep one")
+    form = forms[0]
+    # a turn about one axis may leave out the others
+    cells = table.block([names[c] for c in form], blank=second, missing=0.0 if form is VECTOR else None)
+    empty: Mask = np.asarray(~np.isfinite(cells).all(axis=1))
+    if form in (QUATERNION, MATRIX):
+        out = (_quaternions if form is QUATERNION else _matrices)(table, cells, empty)
+        out[empty] = np.eye(3)
+        return np.ascontiguousarray(out)
+    angles = np.nan_to_num(cells)
+    if form is VECTOR:
+        turned = Rotation.from_rotvec(angles)
+    else:
+        angles[empty] = 0.0
+        turned = Rotation.from_euler(_sequence(table, model, names[form[0]]), angles)
+    return np.ascontiguousarray(turned.as_matrix())
+
+
+def _sequence(table: Table, model: OrientationModel, column: str) -> str:
+    if model.euler is None:
+        table.fail(
+            f"column '{column}': Euler angles need their convention: orientation: {{euler: XYZ}} for turns "
+            "about x, the turned y, the twice turned z; {euler: xyz} for turns about fixed axes"
+        )
+    return model.euler
+
+
+def _quaternions(table: Table, cells: Floats, empty: Mask) -> Floats:
+    length = np.linalg.norm(cells, axis=1)
+    table.check(
+        empty | (np.abs(length - 1.0) < UNIT_LENGTH),
+        lambda i: f"column 'qw': expected a quaternion of length 1, found {length[i]:.6g}",
+    )
+    cells = np.where(empty[:, None], [1.0, 0.0, 0.0, 0.0], cells)
+    return np.asarray(Rotation.from_quat(cells[:, [1, 2, 3, 0]]).as_matrix())
+
+
+def _matrices(table: Table, cells: Floats, empty: Mask) -> Floats:
+    r = np.where(empty[:, None], np.eye(3).reshape(-1), cells).reshape(-1, 3, 3)
+    off = np.abs(r @ r.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2))
+    table.check(
+        (off <= ORTHONORMAL) & (np.linalg.det(r) >= 0.0),
+        lambda i: (
+            f"column 'r11': expected a rotation matrix, found one that is off by {off[i]:.2g} "
+            f"(determinant {np.linalg.det(r[i]):.3g})"
+        ),
+    )
+    return np.asarray(Rotation.from_matrix(r).as_matrix())
 
 
 def gravities(model: ExperimentFile, table: Table) -> tuple[tuple[float, float, float] | None, Floats | None]:
@@ -95,7 +168,7 @@ def gravities(model: ExperimentFile, table: Table) -> tuple[tuple[float, float, 
 
 
 def other(
-    model: ExperimentFile, table: Table, scales: Scales, reading: Floats, channels: tuple[Channel, ...]
+    model: ExperimentFile, table: Table, reading: Floats, channels: tuple[Channel, ...]
 ) -> Floats | None:
     """(n, 3) m, second pose of the rows that read a distance."""
     at = [i for i, c in enumerate(channels) if (kind := kind_of(c)) and kind.pair]
@@ -111,9 +184,9 @@ def other(
                 file=table.file,
             )
         return np.full((len(table), 3), np.nan)
-    out = np.asarray(scales.lengths(POSE2) * table.block(POSE2, blank=True, missing=None))
+    out = table.block(POSE2, blank=True, missing=None)
     read = np.isfinite(reading[:, at]).any(axis=1)
-    same = np.abs(out - scales.lengths(POSE) * table.block(POSE, blank=True)).max(axis=1) < 1e-9
+    same = np.abs(out - table.block(POSE, blank=True)).max(axis=1) < 1e-9
     told = f"column '{kind.name}': {kind.title}"
     table.check(~read | np.isfinite(out).all(axis=1), lambda _: f"{told} has no second pose (x2, y2, z2)")
     table.check(~same, lambda _: f"{told} is between a pose and itself")
@@ -127,19 +200,24 @@ def approach(table: Table) -> Floats | None:
     return np.nan_to_num(table.block(APPROACH, blank=True, missing=0.0))
 
 
-def declared(noise: NoiseModel, scales: Scales, channels: Sequence[Channel]) -> Floats:
+def declared(noise: NoiseModel, units: Units, channels: Sequence[Channel]) -> Floats:
     """(c,) declared standard deviations; NaN where none is."""
     values = [getattr(noise, c.name, None) for c in channels]
-    return np.asarray(scales.motion(tuple(channels)) * np.array([np.nan if v is None else v for v in values]))
+    return np.array(
+        [
+            np.nan if v is None else units.size(c.name, np.nan) * v
+            for c, v in zip(channels, values, strict=True)
+        ]
+    )
 
 
-def sigma(model: ExperimentFile, table: Table, scales: Scales, channels: tuple[Channel, ...]) -> Floats:
+def sigma(model: ExperimentFile, table: Table, units: Units, channels: tuple[Channel, ...]) -> Floats:
     """(n, c) standard deviation of each reading: its own column, else that of the file."""
-    common = declared(model.noise, scales, channels)
+    common = declared(model.noise, units, channels)
     for i, c in enumerate(channels):
         own = model.joints[c.name].noise if c.joint else None
-        common[i] = common[i] if own is None else scales.own[c.name] * own
-    each = scales.motion(channels) * table.block([f"u_{c.name}" for c in channels], blank=True)
+        common[i] = common[i] if own is None else units.own[c.name] * own
+    each = table.block([f"u_{c.name}" for c in channels], blank=True)
     table.check(~(each < 0).any(axis=1), lambda _: "a standard deviation is negative")
     return np.where(np.isfinite(each), each, common)
 

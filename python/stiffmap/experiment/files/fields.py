@@ -50,9 +50,14 @@ DECLARED = (*POSE, *POSE2, *AXES, *VECTOR, *WRENCH)
 
 def quantity_of(column: str) -> str | None:
     """Quantity of a column, of its standard deviation or of its commanded value; None for words and plain numbers."""
+    base = base_of(column)
+    return QUANTITIES.get(base) or {k.name: SI[k.unit] for k in kinds()}.get(base)
+
+
+def base_of(column: str) -> str:
+    """The column in whose unit another one is: a standard deviation, a commanded value, a reading in coordinates of its own."""
     base = column.removeprefix("u_").removesuffix("_cmd")
-    of_kinds = {n: SI[k.unit] for k in kinds() for n in (k.name, k.absolute) if n}
-    return QUANTITIES.get(base) or of_kinds.get(base)
+    return {k.absolute: k.name for k in kinds() if k.absolute}.get(base, base)
 
 
 def read() -> tuple[str, ...]:

@@ -15,11 +15,10 @@ from stiffmap.common.yaml_text import read as read_yaml
 from stiffmap.experiment.channels import AXIS_CHANNELS, Channel
 from stiffmap.experiment.experiment import ASKED, AXES, WRENCH, Experiment, Floats, Loop
 from stiffmap.experiment.files import columns as read_columns
-from stiffmap.experiment.files.fields import SEEN, SEEN_QUATERNION, SEEN_TURNED, absolute, known, read
-from stiffmap.experiment.files.orientation import rotations
+from stiffmap.experiment.files.fields import POSE, SEEN, SEEN_QUATERNION, SEEN_TURNED, absolute, known, read
 from stiffmap.experiment.files.schema import ExperimentFile, file_model
 from stiffmap.experiment.files.table import Table, read_table
-from stiffmap.experiment.files.units import ANGLES, Scales
+from stiffmap.experiment.files.units import ANGLES, Units
 from stiffmap.experiment.readings import kinds
 from stiffmap.model.files.report import validated
 
@@ -41,9 +40,15 @@ def load_experiment(path: str | PathLike[str]) -> Experiment:
     document = read_yaml(file)
     expected = "an experiment file is a mapping with machine, quantity and units"
     model = validated(file_model(), document, str(file), expected)
-    scales = Scales.of(model, str(file))
+    units = Units(model, str(file))
     table = _rename(read_table(file.parent / model.data, model.rows), model.columns)
-    table = scales.of_header(table, {*model.joints, *model.command})
+    table = units.of_header(table, {*model.joints, *model.command})
+    if units.common["length"] < 1e-5 and not model.command and not {*POSE} & {*units.own}:
+        raise FileError(
+            "units: with length: um the poses x, y, z would be in µm as well; write their unit, as in "
+            "{length: mm, dx: um, dy: um, dz: um} (or x: um, if they are)",
+            file=str(file),
+        )
     seconds = [f"{c}2" for c in model.command if f"{c}2" in table]
     own = (*model.joints, *model.command, *seconds)
     if taken := next((c for c in own if c in known()), None):
@@ -51,7 +56,7 @@ def load_experiment(path: str | PathLike[str]) -> Experiment:
     table.refuse_unknown((*known(), *own, *(f"u_{c}" for c in own)), "known:")
     for column in own:
         table.text(column)
-    return _assemble(model, table, scales, file)
+    return _assemble(model, table, units, file)
 
 
 def _rename(table: Table, columns: dict[str, str]) -> Table:
@@ -71,12 +76,12 @@ def _channel(name: str, unit: str, *joint: str) -> Channel:
     return Channel(name, "rad" if unit in ANGLES else "m", *joint)
 
 
-def _assemble(model: ExperimentFile, table: Table, scales: Scales, file: Path) -> Experiment:
+def _assemble(model: ExperimentFile, table: Table, units: Units, file: Path) -> Experiment:
     given = [k.channel for k in kinds() if table.one_of((k.name, k.absolute))]
     joints = [_channel(name, j.unit, j.joint, j.side) for name, j in model.joints.items()]
     extra = (*given, *joints)
-    parts = _readings(model, table, scales, extra)
-    parts |= rows_of(model, table, scales) | _setting(model, scales, file)
+    parts = _readings(model, table, units, extra)
+    parts |= rows_of(model, table) | _setting(model, units, file)
     name = file.parent.name if file.name == "experiment.yaml" else file.stem
     experiment = Experiment(name=name, machine=model.machine, quantity=model.quantity, extra=extra, **parts)
     if experiment.unloaded == "approach" and experiment.approach is None:
@@ -87,19 +92,14 @@ def _assemble(model: ExperimentFile, table: Table, scales: Scales, file: Path) -
 
 
 def _readings(
-    model: ExperimentFile, table: Table, scales: Scales, extra: tuple[Channel, ...]
+    model: ExperimentFile, table: Table, units: Units, extra: tuple[Channel, ...]
 ) -> dict[str, Any]:
     """What the instrument read, SI, and how sure it is."""
     channels = (*AXIS_CHANNELS, *extra)
-    for column in AXES[3:]:
-        if table.one_of((column, f"u_{column}")):
-            scales.angle(column)
-    reading = scales.motion(channels) * table.block([c.name for c in channels], blank=True)
-    seen, seen_rotation = read_columns.seen(table, scales), read_columns.seen_rotation(model, table, scales)
+    reading = table.block([c.name for c in channels], blank=True)
+    seen, seen_rotation = read_columns.seen(table), read_columns.seen_rotation(model, table)
     of_kinds = {
-        k.name: float(scales.motion((k.channel,))[0]) * table.numbers(k.absolute, blank=True)
-        for k in kinds()
-        if k.absolute and k.absolute in table
+        k.name: table.numbers(k.absolute, blank=True) for k in kinds() if k.absolute and k.absolute in table
     }
     _above_zero(table, of_kinds)
     _promise(reading, channels, table, seen, seen_rotation, of_kinds)
@@ -109,30 +109,30 @@ def _readings(
             file=table.file,
         )
     _fits(model.quantity, table)
-    sigma = read_columns.sigma(model, table, scales, channels)
+    sigma = read_columns.sigma(model, table, units, channels)
     return {
         "reading": reading,
         "sigma": np.where(np.isfinite(reading), sigma, np.nan),
         "seen": seen,
         "seen_rotation": seen_rotation,
         "absolute": of_kinds,
-        "other": read_columns.other(model, table, scales, reading, channels),
+        "other": read_columns.other(model, table, reading, channels),
     }
 
 
-def rows_of(model: ExperimentFile, table: Table, scales: Scales) -> dict[str, Any]:
+def rows_of(model: ExperimentFile, table: Table) -> dict[str, Any]:
     """What else stands in the rows: poses, loads, commands, and how they were reached."""
     gravity, gravity_of = read_columns.gravities(model, table)
-    rotation, other_rotation = rotations(table, scales, model.orientation)
+    rotation, other_rotation = read_columns.rotations(table, model.orientation)
     return {
         "ids": read_columns.ids(table),
-        "position": read_columns.position(table, scales, bool(model.command)),
-        "wrench": _wrench(model, table, scales),
-        "asked": _asked(table, scales),
+        "position": read_columns.position(table, bool(model.command)),
+        "wrench": _wrench(model, table),
+        "asked": _asked(table),
         "rotation": rotation,
         "other_rotation": other_rotation,
-        "command": read_columns.command(model, table, scales),
-        "other_command": read_columns.command(model, table, scales, "2"),
+        "command": read_columns.command(model, table),
+        "other_command": read_columns.command(model, table, "2"),
         "approach": read_columns.approach(table),
         "repeat": read_columns.whole(table, "repeat"),
         **{c: table.numbers(c) if c in table else None for c in ("order", "hours", "temperature")},
@@ -145,7 +145,7 @@ def rows_of(model: ExperimentFile, table: Table, scales: Scales) -> dict[str, An
     }
 
 
-def _setting(model: ExperimentFile, scales: Scales, file: Path) -> dict[str, Any]:
+def _setting(model: ExperimentFile, units: Units, file: Path) -> dict[str, Any]:
     """What holds for all rows."""
     normal = np.array(model.surface.normal)
     if not np.linalg.norm(normal) > 0:
@@ -156,18 +156,18 @@ def _setting(model: ExperimentFile, scales: Scales, file: Path) -> dict[str, Any
         "command_of": tuple(_channel(n, c.unit, c.actuator) for n, c in model.command.items()),
         "normal": (x, y, z),
         "surface": model.surface.shape,
-        "anchor": None if model.anchor is None else tuple(scales.length * v for v in model.anchor),
+        "anchor": None if model.anchor is None else tuple(units.common["length"] * v for v in model.anchor),
         **{k: getattr(model, k) for k in SAME},
         "load_point": model.load_point or model.point,
-        "zero_sigma": np.nan_to_num(read_columns.declared(model.zero_noise, scales, AXIS_CHANNELS)),
-        "certificate": _certificate(model, scales, file),
+        "zero_sigma": np.nan_to_num(read_columns.declared(model.zero_noise, units, AXIS_CHANNELS)),
+        "certificate": _certificate(model, units, file),
         "loop": Loop(**model.metrology.model_dump()),
         "record": tuple((k, v) for k, v in {**model.record.model_dump(), "notes": model.notes}.items() if v),
         "source": str(file),
     }
 
 
-def _certificate(model: ExperimentFile, scales: Scales, file: Path) -> tuple[tuple[str, float], ...]:
+def _certificate(model: ExperimentFile, units: Units, file: Path) -> tuple[tuple[str, float], ...]:
     """The instrument's standard uncertainties in SI."""
     given = {k: v for k, v in model.certificate.model_dump(exclude_none=True).items() if v > 0.0}
     for key in ("frame", "frame_direction"):
@@ -176,15 +176,11 @@ def _certificate(model: ExperimentFile, scales: Scales, file: Path) -> tuple[tup
                 f"certificate: {key}: of a frame that is known; found frame: unknown, which is fitted freely",
                 file=str(file),
             )
-    si = {
-        "scale": 1.0,
-        "frame": scales.length,
-        "tool": scales.length,
-        "frame_direction": scales.angle("certificate: frame_direction")
-        if "frame_direction" in given
-        else 1.0,
-    }
-    return tuple((k, v * si[k]) for k, v in given.items())
+    quantities = {"frame": "length", "tool": "length", "frame_direction": "angle"}
+    return tuple(
+        (k, v * (units.of(quantities[k], f"certificate: {k}") if k in quantities else 1.0))
+        for k, v in given.items()
+    )
 
 
 def _fits(quantity: str, table: Table) -> None:
@@ -229,18 +225,14 @@ def _promise(
             reading[good, at[n]] = 0.0
 
 
-def _wrench(model: ExperimentFile, table: Table, scales: Scales) -> Floats:
-    given = [c for c in WRENCH if c in table]
-    if model.quantity == "deflection" and not given:
+def _wrench(model: ExperimentFile, table: Table) -> Floats:
+    if model.quantity == "deflection" and not table.one_of(WRENCH):
         raise MissingColumnError(
             "missing column: a deflection needs a load (fx, fy, fz, mx, my, mz)", file=table.file
         )
-    return np.asarray(scales.wrench(given) * table.block(WRENCH, blank=False, missing=0.0))
+    return table.block(WRENCH, blank=False, missing=0.0)
 
 
-def _asked(table: Table, scales: Scales) -> Floats | None:
+def _asked(table: Table) -> Floats | None:
     """(n, 6) N, N·m that were commanded, NaN where nothing was; each in the unit of the load that was measured."""
-    given = [w for w, c in zip(WRENCH, ASKED, strict=True) if c in table]
-    if not given:
-        return None
-    return np.asarray(scales.wrench(given) * table.block(ASKED, blank=True))
+    return table.block(ASKED, blank=True) if table.one_of(ASKED) else None

@@ -15,7 +15,7 @@ from stiffmap.experiment.files.fields import EULER, PLAN, TURNED2
 from stiffmap.experiment.files.load import rows_of
 from stiffmap.experiment.files.schema import ExperimentFile, UnitsModel
 from stiffmap.experiment.files.table import read_table
-from stiffmap.experiment.files.units import Scales
+from stiffmap.experiment.files.units import Units
 from stiffmap.experiment.virtual.plans import MICRO
 from stiffmap.solve.machine import Machine
 
@@ -37,13 +37,12 @@ def load_plan(
     set-up, approach and points. Raises `FileError` naming file, row and column."""
     units = UnitsModel(length="mm", force="N", angle="rad")
     model = ExperimentFile(machine=machine.name, quantity=quantity, units=units)  # type: ignore[arg-type]
-    scales = Scales.of(model, str(path))
-    table = scales.of_header(read_table(path))
+    table = Units(model, str(path)).of_header(read_table(path))
     table.refuse_unknown(KNOWN, "a plan knows")
     n = len(table)
     size = np.where([c.unit == "m" for c in AXIS_CHANNELS], noise or MICRO[quantity], angle_noise)
     sigma = np.tile(np.where([a in axes for a in AXES], size, np.nan), (n, 1))
-    rows = {k: v for k, v in rows_of(model, table, scales).items() if k not in READ_LATER}
+    rows = {k: v for k, v in rows_of(model, table).items() if k not in READ_LATER}
     if rows["order"] is None:
         rows["order"] = np.arange(1, n + 1, dtype=float)
     if quantity == "deflection" and not rows["wrench"].any():

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from stiffmap.common.outputs import make_folder, putting, write_rows, write_text
+from stiffmap.common.outputs import make_folder, number_cells, putting, write_rows, write_text
 from stiffmap.common.yaml_text import text_of
 from stiffmap.experiment.experiment import ASKED, AXES, WRENCH, Channel, Experiment, Floats, Loop
 from stiffmap.experiment.files.fields import (
@@ -118,12 +118,12 @@ def _columns(e: Experiment) -> dict[str, list[Any]]:
     columns |= absolute
     for i, c in enumerate(e.channels):
         if e.axis_read[i] and c.name not in told:
-            columns[c.name] = _text(e.reading[:, i] * _scale(c))
+            columns[c.name] = number_cells(e.reading[:, i] * _scale(c))
             if not _alike(e, i) and np.isfinite(e.sigma[:, i]).any():
-                columns[f"u_{c.name}"] = _text(e.sigma[:, i] * _scale(c))
+                columns[f"u_{c.name}"] = number_cells(e.sigma[:, i] * _scale(c))
     for name in COUNTED:
         if getattr(e, name) is not None:
-            columns[name] = _text(np.asarray(getattr(e, name), dtype=float))
+            columns[name] = number_cells(np.asarray(getattr(e, name), dtype=float))
     return columns | {n: v for n, v in _words(e).items() if not (n == "point" and SEEN_TARGET in v[0])}
 
 
@@ -149,7 +149,7 @@ def _absolute(e: Experiment) -> tuple[dict[str, list[Any]], tuple[str, ...]]:
         if values is None and kind.found and kind.commanded and e.registration and kind.channel in e.extra:
             values = e.reading[:, e.channels.index(kind.channel)] + kind.commanded(e)
         if values is not None:
-            columns[kind.absolute] = _text(values * _scale(kind.channel))
+            columns[kind.absolute] = number_cells(values * _scale(kind.channel))
             told += (kind.name,)
     return columns, told
 
@@ -167,7 +167,7 @@ def _commanded(e: Experiment) -> dict[str, list[Any]]:
 
 def _block(names: Sequence[str], values: Floats | None, units: Any = 1.0) -> dict[str, list[Any]]:
     """Columns of an array (n, names), SI times `units`; none where there is no array."""
-    return {} if values is None else dict(zip(names, map(_text, (values * units).T), strict=True))
+    return {} if values is None else dict(zip(names, map(number_cells, (values * units).T), strict=True))
 
 
 def _rotvec(rotation: Floats | None, names: Sequence[str]) -> dict[str, list[Any]]:
@@ -181,12 +181,8 @@ def _rotvec(rotation: Floats | None, names: Sequence[str]) -> dict[str, list[Any
 def _loads(e: Experiment) -> dict[str, list[Any]]:
     units = [1.0] * 3 + [MM] * 3
     used = [i for i in range(6) if e.wrench[:, i].any() or (i < 3 and e.quantity == "deflection")]
-    out = {WRENCH[i]: _text(e.wrench[:, i] * units[i]) for i in used}
+    out = {WRENCH[i]: number_cells(e.wrench[:, i] * units[i]) for i in used}
     if e.asked is None:
         return out
     given = np.flatnonzero(np.isfinite(e.asked).any(axis=0))
-    return out | {ASKED[i]: _text(e.asked[:, i] * units[i]) for i in given}
-
-
-def _text(values: Any) -> list[str]:
-    return ["" if np.isnan(v) else f"{v:.9g}" for v in values]
+    return out | {ASKED[i]: number_cells(e.asked[:, i] * units[i]) for i in given}

@@ -35,10 +35,13 @@ class UnitsModel(FileModel):
     angle: Angle | None = None
     temperature: Literal["degC", "K"] | None = None
 
+    def common(self) -> dict[str, str]:
+        """Units of all columns of a quantity."""
+        return self.model_dump(exclude_none=True, include={"length", "force", "angle"})
+
     def own(self) -> dict[str, str]:
         """Units of single columns."""
-        common = ("length", "force", "angle", "temperature")
-        return {k: v for k, v in self.model_dump(exclude_none=True).items() if k not in common}
+        return self.model_dump(exclude_none=True, exclude={"length", "force", "angle", "temperature"})
 
 
 class NoiseModel(FileModel):

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import math
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NoReturn
@@ -13,11 +12,10 @@ import numpy as np
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError, MissingColumnError
-from stiffmap.common.number_text import number_in
 from stiffmap.common.outputs import unguarded
-from stiffmap.common.tables.cells import Cells, filled, packed, row_numbers
-from stiffmap.common.tables.header import Line, refuse_twice
-from stiffmap.common.tables.lines import decimal_comma, lines_of, with_points
+from stiffmap.common.tables.cells import Cells, numbered, packed, row_numbers
+from stiffmap.common.tables.header import refuse_twice
+from stiffmap.common.tables.lines import finite_number, rows_of
 from stiffmap.model.files.schema.base import suggestion
 
 
@@ -29,8 +27,8 @@ class Table:
     header: tuple[str, ...]
     columns: tuple[Cells, ...]
     lines: Sequence[int]
-    factors: Mapping[str, float] = field(default_factory=dict)
-    """What a column's numbers are multiplied by: its own unit over the one that they are read in."""
+    sizes: Mapping[str, float] = field(default_factory=dict)
+    """SI size of a column's unit, by which its numbers are multiplied."""
 
     def __len__(self) -> int:
         return len(self.lines)
@@ -51,22 +49,16 @@ class Table:
         return self.columns[self.header.index(column)]
 
     def numbers(self, column: str, *, blank: bool = False) -> Floats:
-        """A column as floats; with `blank`, empty cells are NaN (a value that was not read)."""
+        """A column in SI; with `blank`, empty cells are NaN (a value that was not read)."""
         found = self._cells(column).numbers(lambda cell, row: self._number(cell, column, row, blank))
-        return found * self.factors[column] if self.factors.get(column, 1.0) != 1.0 else found
+        return found * self.sizes[column] if self.sizes.get(column, 1.0) != 1.0 else found
 
     def _number(self, cell: str, column: str, row: int, blank: bool) -> float:
-        if blank and cell.lower() in ("", "nan", "na"):
-            return math.nan
         try:
-            value = number_in(cell)
-        except ValueError:
-            self.fail(
-                f"column '{column}': expected a number; found {repr(cell) if cell else 'an empty cell'}", row
-            )
-        if not math.isfinite(value):
-            self.fail(f"column '{column}': expected a finite number; found {cell}", row)
-        return value
+            return finite_number(cell, ("", "nan", "na") if blank else ())
+        except ValueError as problem:
+            expected, found = problem.args
+            self.fail(f"column '{column}': expected {expected}; found {found}", row)
 
     def block(self, names: Sequence[str], *, blank: bool, missing: float | None = np.nan) -> Floats:
         """(n, names) numbers; a column that is not there is `missing`, or refused where that is None."""
@@ -102,29 +94,15 @@ class Table:
 
 def read_table(path: Path, expected: int | None = None) -> Table:
     """Cells of a text or workbook with a header line and, where it is known, an expected number of rows; raises `FileError`."""
-    source, lines = lines_of(path), row_numbers()
-    comma = source.separator not in ("", ",") and decimal_comma(row for _, row in source.lines())
-    rows = ((n, row) for n, row in source.lines() if filled(row))
-    header = tuple(c.strip() for c in next(rows, (0, []))[1])
-    columns = packed(_rows(rows, header, lines, str(path)), len(header))
-    if comma:
-        columns = tuple(map(with_points, columns))
+    rows, lines = rows_of(path, remarks=False), row_numbers()
+    header = tuple(c.strip() for c in next(rows)[1])
+    refuse_twice(header, str(path), 1)
+    columns = packed(numbered(rows, lines), len(header))
     if not lines:
         raise FileError("expected a header line and at least one row", file=str(path))
     if expected is not None:
         _whole(path, expected, len(lines))
     return Table(str(path), header, columns, lines)
-
-
-def _rows(rows: Iterable[Line], header: Sequence[str], lines: Any, file: str) -> Iterator[list[str]]:
-    """Rows with something in them, as long as the header; `lines` gathers their numbers."""
-    refuse_twice(header, file, 1)
-    width = len(header)
-    for n, row in rows:
-        if len(row) != width:
-            raise FileError(f"expected {width} cells; found {len(row)}", file=file, line=n)
-        lines.append(n)
-        yield row
 
 
 def _whole(path: Path, expected: int, found: int) -> None:

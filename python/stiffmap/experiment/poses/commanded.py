@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.experiment.experiment import Experiment, Mask
-from stiffmap.experiment.poses.orientation import against_base
+from stiffmap.experiment.experiment import Experiment, Floats, Mask
 from stiffmap.solve.kinematics import Kinematics, forward_kinematics
 from stiffmap.solve.machine import Machine
 
@@ -49,6 +48,19 @@ def located(machine: Machine, experiment: Experiment) -> Experiment:
     return without(out, failed, "the machine has no pose at the commanded coordinates of")
 
 
+def against_base(experiment: Experiment, home: Floats) -> Experiment:
+    """The experiment with its orientations as those of the TCP; `home` (3, 3) is that at home."""
+    if experiment.rotation is None or experiment.rotation_against == "base":
+        return replace(experiment, rotation_against="base")
+    second = experiment.other_rotation
+    return replace(
+        experiment,
+        rotation=experiment.rotation @ home,
+        other_rotation=None if second is None else second @ home,
+        rotation_against="base",
+    )
+
+
 def _with_other(plan: Experiment, here: Kinematics, there: Kinematics, index: list[int]) -> Experiment:
     turned = plan.rotation is not None or not np.allclose(
         np.nan_to_num(there.rotation), np.nan_to_num(here.rotation[:1]), atol=AS_HOME
@@ -64,20 +76,22 @@ def _with_other(plan: Experiment, here: Kinematics, there: Kinematics, index: li
 
 def without(experiment: Experiment, failed: Mask, why: str, cause: str = OUT_OF_REACH) -> Experiment:
     """The experiment without the rows `failed` (n,), which it then names; StiffmapError if none is left."""
-    at = np.flatnonzero(failed)
-    if not at.size:
+    if not failed.any():
         return experiment
+    told = rows_in_words(experiment, failed, why, cause)
+    if failed.all():
+        raise StiffmapError(f"{experiment.name}: {told}")
+    return replace(experiment.rows(~failed), out_of_reach=(*experiment.out_of_reach, told))
+
+
+def rows_in_words(experiment: Experiment, failed: Mask, why: str, cause: str = OUT_OF_REACH) -> str:
+    """How many rows `failed` (n,) and why, the names of some, where the first one is, and the cause."""
+    at = np.flatnonzero(failed)
     rows = ", ".join(experiment.ids[i] for i in at[:NAMED]) + (" ..." if at.size > NAMED else "")
     where = experiment.position[at[0]]
-    first = (
-        f"; first at ({', '.join(f'{1e3 * v:.1f}' for v in where)}) mm" if np.isfinite(where).all() else ""
-    )
-    plural = "s" if at.size > 1 else ""
-    told = f"{why} {at.size} row{plural} (id {rows}{first}): {cause}"
-    if at.size == len(experiment):
-        raise StiffmapError(f"{experiment.name}: {told}")
-    kept = experiment.rows(~failed)
-    return replace(kept, out_of_reach=(*experiment.out_of_reach, told))
+    if np.isfinite(where).all():
+        rows += f"; first at ({', '.join(f'{1e3 * v:.1f}' for v in where)}) mm"
+    return f"{why} {at.size} row{'s' if at.size > 1 else ''} (id {rows}): {cause}"
 
 
 def _columns(machine: Machine, experiment: Experiment) -> list[int]:

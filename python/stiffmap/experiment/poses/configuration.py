@@ -1,14 +1,52 @@
-"""Where all joints of the rigid machine stand in each row of a plan."""
+"""Where the rigid machine stands in each row of a plan: its joints, its named points, how its tool follows each drive.
+
+What is found once holds for a plan and all machines of one nominal geometry.
+"""
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Callable, Hashable
+from typing import Any, Generic, TypeVar
+from weakref import WeakKeyDictionary
 
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from stiffmap.common.kept import Kept
 from stiffmap.experiment.experiment import Experiment, Floats, Integers, Mask
-from stiffmap.experiment.poses.once import Once
-from stiffmap.model.description.rigid import straight
-from stiffmap.solve.kinematics import inverse_kinematics
+from stiffmap.model.description.rigid import nominal_geometry, straight
+from stiffmap.solve.closing import of_drives
+from stiffmap.solve.kinematics import forward_kinematics, inverse_kinematics
 from stiffmap.solve.machine import Machine
+
+Array = TypeVar("Array", bound=NDArray[Any])
+KEPT = 32
+"""Arrays of one plan: a fit that moves a nominal point makes another geometry with every trial."""
+STEP = 1e-6
+"""m or rad of a drive to either side."""
+
+
+class Once(Generic[Array]):
+    """Arrays by plan, geometry and name, the last ones as long as the plan lives; not to be written to."""
+
+    def __init__(self) -> None:
+        self._known: WeakKeyDictionary[Experiment, Kept[Hashable, Array]] = WeakKeyDictionary()
+
+    def get(self, plan: Experiment, machine: Machine, make: Callable[[], Array], name: str = "") -> Array:
+        """The array of these; `make` is called where it is not known."""
+        key = name, nominal_geometry(machine.description)
+        return self._known.setdefault(plan, Kept(KEPT)).made(key, lambda: _frozen(make()))
+
+
+def _frozen(made: Array) -> Array:
+    made.flags.writeable = False
+    return made
+
+
+_REACH: Once[Mask] = Once()
+_POINTS: Once[Floats] = Once()
+_SLOPES: Once[Floats] = Once()
 
 
 def coordinates_of(machine: Machine, plan: Experiment) -> Floats:
@@ -43,9 +81,6 @@ def in_reach(machine: Machine, plan: Experiment) -> Mask:
     return _REACH.get(plan, machine, lambda: _reached(machine, plan))
 
 
-_REACH: Once[Mask] = Once()
-
-
 def _reached(machine: Machine, plan: Experiment) -> Mask:
     plain = straight(machine.description)  # a gap without force has no stiffness, and would leave the kernels
     if plain is not machine.description:
@@ -57,3 +92,49 @@ def _reached(machine: Machine, plan: Experiment) -> Mask:
     if len(left):
         out[left] = np.isfinite(coordinates_of(machine, plan.rows(left))).all(axis=1)
     return out
+
+
+def point_positions(machine: Machine, name: str, plan: Experiment) -> Floats:
+    """(n, 3) m, base axes, of a point where each row is commanded; NaN where that is out of reach.
+
+    Found out once for all machines of one geometry, as long as the plan lives; not to be written to.
+    """
+    if name == "tcp":
+        return plan.position
+    return _POINTS.get(plan, machine, lambda: _point(machine, name, plan), name)
+
+
+def positions_of(machine: Machine, plan: Experiment, read: tuple[str, ...]) -> Floats:
+    """(n, 3) m, where the point of each row is as commanded."""
+    at = {p: point_positions(machine, p, plan) for p in set(read)}
+    return np.stack([at[p][i] for i, p in enumerate(read)])
+
+
+def _point(machine: Machine, name: str, plan: Experiment) -> Floats:
+    found = coordinates_of(machine, plan)
+    at = machine.compiled.point_positions(name, np.ascontiguousarray(found))
+    return np.where(np.asarray(np.isfinite(found).all(axis=1))[:, None], at, np.nan)
+
+
+def drive_jacobian(machine: Machine, plan: Experiment) -> Floats:
+    """(n, 6, actuators) twist of the TCP per unit of each drive of the rigid machine, in the plan's branch.
+
+    NaN in a column where the drive cannot move to both sides. Found out once for all machines of one geometry; not to be written to.
+    """
+    return _SLOPES.get(plan, machine, lambda: _jacobian(machine, plan))
+
+
+def _jacobian(machine: Machine, plan: Experiment) -> Floats:
+    plan, back = poses_once(plan)
+    start = coordinates_of(machine, plan)
+    drives = of_drives(machine.compiled, start)
+    columns = []
+    for k in range(drives.shape[-1]):
+        unit = STEP * np.eye(drives.shape[-1])[k]
+        up, down = (forward_kinematics(machine, drives + s * unit, start=start) for s in (1, -1))
+        between = up.rotation @ np.swapaxes(down.rotation, 1, 2)
+        lost = ~np.asarray(np.isfinite(between).all(axis=(1, 2)))[:, None, None]
+        turn = Rotation.from_matrix(np.where(lost, np.eye(3), between)).as_rotvec()
+        turn = np.where(lost[:, 0], np.nan, turn)
+        columns.append(np.hstack([up.position - down.position, turn]) / (2 * STEP))
+    return np.stack(columns, axis=-1)[back]

@@ -194,7 +194,7 @@ def _refined(s: Sighting, f: Frames) -> Frames:
         size = np.linalg.norm(columns, axis=0)
         scale = np.where(size > 0, size, 1.0)
         step = -np.linalg.lstsq((columns / scale) * weight[:, None], residual * weight, rcond=1e-9)[0] / scale
-        _move(f, step, s)
+        _move(f, step)
         if np.abs(step).max(initial=0.0) < DONE:
             break
     return f
@@ -258,7 +258,7 @@ def _linear(s: Sighting, f: Frames) -> tuple[Floats, Floats]:
     return residual[good], d[good]
 
 
-def _move(f: Frames, step: Floats, s: Sighting) -> None:
+def _move(f: Frames, step: Floats) -> None:
     setups = len(f.base_r)
     parts = step.reshape(-1, 6)
     for k in range(setups):  # instrument: the base moves by a small motion in base axes

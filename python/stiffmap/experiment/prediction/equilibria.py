@@ -10,8 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from stiffmap.experiment.experiment import Experiment, Floats, Integers
 from stiffmap.experiment.noise.level import Mask
-from stiffmap.experiment.poses.configuration import coordinates_of, in_reach
-from stiffmap.experiment.poses.point_kinematics import point_positions, positions_of
+from stiffmap.experiment.poses.configuration import coordinates_of, in_reach, point_positions, positions_of
 from stiffmap.experiment.prediction.joints import joint_channels, joint_motions
 from stiffmap.experiment.prediction.metrology_loop import carrier, rigged, targets
 from stiffmap.experiment.prediction.unloaded_state import lagging, lags, signs
@@ -28,20 +27,8 @@ ACROSS = 1e-3
 """Share of the work that a load does along a free motion of play below which it does not press the gap."""
 
 
-@dataclass(frozen=True)
-class Work:
-    """Equilibria that were solved."""
-
-    solved: int = 0
-    slow: int = 0
-    """How many of them the kernels left to the reference path."""
-
-    def __add__(self, other: Work) -> Work:
-        return Work(self.solved + other.solved, self.slow + other.slow)
-
-
-def motions(machine: Machine, plan: Experiment, threads: int | None = None) -> tuple[Floats, Work]:
-    """(n, c) m, rad of every row and channel, and the equilibria solved for it.
+def motions(machine: Machine, plan: Experiment, threads: int | None = None) -> tuple[Floats, int]:
+    """(n, c) m, rad of every row and channel, and how many equilibria were solved for it.
 
     Deflection: the loaded minus the unloaded state of the same commanded pose.
     """
@@ -57,10 +44,10 @@ def motions(machine: Machine, plan: Experiment, threads: int | None = None) -> t
     return out - rest, count + more
 
 
-def _by_gravity(machine: Machine, plan: Experiment, threads: int | None) -> tuple[Floats, Work]:
+def _by_gravity(machine: Machine, plan: Experiment, threads: int | None) -> tuple[Floats, int]:
     """Every row under its own gravity."""
     assert plan.gravity_of is not None
-    out, count = np.full((len(plan), len(plan.channels)), np.nan), Work()
+    out, count = np.full((len(plan), len(plan.channels)), np.nan), 0
     for g in np.unique(plan.gravity_of, axis=0):
         here = np.flatnonzero((plan.gravity_of == g).all(axis=1))
         part = replace(plan.rows(here), gravity=(float(g[0]), float(g[1]), float(g[2])), gravity_of=None)
@@ -69,7 +56,7 @@ def _by_gravity(machine: Machine, plan: Experiment, threads: int | None) -> tupl
     return out, count
 
 
-def _with_kinds(machine: Machine, plan: Experiment, threads: int | None) -> tuple[Floats, Work]:
+def _with_kinds(machine: Machine, plan: Experiment, threads: int | None) -> tuple[Floats, int]:
     """The motions of the point that is read, and what the kinds of readings make of them."""
     plain = tuple(c for c in plan.extra if kind_of(c) is None)
     bare = replace(plan, extra=plain, other=None, other_joints=None)
@@ -96,7 +83,7 @@ def _with_kinds(machine: Machine, plan: Experiment, threads: int | None) -> tupl
 
 def _pairs(
     machine: Machine, plan: Experiment, bare: Experiment, motion: Floats, threads: int | None
-) -> tuple[tuple[Integers, Seen, Seen], Work]:
+) -> tuple[tuple[Integers, Seen, Seen], int]:
     """Rows with a second commanded pose, and what is seen at both."""
     assert plan.other is not None
     rows = np.flatnonzero(np.isfinite(plan.other).all(axis=1))
@@ -126,11 +113,11 @@ class Solver:
     plan: Experiment
     threads: int | None
 
-    def loaded(self) -> tuple[Floats, Work]:
+    def loaded(self) -> tuple[Floats, int]:
         """(n, c) under the wrenches of the plan."""
         return self._equilibria(self.machine, self.plan)
 
-    def rest(self) -> tuple[Floats, Work]:
+    def rest(self) -> tuple[Floats, int]:
         """(n, c) without the wrenches: in the centre of every gap, or on the side of the approach."""
         bare = self.plan.without_load
         sided = self.plan.quantity == "position" or self.plan.unloaded == "approach"
@@ -138,29 +125,29 @@ class Solver:
             return self._sided(bare)
         return self._equilibria(self.machine, bare)
 
-    def _sided(self, bare: Experiment) -> tuple[Floats, Work]:
+    def _sided(self, bare: Experiment) -> tuple[Floats, int]:
         sign = signs(self.machine, bare)
-        out, count = np.full((len(bare), len(bare.channels)), np.nan), Work()
+        out, count = np.full((len(bare), len(bare.channels)), np.nan), 0
         for s in np.unique(sign, axis=0):
             here = np.flatnonzero((sign == s).all(axis=1))
             out[here], more = self._equilibria(lagging(self.machine, s, bool(bare.gravity)), bare.rows(here))
             count += more
         return out, count
 
-    def _equilibria(self, machine: Machine, plan: Experiment) -> tuple[Floats, Work]:
+    def _equilibria(self, machine: Machine, plan: Experiment) -> tuple[Floats, int]:
         if not plan.wrench.any() and not moves_unloaded(machine, plan):
-            return _at_command(machine, plan), Work()
+            return _at_command(machine, plan), 0
         if len(set(plan.load_points)) < 2:
             return self._unique(machine, plan, plan.load_points[0] if plan.load_points else plan.load_point)
         labels = np.array(plan.load_points)
-        out, count = np.full((len(plan), len(plan.channels)), np.nan), Work()
+        out, count = np.full((len(plan), len(plan.channels)), np.nan), 0
         for point in np.unique(labels):
             here = np.flatnonzero(labels == point)
             out[here], more = self._unique(machine, plan.rows(here), str(point))
             count += more
         return out, count
 
-    def _unique(self, machine: Machine, plan: Experiment, load_point: str) -> tuple[Floats, Work]:
+    def _unique(self, machine: Machine, plan: Experiment, load_point: str) -> tuple[Floats, int]:
         """Each different (pose, wrench) is solved once."""
         once, back = plan.distinct
         read = targets(machine, plan)
@@ -182,12 +169,11 @@ class Solver:
         linear = moved[back, [number[r] for r in read]]
         if on:
             linear = seen_from(machine, plan, read, on, linear, moved[back, number[on]])
-        work = Work(len(once), int(np.count_nonzero(solution.flags & Flag.REFERENCE_PATH)))
         if not joint_channels(plan):
-            return linear, work
+            return linear, len(once)
         joints = joint_motions(machine, once, solution.coordinates, solution.coordinate_names)
         joints = np.where(ok[:, None], joints, np.nan)
-        return np.hstack([linear, joints[back]]), work
+        return np.hstack([linear, joints[back]]), len(once)
 
 
 def solved(machine: Machine, plan: Experiment, options: SolveOptions) -> Solution:

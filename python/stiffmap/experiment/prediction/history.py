@@ -12,8 +12,7 @@ import numpy as np
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.experiment import Experiment, Floats
-from stiffmap.experiment.poses.drive_jacobian import drive_jacobian
-from stiffmap.experiment.poses.point_kinematics import positions_of
+from stiffmap.experiment.poses.configuration import drive_jacobian, positions_of
 from stiffmap.experiment.prediction.equilibria import solved
 from stiffmap.experiment.prediction.metrology_loop import targets
 from stiffmap.experiment.readings import Seen, kind_of

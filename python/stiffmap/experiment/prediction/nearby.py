@@ -6,15 +6,15 @@ Readings of displacements at the loaded body alone; everything else is for whole
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.experiment import Experiment, Floats
-from stiffmap.experiment.poses.point_kinematics import point_positions, positions_of
-from stiffmap.experiment.prediction.equilibria import Work, moves_unloaded
+from stiffmap.experiment.poses.configuration import point_positions, positions_of
+from stiffmap.experiment.prediction.equilibria import moves_unloaded
 from stiffmap.experiment.prediction.joints import joint_channels
 from stiffmap.experiment.prediction.metrology_loop import carrier, rigged, targets
 from stiffmap.experiment.prediction.unloaded_state import lags
@@ -50,7 +50,8 @@ class Nearby:
     machine: Machine
     plan: Experiment
     threads: int | None
-    work: Work = field(default_factory=Work)
+    solved: int = 0
+    """Equilibria of this machine."""
 
     def changes(self, others: Sequence[Near]) -> list[Floats | None]:
         """(n, c) m, rad each: what other machines show more than this one, to first order in where they differ. None where
@@ -134,7 +135,7 @@ class Nearby:
         same = [machine.compiled, *(m.compiled for m in others)]
         solution, varied = solve_call(machine.compiled, call, same)
         slow = (solution.flags & Flag.REFERENCE_PATH) > 0
-        self.work += Work(len(once), int(slow.sum()))
+        self.solved += len(once)
         untold = solution.ok & np.isnan(varied).any(axis=(-2, -1))
         if (slow | untold).mean() > FEW:
             return None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable, Iterable, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -15,10 +15,9 @@ from stiffmap.experiment.experiment import Experiment, Floats, Mask
 from stiffmap.experiment.poses.against_command import resolved
 from stiffmap.experiment.poses.commanded import OUT_OF_REACH, located, without
 from stiffmap.experiment.poses.configuration import coordinates_of
-from stiffmap.experiment.prediction.equilibria import Work, motions
+from stiffmap.experiment.prediction.equilibria import motions
 from stiffmap.experiment.prediction.history import Drives, drives_of, history_motion
 from stiffmap.experiment.prediction.joints import check_joints
-from stiffmap.experiment.prediction.measurement import readings, true_wrench
 from stiffmap.experiment.prediction.nearby import Near, Nearby
 from stiffmap.experiment.prediction.recorded import at_records, records_of
 from stiffmap.model import effects
@@ -44,7 +43,6 @@ class Predictor:
         self.threads = threads
         self.machine, self.experiment = resolved(machine, located(machine, experiment))
         self.solved = 0
-        self._work = Work()
         self._memory: Kept[tuple[Terms, Terms], Floats] = Kept()
         self._changes: Kept[tuple[Terms, Terms], Floats] = Kept()
         self._machines: Kept[Hashable, Machine] = Kept(MACHINES)
@@ -124,7 +122,7 @@ class Predictor:
             else None
             for change, t in zip(told.changes(others), terms, strict=True)
         ]
-        self.solved += told.work.solved
+        self.solved += told.solved
         return out
 
     def beside(self, *, machine: Machine | None = None, rows: Mask | None = None) -> Predictor:
@@ -183,7 +181,6 @@ class Predictor:
         """(n, c) of the machine, remembered."""
         motion = self._memory.get((mechanical, load))
         if motion is None:
-            self._work = Work()
             motion = at_records(self._plan_under(load), mechanical, self._branches)
             self._memory.put((mechanical, load), motion, motion.nbytes)
         return motion
@@ -205,9 +202,8 @@ class Predictor:
         return out
 
     def _solve(self, plan: Experiment, terms: Terms) -> Floats:
-        out, work = motions(self.with_terms(terms), plan, self.threads)
-        self.solved += work.solved
-        self._work += work
+        out, solved = motions(self.with_terms(terms), plan, self.threads)
+        self.solved += solved
         return out
 
 
@@ -217,6 +213,26 @@ def predict(machine: Machine, experiment: Experiment, terms: Sequence[AppliedEff
     Raises StiffmapError for an unknown point or effect.
     """
     return Predictor(machine, experiment)(terms)
+
+
+def true_wrench(experiment: Experiment, terms: Iterable[AppliedEffect]) -> Floats:
+    """(n, 6) the wrench that acts, from the one that was noted."""
+    w = experiment.wrench
+    for term in terms:
+        load = effects.get(term.kind).load
+        w = w if load is None else load(w, experiment, term)
+    return w
+
+
+def readings(experiment: Experiment, motion: Floats, terms: Sequence[AppliedEffect]) -> Floats:
+    """(n, c) what the instruments show for the true `motion` (n, c). A motor stands, unless an effect says that part
+    of its drive yields before the encoder."""
+    seen = np.array([0.0 if c.side == "motor" else 1.0 for c in experiment.channels])
+    out: Floats = motion * seen
+    for term in terms:
+        reading = effects.get(term.kind).reading
+        out = out if reading is None else reading(out, motion, experiment, term)
+    return out
 
 
 def check_points(machine: Machine, experiment: Experiment) -> None:

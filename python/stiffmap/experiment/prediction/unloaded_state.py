@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from stiffmap.experiment.experiment import Experiment, Floats
-from stiffmap.experiment.poses.drive_jacobian import drive_jacobian
+from stiffmap.experiment.poses.configuration import drive_jacobian
 from stiffmap.model.description import CommandError, Element, Joint, Leg, MachineDescription
 from stiffmap.model.description.tree import edit_sequences
 from stiffmap.solve.kinematics import inverse_kinematics

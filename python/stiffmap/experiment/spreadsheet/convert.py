@@ -46,7 +46,6 @@ class Imported:
     rows: Rows
     repeats: int
     constants: dict[str, float]
-    notes: list[Column]
     head: dict[str, Any] = field(default_factory=dict)
     """Further keys of experiment.yaml."""
     said: tuple[str, ...] = ()
@@ -96,8 +95,9 @@ def understand(
     rows = Rows(sheet, used, constants, factors)
     told = {"command": {k: {"actuator": a, "unit": u} for k, (a, u) in drives.items()}} if drives else {}
     further = told | dict(head or {})
-    return Imported(columns, named, factors, rows.header, rows, rows.repeats, dict(constants),
-                    [c for c in columns if c.meaning == "note"], further, tuple(said))  # fmt: skip
+    return Imported(
+        columns, named, factors, rows.header, rows, rows.repeats, dict(constants), further, tuple(said)
+    )
 
 
 def _ask(sheet: Sheet, known_: set[str]) -> None:
@@ -271,9 +271,10 @@ def write_folder(
         head["record"] = told
     with only_job(make_folder(folder)):
         head["rows"] = write_rows(folder / "data.csv", [ABSOLUTE.get(h, h) for h in found.header], found.rows)
-        if found.notes:
-            kept = ([row[c.index] for c in found.notes] for row in sheet.rows)
-            write_rows(folder / "notes.csv", [sheet.header[c.index] for c in found.notes], kept)
+        notes = [c.index for c in found.columns if c.meaning == "note"]
+        if notes:
+            kept = ([row[i] for i in notes] for row in sheet.rows)
+            write_rows(folder / "notes.csv", [sheet.header[i] for i in notes], kept)
         write_text(folder / "experiment.yaml", text_of(head))
 
 

@@ -2,30 +2,46 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
 from os import PathLike
 from pathlib import Path
 
 from stiffmap.common.broadcasting import given_path, one_of
-from stiffmap.common.errors import StiffmapError
+from stiffmap.common.errors import FileError, MissingColumnError, StiffmapError
 from stiffmap.common.fingerprints import file_digest
-from stiffmap.common.outputs import new_file
+from stiffmap.common.outputs import new_file, putting
 from stiffmap.common.short import short_repr
 from stiffmap.common.tables.header import RECORD
-from stiffmap.common.tables.sheet import Layout, Sheet, read_sheet
+from stiffmap.common.tables.lines import EXCEL
+from stiffmap.common.tables.sheet import Layout, Sheet, column_letter, read_sheet
+from stiffmap.common.tables.workbook import sheet_names
 from stiffmap.experiment.experiment import Experiment
+from stiffmap.experiment.files.load import load_experiment
 from stiffmap.experiment.noise.level import against_the_load, contradictions
 from stiffmap.experiment.spreadsheet.answers import Answers, Meant
-from stiffmap.experiment.spreadsheet.convert import Imported
+from stiffmap.experiment.spreadsheet.convert import Imported, Question, write_folder
 from stiffmap.experiment.spreadsheet.dh import LEG, arm, read_dh
-from stiffmap.experiment.spreadsheet.dialogue import Ask
-from stiffmap.experiment.spreadsheet.folder import make_experiment
+from stiffmap.experiment.spreadsheet.dialogue import (
+    Ask,
+    Unanswered,
+    ask_all,
+    asked,
+    profile_file,
+    remember,
+    remembered,
+)
 from stiffmap.experiment.spreadsheet.guess import has_meaning
-from stiffmap.experiment.spreadsheet.instrument import load_instrument
-from stiffmap.experiment.spreadsheet.joints import DIFFERENCES, drives_of
-from stiffmap.experiment.spreadsheet.reading import Reading, read_and_ask
+from stiffmap.experiment.spreadsheet.instrument import Instrument, as_readings, load_instrument
+from stiffmap.experiment.spreadsheet.joints import DIFFERENCES, as_seen, commanded, drives_of, turned
+from stiffmap.experiment.spreadsheet.sockets import seated
+from stiffmap.experiment.spreadsheet.together import oriented, together
 from stiffmap.solve.machine import Machine, load_machine
+
+Understand = Callable[[str | None, Ask | None], tuple[Meant, Imported]]
+"""What is meant by a sheet of that name, with answers to its questions."""
 
 
 @short_repr
@@ -119,8 +135,10 @@ def experiment_from_table(
     drives = drives if rows is None else {f"{LEG}.{r.name}": r.slides for r in rows}
     numbered = any(h.strip("+-").isdigit() for many in chosen.values() for h in many)
     layout = Layout(has_meaning, tuple(header), numbered, which)
-    read = Reading(wrote, drives, difference, quantity == "deflection", layout)
-    m, found = read_and_ask(file, sheet, read, given, ask)
+    understood = partial(
+        _understood, file, layout, drives, wrote, difference, quantity == "deflection", given
+    )
+    m, found = _fitting(file, sheet, understood, ask)
     own = m.sheet
     if rows is not None and not m.columns:
         raise StiffmapError(f"{file}: no column commands a joint; the arm has {', '.join(drives)}")
@@ -128,10 +146,100 @@ def experiment_from_table(
     declared = str(output / "machine.yaml") if machine is None else str(machine)
     title = f"from {own.file.replace(str(file), file.name)}"
     kept = {"source": file.name, "sha256": file_digest(file), **(record or {})}
-    made = make_experiment(found, own, output, declared, quantity, m.noise, title, kept)
+    with putting(output, "experiment.yaml") as fresh:
+        write_folder(found, own, fresh, declared, quantity, m.noise, title, kept)
+        try:
+            made = load_experiment(fresh)
+        except FileError as error:  # nothing is left behind
+            raise _of_sheet(error, found, own, fresh) from None
+    made = replace(made, name=output.name)
     if rows is not None and dh is not None:
         source = f"from {Path(dh).name}"
         Machine(arm(rows, dh_convention, output.name, source, m.middle())).save(declared)
     warnings = tuple(line for line in (against_the_load(made), *contradictions(made)) if line)
     remarks = (*m.said, *(f"left out: {text}" for text in own.aside))
     return FromTable(made, output, declared, warnings, remarks, own, found, m if m.columns else None)
+
+
+def _fitting(
+    file: Path, sheet: str | None, understood: Understand, ask: Ask | None
+) -> tuple[Meant, Imported]:
+    """The sheet that fits with the answers in use, and what was understood of it."""
+    names = sheet_names(file) if sheet is None and file.suffix.lower() in EXCEL else [sheet]
+    if len(names) == 1:
+        return understood(sheet, ask)
+    reasons: dict[str, StiffmapError] = {}
+    for name in names:
+        try:
+            return understood(name, None)
+        except StiffmapError as problem:
+            reasons[str(name)] = problem
+    tables = [n for n, p in reasons.items() if type(p) is Question]
+    if ask is not None and tables:
+        return understood(tables[0], ask)
+    lines = "; ".join(f"'{n}': {str(p).removeprefix(str(file)).lstrip(':, ')}" for n, p in reasons.items())
+    raise StiffmapError(f"{file}: none of its {len(names)} sheets fits (--sheet NAME reads one). {lines}")
+
+
+def _understood(
+    file: Path,
+    layout: Layout,
+    drives: Mapping[str, bool],
+    wrote: Instrument | None,
+    difference: str,
+    deflection: bool,
+    given: Answers,
+    name: str | None,
+    ask: Ask | None,
+) -> tuple[Meant, Imported]:
+    """One sheet: `drives` (name -> whether it slides) it may command, what `wrote` it, the sign of its `difference`; rows of a
+    `deflection` need a load."""
+    form = read_sheet(file, name, layout)
+    kept = remembered(form)
+    m = Meant.of_sheet(form, given if kept is None else kept.below(given))
+    if kept is not None:
+        m.said.append(f"answers of an earlier sheet of this form are used: {profile_file(form)}")
+    together(m, deflection)
+    commanded(m, drives)
+    if m.columns:
+        asked(m, ask, partial(seated, m))
+        as_seen(m, difference)
+    elif wrote is not None:
+        as_readings(m, wrote)
+    if not m.placed:
+        turned(m, difference)
+    oriented(m)
+    try:
+        found = ask_all(m, ask, deflection and not m.placed)
+    except Unanswered as left:
+        said = m.to_remember(form, given)
+        if said == given:
+            raise
+        raise StiffmapError(f"{left}; the answers so far are remembered: {remember(form, said)}") from None
+    if m.answered:
+        kept_in = remember(form, m.to_remember(form, given))
+        m.said.append(f"the answers are remembered for sheets of this form: {kept_in}")
+    m.said += found.said
+    return m, found
+
+
+def _of_sheet(error: FileError, found: Imported, sheet: Sheet, fresh: Path) -> FileError:
+    """An error of the generated files in the words of the sheet."""
+    reason = re.sub(r" \(first in line \d+\)", "", error.reason)
+    columns = {c.meaning: c for c in found.columns if c.meaning != "note"}
+
+    def named(match: re.Match[str]) -> str:
+        c = columns.get(match[1])
+        return match[0] if c is None else f"column '{sheet.header[c.index]}' ({column_letter(c.index)})"
+
+    reason = re.sub(r"column '([^']*)'", named, reason).replace(str(fresh), sheet.file)
+    if isinstance(error, MissingColumnError):
+        reason += f"; say which by --map fx='HEADER'; columns: {', '.join(repr(h) for h in sheet.header)}"
+    at = None
+    if (
+        error.line is not None
+        and error.file.endswith("data.csv")
+        and 2 <= error.line < len(found.rows.lines) + 2
+    ):
+        at = found.rows.lines[error.line - 2]
+    return FileError(reason, file=sheet.file, line=at, key=error.key)

@@ -22,9 +22,8 @@ from stiffmap.common.outputs import write_rows
 from stiffmap.common.short import short_repr
 from stiffmap.experiment.experiment import AXES, Experiment
 from stiffmap.experiment.files.plan_file import load_plan
-from stiffmap.experiment.poses.configuration import coordinates_of
-from stiffmap.experiment.poses.drive_jacobian import drive_jacobian
-from stiffmap.experiment.poses.orientation import against_base
+from stiffmap.experiment.poses.commanded import against_base
+from stiffmap.experiment.poses.configuration import coordinates_of, drive_jacobian
 from stiffmap.experiment.prediction.equilibria import motions
 from stiffmap.model.description import TASK
 from stiffmap.solve.closing import of_drives

@@ -56,11 +56,10 @@ def command(
 
 
 def _write(r: Residual, rows: int, output: Path) -> None:
-    from stiffmap.experiment.comparison.table import write_table
     from stiffmap.ui.plot.experiment import figures
 
     place = make_folder(output)
-    write_table(r, place / "residual.csv")
+    r.write_table(place / "residual.csv")
     write_text(place / "residual.json", json_text(r.as_plain(rows)))
     for name, figure in figures(r).items():
         write_picture(place / f"{name}.png", figure, dpi=130)

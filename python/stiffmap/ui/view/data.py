@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError
 from stiffmap.experiment import Experiment
-from stiffmap.experiment.comparison.residual import residual
+from stiffmap.experiment.calls import residual
 from stiffmap.solve.machine import Machine, load_machine
 from stiffmap.ui.plot.elements import element_links
 from stiffmap.ui.plot.loaded import round_factor

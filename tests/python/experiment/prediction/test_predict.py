@@ -12,7 +12,7 @@ from stiffmap.experiment import Predictor, predict, random_plan, simulate
 from stiffmap.experiment.noise.checks import checks
 from stiffmap.experiment.noise.level import noise_of
 from stiffmap.experiment.noise.outliers import suspects, without_suspects
-from stiffmap.experiment.prediction.measurement import readings, true_wrench
+from stiffmap.experiment.prediction.predict import readings, true_wrench
 from stiffmap.model.description import AppliedEffect
 
 

@@ -9,8 +9,7 @@ import pytest
 from tests.oracle.twins.generator import twin
 
 import stiffmap as sm
-from stiffmap.experiment import Experiment, Predictor, random_plan
-from stiffmap.experiment.comparison.residual import residual
+from stiffmap.experiment import Experiment, Predictor, random_plan, residual
 from stiffmap.experiment.noise.level import noise_of
 from stiffmap.experiment.noise.over_time import OverTime, over_time
 from stiffmap.experiment.noise.whitening import Problem

@@ -12,7 +12,8 @@ import numpy as np
 
 from stiffmap.common.broadcasting import given_path
 from stiffmap.common.errors import FileError
-from stiffmap.common.tables.named import WORD, Known, NamedTable, Rows, named, rows_of
+from stiffmap.common.tables.lines import rows_of
+from stiffmap.common.tables.named import WORD, Known, NamedTable, Rows, named
 
 COLUMNS = {
     "feed_per_tooth": ("feed_per_tooth_mm", "m"), "fx": ("Fx_N", "N"), "fy": ("Fy_N", "N"), "fz": ("Fz_N", "N"),
