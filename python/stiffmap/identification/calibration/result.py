@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from stiffmap.common.json_text import json_text
-from stiffmap.common.number_text import percents, with_uncertainty, within
+from stiffmap.common.number_text import with_uncertainty, within
 from stiffmap.common.plain import plain
 from stiffmap.common.short import short_repr
 from stiffmap.experiment.comparison.summary import Summary
@@ -17,13 +17,14 @@ from stiffmap.experiment.noise.outliers import set_aside
 from stiffmap.experiment.noise.over_time import OverTime
 from stiffmap.identification.calibration.table import Row
 from stiffmap.identification.inference.machines import HeldOut
+from stiffmap.identification.inference.shares import largest
 from stiffmap.identification.inference.travel import Profile
 from stiffmap.identification.inference.verdict import not_as_stated
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.validity import Validity
 
-LEAST, MOST = 0.005, 6
-"""Share from which a line names a part, and how many."""
+MOST = 6
+"""Parts that a line names."""
 DISPLAY_UNITS = {"m": (1e3, "mm"), "rad": (1e3, "mrad"), "1": (1e6, "ppm")}
 FACTOR = 0.5
 """Logarithm of a factor from which it is written as one: ×1.65."""
@@ -99,10 +100,7 @@ class Calibration:
             for group, factor in self.wide.items()
         ]
         out.append(f"identifiable from the readings: {self.rank} directions of {len(self.rows)} unknowns")
-        largest = _largest(self.shares)
-        shares = percents([s for _, s in largest])
-        parts = "; ".join(f"{p}: {share} %" for (p, _), share in zip(largest, shares, strict=True))
-        out.append(f"shares of the squares: {parts}")
+        out.append(f"shares of the squares: {'; '.join(largest(self.shares, MOST))}")
         noise = "" if math.isnan(self.noise) else f" (noise {in_display_units(self.noise, 'm')})"
         out.append(f"misfit: rms {size(self.before)} as declared, {size(self.after)} {self.which}{noise}")
         if self.held_out:
@@ -156,11 +154,6 @@ class Calibration:
 
     def __str__(self) -> str:
         return "\n".join(self.lines())
-
-
-def _largest(shares: Mapping[str, float]) -> list[tuple[str, float]]:
-    """The largest parts, largest first."""
-    return [(p, s) for p, s in sorted(shares.items(), key=lambda x: -x[1]) if s >= LEAST][:MOST]
 
 
 def in_display_units(value: float, unit: str) -> str:
