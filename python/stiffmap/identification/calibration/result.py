@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 from stiffmap.common.json_text import json_text
@@ -23,6 +23,8 @@ from stiffmap.identification.inference.verdict import not_as_stated
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.validity import Validity
 
+APART = ("rows", "beyond", "wide", "shares", "profiles", "failed", "validity")
+"""Fields that JSON has in another form, behind all others."""
 MOST = 6
 """Parts that a line names."""
 DISPLAY_UNITS = {"m": (1e3, "mm"), "rad": (1e3, "mrad"), "1": (1e6, "ppm")}
@@ -38,51 +40,51 @@ class Calibration:
     verdict: str
     """``as declared``, ``adjusted within tolerance``, ``adjusted beyond tolerance``, ``beyond tolerance: NAME, ...`` or
     ``unattributed``."""
-    rows: tuple[Row, ...]
     rank: int
     """Directions that the readings determine, of `len(rows)`."""
-    beyond: tuple[Row, ...]
-    """Numbers that no tolerance allows."""
-    wide: Mapping[str, float]
-    """Groups whose numbers are off by so many times their standard uncertainties (rms), where that is beyond doubt."""
     which: str
     """What `machine` is: ``calibrated``, or ``declared`` where that predicts as well."""
     before: Summary
     """The declared machine on all readings."""
     after: Summary
     """`machine` on all readings."""
-    held_out: HeldOut | None
-    """Both on readings that no fit saw; None where there are not two folds, or time was over."""
-    promise: tuple[float, float] | None
-    """By how much a reading of another pose will differ from `machine`, m or rad, and its standard uncertainty."""
     noise: float
     """Noise floor, m (NaN where only angles are read)."""
     scale: float
     """Noise of the readings over the floor."""
-    shares: Mapping[str, float]
-    """How the squares of the readings' difference from the declared machine are shared out."""
     rest: str
     """What is left that nobody can name; empty: nothing."""
-    profiles: tuple[Profile, ...]
-    """Errors along the drives' travel, which `machine` has."""
     outliers: tuple[str, ...]
     """Rows that stand alone."""
     swapped: tuple[tuple[str, str], ...]
     """Pairs of them that fit where each has the reading of the other."""
-    failed: tuple[tuple[str, str], ...]
-    """Unknowns that the machine cannot be built or solved with, and why."""
     stopped: bool
     """Whether the time budget ended it early: the answer is the best so far."""
+    seconds: float
+    promise: tuple[float, float] | None
+    """By how much a reading of another pose will differ from `machine`, m or rad, and its standard uncertainty."""
+    held_out: HeldOut | None
+    """Both on readings that no fit saw; None where there are not two folds, or time was over."""
+    over_time: OverTime | None
+    """What `machine` leaves over time; None where no times were recorded."""
+    rows: tuple[Row, ...]
+    beyond: tuple[Row, ...]
+    """Numbers that no tolerance allows."""
+    wide: Mapping[str, float]
+    """Groups whose numbers are off by so many times their standard uncertainties (rms), where that is beyond doubt."""
+    shares: Mapping[str, float]
+    """How the squares of the readings' difference from the declared machine are shared out."""
+    profiles: tuple[Profile, ...]
+    """Errors along the drives' travel, which `machine` has."""
+    failed: tuple[tuple[str, str], ...]
+    """Unknowns that the machine cannot be built or solved with, and why."""
     machine: Machine = field(repr=False)
     """The machine that is handed over; its controller keeps the declared numbers."""
     validity: Validity
     """What the readings covered; beyond it nothing vouches for `machine`."""
-    over_time: OverTime | None
-    """What `machine` leaves over time; None where no times were recorded."""
     experiment: Experiment = field(repr=False)
     residual: Floats = field(repr=False)
     """(n, c) reading minus prediction of `machine`, less fitted frames and zeros; NaN of outliers."""
-    seconds: float
 
     def lines(self) -> list[str]:
         """The verdict in a few lines."""
@@ -127,20 +129,7 @@ class Calibration:
 
     def as_plain(self) -> dict[str, Any]:
         """JSON data."""
-        names = (
-            "verdict",
-            "rank",
-            "which",
-            "before",
-            "after",
-            "noise",
-            "scale",
-            "rest",
-            "outliers",
-            "swapped",
-            "stopped",
-        )
-        out = {n: plain(getattr(self, n)) for n in (*names, "seconds", "promise", "held_out", "over_time")}
+        out = {f.name: plain(getattr(self, f.name)) for f in fields(self) if f.repr and f.name not in APART}
         v = self.validity
         out["validity"] = plain(
             {"poses": v.poses, "drives": dict(v.drives), "loads": dict(v.loads), "temperature": v.temperature}

@@ -18,12 +18,7 @@ from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.identification.inference.amplitudes import Fit
 from stiffmap.identification.inference.columns import MOST_READINGS, Columns, drawn
 from stiffmap.identification.inference.constants import DEGREES, STANDS_OUT
-from stiffmap.identification.inference.corrected import (
-    Corrected,
-    columns_of,
-    machine_of,
-    without,
-)
+from stiffmap.identification.inference.corrected import Corrected, columns_of, machine_of, without
 from stiffmap.identification.inference.readings import Readings
 from stiffmap.identification.validity import covered
 from stiffmap.solve.machine import Machine
