@@ -89,8 +89,8 @@ def calibrate(
     with clock.on_interrupt():
         predictor = Predictor(declared, data, threads=threads)
         refuse(predictor.experiment, predictor())
-        empty = Plan.empty(predictor())
-        found = infer(predictor, empty, tolerances, exclude, clock, seed, travel=True)
+        without_effects = Plan(predictor(), (), ())
+        found = infer(predictor, without_effects, tolerances, exclude, clock, seed, travel=True)
         return _answer(predictor, found, clock, seed, start)
 
 

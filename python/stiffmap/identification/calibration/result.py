@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any
 
@@ -120,8 +120,18 @@ class Calibration:
         return out + set_aside(self.outliers, self.swapped)
 
     def table(self, most: int | None = None) -> list[str]:
-        """The unknowns, one a line, those first that the readings determine best."""
-        return table(self.rows, most)
+        """The unknowns, one a line, those first that the readings determine best: name, value, u, posterior sigma, pull, observability."""
+        width = max((len(r.name) for r in self.rows), default=4)
+        out = [
+            f"{'unknown':{width}}  {'value':>12}  {'u':>11}  {'sigma':>11}  {'pull':>6}  {'observable':>10}  identifiable"
+        ]
+        for r in sorted(self.rows, key=lambda r: -r.observability)[:most]:
+            found = ("minimal" if r.minimal else "yes") if r.identifiable else "no"
+            value, u, sigma = (in_display_units(v, r.unit) for v in (r.value, r.u, r.sigma))
+            out.append(
+                f"{r.name:{width}}  {value:>12}  {u:>11}  {sigma:>11}  {r.pull:6.1f}  {r.observability:10.1f}  {found}"
+            )
+        return out
 
     def to_json(self) -> str:
         """All but arrays and machines, SI; NaN is null."""
@@ -161,18 +171,3 @@ def measured(value: float, u: float, unit: str) -> str:
         return f"×{within(math.exp(value), math.exp(value) * u)} ± {within(100.0 * u, 100.0 * u)} %"
     factor, name = DISPLAY_UNITS[unit]
     return f"{with_uncertainty(factor * value, factor * u)} {name}"
-
-
-def table(rows: Sequence[Row], most: int | None = None) -> list[str]:
-    """Name, value, u, posterior sigma, pull, observability."""
-    width = max((len(r.name) for r in rows), default=4)
-    out = [
-        f"{'unknown':{width}}  {'value':>12}  {'u':>11}  {'sigma':>11}  {'pull':>6}  {'observable':>10}  identifiable"
-    ]
-    for r in sorted(rows, key=lambda r: -r.observability)[:most]:
-        found = ("minimal" if r.minimal else "yes") if r.identifiable else "no"
-        value, u, sigma = (in_display_units(v, r.unit) for v in (r.value, r.u, r.sigma))
-        out.append(
-            f"{r.name:{width}}  {value:>12}  {u:>11}  {sigma:>11}  {r.pull:6.1f}  {r.observability:10.1f}  {found}"
-        )
-    return out

@@ -75,7 +75,8 @@ def candidates(description: MachineDescription, experiment: Experiment) -> list[
     found = []
     for kind in registry.kinds():
         effect = effects.get(kind)
-        if recorded(effect, experiment) and not (effect.hidden and effect.hidden(experiment)):
+        recorded = experiment.recorded.issuperset(effect.needs)
+        if recorded and not (effect.hidden and effect.hidden(experiment)):
             found += of_kind(effect, description)
     return found
 
@@ -110,11 +111,6 @@ def meanings(parameters: tuple[Parameter, ...]) -> list[tuple[Parameter, ...]]:
 def _plausible(p: Parameter) -> Parameter:
     lower, upper = p.plausible or (p.lower, p.upper)
     return replace(p, lower=max(lower, p.lower), upper=min(upper, p.upper))
-
-
-def recorded(effect: EffectType, experiment: Experiment) -> bool:
-    """Whether the data hold what the effect needs."""
-    return experiment.recorded.issuperset(effect.needs)
 
 
 def check_kinds(names: Iterable[str]) -> frozenset[str]:

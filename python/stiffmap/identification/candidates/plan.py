@@ -27,11 +27,6 @@ class Plan:
     """All of them, with their columns."""
     failed: tuple[tuple[Candidate, str], ...]
 
-    @staticmethod
-    def empty(base: Floats) -> Plan:
-        """Without any effect."""
-        return Plan(base, (), ())
-
 
 _PLANS: Kept[str, Plan] = Kept(8)
 

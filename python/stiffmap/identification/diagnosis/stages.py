@@ -104,12 +104,7 @@ def diagnose(
     times.append(time.perf_counter())
     seconds = {s: b - a for s, a, b in zip(steps, times, times[1:], strict=False)}
     d = replace(d, seconds=seconds)
-    return with_slips(d, slips) if slips else d
-
-
-def with_slips(d: Diagnosis, slips: Sequence[Slip]) -> Diagnosis:
-    """The answer that names mistakes in the readings before any cause."""
-    return replace(d, slips=[by_gain(s, d.effects) for s in slips], verdict="readings")
+    return replace(d, slips=[by_gain(s, d.effects) for s in slips], verdict="readings") if slips else d
 
 
 def by_gain(s: Slip, effects: Sequence[Effect]) -> Slip:

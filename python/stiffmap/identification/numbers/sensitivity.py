@@ -168,13 +168,8 @@ def zeros_anew(s: Sensitivity, experiment: Experiment) -> Sensitivity:
     zeros = [i for i, u in enumerate(s.unknowns) if u.group == "zeros" and not u.setup]
     if len(names) < 2 or not zeros or experiment.quantity != "position":
         return s
-    more: list[Unknown] = []
-    columns: list[Floats] = []
-    for name in names:
-        here = np.array(experiment.setup) == name
-        for i in zeros:
-            u = s.unknowns[i]
-            more.append(replace(u, name=f"{u.name} in set-up {name}", setup=str(name)))
-            columns.append(np.where(here[:, None], s.columns[..., i], 0.0))
+    each = [(str(name), s.unknowns[i], s.columns[..., i]) for name in names for i in zeros]
+    more = [replace(u, name=f"{u.name} in set-up {name}", setup=name) for name, u, _ in each]
+    columns = [np.where((np.array(experiment.setup) == name)[:, None], c, 0.0) for name, _, c in each]
     stack = np.concatenate([s.columns, np.stack(columns, axis=-1)], axis=-1)
     return replace(s, unknowns=(*s.unknowns, *more), columns=stack)

@@ -21,7 +21,7 @@ from stiffmap.experiment.noise.whitening import Problem, readings_of
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.identification.candidates.plan import Plan
 from stiffmap.identification.candidates.sensitivity import Variant
-from stiffmap.identification.diagnosis.slips.axes import coordinates, gauges, loads, moved, shifts, steps
+from stiffmap.identification.diagnosis.slips.axes import gauges, loads, moved, shifts, steps
 from stiffmap.identification.diagnosis.slips.factors import factors
 from stiffmap.identification.diagnosis.slips.slip import Hypothesis, Slip
 from stiffmap.identification.inference.places import Shape, shape_of
@@ -230,10 +230,9 @@ def quiet(e: Experiment, noise: Noise) -> Floats:
 
 def _all(s: Readings, problem: Problem) -> Iterator[Hypothesis]:
     e = s.experiment
-    shown = coordinates(e, s.base)
     if e.quantity == "deflection" or _orthogonal(e):
-        yield from gauges(e, shown)
-        yield from shifts(e, shown)
+        yield from gauges(e, s.base)
+        yield from shifts(e, s.base)
     if e.quantity == "deflection":
         yield from factors(e, problem, s.base, partial(left_beside, s))
         if e.wrench[:, :3].any():
