@@ -48,10 +48,6 @@ class Clock:
             self.stopped = True
         return self.stopped
 
-    def stop(self) -> None:
-        """No new step, from now on."""
-        self.stopped = True
-
     @contextmanager
     def on_interrupt(self) -> Iterator[None]:
         """Ctrl-C stops the clock, wherever it comes; the next one raises KeyboardInterrupt, as it does where somebody
@@ -64,7 +60,7 @@ class Clock:
 
         def once(number: int, frame: FrameType | None) -> None:
             signal.signal(signal.SIGINT, signal.default_int_handler)
-            self.stop()
+            self.stopped = True
             self.say("nothing more: the best so far is the answer (Ctrl-C again: no answer)")
 
         signal.signal(signal.SIGINT, once)

@@ -40,7 +40,7 @@ from stiffmap.identification.inference.shares import shares
 from stiffmap.identification.inference.verdict import judged
 from stiffmap.identification.numbers import GROUPS, Tolerances
 from stiffmap.identification.validity import covered
-from stiffmap.solve.machine import Machine, load_machine
+from stiffmap.solve.machine import Machine, as_machine
 
 
 @on_one_thread
@@ -81,17 +81,16 @@ def calibrate(
         docs/calibration.md describes the method.
     """
     whole_number(seed, "seed", 0)
-    machine = machine if isinstance(machine, Machine) else load_machine(machine)
-    data = as_experiment(experiment)
+    declared, data = as_machine(machine), as_experiment(experiment)
     for name in exclude:
         if name not in GROUPS:
             raise StiffmapError(f"calibration: unknown group '{name}'; there are: {', '.join(GROUPS)}")
     clock, start = Clock.of(time_limit, progress), time.perf_counter()
     with clock.on_interrupt():
-        predictor = Predictor(machine, data, threads=threads)
+        predictor = Predictor(declared, data, threads=threads)
         refuse(predictor.experiment, predictor())
-        empty = Plan.empty(predictor())
-        found = infer(predictor, empty, tolerances, exclude, clock, seed, travel=True)
+        without_effects = Plan(predictor(), (), ())
+        found = infer(predictor, without_effects, tolerances, exclude, clock, seed, travel=True)
         return _answer(predictor, found, clock, seed, start)
 
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 from stiffmap.common.json_text import json_text
-from stiffmap.common.number_text import percents, with_uncertainty, within
+from stiffmap.common.number_text import with_uncertainty, within
 from stiffmap.common.plain import plain
 from stiffmap.common.short import short_repr
 from stiffmap.experiment.comparison.summary import Summary
@@ -17,13 +17,16 @@ from stiffmap.experiment.noise.outliers import set_aside
 from stiffmap.experiment.noise.over_time import OverTime
 from stiffmap.identification.calibration.table import Row
 from stiffmap.identification.inference.machines import HeldOut
+from stiffmap.identification.inference.shares import largest
 from stiffmap.identification.inference.travel import Profile
 from stiffmap.identification.inference.verdict import not_as_stated
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.validity import Validity
 
-LEAST, MOST = 0.005, 6
-"""Share from which a line names a part, and how many."""
+APART = ("rows", "beyond", "wide", "shares", "profiles", "failed", "validity")
+"""Fields that JSON has in another form, behind all others."""
+MOST = 6
+"""Parts that a line names."""
 DISPLAY_UNITS = {"m": (1e3, "mm"), "rad": (1e3, "mrad"), "1": (1e6, "ppm")}
 FACTOR = 0.5
 """Logarithm of a factor from which it is written as one: ×1.65."""
@@ -37,51 +40,51 @@ class Calibration:
     verdict: str
     """``as declared``, ``adjusted within tolerance``, ``adjusted beyond tolerance``, ``beyond tolerance: NAME, ...`` or
     ``unattributed``."""
-    rows: tuple[Row, ...]
     rank: int
     """Directions that the readings determine, of `len(rows)`."""
-    beyond: tuple[Row, ...]
-    """Numbers that no tolerance allows."""
-    wide: Mapping[str, float]
-    """Groups whose numbers are off by so many times their standard uncertainties (rms), where that is beyond doubt."""
     which: str
     """What `machine` is: ``calibrated``, or ``declared`` where that predicts as well."""
     before: Summary
     """The declared machine on all readings."""
     after: Summary
     """`machine` on all readings."""
-    held_out: HeldOut | None
-    """Both on readings that no fit saw; None where there are not two folds, or time was over."""
-    promise: tuple[float, float] | None
-    """By how much a reading of another pose will differ from `machine`, m or rad, and its standard uncertainty."""
     noise: float
     """Noise floor, m (NaN where only angles are read)."""
     scale: float
     """Noise of the readings over the floor."""
-    shares: Mapping[str, float]
-    """How the squares of the readings' difference from the declared machine are shared out."""
     rest: str
     """What is left that nobody can name; empty: nothing."""
-    profiles: tuple[Profile, ...]
-    """Errors along the drives' travel, which `machine` has."""
     outliers: tuple[str, ...]
     """Rows that stand alone."""
     swapped: tuple[tuple[str, str], ...]
     """Pairs of them that fit where each has the reading of the other."""
-    failed: tuple[tuple[str, str], ...]
-    """Unknowns that the machine cannot be built or solved with, and why."""
     stopped: bool
     """Whether the time budget ended it early: the answer is the best so far."""
+    seconds: float
+    promise: tuple[float, float] | None
+    """By how much a reading of another pose will differ from `machine`, m or rad, and its standard uncertainty."""
+    held_out: HeldOut | None
+    """Both on readings that no fit saw; None where there are not two folds, or time was over."""
+    over_time: OverTime | None
+    """What `machine` leaves over time; None where no times were recorded."""
+    rows: tuple[Row, ...]
+    beyond: tuple[Row, ...]
+    """Numbers that no tolerance allows."""
+    wide: Mapping[str, float]
+    """Groups whose numbers are off by so many times their standard uncertainties (rms), where that is beyond doubt."""
+    shares: Mapping[str, float]
+    """How the squares of the readings' difference from the declared machine are shared out."""
+    profiles: tuple[Profile, ...]
+    """Errors along the drives' travel, which `machine` has."""
+    failed: tuple[tuple[str, str], ...]
+    """Unknowns that the machine cannot be built or solved with, and why."""
     machine: Machine = field(repr=False)
     """The machine that is handed over; its controller keeps the declared numbers."""
     validity: Validity
     """What the readings covered; beyond it nothing vouches for `machine`."""
-    over_time: OverTime | None
-    """What `machine` leaves over time; None where no times were recorded."""
     experiment: Experiment = field(repr=False)
     residual: Floats = field(repr=False)
     """(n, c) reading minus prediction of `machine`, less fitted frames and zeros; NaN of outliers."""
-    seconds: float
 
     def lines(self) -> list[str]:
         """The verdict in a few lines."""
@@ -99,10 +102,7 @@ class Calibration:
             for group, factor in self.wide.items()
         ]
         out.append(f"identifiable from the readings: {self.rank} directions of {len(self.rows)} unknowns")
-        largest = _largest(self.shares)
-        shares = percents([s for _, s in largest])
-        parts = "; ".join(f"{p}: {share} %" for (p, _), share in zip(largest, shares, strict=True))
-        out.append(f"shares of the squares: {parts}")
+        out.append(f"shares of the squares: {'; '.join(largest(self.shares, MOST))}")
         noise = "" if math.isnan(self.noise) else f" (noise {in_display_units(self.noise, 'm')})"
         out.append(f"misfit: rms {size(self.before)} as declared, {size(self.after)} {self.which}{noise}")
         if self.held_out:
@@ -120,8 +120,18 @@ class Calibration:
         return out + set_aside(self.outliers, self.swapped)
 
     def table(self, most: int | None = None) -> list[str]:
-        """The unknowns, one a line, those first that the readings determine best."""
-        return table(self.rows, most)
+        """The unknowns, one a line, those first that the readings determine best: name, value, u, posterior sigma, pull, observability."""
+        width = max((len(r.name) for r in self.rows), default=4)
+        out = [
+            f"{'unknown':{width}}  {'value':>12}  {'u':>11}  {'sigma':>11}  {'pull':>6}  {'observable':>10}  identifiable"
+        ]
+        for r in sorted(self.rows, key=lambda r: -r.observability)[:most]:
+            found = ("minimal" if r.minimal else "yes") if r.identifiable else "no"
+            value, u, sigma = (in_display_units(v, r.unit) for v in (r.value, r.u, r.sigma))
+            out.append(
+                f"{r.name:{width}}  {value:>12}  {u:>11}  {sigma:>11}  {r.pull:6.1f}  {r.observability:10.1f}  {found}"
+            )
+        return out
 
     def to_json(self) -> str:
         """All but arrays and machines, SI; NaN is null."""
@@ -129,20 +139,7 @@ class Calibration:
 
     def as_plain(self) -> dict[str, Any]:
         """JSON data."""
-        names = (
-            "verdict",
-            "rank",
-            "which",
-            "before",
-            "after",
-            "noise",
-            "scale",
-            "rest",
-            "outliers",
-            "swapped",
-            "stopped",
-        )
-        out = {n: plain(getattr(self, n)) for n in (*names, "seconds", "promise", "held_out", "over_time")}
+        out = {f.name: plain(getattr(self, f.name)) for f in fields(self) if f.repr and f.name not in APART}
         v = self.validity
         out["validity"] = plain(
             {"poses": v.poses, "drives": dict(v.drives), "loads": dict(v.loads), "temperature": v.temperature}
@@ -156,11 +153,6 @@ class Calibration:
 
     def __str__(self) -> str:
         return "\n".join(self.lines())
-
-
-def _largest(shares: Mapping[str, float]) -> list[tuple[str, float]]:
-    """The largest parts, largest first."""
-    return [(p, s) for p, s in sorted(shares.items(), key=lambda x: -x[1]) if s >= LEAST][:MOST]
 
 
 def in_display_units(value: float, unit: str) -> str:
@@ -179,18 +171,3 @@ def measured(value: float, u: float, unit: str) -> str:
         return f"×{within(math.exp(value), math.exp(value) * u)} ± {within(100.0 * u, 100.0 * u)} %"
     factor, name = DISPLAY_UNITS[unit]
     return f"{with_uncertainty(factor * value, factor * u)} {name}"
-
-
-def table(rows: Sequence[Row], most: int | None = None) -> list[str]:
-    """Name, value, u, posterior sigma, pull, observability."""
-    width = max((len(r.name) for r in rows), default=4)
-    out = [
-        f"{'unknown':{width}}  {'value':>12}  {'u':>11}  {'sigma':>11}  {'pull':>6}  {'observable':>10}  identifiable"
-    ]
-    for r in sorted(rows, key=lambda r: -r.observability)[:most]:
-        found = ("minimal" if r.minimal else "yes") if r.identifiable else "no"
-        value, u, sigma = (in_display_units(v, r.unit) for v in (r.value, r.u, r.sigma))
-        out.append(
-            f"{r.name:{width}}  {value:>12}  {u:>11}  {sigma:>11}  {r.pull:6.1f}  {r.observability:10.1f}  {found}"
-        )
-    return out

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from stiffmap.experiment.experiment import Experiment
+from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.model import effects
 from stiffmap.model.description import AppliedEffect, MachineDescription
 from stiffmap.model.effects import EffectType, Parameter, registry
@@ -47,10 +47,27 @@ class Candidate:
         given = tuple((p.name, float(v)) for p, v in zip(self.parameters, values, strict=True))
         return AppliedEffect(self.kind, self.element, self.legs, given, self.options)
 
+    def term_of(self, given: Mapping[str, float]) -> AppliedEffect:
+        """The effect with some values (SI) by name, the others at their null."""
+        return self.term([given.get(p.name, float(p.null or 0.0)) for p in self.parameters])
+
+    def strengths(self, values: Floats) -> tuple[tuple[Parameter, float], ...]:
+        """Linear parameters with their values, SI, of values (p,) in scales from the null; nothing where there are more or fewer."""
+        if len(self.linear) != len(values):
+            return ()
+        return tuple(
+            (p, float(p.null or 0.0) + float(v) * p.scale) for p, v in zip(self.linear, values, strict=True)
+        )
+
     def __str__(self) -> str:
-        legs = f", leg{'s' if len(self.legs) > 1 else ''} {', '.join(self.legs)}" if self.legs else ""
         axes = " by axis" if self.parameters[0].name == "gain_x" else ""
-        return f"{self.kind} of {self.element}{legs}{axes}"
+        return f"{words(*self.place)}{axes}"
+
+
+def words(kind: str, element: str, legs: Names) -> str:
+    """``compliance of actuator, leg x``."""
+    of_legs = f", leg{'s' if len(legs) > 1 else ''} {', '.join(legs)}" if legs else ""
+    return f"{kind} of {element}{of_legs}"
 
 
 def candidates(description: MachineDescription, experiment: Experiment) -> list[Candidate]:
@@ -58,7 +75,8 @@ def candidates(description: MachineDescription, experiment: Experiment) -> list[
     found = []
     for kind in registry.kinds():
         effect = effects.get(kind)
-        if recorded(effect, experiment) and not (effect.hidden and effect.hidden(experiment)):
+        recorded = experiment.recorded.issuperset(effect.needs)
+        if recorded and not (effect.hidden and effect.hidden(experiment)):
             found += of_kind(effect, description)
     return found
 
@@ -70,10 +88,13 @@ def of_kind(effect: EffectType, description: MachineDescription) -> list[Candida
         parameters = tuple(
             p
             for p in effect.parameters_at(description, element, legs)
-            if (p.name in effect.moved if effect.moved else p.fitted or _unknown(p))
+            # fitted too: a number that must be given and that nobody gives, as the anchor of a cable
+            if (
+                p.name in effect.moved if effect.moved else p.fitted or (p.null is None and p.default is None)
+            )
         )
-        parameters = tuple(p for p in parameters if not _later_alternative(effect, p, parameters))
-        parameters = tuple(map(_plausible, parameters))
+        later = [p.name for p in parameters if p.name in effect.one_of][1:]
+        parameters = tuple(_plausible(p) for p in parameters if p.name not in later)
         if parameters and (effect.signature or any(p.null is not None for p in parameters)):
             out += [Candidate(effect.kind, element, legs, part) for part in meanings(parameters)]
     return out
@@ -90,21 +111,6 @@ def meanings(parameters: tuple[Parameter, ...]) -> list[tuple[Parameter, ...]]:
 def _plausible(p: Parameter) -> Parameter:
     lower, upper = p.plausible or (p.lower, p.upper)
     return replace(p, lower=max(lower, p.lower), upper=min(upper, p.upper))
-
-
-def _unknown(p: Parameter) -> bool:
-    """A number that must be given and that nobody gives, as the anchor of a cable: the fit finds it."""
-    return p.null is None and p.default is None
-
-
-def _later_alternative(effect: EffectType, p: Parameter, among: Sequence[Parameter]) -> bool:
-    alternatives = [q.name for q in among if q.name in effect.one_of]
-    return p.name in alternatives[1:]
-
-
-def recorded(effect: EffectType, experiment: Experiment) -> bool:
-    """Whether the data hold what the effect needs."""
-    return experiment.recorded.issuperset(effect.needs)
 
 
 def check_kinds(names: Iterable[str]) -> frozenset[str]:

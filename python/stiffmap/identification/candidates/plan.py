@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.fingerprints import digest
@@ -26,13 +26,6 @@ class Plan:
     variants: tuple[Variant, ...]
     """All of them, with their columns."""
     failed: tuple[tuple[Candidate, str], ...]
-    digest: str = ""
-    """Of the machine and the plan."""
-
-    @staticmethod
-    def empty(base: Floats) -> Plan:
-        """Without any effect."""
-        return Plan(base, (), ())
 
 
 _PLANS: Kept[str, Plan] = Kept(8)
@@ -46,10 +39,8 @@ def plan_of(predictor: Predictor, clock: Clock | None = None) -> Plan:
     key = digest(fingerprint(predictor), predictor.experiment.read, registered)
     plan = _PLANS.get(key)
     if plan is None:
-        found, whole = _compute(predictor, clock)
-        if not whole:
-            return replace(found, digest=f"{key}, the first {len(found.variants)}")
-        plan = _PLANS.put(key, replace(found, digest=key))
+        plan, whole = _compute(predictor, clock)
+        return _PLANS.put(key, plan) if whole else plan
     return plan
 
 

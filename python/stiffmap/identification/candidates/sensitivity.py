@@ -87,25 +87,19 @@ def variants(
             periods, k = s.period
             if periods is not last:  # once for all of its frequencies
                 last, finite = periods, all(np.isfinite(c[solved]).all() for c in periods.changes)
-            wave = Wave(periods, k, index) if finite else None
-            yield _variant(candidate, wave, np.full(2, float(s.grows)), shape, s.start)
+            columns: Floats | Wave | None = Wave(periods, k, index) if finite else None
+            sign = np.full(2, float(s.grows))
         elif s.columns is not None:
-            sign = np.full(s.columns.shape[-1], float(s.grows))
-            yield _variant(candidate, lines_of(s.columns, base, index), sign, shape, s.start)
+            columns, sign = lines_of(s.columns, base, index), np.full(s.columns.shape[-1], float(s.grows))
         else:
             single = [
                 difference(candidate, p, shape, predictor, base) if told is None else told
                 for p in linear
                 for told in [slopes.of(candidate, p)]
             ]
-            found = lines_of(np.stack(single, axis=-1), base, index)
-            yield _variant(candidate, found, np.array([side(p) for p in linear]), shape, s.start)
-
-
-def _variant(
-    candidate: Candidate, columns: Floats | Wave | None, sign: Floats, shape: Shape, start: Start | None
-) -> Variant | None:
-    return None if columns is None else Variant(candidate, columns, sign, shape, start)
+            columns = lines_of(np.stack(single, axis=-1), base, index)
+            sign = np.array([side(p) for p in linear])
+        yield None if columns is None else Variant(candidate, columns, sign, shape, s.start)
 
 
 def lines_of(columns: Floats, base: Floats, index: Index) -> Floats | None:
@@ -120,9 +114,7 @@ def difference(
 ) -> Floats:
     """(n, c) change of the readings per scale of parameter p, one-sided from the null, of whole predictions."""
     step = (side(p) * ONE_SIDED or SMOOTH) * p.scale
-    given = dict(shape) | {p.name: float(p.null or 0.0) + step}
-    values = [given.get(q.name, float(q.null or 0.0)) for q in candidate.parameters]
-    raw = predictor([candidate.term(values)]) - base
+    raw = predictor([candidate.term_of(dict(shape) | {p.name: float(p.null or 0.0) + step})]) - base
     return np.asarray(raw / (step / p.scale))
 
 

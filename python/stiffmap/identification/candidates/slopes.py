@@ -32,10 +32,8 @@ class Slopes:
         return self._ahead.of((candidate, p))
 
     def _tell(self, some: Sequence[Key]) -> list[Floats | None]:
-        moved = [
-            (c.term([_null(q) + (step_of(p) if q is p else 0.0) for q in c.parameters]),) for c, p in some
-        ]
-        unmoved = [(c.term([_null(q) for q in c.parameters]),) for c, _ in some]
+        moved = [(c.term_of({p.name: float(p.null or 0.0) + step_of(p)}),) for c, p in some]
+        unmoved = [(c.term_of({}),) for c, _ in some]
         changes = self._predictor.changes(moved, unmoved=unmoved)
         return [
             None if change is None else change / (step_of(p) / p.scale)
@@ -47,10 +45,6 @@ def _is_smooth(candidate: Candidate) -> bool:
     """Whether an effect of the machine shows by its slopes alone."""
     effect = get(candidate.kind)
     return effect.apply is not None and effect.signature is None and not candidate.shape
-
-
-def _null(p: Parameter) -> float:
-    return float(p.null or 0.0)
 
 
 def side(p: Parameter) -> int:

@@ -19,8 +19,7 @@ from stiffmap.experiment.noise.whitening import Problem
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.identification.candidates.candidates import Candidate
 from stiffmap.identification.clock import Clock
-from stiffmap.identification.diagnosis.report.detectability import detectable
-from stiffmap.identification.diagnosis.report.effects import effects_of
+from stiffmap.identification.diagnosis.report.effects import detectable, effects_of
 from stiffmap.identification.diagnosis.report.findings import Effect, NoiseReport, Number, Numbers, Rest
 from stiffmap.identification.diagnosis.report.result import Diagnosis
 from stiffmap.identification.diagnosis.report.separation import separation

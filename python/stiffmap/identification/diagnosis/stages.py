@@ -25,7 +25,7 @@ from stiffmap.identification.diagnosis.slips.find import find_slip
 from stiffmap.identification.diagnosis.slips.slip import Slip
 from stiffmap.identification.inference.inference import infer
 from stiffmap.identification.numbers import GROUPS, Tolerances
-from stiffmap.solve.machine import Machine, load_machine
+from stiffmap.solve.machine import Machine, as_machine
 
 SLIPS = 2
 """Mistakes in the readings that are undone one after the other."""
@@ -76,12 +76,11 @@ def diagnose(
         describes the method.
     """
     whole_number(seed, "seed", 0)
-    machine = machine if isinstance(machine, Machine) else load_machine(machine)
-    data = as_experiment(experiment)
+    declared, data = as_machine(machine), as_experiment(experiment)
     clock = Clock.of(time_limit, progress)
     check_kinds(n for n in exclude if n not in GROUPS)
     with clock.on_interrupt():
-        predictor = Predictor(machine, data, threads=threads)
+        predictor = Predictor(declared, data, threads=threads)
         refuse(predictor.experiment, predictor())
         times = [time.perf_counter()]
         slips: list[Slip] = []
@@ -94,7 +93,7 @@ def diagnose(
             slips.append(found.slip)
             if not found.slip.undone:
                 break
-            predictor = Predictor(machine, found.experiment, threads=threads)
+            predictor = Predictor(declared, found.experiment, threads=threads)
             refuse(predictor.experiment, predictor())
             plan = plan_of(predictor, clock)
         times.append(time.perf_counter())
@@ -105,12 +104,7 @@ def diagnose(
     times.append(time.perf_counter())
     seconds = {s: b - a for s, a, b in zip(steps, times, times[1:], strict=False)}
     d = replace(d, seconds=seconds)
-    return with_slips(d, slips) if slips else d
-
-
-def with_slips(d: Diagnosis, slips: Sequence[Slip]) -> Diagnosis:
-    """The answer that names mistakes in the readings before any cause."""
-    return replace(d, slips=[by_gain(s, d.effects) for s in slips], verdict="readings")
+    return replace(d, slips=[by_gain(s, d.effects) for s in slips], verdict="readings") if slips else d
 
 
 def by_gain(s: Slip, effects: Sequence[Effect]) -> Slip:

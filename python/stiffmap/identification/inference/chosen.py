@@ -48,12 +48,7 @@ class Chosen:
     @property
     def strengths(self) -> tuple[tuple[Parameter, float], ...]:
         """Linear parameters with their values, SI; nothing where the strengths are not theirs."""
-        linear = self.place.candidate.linear
-        if len(linear) != len(self.values):
-            return ()
-        return tuple(
-            (p, float(p.null or 0.0) + float(v) * p.scale) for p, v in zip(linear, self.values, strict=True)
-        )
+        return self.place.candidate.strengths(self.values)
 
     def lines(self, columns: Columns) -> Floats:
         """(N, p) m, rad: its columns, per scale of each linear parameter."""

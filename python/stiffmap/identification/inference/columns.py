@@ -58,15 +58,15 @@ class Columns:
     unknowns: tuple[Unknown, ...]
     numbers: Floats
     """(m, p) change of the readings per standard uncertainty of each declared number."""
-    gaps: tuple[tuple[str, str, Floats], ...]
-    """Kind, name and (m, m) covariance, of mean variance one, of what nobody can name."""
-    places: tuple[Place, ...]
     use: Integers
     """(N,) which of all readings these are, in the order of `readings_of`."""
-    travel: tuple[tuple[str, Floats, float], ...]
+    gaps: tuple[tuple[str, str, Floats], ...] = ()
+    """Kind, name and (m, m) covariance, of mean variance one, of what nobody can name."""
+    places: tuple[Place, ...] = ()
+    travel: tuple[tuple[str, Floats, float], ...] = ()
     """Name, (m, k) factor F of a covariance F Fᵀ of mean variance one, of errors along the travel of each drive, and their
     standard deviation in m or rad."""
-    repeats: tuple[float, float]
+    repeats: tuple[float, float] = (0.0, 0.0)
     """Sum of squares within repeats that were averaged, in noise, and its degrees of freedom."""
 
     @property
@@ -84,24 +84,9 @@ class Columns:
     def bare(e: Experiment, rows: Integers, channel: Integers, spared: Free, residual: Floats) -> Columns:
         """Of N readings in noise and a residual (m,) in what is free of them: without numbers, gaps and effects."""
         n, m = spared.matrix.shape
-        zero, none = np.zeros((m, m)), np.zeros((m, 0))
-        empty = np.zeros((n, 0))
+        none, zero = np.zeros((m, 0)), np.zeros((m, m))
         return Columns(
-            e,
-            rows,
-            channel,
-            np.ones(n),
-            spared,
-            empty,
-            residual,
-            zero,
-            (),
-            none,
-            (),
-            (),
-            np.arange(n),
-            (),
-            (0.0, 0.0),
+            e, rows, channel, np.ones(n), spared, np.zeros((n, 0)), residual, zero, (), none, np.arange(n)
         )
 
     def rotated(self, values: Floats) -> Floats:
@@ -169,6 +154,7 @@ def columns(
     numbers = free.T @ (s.columns[index] / noise[:, None])
     seen = np.linalg.norm(numbers, axis=0) > NULL
     points = Points(rows, channel, noise)
+    common = free.T @ zeros(e, points)
     found = tuple(
         (k.kind, k.name, free.T @ k.between(points, points) @ free)
         for k in gaps(predictor.machine, e, points)
@@ -181,12 +167,12 @@ def columns(
         spared,
         mean @ q,
         free.T @ raw,
-        _square(free.T @ zeros(e, points)),
+        common @ common.T,
         tuple(u for u, k in zip(s.unknowns, seen, strict=True) if k),
         numbers[:, seen],
+        use,
         tuple((kind, name, k * len(k) / np.trace(k)) for kind, name, k in found if np.trace(k) > NULL),
         places(plan, free, noise, use, predictor.machine.description),
-        use,
         tuple(_along_travel(predictor, s, index, noise, free)) if travel else (),
         (float(within @ within), float(len(rows) - mean.shape[1])),
     )
@@ -202,10 +188,6 @@ def _along_travel(
             size = float(np.linalg.norm(factor) / np.sqrt(len(factor)))
             if size > NULL:
                 yield name, factor / size, 1.0 / size
-
-
-def _square(factor: Floats) -> Floats:
-    return np.asarray(factor @ factor.T)
 
 
 def drawn(pose: Integers, seed: int, most: int) -> Integers:

@@ -81,14 +81,11 @@ def infer(
 
 def terms(chosen: Sequence[Chosen]) -> tuple[AppliedEffect, ...]:
     """The effects with their strengths, SI."""
-    return tuple(_term(c) for c in chosen)
-
-
-def _term(c: Chosen) -> AppliedEffect:
-    v = c.variant
-    candidate = c.place.candidate
-    given = dict(v.shape) | dict(c.refined)
-    given |= {p.name: float(np.clip(value, p.lower, p.upper)) for p, value in c.strengths}
-    if v.start is not None:
-        given |= v.start(c.values)
-    return candidate.term([given.get(p.name, float(p.null or 0.0)) for p in candidate.parameters])
+    out = []
+    for c in chosen:
+        given = dict(c.variant.shape) | dict(c.refined)
+        given |= {p.name: float(np.clip(value, p.lower, p.upper)) for p, value in c.strengths}
+        if c.variant.start is not None:
+            given |= c.variant.start(c.values)
+        out.append(c.place.candidate.term_of(given))
+    return tuple(out)

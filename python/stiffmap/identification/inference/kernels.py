@@ -64,9 +64,9 @@ def gaps(machine: Machine, e: Experiment, points: Points) -> Iterator[Kernel]:
     yield from shared(e, points)
     when = e.hours if e.hours is not None else e.order
     if when is not None:
-        t, session = _sessions(when, e.runs)
+        t = _in_sessions(when, e.runs)
         for length in SESSIONS:
-            yield _wander(f"wander over {length:g} session", t / length, session)
+            yield _wander(f"wander over {length:g} session", t / length, e.runs)
 
 
 def _field(name: str, here: Mask, x: Floats, load: Floats | None) -> Kernel:
@@ -136,10 +136,10 @@ def _spaces(machine: Machine, e: Experiment) -> Iterator[tuple[str, Floats]]:
     yield "place", unit(free_position(e))
 
 
-def _sessions(when: Floats, session: Integers) -> tuple[Floats, Integers]:
+def _in_sessions(when: Floats, session: Integers) -> Floats:
     """Times in shares of the longest session."""
     longest = max((float(np.ptp(when[session == k])) for k in np.unique(session)), default=0.0)
-    return np.asarray(when / (longest or 1.0)), session
+    return np.asarray(when / (longest or 1.0))
 
 
 def free_position(e: Experiment) -> Floats:

@@ -18,12 +18,7 @@ from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.identification.inference.amplitudes import Fit
 from stiffmap.identification.inference.columns import MOST_READINGS, Columns, drawn
 from stiffmap.identification.inference.constants import DEGREES, STANDS_OUT
-from stiffmap.identification.inference.corrected import (
-    Corrected,
-    columns_of,
-    machine_of,
-    without,
-)
+from stiffmap.identification.inference.corrected import Corrected, columns_of, machine_of, without
 from stiffmap.identification.inference.readings import Readings
 from stiffmap.identification.validity import covered
 from stiffmap.solve.machine import Machine
@@ -107,9 +102,7 @@ def own_zeros(found: Corrected, own: Mask) -> Floats:
     no other set-up says anything of them."""
     given = found.given
     e = given.predictor.experiment
-    names = np.array(e.setup)
-    if not len(names):
-        return np.zeros_like(found.prediction)
+    names = np.array(e.setup or ("",) * len(e))
     inside = set(np.unique(names[own])) - set(np.unique(names[~own]))
     mine = [k for k, u in enumerate(given.sensitivity.unknowns) if u.setup in inside and u.setup]
     if not mine:

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
+from stiffmap.common.number_text import percents
 from stiffmap.experiment.experiment import Floats
 from stiffmap.identification.inference.amplitudes import Fit, noise_part
 from stiffmap.identification.inference.columns import Columns
 from stiffmap.identification.inference.constants import STANDS_OUT
 from stiffmap.identification.inference.parts import GAPS, NOISE
+
+LEAST = 0.005
+"""Share from which a part is named."""
 
 
 def shares(columns: Columns, fit: Fit) -> dict[str, float]:
@@ -20,6 +26,12 @@ def shares(columns: Columns, fit: Fit) -> dict[str, float]:
     squares[NOISE] = float(np.sum(noise_part(fit)[0][fit.weights >= 1.0 / STANDS_OUT] ** 2))
     whole = max(sum(squares.values()), 1e-300)
     return {name: s / whole for name, s in squares.items()}
+
+
+def largest(shares: Mapping[str, float], most: int | None = None) -> list[str]:
+    """``drive x: 12 %``: the parts of at least half a per cent, the largest first."""
+    found = [(p, s) for p, s in sorted(shares.items(), key=lambda s: -s[1]) if s >= LEAST][:most]
+    return [f"{p}: {whole} %" for (p, _), whole in zip(found, percents([s for _, s in found]), strict=True)]
 
 
 def of_numbers(columns: Columns, fit: Fit) -> list[tuple[float, float, float]]:

@@ -14,7 +14,7 @@ from stiffmap.identification.inference.chosen import Chosen
 from stiffmap.identification.inference.columns import Columns
 from stiffmap.identification.inference.constants import ALIKE, EQUAL_SHARE, ODDS, RARE, TOLERANCES
 from stiffmap.identification.inference.names import EXACT, Model, Search
-from stiffmap.identification.inference.parts import GAPS
+from stiffmap.identification.inference.parts import GAPS, Part
 from stiffmap.identification.inference.places import Place
 from stiffmap.identification.inference.shares import of_numbers
 from stiffmap.identification.numbers.unknowns import Unknown
@@ -250,20 +250,19 @@ def out_of_tolerance(columns: Columns, fit: Fit) -> Iterator[Beyond]:
 
 def left(fit: Fit) -> tuple[str, str]:
     """What is left unexplained by names and numbers, and the correlation of the noise in time; empty where there is none."""
-    gaps = [(p, t) for p, t in zip(fit.parts, fit.t[1:], strict=True) if p.kind in GAPS and t > OFF + 1.0]
-    rest = ""
-    if gaps and _significant(fit, [p.name for p, _ in gaps]):
-        rest = max(gaps, key=lambda g: g[1])[0].name
+    on = {p: t for p, t in zip(fit.parts, fit.t[1:], strict=True) if t > OFF + 1.0}
+    gaps, over = [p for p in on if p.kind in GAPS], [p for p in on if p.kind == "time"]
+
+    def largest(some: list[Part], freedom: int = 0) -> str:
+        found = some and _significant(fit, [p.name for p in some], freedom)
+        return max(some, key=lambda p: on[p]).name if found else ""
+
+    rest, time = largest(gaps), largest(over)
     centre, sd = noise_prior(fit.columns)
     if float(fit.t[0]) - centre > KAPPA_SDS * sd:
         rest = rest or "noise larger than declared"
-    over = [(p, t) for p, t in zip(fit.parts, fit.t[1:], strict=True) if p.kind == "time" and t > OFF + 1.0]
-    time = ""
-    if over and _significant(fit, [p.name for p, _ in over]):
-        time = max(over, key=lambda g: g[1])[0].name
-    both = [*gaps, *over]
-    if not rest and not time and gaps and over and _significant(fit, [p.name for p, _ in both], len(both)):
-        rest = max(both, key=lambda g: g[1])[0].name  # either may be the noise, not both
+    if not rest and not time and gaps and over:
+        rest = largest([*gaps, *over], len(gaps) + len(over))  # either may be the noise, not both
     return rest, time
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -22,8 +21,6 @@ from stiffmap.model.description import AppliedEffect
 STEP = 0.1
 """Of a standard uncertainty, for differences."""
 
-Progress = Callable[[str, int, int], None]
-
 
 @dataclass(frozen=True, eq=False)
 class Sensitivity:
@@ -36,10 +33,6 @@ class Sensitivity:
     """(n, c) prediction of the declared machine."""
     failed: tuple[tuple[str, str], ...] = ()
     """Unknowns that the machine cannot be built or solved with, and why."""
-    stopped: bool = False
-    """Whether a time budget ended the differences before all unknowns had their turn."""
-    at: Floats | None = None
-    """(p,) where the columns hold, in standard uncertainties; None: at the declared numbers."""
 
 
 BENT = 0.05
@@ -93,23 +86,13 @@ def _frame_part(predictor: Predictor, pairs: Sequence[tuple[Unknown, float]]) ->
     return np.asarray(sum(columns[what] * by for what, by in moved))
 
 
-def sensitivity(
-    predictor: Predictor,
-    unknowns: Sequence[Unknown],
-    *,
-    until: float = np.inf,
-    progress: Progress | None = None,
-) -> Sensitivity:
-    """Slopes of the readings, or differences of variants of the machine, one per unknown; `until` (s, of time.monotonic) ends them.
+def sensitivity(predictor: Predictor, unknowns: Sequence[Unknown]) -> Sensitivity:
+    """Slopes of the readings, or differences of variants of the machine, one per unknown.
 
     The last few are kept: they do not depend on the readings.
     """
     key = (fingerprint(predictor), tuple(unknowns))
-    known = _KEPT.get(key)
-    if known is not None:
-        return known
-    found = _differences(predictor, unknowns, until, progress)
-    return found if found.stopped else _KEPT.put(key, found)
+    return _KEPT.made(key, lambda: _differences(predictor, unknowns))
 
 
 def bends(
@@ -125,17 +108,15 @@ def bends(
     return 2.0 * float(np.linalg.norm(missed)) > max(BENT * float(np.linalg.norm(white(straight))), least)
 
 
-def sensitivity_at(
-    predictor: Predictor, s: Sensitivity, values: Floats, until: float = np.inf
-) -> Sensitivity:
+def sensitivity_at(predictor: Predictor, s: Sensitivity, values: Floats) -> Sensitivity:
     """The same unknowns with columns at `values` (p,); those that fail there keep the old ones, and so do rows that do."""
     columns = s.columns.copy()
     base = predicted(predictor, s.unknowns, values)
     solved = np.isfinite(base)
-    for k, column, _ in _columns(predictor, s.unknowns, values, base, until):
+    for k, column, _ in _columns(predictor, s.unknowns, values, base):
         if column is not None:
             columns[..., k] = np.where(solved, column, columns[..., k])
-    return replace(s, columns=columns, at=values)
+    return replace(s, columns=columns)
 
 
 def _changed(
@@ -152,20 +133,11 @@ def _changed(
 
 
 def _columns(
-    predictor: Predictor,
-    unknowns: Sequence[Unknown],
-    values: Floats,
-    base: Floats,
-    until: float,
-    progress: Progress | None = None,
+    predictor: Predictor, unknowns: Sequence[Unknown], values: Floats, base: Floats
 ) -> Iterator[tuple[int, Floats | None, str]]:
-    """Each unknown with (n, c) its slopes at `values`, where the machine shows `base`, or why there are none; until time is over."""
+    """Each unknown with (n, c) its slopes at `values`, where the machine shows `base`, or why there are none."""
     slopes, solved = Slopes(predictor, unknowns, values), np.isfinite(base)
     for k, u in enumerate(unknowns):
-        if time.monotonic() > until:
-            return
-        if progress is not None:
-            progress(u.name, k, len(unknowns))
         try:
             column = slopes.of(k)
             if column is None:
@@ -180,15 +152,13 @@ def _columns(
             yield k, None, "the machine has no equilibrium with it at some poses"
 
 
-def _differences(
-    predictor: Predictor, unknowns: Sequence[Unknown], until: float, progress: Progress | None
-) -> Sensitivity:
+def _differences(predictor: Predictor, unknowns: Sequence[Unknown]) -> Sensitivity:
     base = predictor()
-    each = list(_columns(predictor, unknowns, np.zeros(len(unknowns)), base, until, progress))
+    each = list(_columns(predictor, unknowns, np.zeros(len(unknowns)), base))
     shown = [(unknowns[k], c) for k, c, _ in each if c is not None and np.any(np.nan_to_num(c))]
     stack = np.stack([c for _, c in shown], axis=-1) if shown else np.zeros((*base.shape, 0))
     failed = tuple((unknowns[k].name, why) for k, c, why in each if c is None)
-    return Sensitivity(tuple(u for u, _ in shown), stack, base, failed, len(each) < len(unknowns))
+    return Sensitivity(tuple(u for u, _ in shown), stack, base, failed)
 
 
 def zeros_anew(s: Sensitivity, experiment: Experiment) -> Sensitivity:
@@ -198,14 +168,8 @@ def zeros_anew(s: Sensitivity, experiment: Experiment) -> Sensitivity:
     zeros = [i for i, u in enumerate(s.unknowns) if u.group == "zeros" and not u.setup]
     if len(names) < 2 or not zeros or experiment.quantity != "position":
         return s
-    more: list[Unknown] = []
-    columns: list[Floats] = []
-    for name in names:
-        here = np.array(experiment.setup) == name
-        for i in zeros:
-            u = s.unknowns[i]
-            more.append(replace(u, name=f"{u.name} in set-up {name}", setup=str(name)))
-            columns.append(np.where(here[:, None], s.columns[..., i], 0.0))
-    at = None if s.at is None else np.append(s.at, np.zeros(len(more)))
+    each = [(str(name), s.unknowns[i], s.columns[..., i]) for name in names for i in zeros]
+    more = [replace(u, name=f"{u.name} in set-up {name}", setup=name) for name, u, _ in each]
+    columns = [np.where((np.array(experiment.setup) == name)[:, None], c, 0.0) for name, _, c in each]
     stack = np.concatenate([s.columns, np.stack(columns, axis=-1)], axis=-1)
-    return replace(s, unknowns=(*s.unknowns, *more), columns=stack, at=at)
+    return replace(s, unknowns=(*s.unknowns, *more), columns=stack)

@@ -90,17 +90,11 @@ def unknowns(
         out.append(
             Unknown("scale of the instrument", INSTRUMENT, "1", t.instrument, (((INSTRUMENT, SCALE), 1.0),))
         )
-    out += [
-        Unknown(
-            f"{'turn' if unit == 'rad' else 'shift'} of the instrument's frame, {name}",
-            INSTRUMENT,
-            unit,
-            t.frame_direction if unit == "rad" else t.frame,
-            (((INSTRUMENT, name), 1.0),),
-        )
-        for name, unit in frame_names(experiment)
-        if (t.frame_direction if unit == "rad" else t.frame) > 0.0
-    ]
+    for name, unit in frame_names(experiment):
+        what, u = ("turn", t.frame_direction) if unit == "rad" else ("shift", t.frame)
+        if u > 0.0:
+            full = f"{what} of the instrument's frame, {name}"
+            out.append(Unknown(full, INSTRUMENT, unit, u, (((INSTRUMENT, name), 1.0),)))
     if not loaded:
         out = [p for p in out if p.group not in ("drive compliance", "link compliance")]
     if not weighs:
@@ -124,12 +118,18 @@ def _of_sequence(
             run = []
         elif isinstance(e, Offset):
             run.append((name, e))
-        elif isinstance(e, Spring) and not e.laws:
-            u = given.spring(name, e, t.compliance)
-            out.append(_relative(name, leg, "link compliance", "compliance", u))
-        elif isinstance(e, Body) and e.mass > 0.0:
-            out.append(_relative(name, leg, "masses", "mass", given.mass(name, e.mass, t.mass)))
+        else:
+            out += _of_part(e, name, leg, t, given)
     return out, run
+
+
+def _of_part(e: Element, name: str, leg: str, t: Tolerances, given: Declared) -> Iterator[Unknown]:
+    """Of a spring its compliance, of a body its mass."""
+    if isinstance(e, Spring) and not e.laws:
+        u = given.spring(name, e, t.compliance)
+        yield _relative(name, leg, "link compliance", "compliance", u)
+    elif isinstance(e, Body) and e.mass > 0.0:
+        yield _relative(name, leg, "masses", "mass", given.mass(name, e.mass, t.mass))
 
 
 def joint_name(element: str) -> str:
@@ -220,10 +220,4 @@ def _of_block(block: Block, path: str, leg: str, t: Tolerances, given: Declared)
             )
     for branch in block.branches:
         for e in branch.elements:
-            if isinstance(e, Spring) and not e.laws:
-                name = f"{path}.{branch.name}.{e.name}"
-                u = given.spring(name, e, t.compliance)
-                yield _relative(name, leg, "link compliance", "compliance", u)
-            elif isinstance(e, Body) and e.mass > 0.0:
-                name = f"{path}.{branch.name}.{e.name}"
-                yield _relative(name, leg, "masses", "mass", given.mass(name, e.mass, t.mass))
+            yield from _of_part(e, f"{path}.{branch.name}.{e.name}", leg, t, given)

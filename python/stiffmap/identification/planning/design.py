@@ -22,8 +22,13 @@ from stiffmap.common.short import short_repr
 from stiffmap.experiment.experiment import PER_ROW, Experiment
 from stiffmap.experiment.virtual.plans import load_set, plan_of_poses, random_poses
 from stiffmap.identification.planning.estimate import Estimate, estimate, fitted
-from stiffmap.identification.planning.exchange import exchange
-from stiffmap.identification.planning.information import Information, information_of, map_weight, of_map
+from stiffmap.identification.planning.information import (
+    Information,
+    exchange,
+    information_of,
+    map_weight,
+    of_map,
+)
 from stiffmap.model.description import AppliedEffect
 from stiffmap.solve.kinematics import inverse_kinematics
 from stiffmap.solve.machine import Machine

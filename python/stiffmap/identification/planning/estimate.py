@@ -13,6 +13,7 @@ from stiffmap.experiment.experiment import Experiment
 from stiffmap.experiment.noise.level import noise_of
 from stiffmap.experiment.noise.whitening import Problem
 from stiffmap.experiment.prediction.predict import Predictor
+from stiffmap.identification.candidates.candidates import words
 from stiffmap.identification.candidates.slopes import step_of
 from stiffmap.identification.inference.optimum import covariance, optimum
 from stiffmap.model import effects
@@ -90,7 +91,9 @@ def estimate(machine: Machine, experiment: Experiment, terms: Sequence[AppliedEf
     )
     spread, rank = covariance(found.jacobian)
     return Estimate(
-        tuple(f"{_place(begun[i])}: {p.name}" for i, p in parameters),
+        tuple(
+            f"{words(t.kind, t.element, t.legs)}: {p.name}" for t, p in ((begun[i], p) for i, p in parameters)
+        ),
         tuple(p.unit for _, p in parameters),
         found.x * scale,
         spread * np.outer(scale, scale),
@@ -147,8 +150,3 @@ def slopes(predictor: Predictor, terms: Terms, parameters: list[tuple[int, Param
         high, low = min(x[k] + STEP * p.scale, p.upper), max(x[k] - STEP * p.scale, p.lower)
         out[..., k] = (predictor(at(k, high)) - predictor(at(k, low))) / (high - low)
     return np.nan_to_num(out)
-
-
-def _place(t: AppliedEffect) -> str:
-    legs = f", leg{'s' if len(t.legs) > 1 else ''} {', '.join(t.legs)}" if t.legs else ""
-    return f"{t.kind} of {t.element}{legs}"

@@ -1,6 +1,11 @@
-"""What every candidate row adds: information matrices of wanted numbers and of all that is unknown next to them."""
+"""What every candidate row adds: information matrices of wanted numbers and of all that is unknown next to them.
+
+Rows are taken one after the other, then exchanged while that gains (V. V. Fedorov, Theory of Optimal Experiments, 1972).
+"""
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import numpy as np
 
@@ -12,13 +17,14 @@ from stiffmap.experiment.noise.whitening import Problem
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.experiment.virtual.plans import plan_of_poses
 from stiffmap.identification.inference.optimum import covariance
-from stiffmap.identification.planning.estimate import fitted, slopes
-from stiffmap.model.description import AppliedEffect
+from stiffmap.identification.planning.estimate import Terms, fitted, slopes
 from stiffmap.solve.machine import Machine
 
-Terms = tuple[AppliedEffect, ...]
 RIDGE = 1e-9
 """Information of a parameter per typical size that no row has to bring: makes the first rows comparable."""
+PASSES = 3
+Value = Callable[[Floats], Floats]
+"""Worth (...) of information matrices (..., k, k)."""
 
 
 class Information:
@@ -84,3 +90,33 @@ def map_weight(
     there = Information(machine, plan_of_poses(machine, "deflection", at, wrench[None]), terms)
     columns = there.columns[:, :3]
     return np.asarray(np.einsum("nak,nal->kl", columns, columns) / len(columns))
+
+
+def exchange(
+    matrices: Floats, start: Floats, free: Integers, rows: int, value: Value, passes: int = PASSES
+) -> Integers:
+    """Indices of the rows chosen: greedily, then exchanged while that gains, in so many passes."""
+    left = [int(i) for i in free]
+    picked: list[int] = []
+    total = start.copy()
+    for _ in range(rows):
+        best = left[int(np.argmax(value(total + matrices[left])))]
+        picked.append(best)
+        left.remove(best)
+        total = total + matrices[best]
+    for _ in range(passes):
+        changed = False
+        for place, old in enumerate(picked):
+            bare = total - matrices[old]
+            options = [old, *left]
+            scores = value(bare + matrices[options])
+            k = int(np.argmax(scores))
+            if k and scores[k] > scores[0] + 1e-9 * (1 + abs(scores[0])):
+                new = options[k]
+                picked[place] = new
+                left.remove(new)
+                left.append(old)
+                total, changed = bare + matrices[new], True
+        if not changed:
+            break
+    return np.array(picked, dtype=np.intp)

@@ -6,8 +6,7 @@ import numpy as np
 
 from stiffmap.common.broadcasting import Floats, whole_number
 from stiffmap.common.errors import StiffmapError
-from stiffmap.identification.planning.exchange import exchange
-from stiffmap.identification.planning.information import information_of
+from stiffmap.identification.planning.information import exchange, information_of
 from stiffmap.identification.taps.causes import causes, scaled, term
 from stiffmap.identification.taps.problem import Problem
 from stiffmap.identification.taps.table import TapTest

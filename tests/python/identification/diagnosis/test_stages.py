@@ -15,7 +15,7 @@ from stiffmap.experiment.noise.whitening import Problem
 from stiffmap.identification.candidates.candidates import Candidate
 from stiffmap.identification.candidates.sensitivity import Variant
 from stiffmap.identification.diagnosis.report import separation as stage
-from stiffmap.identification.diagnosis.slips.screen import Screen
+from stiffmap.identification.diagnosis.slips.find import Screen
 from stiffmap.model import effects
 from stiffmap.model.effects import Parameter
 

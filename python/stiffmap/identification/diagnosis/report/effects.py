@@ -1,4 +1,4 @@
-"""Named effects with their intervals, aliases and definitions."""
+"""Named effects with their intervals, aliases and definitions, and the smallest that an experiment would have revealed."""
 
 from __future__ import annotations
 
@@ -6,13 +6,21 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from scipy.stats import norm
 
 from stiffmap.experiment.experiment import Floats
 from stiffmap.identification.candidates.candidates import Candidate
-from stiffmap.identification.diagnosis.report.findings import Effect
+from stiffmap.identification.diagnosis.report.findings import Detectability, Effect
+from stiffmap.identification.inference.amplitudes import Fit
+from stiffmap.identification.inference.columns import Columns
+from stiffmap.identification.inference.constants import ODDS
 from stiffmap.identification.inference.corrected import WIDE, Corrected, Term
+from stiffmap.identification.inference.places import Place, reach
 from stiffmap.model.description import MachineDescription
 from stiffmap.model.effects import Placed, registry
+
+POWER = 0.95
+"""Probability with which an effect of that size has a name."""
 
 
 def effects_of(
@@ -93,3 +101,31 @@ def definition(candidate: Candidate) -> str:
     """What the effect is, its pivot, frame and what moves with it."""
     e = registry.get(candidate.kind)
     return f"{e.doc} Pivot: {e.pivot}. Frame: {e.frame}. Moves: {e.moves}."
+
+
+def detectable(columns: Columns, fit: Fit) -> list[Detectability]:
+    """One entry per place: the sizes that gain the odds of a name over all places, with 95 % power, in the model that was found."""
+    needed = np.sqrt(2.0 * np.log(ODDS * max(1, len(columns.places)))) + norm.isf(1.0 - POWER)
+    out = []
+    for place in columns.places:
+        sizes = _sizes(columns, fit, place, float(needed))
+        if any(v is not None for v in sizes.values()):
+            c = place.candidate
+            out.append(Detectability(c.kind, c.element, c.legs, sizes, [as_place(a) for a in place.aliases]))
+    return out
+
+
+def _sizes(columns: Columns, fit: Fit, place: Place, needed: float) -> dict[str, float | None]:
+    """The median over shapes (periods)."""
+    linear = place.candidate.linear
+    each: list[Floats] = []
+    for shape in place.shapes[:: max(1, len(place.shapes) // 5)]:
+        white = fit.white(columns.rotated(columns.lines(shape.variant)))
+        if white.shape[1] != len(linear):
+            return dict.fromkeys((p.name for p in linear), None)
+        with np.errstate(divide="ignore"):
+            each.append(needed / np.linalg.norm(white, axis=0))
+    out: dict[str, float | None] = {}
+    for p, size in zip(linear, np.median(each, axis=0), strict=True):
+        out[p.name] = float(size) * p.scale if float(size) < reach(p) else None
+    return out

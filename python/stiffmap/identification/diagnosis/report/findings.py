@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 from stiffmap.common.json_text import json_text
@@ -12,12 +11,14 @@ from stiffmap.experiment.comparison.summary import Summary
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.noise.checks import Check
 from stiffmap.experiment.noise.level import Mask
+from stiffmap.identification.candidates.candidates import words
 from stiffmap.identification.diagnosis.report.separation import Separation
 from stiffmap.identification.diagnosis.slips.slip import Slip
 from stiffmap.identification.inference.machines import HeldOut
 from stiffmap.solve.machine import Machine
 
-Place = Mapping[str, Any]
+APART = ("verdict", "held_out", "shares", "machine", "declared", "experiment", "calibration", "seed")
+"""Fields that JSON has in another form, or not at all."""
 
 
 @dataclass(frozen=True)
@@ -44,11 +45,10 @@ class Effect:
         return (self.kind, self.element, self.legs)
 
     def __str__(self) -> str:
-        legs = f", leg{'s' if len(self.legs) > 1 else ''} {', '.join(self.legs)}" if self.legs else ""
         values = "; ".join(
             f"{n} {v:.5g} [{a:.5g}, {b:.5g}] {u}" for n, (v, a, b, u) in self.parameters.items()
         )
-        return f"{self.kind} of {self.element}{legs}: {values}"
+        return f"{words(*self.place)}: {values}"
 
 
 @dataclass(frozen=True)
@@ -94,10 +94,6 @@ class Numbers:
     """Those that no tolerance allows, the largest share first."""
     table: tuple[Number, ...]
     """All that the readings show."""
-
-    def as_plain(self) -> dict[str, Any]:
-        """JSON data."""
-        return {"verdict": self.verdict, "beyond": plain(self.beyond), "table": plain(self.table)}
 
 
 @dataclass(frozen=True)
@@ -166,6 +162,8 @@ class Findings:
     """(n, c) m, rad: what nobody can name, at the readings that were compared; NaN elsewhere."""
     calibration: Numbers | None = None
     """Declared numbers, where the readings say that they are off; None where they are as declared."""
+    seconds: dict[str, float] = field(default_factory=dict)
+    """What each step took."""
     refused: list[str] = field(default_factory=list)
     """Effects that the readings seemed to demand and that are not named, and why."""
     which: str = "declared"
@@ -178,8 +176,6 @@ class Findings:
     """Mistakes of writing or mounting that the readings show, named before any cause."""
     seed: int | None = None
     """Of folds and simulated noise."""
-    seconds: dict[str, float] = field(default_factory=dict)
-    """What each step took."""
 
     def to_json(self) -> str:
         """All fields but arrays and machines, SI; NaN is null."""
@@ -187,35 +183,12 @@ class Findings:
 
     def as_plain(self) -> dict[str, Any]:
         """JSON data."""
-        names = (
-            "effects",
-            "alternatives",
-            "separations",
-            "before",
-            "after",
-            "noise",
-            "detectable",
-            "unobservable",
-        )
-        more = (
-            "outliers",
-            "checks_before",
-            "checks_after",
-            "unexplained",
-            "limitations",
-            "seconds",
-            "refused",
-            "which",
-            "stopped",
-            "not_tried",
-            "slips",
-        )
         out: dict[str, Any] = {"verdict": self.verdict, "units": "SI (m, rad, N, N·m, kg), base axes"}
         out |= {"machine": self.declared.name, "experiment": self.experiment.name}
-        out |= {n: plain(getattr(self, n)) for n in (*names, *more)}
+        out |= {f.name: plain(getattr(self, f.name)) for f in fields(self) if f.repr and f.name not in APART}
         out["shares"] = [{"part": name, "share": share} for name, share in self.shares.items()]
         if self.held_out:
             h = self.held_out
             out["held_out"] = {"folds": h.folds, "by": h.by}
-        out["calibration"] = self.calibration.as_plain() if self.calibration else None
+        out["calibration"] = plain(self.calibration)
         return out

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import isfinite
 from typing import Any
 
-from stiffmap.common.number_text import with_uncertainty, within
+from stiffmap.common.number_text import with_uncertainty
 from stiffmap.identification.diagnosis.report.findings import Effect
-from stiffmap.identification.diagnosis.report.wording import noise_size, number_text, separation_text
+from stiffmap.identification.diagnosis.report.wording import digits, noise_size, number_text, separation_text
 from stiffmap.identification.diagnosis.slips.slip import Slip
 from stiffmap.model.effects import registry
 
@@ -21,7 +21,7 @@ UNITS = {
     "1": (1.0, ""),
 }
 """Factor from SI, and the unit that a workshop reads."""
-NAMES = {"actuator": "drive", "motor": "motor"}
+NAMES = {"actuator": "drive"}
 ALIASES = 2
 """What cannot be distinguished from an effect: how many the headline names."""
 
@@ -38,21 +38,18 @@ def measured(value: float, low: float, high: float, unit: str) -> str:
 def interval(value: float, low: float, high: float, unit: str) -> tuple[str, str, str]:
     """Value and ends of the interval to the same digits, with the unit that a workshop reads."""
     factor, name = UNITS.get(unit, (1.0, unit))
-    half = factor * abs(high - low) / 2 / 1.96
-    if not (half > 0 and isfinite(half)):
-        texts = [f"{factor * v:.4g}" for v in (value, low, high)]
-    else:
-        texts = [within(factor * v, half) for v in (value, low, high)]
-    own, least, most = (f"{text} {name}".rstrip() for text in texts)
+    own, least, most = (f"{text} {name}".rstrip() for text in digits(factor, value, low, high))
     return own, least, most
 
 
 def place(e: Effect) -> str:
     """``the drive of leg z``."""
-    element = NAMES.get(e.element, e.element)
-    if not e.legs:
-        return f"the {element}"
-    return f"the {element} of leg{'s' if len(e.legs) > 1 else ''} {', '.join(e.legs)}"
+    return f"the {_element(e.element, e.legs)}"
+
+
+def _element(element: str, legs: Sequence[str]) -> str:
+    of = f" of leg{'s' if len(legs) > 1 else ''} {', '.join(legs)}" if legs else ""
+    return f"{NAMES.get(element, element)}{of}"
 
 
 def sentence(e: Effect) -> str:
@@ -72,7 +69,7 @@ def _compared(e: Effect, more: str, less: str) -> str:
         if scale >= 1
         else f"{1 / scale:.2f} times as {less} as in your file"
     )
-    head = f"{place(e).capitalize() if place(e)[0] != 't' else 'T' + place(e)[1:]} is {how}"
+    head = f"{_upper(place(e))} is {how}"
     if "value" not in e.parameters:
         return f"{head}: scale {measured(*e.parameters['scale'])}"
     value, low, high, unit = e.parameters["value"]
@@ -122,10 +119,7 @@ def aliases(e: Effect) -> str:
 
 def alias_words(a: Mapping[str, Any]) -> str:
     """``the stiffness of the foot of leg z``, as one says it."""
-    legs = a["legs"]
-    element = NAMES.get(a["element"], a["element"])
-    of = f" of leg{'s' if len(legs) > 1 else ''} {', '.join(legs)}" if legs else ""
-    return f"{registry.get(a['kind']).title} ({element}{of})"
+    return f"{registry.get(a['kind']).title} ({_element(a['element'], a['legs'])})"
 
 
 def _of_machine(d: Any, verdict: str) -> str:

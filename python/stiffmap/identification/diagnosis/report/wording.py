@@ -6,10 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from stiffmap.common.number_text import percent, percents, with_uncertainty, within
+from stiffmap.common.number_text import percent, with_uncertainty, within
+from stiffmap.identification.candidates.candidates import words
 from stiffmap.identification.diagnosis.report.findings import Effect, Findings, Number, Rest
 from stiffmap.identification.diagnosis.report.separation import Separation
 from stiffmap.identification.diagnosis.slips.slip import Slip
+from stiffmap.identification.inference.shares import largest
 from stiffmap.solve.validity import Validity
 
 DISPLAY_UNITS = {"m": (1e3, "mm"), "m/N": (1e3, "mm/N"), "rad": (1e3, "mrad"), "1/m": (1e-3, "1/mm")}
@@ -64,13 +66,9 @@ def _thousandth(value: float, unit: str) -> str:
 def _more(d: Findings) -> list[str]:
     """How the difference is shared out, which machine is handed over, what is not named and why."""
     out = []
-    largest = [(name, s) for name, s in sorted(d.shares.items(), key=lambda s: -s[1]) if s > 0.005]
-    if d.verdict != "none" and len(largest) > 1:
-        names, sizes = zip(*largest, strict=True)
-        out.append(
-            "shares of the squares: "
-            + "; ".join(f"{name}: {s} %" for name, s in zip(names, percents(sizes), strict=True))
-        )
+    shared = largest(d.shares)
+    if d.verdict != "none" and len(shared) > 1:
+        out.append(f"shares of the squares: {'; '.join(shared)}")
     if d.which == "declared" and d.effects:
         out.append(
             "machine.yaml is the declared machine: none that was corrected predicts unseen readings better"
@@ -106,25 +104,23 @@ def _not_tried(what: Sequence[str]) -> str:
     return f"; not tried: {'; '.join(what[:LISTED])}{more}" if what else ""
 
 
-def in_display_units(value: float, unit: str) -> str:
-    """A number in the units of the screen."""
-    factor, name = DISPLAY_UNITS.get(unit, (1.0, unit))
-    return f"{value * factor:.4g} {name}" if name != "1" else f"{value:.4g}"
+def digits(factor: float, value: float, low: float, high: float) -> list[str]:
+    """A value and the ends of its 95 % interval, times a factor, all to the digits that the value carries."""
+    half = factor * abs(high - low) / 2 / 1.96
+    return [within(factor * v, half) for v in (value, low, high)]
 
 
 def effect_text(e: Effect) -> str:
     """``compliance of actuator, leg z: scale 2.148 [2.137, 2.159]``."""
-    legs = f", leg{'s' if len(e.legs) > 1 else ''} {', '.join(e.legs)}" if e.legs else ""
     values = []
-    for name, (value, low, high, unit) in e.parameters.items():
+    for name, (*numbers, unit) in e.parameters.items():
         factor, label = DISPLAY_UNITS.get(unit, (1.0, unit))
-        half = factor * abs(high - low) / 2 / 1.96
-        at, *ends = (within(factor * v, half) for v in (value, low, high))
+        at, *ends = digits(factor, *numbers)
         text = f"{name} {at} [{', '.join(ends)}]"
         values.append(text if label == "1" else f"{text} {label}")
     n = len(e.aliases)
     same = f" (these readings cannot distinguish it from {n} other{'s' if n > 1 else ''})" if n else ""
-    return f"{e.kind} of {e.element}{legs}: {', '.join(values)}{same}"
+    return f"{words(*e.place)}: {', '.join(values)}{same}"
 
 
 def separation_text(s: Separation) -> str:
@@ -163,8 +159,8 @@ def _place(p: Rest) -> str:
     if p.position is None:
         return ""
     where = ", ".join(f"{1e3 * v:.0f}" for v in p.position)
-    size = in_display_units(p.size, "rad" if p.axis.startswith("r") else "m")
-    return f"; largest in {p.axis} at ({where}) mm, {size} rms"
+    unit = "mrad" if p.axis.startswith("r") else "mm"
+    return f"; largest in {p.axis} at ({where}) mm, {1e3 * p.size:.4g} {unit} rms"
 
 
 def _limits(d: Findings) -> str:

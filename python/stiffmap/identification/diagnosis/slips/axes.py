@@ -62,8 +62,10 @@ def _changes(turn: Turn) -> int:
     return sum(pair != (a, 1) for a, pair in turn.items())
 
 
-def gauges(e: Experiment, shown: Floats) -> Iterator[Hypothesis]:
-    """Gauges of x, y, z along other axes; `shown` (n, c) is what true ones show, coordinates where positions are read."""
+def gauges(e: Experiment, base: Floats) -> Iterator[Hypothesis]:
+    """Gauges of x, y, z along other axes; `base` (n, c) m, rad is what the declared machine reads."""
+    where = _coordinates(e)
+    shown = base + where
     axes = [int(a) for a in np.flatnonzero(e.axis_read[:3])]
     for turn in turns(axes) if axes else ():
         there = shown.copy()
@@ -71,14 +73,14 @@ def gauges(e: Experiment, shown: Floats) -> Iterator[Hypothesis]:
             there[:, a] = s * shown[:, b]
         kind, seen, check = words(turn, "gauge", "readings")
         changes = _changes(turn)
-        yield Hypothesis(kind, seen, check, changes, _read(e, there), partial(mounted, turn=turn))
+        yield Hypothesis(kind, seen, check, changes, there - where, partial(mounted, turn=turn))
     for i in range(3, 6):
         if e.axis_read[i] and e.quantity == "deflection":
             there = shown.copy()
             there[:, i] *= -1.0
             name = e.channels[i].name
             yield Hypothesis("sign", f"{name} has the opposite sign", f"check the sign of {name}", 1,
-                             _read(e, there), partial(times, factor=-1.0, axes=(i,)))  # fmt: skip
+                             there - where, partial(times, factor=-1.0, axes=(i,)))  # fmt: skip
 
 
 def mounted(e: Experiment, turn: Turn) -> Experiment:
@@ -130,11 +132,11 @@ def pulled(e: Experiment, turn: Turn) -> Experiment:
     return replace(e, wrench=wrench)
 
 
-def shifts(e: Experiment, shown: Floats) -> Iterator[Hypothesis]:
-    """Readings that stand one row too high or too low (or one group of repeats)."""
-    n = len(e)
+def shifts(e: Experiment, base: Floats) -> Iterator[Hypothesis]:
+    """Readings that stand one row too high or too low (or one group of repeats); `base` (n, c) m, rad as for `gauges`."""
+    n, where = len(e), _coordinates(e)
     for step in steps(e):
-        there = np.roll(shown, step, axis=0)
+        there = np.roll(base + where, step, axis=0)
         keep = np.ones(n, bool)
         keep[:step] = False if step > 0 else keep[:step]
         if step < 0:
@@ -142,7 +144,7 @@ def shifts(e: Experiment, shown: Floats) -> Iterator[Hypothesis]:
         way = "below" if step > 0 else "above"
         many = "one row" if abs(step) == 1 else f"{abs(step)} rows"
         yield Hypothesis("shift", f"each reading stands {many} {way} its pose and load",
-                         f"check whether the readings are shifted by {many}", 1, _read(e, there),
+                         f"check whether the readings are shifted by {many}", 1, there - where,
                          partial(moved, step=step), keep)  # fmt: skip
 
 
@@ -160,20 +162,12 @@ def moved(e: Experiment, step: int) -> Experiment:
     return whole.rows(np.arange(len(e) - step) if step > 0 else np.arange(-step, len(e)))
 
 
-def coordinates(e: Experiment, prediction: Floats) -> Floats:
-    """(n, c) what true gauges show: deflections, or coordinates where positions are read."""
-    return np.asarray(prediction + _coordinates(e))
-
-
 def _coordinates(e: Experiment) -> Floats:
+    """(n, c) what gauges show of the commanded poses: coordinates where positions are read."""
     where = np.zeros((len(e), len(e.channels)))
     if e.quantity == "position":
         where[:, :3] = e.position
     return where
-
-
-def _read(e: Experiment, shown: Floats) -> Floats:
-    return np.asarray(shown - _coordinates(e))
 
 
 def _listed(names: list[str]) -> str:

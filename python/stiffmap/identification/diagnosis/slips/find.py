@@ -6,24 +6,26 @@ comes near that; what a part of the machine may show as well (a factor of two) o
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 
 import numpy as np
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.experiment.experiment import Experiment, Floats
+from stiffmap.experiment.experiment import Experiment, Floats, Integers
 from stiffmap.experiment.noise.checks import checks
 from stiffmap.experiment.noise.level import Noise, noise_of
 from stiffmap.experiment.noise.outliers import without_suspects
 from stiffmap.experiment.noise.whitening import Problem, readings_of
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.identification.candidates.plan import Plan
-from stiffmap.identification.diagnosis.slips.axes import coordinates, gauges, loads, moved, shifts, steps
+from stiffmap.identification.candidates.sensitivity import Variant
+from stiffmap.identification.diagnosis.slips.axes import gauges, loads, moved, shifts, steps
 from stiffmap.identification.diagnosis.slips.factors import factors
-from stiffmap.identification.diagnosis.slips.screen import Screen
 from stiffmap.identification.diagnosis.slips.slip import Hypothesis, Slip
+from stiffmap.identification.inference.places import Shape, shape_of
+from stiffmap.model.effects import get
 
 MOST, LEFT = 0.5, 0.1
 """Share of the misfit beyond noise that may stay with a mistake alone, and jointly with one part of the machine."""
@@ -56,6 +58,43 @@ class Judged:
     """What stays with it."""
     beside: float
     """What stays with it and the best single part of the machine."""
+
+
+@dataclass(frozen=True, eq=False)
+class Screen:
+    """The directions of all parts of the machine in whitened readings (N,)."""
+
+    problem: Problem
+    use: Integers
+    """(R,) the problem's readings among those of the variants."""
+    shapes: tuple[Shape, ...]
+
+    @staticmethod
+    def of(problem: Problem, use: Integers, variants: Sequence[Variant]) -> Screen:
+        """Of variants that are no fault of the measurement."""
+        parts = [v for v in variants if not get(v.candidate.kind).measurement]
+        found = (shape_of(v, problem.white_lines(v.lines(use))) for v in parts)
+        return Screen(problem, use, tuple(s for s in found if s is not None))
+
+    def gain(self, residual: Floats) -> float:
+        """What the best part takes from chi-square of a residual (N,), its strengths within their bounds."""
+        along = [s.directions.T @ residual for s in self.shapes]
+        gains = np.array(
+            [
+                a @ a if not s.sign or s.sign * a[0] > 0.0 else 0.0
+                for s, a in zip(self.shapes, along, strict=True)
+            ]
+        )
+        best = (k for k in np.argsort(-gains) if self._is_possible(self.shapes[k].variant, residual))
+        return float(gains[k]) if (k := next(best, None)) is not None else 0.0
+
+    def _is_possible(self, v: Variant, residual: Floats) -> bool:
+        """Whether the strengths that explain most are within the bounds of their parameters."""
+        if v.start is not None:
+            return True
+        white = self.problem.white_lines(v.lines(self.use))
+        strengths = np.linalg.lstsq(white, residual, rcond=1e-5)[0]
+        return all(p.lower <= x <= p.upper for p, x in v.candidate.strengths(np.asarray(strengths)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,10 +230,9 @@ def quiet(e: Experiment, noise: Noise) -> Floats:
 
 def _all(s: Readings, problem: Problem) -> Iterator[Hypothesis]:
     e = s.experiment
-    shown = coordinates(e, s.base)
     if e.quantity == "deflection" or _orthogonal(e):
-        yield from gauges(e, shown)
-        yield from shifts(e, shown)
+        yield from gauges(e, s.base)
+        yield from shifts(e, s.base)
     if e.quantity == "deflection":
         yield from factors(e, problem, s.base, partial(left_beside, s))
         if e.wrench[:, :3].any():
