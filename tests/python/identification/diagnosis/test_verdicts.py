@@ -14,7 +14,8 @@ from stiffmap.experiment import Predictor, random_plan, simulate
 from stiffmap.identification.candidates.plan import plan_of
 from stiffmap.model.description import AppliedEffect
 
-SETS = Path(__file__).parents[4] / "examples" / "experiments"
+ROOT = Path(__file__).parents[4]
+SETS = ROOT / "examples" / "experiments"
 pytestmark = pytest.mark.filterwarnings("ignore::RuntimeWarning")
 
 
@@ -33,6 +34,12 @@ def only(d: sm.Diagnosis) -> tuple[str, str, list[str]]:
     return (d.effects[0].kind, d.effects[0].element, list(d.effects[0].legs))
 
 
+def obeys_its_schema(d: sm.Diagnosis) -> None:
+    jsonschema = pytest.importorskip("jsonschema")
+    form = json.loads((ROOT / "docs/schemas/diagnose.json").read_text(encoding="utf-8"))
+    jsonschema.Draft202012Validator(form).validate(json.loads(d.to_json()))
+
+
 def holds(d: sm.Diagnosis, name: str, truth: float) -> bool:
     _, low, high, _ = d.effects[0].parameters[name]
     return low <= truth <= high
@@ -49,6 +56,7 @@ def test_known_position_sets(
     machine: sm.Machine, folder: str, place: tuple[str, str, list[str]], parameter: str, truth: float
 ) -> None:
     d = sm.diagnose(machine, SETS / folder)
+    obeys_its_schema(d)
     assert d.verdict == "effects" and only(d) == place
     assert holds(d, parameter, truth)
     assert d.after.ratio <= 1.05 < d.before.ratio
@@ -68,6 +76,7 @@ def test_known_deflection_sets(
     machine: sm.Machine, folder: str, place: tuple[str, str, list[str]] | None, parameter: str, truth: float
 ) -> None:
     d = sm.diagnose(machine, SETS / folder)
+    obeys_its_schema(d)
     if place is None:
         assert d.verdict == "none" and not d.effects and not d.unexplained
         return

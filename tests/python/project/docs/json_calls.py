@@ -95,7 +95,7 @@ COSTLY = {
     "measures",
     "taps",
 }
-"""Left to the slow lane."""
+"""Left to the examples of their help."""
 MAPS: dict[str, tuple[str, ...]] = {
     "calibrate": (
         ".validity.drives", ".validity.loads", ".before.per_axis", ".after.per_axis", ".held_out.before.per_axis",

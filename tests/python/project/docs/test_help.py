@@ -1,8 +1,9 @@
-"""Every example of every ``--help`` runs, in a folder that holds the files they speak of."""
+"""Every example of every ``--help`` runs, in a folder that holds the files they speak of; with --json it obeys its schema."""
 
 from __future__ import annotations
 
 import importlib.util
+import json
 import re
 import shlex
 import shutil
@@ -21,6 +22,7 @@ from stiffmap.ui.cli.commands import COMMANDS
 
 ROOT = Path(__file__).parents[4]
 SHIPPED = ROOT / "python/stiffmap"
+SCHEMAS = ROOT / "docs/schemas"
 SERVO = ROOT / "tests/data/experiments/A-servo"
 MADE_SMALLER = {  # the last word counts
     "optimize my_design": ("--generations", "1"),
@@ -193,6 +195,11 @@ def test_examples_run(
     lines = examples(load(command))
     assert lines, f"stiffmap {name} --help has no example"
     lines = [line for line in lines if not any(part in line for part in RUN_ELSEWHERE)]
+    jsonschema = pytest.importorskip("jsonschema")
+    validator = jsonschema.Draft202012Validator(
+        json.loads((SCHEMAS / f"{name}.json").read_text(encoding="utf-8"))
+    )
+    capsys.readouterr()
     for line in lines:
         words = shlex.split(line)
         while "=" in words[0]:
@@ -201,5 +208,7 @@ def test_examples_run(
         smaller = next(
             (more for start, more in MADE_SMALLER.items() if line.startswith(f"stiffmap {start}")), ()
         )
-        code = main([*words[1:], *smaller])
-        assert code in (0, 1), f"{line}: {code}: {capsys.readouterr().err}"
+        code = main([*words[1:], *smaller, "--json"])
+        out = capsys.readouterr()
+        assert code in (0, 1), f"{line}: {code}: {out.err}"
+        validator.validate(json.loads(out.out))

@@ -1,4 +1,5 @@
-"""What commands print with --json obeys the schemas of docs/schemas; a command without a schema is no command."""
+"""What commands print with --json obeys the schemas of docs/schemas; a command without a schema is no command.
+What takes long is tried by the examples of its help (test_help.py)."""
 
 from __future__ import annotations
 
@@ -33,32 +34,17 @@ def test_every_command_has_calls_and_a_schema() -> None:
     assert {p.stem for p in SCHEMAS.glob("*.json")} == set(CALLS)
 
 
-def obeys(
-    name: str, workshop: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    jsonschema = pytest.importorskip("jsonschema")
-    monkeypatch.chdir(workshop)
-    for call in CALLS[name]:
-        assert main([*shlex.split(call), "--json"]) in (0, 1), capsys.readouterr().err
-        jsonschema.Draft202012Validator(schema(name)).validate(json.loads(capsys.readouterr().out))
-
-
 @pytest.mark.parametrize("name", sorted(set(CALLS) - COSTLY))
 def test_quick_commands_obey_their_schema(
     name: str, workshop: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     if name == "view":
         pytest.importorskip("viser", reason="needs the extra [view]")
-    obeys(name, workshop, monkeypatch, capsys)
-
-
-@pytest.mark.parametrize("name", sorted(COSTLY - {"bench"}))
-def test_costly_commands_obey_their_schema(
-    name: str, workshop: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    if name == "link":
-        pytest.importorskip("gmsh", reason="needs the extra [fea]", exc_type=(ImportError, OSError))
-    obeys(name, workshop, monkeypatch, capsys)
+    jsonschema = pytest.importorskip("jsonschema")
+    monkeypatch.chdir(workshop)
+    for call in CALLS[name]:
+        assert main([*shlex.split(call), "--json"]) in (0, 1), capsys.readouterr().err
+        jsonschema.Draft202012Validator(schema(name)).validate(json.loads(capsys.readouterr().out))
 
 
 def test_a_schema_refuses_a_missing_key_and_another_type() -> None:
