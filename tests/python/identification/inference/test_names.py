@@ -39,7 +39,9 @@ def place(name: str, column: np.ndarray, free: np.ndarray) -> Place:
         (replace(scale, name="strength", lower=-np.inf, plausible=None, upper=np.inf),),
     )
     lines = (free @ column)[None]
-    variant: Any = SimpleNamespace(lines=lambda use: lines[:, use], candidate=candidate)
+    variant: Any = SimpleNamespace(
+        lines=lambda use: lines[:, use], candidate=candidate, shape=(), sign=np.ones(1)
+    )
     return Place(candidate, (Shape(variant, (column / np.linalg.norm(column))[:, None], 0),))
 
 
@@ -70,6 +72,25 @@ def test_one_effect_is_one_and_nothing_is_nothing(seed):
     assert found(setting(seed, (25.0, 25.0, 25.0))) == {"all legs"}
     assert found(setting(seed, (0.0, 30.0, 0.0))) == {"leg 2"}
     assert found(setting(seed, (0.0, 0.0, 0.0))) == set()
+
+
+@pytest.mark.parametrize(
+    "bend", [200.0, 20.0]
+)  # the second is beyond what corrections of straight lines follow
+def test_an_effect_that_bends_is_found_with_its_own_strength(bend: float) -> None:
+    """A strength v shows v + v²/bend along its direction, which a straight line takes for a larger one."""
+    c = setting(2, (0.0, 30.0 + 30.0**2 / bend, 0.0))
+
+    def predict(chosen: Any) -> np.ndarray:
+        lines = [s.rotated(c) @ s.values for s in chosen]
+        return np.sum([v * (1 + np.linalg.norm(v) / bend) for v in lines], axis=0)
+
+    best = searched(c, predict).best
+    assert [s.place.candidate.element for s in best.chosen] == ["leg 2"]
+    (one,) = best.chosen
+    strength = one.by_posterior(best.fit) if bend > 100 else one
+    line = strength.rotated(c) @ strength.values
+    assert np.sign(line @ c.residual) * np.linalg.norm(line) == pytest.approx(30.0, abs=3.0)
 
 
 def test_what_shows_the_same_is_an_equivalent():
@@ -192,7 +213,16 @@ def test_a_number_is_no_effect_that_contains_a_named_one():
     )  # fmt: skip
     lines = (c.free @ both).T
     wide = Place(
-        candidate, (Shape(SimpleNamespace(lines=lambda use: lines[:, use], candidate=candidate), both, 0),)
+        candidate,
+        (
+            Shape(
+                SimpleNamespace(
+                    lines=lambda use: lines[:, use], candidate=candidate, shape=(), sign=np.ones(1)
+                ),
+                both,
+                0,
+            ),
+        ),
     )
     narrow = replace(narrow, wider=(candidate,))
     d = other.shapes[0].directions
