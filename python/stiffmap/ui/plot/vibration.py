@@ -36,14 +36,18 @@ def lobes_figure(
                 s, d, mu, cmap=COLOURS + "_r", vmin=0.5, vmax=1.5, shading="nearest", rasterized=True
             )
             bar = figure.colorbar(filled, ax=ax, extend="both")
-            bar.set_label("largest multiplier of a tooth period")
+            bar.set_label("largest multiplier, above 1: chatter")
             if mu.min() < 1 < mu.max():
                 ax.contour(s, d, mu, levels=[1.0], colors=[BLACK], linewidths=1.4)
-            ax.plot([], [], color=BLACK, lw=1.4, label="border, semi-discretization")
+                ax.plot([], [], color=BLACK, lw=1.4, label="border, semi-discretization")
         zero = np.where(np.isfinite(lobes.limit_zero_order), MM * lobes.limit_zero_order, np.nan)
         ax.plot(s, zero, color=VERMILLION, ls="--", lw=1, label="border, zero order")
         if speed is not None and depth is not None:
-            ax.plot(RPM * speed, MM * depth, "o", mfc="white", mec=BLUE, mew=1.5, label="the process")
+            at = RPM * speed, MM * depth
+            near = np.clip(at[0], s[0], s[-1]), min(at[1], d[-1])
+            beyond = "" if np.allclose(at, near) else ", beyond these axes"
+            ax.plot(*near, "o", mfc="white", mec=BLUE, mew=1.5, clip_on=False, zorder=5,
+                    label=f"the process: {at[0]:.5g} rpm, {at[1]:.3g} mm{beyond}")  # fmt: skip
         ax.margins(0)
         ax.set_xlim(s[0], s[-1])
         ax.set_ylim(0, d[-1])
