@@ -25,11 +25,13 @@ CALLS: dict[str, tuple[str, ...]] = {
     ),
     "map": (
         "map five-bar --points 4 -o m --no-pictures",
+        "map orthoglide-revised --y 0 --plane xz --points 4 -o m --no-pictures",
+        "map orthoglide-revised --x 0 --plane yz --points 4 -o m --no-pictures",
         "map five-bar --points 4 --estimate",
         "map five-bar --points 4 --statistics",
         "map five-bar --toolpath path_flat.csv -o m --no-pictures",
     ),
-    "polar": ("polar five-bar -o p",),
+    "polar": ("polar five-bar -o p", "polar tripteron --at 300,400,500 --plane xz -o p"),
     "wrench": (
         "wrench orthoglide-revised --by 0.1,0,0",
         "wrench five-bar --by 0.1,0,0",
@@ -39,6 +41,8 @@ CALLS: dict[str, tuple[str, ...]] = {
     "sweep": (
         "sweep orthoglide-revised --direction 1,0,0",
         "sweep orthoglide-revised --direction 1,0,0 --to 500 --points 4",
+        "sweep orthoglide-revised --from 0 --to 500 --points 4",
+        "sweep linear-delta --direction 0,0,-1 --control displacement --limit 20",
     ),
     "measures": (
         "measures five-bar --nodes 3 --coarse 3",
@@ -69,16 +73,24 @@ CALLS: dict[str, tuple[str, ...]] = {
     "plan": (
         "plan orthoglide-revised --identify 'compliance actuator x scale=1' --rows 4 --poses 8",
         "plan examples/taps/kr210.yaml --taps 2 --poses 4",
+        "plan orthoglide-revised --identify 'compliance actuator scale=1' --until 0.05 --twin 'compliance actuator scale=1.4'",
+        "plan orthoglide-revised --identify 'dead_zone actuator y half_width=10um' --rival 'compliance actuator y scale=1.2'",
     ),
     "monitor": ("monitor orthoglide-revised january june --effect 'dead_zone actuator y half_width=10um'",),
     "compensate": (
         "compensate orthoglide-revised poses.csv",
         "compensate travelling-column --axis z -o z.csv",
+        "compensate results/map.nc --case Fx --axis x --format siemens -o x.mpf",
+        "compensate calibrated_arm.yaml --urdf arm.urdf -o corrected.urdf",
+        "compensate corrected.yaml --check held_out",
+        "compensate ur10 --effect 'zero_offset elbow error=1mrad' --dh arm.csv",
     ),
     "mill": ("mill orthoglide-revised outline.ngc --process trimming -o mil",),
     "bench": ("bench --rounds 1",),
     "process": ("process forces.csv --process slot -o process.yaml", "process signals.csv"),
-    "lobes": ("lobes linear-delta --process slot --mode 1243,6.2,0.048,x --mode 1747,2.9,0.1,y",),
+    "lobes": (
+        "lobes linear-delta --process slot --mode 1243,6.2,0.048,x --mode 1747,2.9,0.1,y --points 4,3",
+    ),
     "taps": ("taps examples/taps/kr210.yaml examples/taps/taps.csv --only compliance",),
     "view": ("view five-bar --html v.html",),
 }
@@ -94,6 +106,7 @@ COSTLY = {
     "monitor",
     "measures",
     "taps",
+    "lobes",
 }
 """Left to the examples of their help."""
 MAPS: dict[str, tuple[str, ...]] = {

@@ -172,10 +172,9 @@ def test_lengths_from_a_millimetre_on_are_in_millimetres(model: Model) -> None:
     found = model.moment.plane(11)
     assert "deflection under this load, mm: 0.5 to 2.5 mm" in colour_bar(found, (500.0, 2500.0), 1e-3)
     assert ">1.5</text>" in colour_bar(found, (500.0, 2500.0), 1e-3)
-    soft = Model(model.declared, replace(model.state, force=(0.0, 0.0, -30000.0)))
+    soft = Model(model.declared, replace(model.state, force=(0.0, 0.0, -3000.0)))
     d = 1e3 * float(np.linalg.norm(soft.moment.solve().displacement[:3]))
     assert d > 1 and probe_text(soft.moment, soft.state.position).endswith(f": {d:.5g} mm")
-    assert any("deflection under this load, mm" in ax.get_xlabel() for ax in view_figure(soft.moment).axes)
 
 
 def test_the_colour_bar_says_how_many_poses_are_hatched(model: Model) -> None:
