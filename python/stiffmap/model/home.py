@@ -11,7 +11,7 @@ from stiffmap.model.description import MachineDescription
 ENOUGH = 1e-9  # m, rad; below it, a gap is round-off
 ADVICE = (
     "correct the dimensions or the home coordinates, which must close within 5 % of the machine's size; "
-    "with 'solve: true' under home they are a first guess only"
+    "with 'solve: true' in the home at the top of the file they are a first guess only"
 )
 
 

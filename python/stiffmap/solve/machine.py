@@ -103,7 +103,10 @@ class Machine:
     def workspace(self) -> Floats:
         """(2, 3) m: lowest and highest corner of the workspace box."""
         if self._description.workspace is None:
-            raise StiffmapError(f"{self.name}: the machine file declares no workspace box")
+            raise StiffmapError(
+                f"{self.name}: the machine file declares no workspace box; write one into it, such as "
+                "workspace: {x: [-100, 100], y: [-100, 100], z: [0, 200]}"
+            )
         return np.array(self._description.workspace)
 
     @spelled_out(SolveKeywords)

@@ -93,7 +93,7 @@ title: {title}
 source: "made by stiffmap new --from {self.name}: {dims} (mm; drives in N/µm or kN·m/rad); replace what you know better"
 units: {{length: mm, force: N, angle: deg, mass: kg}}
 
-home: {{translation: [{", ".join(home)}]}}
+home: {{translation: [{", ".join(home)}], solve: true}}
 {f"task: {task}{chr(10)}" if task else ""}workspace: {{{", ".join(sides)}}}
 
 materials:

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 from rich.text import Text
 
-from stiffmap.model.home import gap_text
+from stiffmap.model.home import ENOUGH, gap_text
 from stiffmap.solve.advice import advice
 from stiffmap.solve.check import FileCheck, check_file
 from stiffmap.solve.machine import Machine
@@ -49,7 +49,8 @@ def _lines(result: FileCheck) -> Iterator[str | Text]:
     trial = tried(Machine(machine))
     yield Text.assemble((machine.name, "bold"), f"  {machine.title}")
     yield "  " + ", ".join(f"{n} {sort}" for sort, n in result.counts.items() if n)
-    yield f"  home as written is open at {gap_text(machine, result.gaps)}"
+    if any(max(g[1:]) > ENOUGH for g in result.gaps):
+        yield f"  home as written is open at {gap_text(machine, result.gaps)}"
     for change in sorted(result.changes, key=lambda c: -abs(c.closed - c.declared))[:MOST_CHANGES]:
         yield f"  home, closed: {change.text(machine)}"
     if len(result.changes) > MOST_CHANGES:

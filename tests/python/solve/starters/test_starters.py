@@ -230,3 +230,12 @@ def test_dimensions_are_options() -> None:
 def test_dimensions_need_a_class(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["new", str(tmp_path / "m.yaml"), "--radius", "300"]) == 2
     assert "--radius: only with --from" in capsys.readouterr().err
+
+
+def test_a_length_that_is_changed_by_hand_moves_the_home_coordinates() -> None:
+    """The starter says ``solve: true``: its home coordinates are a first guess."""
+    text = machine_text("3-rrr", "mine", {})
+    longer = text.replace("translation: [200, 0, 0]", "translation: [220, 0, 0]")
+    assert longer.count("220") == 1 and longer != text
+    machine = sm.load_machine(longer)
+    assert machine.solve(machine.description.home.p, [100.0, 0, 0, 0, 0, 0]).ok
