@@ -17,7 +17,7 @@ ORTHOGLIDE = ["--process", "trimming", "--at", "50,50,0"]
 
 def test_outline_to_report_and_program(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     source = tmp_path / "outline.ngc"
-    source.write_text(outline_text("washbasin"))
+    source.write_text(outline_text("washbasin", feed=0.08))
     out = tmp_path / "result"
     code = main(
         [
@@ -41,6 +41,9 @@ def test_outline_to_report_and_program(tmp_path: Path, capsys: pytest.CaptureFix
     assert said["mirror_leaves_mm"]["largest"] > 2 * after["largest"]
     page = (out / "report.html").read_text()
     assert said["verdict"] in page
+    force = [f"{said['force_N'][k]:.3g}" for k in ("least", "largest")]
+    assert f"Along the path as simulated: feed 4.8 m/min, force {force[0]} to {force[1]} N." in page
+    assert "At the process file&#39;s own feed (6 m/min), speed and cut the mean force would be" in page
     assert page.count("data:image/png") == 3
     assert "http" not in page.replace("http://www.w3.org", "")
     program = load_path(out / "compensated.ngc")
