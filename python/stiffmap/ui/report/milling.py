@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from stiffmap.common.outputs import make_folder, write_rows, write_text
-from stiffmap.machining.milling.choices import Choices
+from stiffmap.machining.milling.choices import Choices, part_lies
 from stiffmap.machining.milling.job import Milled
 from stiffmap.machining.milling.limits import outside
 from stiffmap.machining.milling.placement import Placements
@@ -42,6 +42,7 @@ def summary(found: Milled) -> dict[str, object]:
         "length_mm": float(1e3 * job.points.way[-1]),
         "time_s": float(np.sum(np.diff(job.points.way) / job.feed[1:])),
         "verdict": verdict(ds),
+        "part_lies": part_lies(job),
         "stability": _stability(found),
         "statuses": {
             s.name: int((ds.status.values == s).sum()) for s in Status if (ds.status.values == s).any()
@@ -202,7 +203,7 @@ def _sheet(found: Milled) -> Sheet:
         f"The compensated program has {found.program.pieces} cutting moves; it was read back and simulated with the force "
         "evaluated anew at the true distance from the wall.",
     ]
-    lines += [w.text for w in found.warnings]
+    lines += [*filter(None, [s["part_lies"]]), *(w.text for w in found.warnings)]
     if (f := found.feeds) is not None:
         over = int((~f.held).sum())
         kept = (

@@ -41,6 +41,7 @@ def test_outline_to_report_and_program(tmp_path: Path, capsys: pytest.CaptureFix
     assert said["mirror_leaves_mm"]["largest"] > 2 * after["largest"]
     page = (out / "report.html").read_text()
     assert said["verdict"] in page
+    assert said["part_lies"].split("`")[0] in page
     force = [f"{said['force_N'][k]:.3g}" for k in ("least", "largest")]
     assert f"Along the path as simulated: feed 4.8 m/min, force {force[0]} to {force[1]} N." in page
     assert "At the process file&#39;s own feed (6 m/min), speed and cut the mean force would be" in page
@@ -58,7 +59,12 @@ def test_findings_and_errors(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     assert main(["mill", *small, "--tolerance", "0.000001", "--step", "5"]) == 1
     assert "beyond it compensated" in capsys.readouterr().out
     assert main(["mill", *small]) == 0
-    assert "warnings" not in capsys.readouterr().out
+    out = capsys.readouterr().out
+    assert "warnings" not in out
+    assert (
+        "part_lies: Seen from the spindle the outline is travelled clockwise; in a climb cut the part lies inside it."
+        in out
+    )
     assert main(["mill", *small[:-2]]) == 1  # at the machine's home its drives are too weak
     assert "The drive effort is broken at 12 of" in capsys.readouterr().out
     assert (
