@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.python.machining.milling.gantry import gantry
 
 import stiffmap as sm
-from stiffmap.machining.toolpath import load_path, outline_text
+from stiffmap.machining.milling import mill_job
+from stiffmap.machining.toolpath import load_path, outline, outline_text
 from stiffmap.ui.cli import main
+from stiffmap.ui.plot.milling import outline_figure
 
 ORTHOGLIDE = ["--process", "trimming", "--at", "50,50,0"]
 
@@ -87,6 +91,39 @@ def test_findings_and_errors(tmp_path: Path, capsys: pytest.CaptureFixture[str])
         said = capsys.readouterr()
         assert message in said.err
         assert len(said.err.splitlines()) == 1
+
+
+@pytest.mark.parametrize(("side", "corner"), [("climb", "outside"), ("conventional", "inside")])
+def test_the_picture_of_an_outline_has_true_corners(side: str, corner: str) -> None:
+    process = sm.load_process("trimming")
+    process = replace(process, cut=replace(process.cut, side=side))
+    square = outline("rectangle", (0.08, 0.06, 0.0))  # clockwise
+    figure = outline_figure(mill_job(gantry(), square, process, at=(0, 0, 0), step=5e-3))
+    ax = figure.axes[0]
+    wanted, compensated = ax.lines
+    assert [wanted.get_label(), compensated.get_label()] == ["wanted", "compensated"]
+    half = np.array([40.0, 30.0]) + (-6 if corner == "outside" else 6)
+    x, y = np.abs(np.asarray(wanted.get_xydata()).T)
+    assert np.max([x, y], axis=1) == pytest.approx(half)
+    if corner == "outside":  # all on the walls, and the four corners themselves
+        assert np.minimum(np.abs(x - half[0]), np.abs(y - half[1])) == pytest.approx(0, abs=1e-9)
+        assert np.any(np.hypot(x - half[0], y - half[1]) < 1e-9)
+    else:  # the tool's rounding of 6 mm
+        round_ = (x > 40 + 1e-6) & (y > 30 + 1e-6)
+        assert np.hypot(x - 40, y - 30)[round_] == pytest.approx(6)
+        assert round_.sum() > 4 * 10
+    assert (np.isnan(np.asarray(compensated.get_xydata())).any(axis=1)).sum() >= 4  # no line across a corner
+
+
+def test_the_picture_has_no_line_between_cuts(tmp_path: Path) -> None:
+    file = tmp_path / "two.ngc"
+    lift = "G0 Z5\nX0 Y20\nG1 Z0"
+    file.write_text(f"G21 G90 G17 G94\nS12000 M3\nG0 X0 Y0 Z5\nG1 Z0 F1000\nX30\n{lift}\nX30\nG0 Z5\nM2\n")
+    found = mill_job(gantry(), file, "trimming", at=(0, 0, 0), step=5e-3)
+    for line in outline_figure(found).axes[0].lines:
+        y = np.asarray(line.get_ydata())
+        assert np.nanmax(np.abs(np.diff(y))) < 1
+        assert np.nanmax(y) - np.nanmin(y) > 19
 
 
 def test_python_does_what_the_command_does(capsys: pytest.CaptureFixture[str]) -> None:
