@@ -157,3 +157,11 @@ def test_python_turns_the_tool_of_an_arm() -> None:
     assert float(abs(turned.error_normal).max()) <= float(abs(fixed.error_normal).max()) * (1 + 1e-6)
     with pytest.raises(sm.StiffmapError, match="size, offset"):
         sm.mill("ur10", load_path("circle"), "trimming", size=(0.06,))
+
+
+def test_the_documentation_says_first_what_the_shipped_process_cuts() -> None:
+    text = (Path(__file__).parents[4] / "docs/milling.md").read_text(encoding="utf-8")
+    begin = text[: text.index("## A process")]
+    for word in ("edge", "composite part", "diamond-coated tool"):
+        assert word in sm.load_process("trimming").title
+        assert word in begin
