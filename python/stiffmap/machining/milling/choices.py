@@ -21,6 +21,7 @@ from stiffmap.machining.milling.setting import Setting, setting
 from stiffmap.machining.milling.speed import other_side
 from stiffmap.machining.process import Process, load_process
 from stiffmap.machining.toolpath import Box, Placement, Toolpath, box, load_path, sampled
+from stiffmap.machining.toolpath.engagement import part_side
 from stiffmap.machining.toolpath.entry import entered_at, outline_of, turned_round
 from stiffmap.solve.machine import Machine
 
@@ -153,3 +154,20 @@ def best_entry(job: Setting, threads: int | None = None) -> Entry:
     normal = np.where(np.isfinite(size) & (job.engaged.corner == 0) & job.engaged.wall, normal, np.inf)
     k = int(np.argmin(normal))
     return Entry(float(job.points.way[k]), float(normal[k]), float(normal[0]))
+
+
+def part_lies(job: Setting) -> str | None:
+    """A sentence on which side of a closed outline the part lies, and how to change it; None for slots and other paths."""
+    try:
+        outline_of(job.path)
+    except StiffmapError:
+        return None
+    side, p = job.process.cut.side, job.position - job.position[0]
+    if side == "slot":
+        return None
+    area = float((np.cross(p[:-1], p[1:]) * job.tool[1:]).sum())
+    words = ("outside", "inside") if part_side(job.process) * area < 0 else ("inside", "outside")
+    return (
+        f"Seen from the spindle the outline is travelled {'counter-clockwise' if area > 0 else 'clockwise'}; in a {side} cut the part "
+        f"lies {words[0]} it. If it lies {words[1]}, exchange climb and conventional in the process file (`side` of `cut`)."
+    )

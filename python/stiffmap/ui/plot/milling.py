@@ -18,33 +18,56 @@ from stiffmap.ui.plot.style import BLACK, BLUE, COLOURS, GREEN, MM, TOLERANCE, l
 
 SHARE = 0.08
 """Of the outline's size, that the largest error takes as it is drawn."""
+ROUND = np.arange(1, 20) / 20.5
+"""Shares of the turn of an inside corner, where the wanted wall has the tool's rounding; never the half, where opposite directions cancel."""
 
 
 def outline_figure(found: Milled) -> Figure:
-    """The wanted wall, as it is cut and as the compensated program cuts it; errors magnified as stated, mm, axes of the part."""
+    """The wanted wall, as it is cut and as the compensated program cuts it; errors magnified as stated, mm, axes of the part.
+
+    Points next to sharp outside corners, which have no wall, are left out; the magnified lines end at each corner, all lines between cuts that do not touch.
+    """
     job, ds = found.job, found.dataset
-    side = found.job.process.tool.diameter / 2
-    off = _back(job.off, found)
-    wall = job.points.position - side * off
-    before, after = ds.error_normal.values, ds.error_normal_after.values
-    size = float(np.ptp(wall[:, :2], axis=0).max())
+    off, position, has_wall = _back(job.off, found), job.points.position, job.engaged.wall
+    apart = np.abs(np.diff(position, axis=0)).max(axis=1) > 1e-9
+    turned = np.abs(np.diff(off, axis=0)).max(axis=1) > 1e-6
+    corner = np.flatnonzero((np.diff(job.points.way) < 1e-9) & (apart | turned))
+    after_corner = np.repeat(corner + 1, len(ROUND))
+    one, other = off[corner], off[corner + 1]
+    arc = one[:, None] + ROUND[:, None] * (other - one)[:, None]
+    arc /= np.linalg.norm(arc, axis=2, keepdims=True)
+    # where the walls of an outside corner meet
+    sharp = (one + other) / np.maximum(1 + (one * other).sum(axis=1, keepdims=True), 0.5)
+    between = np.where(has_wall[corner, None, None], arc, sharp[:, None])
+    between[apart[corner]] = np.nan
+    around = np.insert(off, after_corner, between.reshape(-1, 3), axis=0)
+    side = job.process.tool.diameter / 2
+    wanted = np.insert(position, after_corner, position[after_corner], axis=0) - side * around
+    wanted = wanted[np.insert(has_wall, after_corner, True)]
+    before, after = (np.where(has_wall, ds[n], np.nan) for n in ("error_normal", "error_normal_after"))
+    size = float(np.ptp(position[:, :2], axis=0).max())
     factor = max(round_factor(SHARE * size, float(np.nanmax(np.abs(before), initial=0.0))), 1.0)
     unit, scale = length_unit(float(np.nanmax(np.abs(before), initial=0.0)))
+
+    def magnified(error: Floats) -> Floats:
+        wall = position + (factor * error - side)[:, None] * off
+        return np.insert(MM * wall[:, :2], corner + 1, np.nan, axis=0)
+
     with paper(6.4, 4.8, f"Wall of the part; errors drawn {factor:g} times larger") as figure:
         ax: Any = figure.subplots()
-        ax.plot(*(MM * wall[:, :2].T), color=BLACK, lw=1.0, label="wanted")
-        cut = MM * (wall + factor * before[:, None] * off)[:, :2]
-        ax.plot(*cut.T, color="0.7", lw=0.8, label="as it is cut")
+        ax.plot(*(MM * wanted[:, :2].T), color=BLACK, lw=1.0, label="wanted")
+        cut = magnified(before)
         lines = LineCollection(
             [cut[k : k + 2] for k in range(len(cut) - 1)],
-            array=scale * np.abs(before[1:]),
+            array=scale * np.abs(np.insert(before, corner + 1, np.nan)[1:]),
             cmap=COLOURS,
             linewidths=2.2,
         )
         ax.add_collection(lines)
-        compensated = MM * (wall + factor * after[:, None] * off)[:, :2]
-        ax.plot(*compensated.T, color=GREEN, lw=1.0, ls="--", label="compensated")
-        figure.colorbar(lines, ax=ax, shrink=0.7, label=f"size of the error across the wall, {unit}")
+        ax.plot(*magnified(after).T, color=GREEN, lw=1.0, ls="--", label="compensated")
+        figure.colorbar(
+            lines, ax=ax, shrink=0.7, label=f"as it is cut: size of the error across the wall, {unit}"
+        )
         ax.set_aspect("equal")
         ax.autoscale_view()
         ax.set(xlabel="x of the part, mm", ylabel="y of the part, mm")

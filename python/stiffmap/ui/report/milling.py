@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterable
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from stiffmap.common.outputs import make_folder, write_rows, write_text
-from stiffmap.machining.milling.choices import Choices
+from stiffmap.machining.milling.choices import Choices, part_lies
 from stiffmap.machining.milling.job import Milled
 from stiffmap.machining.milling.limits import outside
 from stiffmap.machining.milling.placement import Placements
@@ -41,6 +42,7 @@ def summary(found: Milled) -> dict[str, object]:
         "length_mm": float(1e3 * job.points.way[-1]),
         "time_s": float(np.sum(np.diff(job.points.way) / job.feed[1:])),
         "verdict": verdict(ds),
+        "part_lies": part_lies(job),
         "stability": _stability(found),
         "statuses": {
             s.name: int((ds.status.values == s).sum()) for s in Status if (ds.status.values == s).any()
@@ -176,6 +178,12 @@ def _digests(found: Milled) -> dict[str, str]:
     }
 
 
+def _range(values: Iterable[float]) -> str:
+    """The least and the largest value; one number where they read the same."""
+    numbers = list(values)
+    return " to ".join(dict.fromkeys(f"{v:.3g}" for v in (min(numbers), max(numbers))))
+
+
 def _sheet(found: Milled) -> Sheet:
     job = found.job
     s: dict[str, Any] = summary(found)
@@ -186,14 +194,16 @@ def _sheet(found: Milled) -> Sheet:
     lines = [
         f"{job.path.name} on {job.machine.name}: {s['length_mm']:.0f} mm of cut, {s['time_s']:.1f} s, part at "
         f"({', '.join(f'{v:.1f}' for v in s['at_mm'])}) mm, turned by {s['turn_deg']:.1f} deg.",
-        f"Process {p.name}: {p.cut.side} cut, {1e3 * p.cut.axial:g} mm deep, {60 * p.feed:.3g} m/min; mean force {mean} N along the "
-        f"feed, to its left, along the tool; {force.power:.0f} W at the spindle.",
+        f"Process {p.name}: {p.cut.side} cut, {1e3 * p.cut.axial:g} mm deep. Along the path as simulated: feed "
+        f"{_range(60 * job.feed)} m/min, force {_range(s['force_N'].values())} N.",
+        f"At the process file's own feed ({60 * p.feed:.3g} m/min), speed and cut the mean force would be {mean} N along the feed, "
+        f"to its left, along the tool, with {force.power:.0f} W at the spindle.",
         f"Error across the wall: positive where material stays on the part. Loop gain kp/k up to {gain:.3g}: "
         f"one mirrored program would leave {s['mirror_leaves_mm']['largest']:.4f} mm.",
         f"The compensated program has {found.program.pieces} cutting moves; it was read back and simulated with the force "
         "evaluated anew at the true distance from the wall.",
     ]
-    lines += [w.text for w in found.warnings]
+    lines += [*filter(None, [s["part_lies"]]), *(w.text for w in found.warnings)]
     if (f := found.feeds) is not None:
         over = int((~f.held).sum())
         kept = (

@@ -13,6 +13,7 @@ from tests.python.machining.milling.gantry import gantry
 import stiffmap as sm
 from stiffmap.common.errors import StiffmapError
 from stiffmap.machining.milling import mill, mill_job
+from stiffmap.machining.milling.choices import choices, part_lies
 from stiffmap.machining.milling.equilibrium import equilibrium
 from stiffmap.machining.milling.limits import drive_speeds
 from stiffmap.machining.milling.placement import Search, placements
@@ -54,6 +55,36 @@ def test_dynamic_programming_is_exhaustive_search(seed: int, largest: bool) -> N
     else:
         assert found is not None
         assert cost(tuple(found)) == pytest.approx(best)
+
+
+@pytest.mark.parametrize("turn", [0.0, 2.0])
+@pytest.mark.parametrize("reverse", [True, False])
+@pytest.mark.parametrize(
+    ("name", "way", "other", "climb"), [("circle", "clockwise", "counter-clockwise", "inside"), ("pocket", "counter-clockwise", "clockwise", "outside")]
+)  # fmt: skip
+def test_where_the_part_lies_is_said(
+    name: str, way: str, other: str, climb: str, reverse: bool, turn: float
+) -> None:
+    places = {"inside", "outside"}
+    for process in (PROCESS, other_side(PROCESS)):
+        c = choices(
+            gantry(), name, process, turn=turn, reverse=reverse, step=0.01, thickness=None, threads=1
+        )  # fmt: skip
+        job = setting(gantry(), c.path, c.process, sampled(c.path, 0.01), c.place)
+        said = part_lies(job)
+        assert said is not None
+        assert f"is travelled {other if reverse else way}; in a {c.process.cut.side} cut" in said
+        (here,) = {climb} if process is PROCESS else places - {climb}
+        assert f"the part lies {here} it. If it lies {(places - {here}).pop()}, exchange" in said
+        reach = np.linalg.norm((job.position - job.off)[:, :2] - job.place.at[:2], axis=1).min()
+        assert (reach < 1) == (here == "inside")  # from the path a metre to the part
+
+
+def test_of_other_paths_no_side_is_said() -> None:
+    for path, process in ((path_of([[0, 0, 0], [0.1, 0, 0]]), "trimming"), (outline("circle"), "slot")):
+        cut = sm.load_process(process)
+        job = setting(gantry(), path, cut, sampled(path, 0.01), path.placed())
+        assert part_lies(job) is None
 
 
 def arm_job(step: float = 0.02) -> Setting:

@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.python.machining.milling.gantry import gantry
 
 import stiffmap as sm
-from stiffmap.machining.toolpath import load_path, outline_text
+from stiffmap.machining.milling import mill_job
+from stiffmap.machining.toolpath import load_path, outline, outline_text
 from stiffmap.ui.cli import main
+from stiffmap.ui.plot.milling import outline_figure
 
 ORTHOGLIDE = ["--process", "trimming", "--at", "50,50,0"]
 
 
 def test_outline_to_report_and_program(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     source = tmp_path / "outline.ngc"
-    source.write_text(outline_text("washbasin"))
+    source.write_text(outline_text("washbasin", feed=0.08))
     out = tmp_path / "result"
     code = main(
         [
@@ -41,6 +45,10 @@ def test_outline_to_report_and_program(tmp_path: Path, capsys: pytest.CaptureFix
     assert said["mirror_leaves_mm"]["largest"] > 2 * after["largest"]
     page = (out / "report.html").read_text()
     assert said["verdict"] in page
+    assert said["part_lies"].split("`")[0] in page
+    force = [f"{said['force_N'][k]:.3g}" for k in ("least", "largest")]
+    assert f"Along the path as simulated: feed 4.8 m/min, force {force[0]} to {force[1]} N." in page
+    assert "At the process file&#39;s own feed (6 m/min), speed and cut the mean force would be" in page
     assert page.count("data:image/png") == 3
     assert "http" not in page.replace("http://www.w3.org", "")
     program = load_path(out / "compensated.ngc")
@@ -55,7 +63,12 @@ def test_findings_and_errors(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     assert main(["mill", *small, "--tolerance", "0.000001", "--step", "5"]) == 1
     assert "beyond it compensated" in capsys.readouterr().out
     assert main(["mill", *small]) == 0
-    assert "warnings" not in capsys.readouterr().out
+    out = capsys.readouterr().out
+    assert "warnings" not in out
+    assert (
+        "part_lies: Seen from the spindle the outline is travelled clockwise; in a climb cut the part lies inside it."
+        in out
+    )
     assert main(["mill", *small[:-2]]) == 1  # at the machine's home its drives are too weak
     assert "The drive effort is broken at 12 of" in capsys.readouterr().out
     assert (
@@ -78,6 +91,39 @@ def test_findings_and_errors(tmp_path: Path, capsys: pytest.CaptureFixture[str])
         said = capsys.readouterr()
         assert message in said.err
         assert len(said.err.splitlines()) == 1
+
+
+@pytest.mark.parametrize(("side", "corner"), [("climb", "outside"), ("conventional", "inside")])
+def test_the_picture_of_an_outline_has_true_corners(side: str, corner: str) -> None:
+    process = sm.load_process("trimming")
+    process = replace(process, cut=replace(process.cut, side=side))
+    square = outline("rectangle", (0.08, 0.06, 0.0))  # clockwise
+    figure = outline_figure(mill_job(gantry(), square, process, at=(0, 0, 0), step=5e-3))
+    ax = figure.axes[0]
+    wanted, compensated = ax.lines
+    assert [wanted.get_label(), compensated.get_label()] == ["wanted", "compensated"]
+    half = np.array([40.0, 30.0]) + (-6 if corner == "outside" else 6)
+    x, y = np.abs(np.asarray(wanted.get_xydata()).T)
+    assert np.max([x, y], axis=1) == pytest.approx(half)
+    if corner == "outside":  # all on the walls, and the four corners themselves
+        assert np.minimum(np.abs(x - half[0]), np.abs(y - half[1])) == pytest.approx(0, abs=1e-9)
+        assert np.any(np.hypot(x - half[0], y - half[1]) < 1e-9)
+    else:  # the tool's rounding of 6 mm
+        round_ = (x > 40 + 1e-6) & (y > 30 + 1e-6)
+        assert np.hypot(x - 40, y - 30)[round_] == pytest.approx(6)
+        assert round_.sum() > 4 * 10
+    assert (np.isnan(np.asarray(compensated.get_xydata())).any(axis=1)).sum() >= 4  # no line across a corner
+
+
+def test_the_picture_has_no_line_between_cuts(tmp_path: Path) -> None:
+    file = tmp_path / "two.ngc"
+    lift = "G0 Z5\nX0 Y20\nG1 Z0"
+    file.write_text(f"G21 G90 G17 G94\nS12000 M3\nG0 X0 Y0 Z5\nG1 Z0 F1000\nX30\n{lift}\nX30\nG0 Z5\nM2\n")
+    found = mill_job(gantry(), file, "trimming", at=(0, 0, 0), step=5e-3)
+    for line in outline_figure(found).axes[0].lines:
+        y = np.asarray(line.get_ydata())
+        assert np.nanmax(np.abs(np.diff(y))) < 1
+        assert np.nanmax(y) - np.nanmin(y) > 19
 
 
 def test_python_does_what_the_command_does(capsys: pytest.CaptureFixture[str]) -> None:
@@ -111,3 +157,11 @@ def test_python_turns_the_tool_of_an_arm() -> None:
     assert float(abs(turned.error_normal).max()) <= float(abs(fixed.error_normal).max()) * (1 + 1e-6)
     with pytest.raises(sm.StiffmapError, match="size, offset"):
         sm.mill("ur10", load_path("circle"), "trimming", size=(0.06,))
+
+
+def test_the_documentation_says_first_what_the_shipped_process_cuts() -> None:
+    text = (Path(__file__).parents[4] / "docs/milling.md").read_text(encoding="utf-8")
+    begin = text[: text.index("## A process")]
+    for word in ("edge", "composite part", "diamond-coated tool"):
+        assert word in sm.load_process("trimming").title
+        assert word in begin
