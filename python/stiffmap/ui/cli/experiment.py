@@ -173,7 +173,8 @@ def _told(table: FromTable, words: Sequence[str]) -> Iterator[Any]:
         head, rows = experiment_rows(made)
     yield table_of("the first rows, as understood", head, rows, padding=(0, 1, 0, 0))
     poses = int(made.groups.max()) + 1
-    yield f"{table.folder}: {len(made)} rows of {made.quantity} at {poses} poses; reads {', '.join(made.axes)}"
+    read = [p if (p := c.replace("d", "p", 1)) in found.header else c for c in made.axes]
+    yield f"{table.folder}: {len(made)} rows of {made.quantity} at {poses} poses; reads {', '.join(read)}"
     declared = np.all(~made.read | (made.sigma > 0), axis=0)
     each = zip(made.channels, declared, made.axis_read, strict=True)
     silent = [c.name for c, known, read in each if read and not known]
@@ -182,7 +183,8 @@ def _told(table: FromTable, words: Sequence[str]) -> Iterator[Any]:
     then = f"stiffmap residual {table.machine} {table.folder}"
     if lost := unknown(made):  # which no command would take
         again = ["stiffmap", *words, *(() if "--overwrite" in words else ["--overwrite"])]
-        units = {c: found.units.get(c, found.units.get(c.replace("d", "p", 1), "mm")) for c in lost}
+        own = {c for c in lost if {c, c.replace("d", "p", 1)} & found.factors.keys()}
+        units = {c: "the unit of the sheet" if c in own else found.units.get(c, "mm") for c in lost}
         then = " ".join([shlex.join(again), *(f"--noise {c}=<one sigma in {u}>" for c, u in units.items())])
     yield Text.assemble("next: ", (then, "cyan"))
 
