@@ -14,6 +14,8 @@ from stiffmap.experiment.experiment import Experiment, Floats
 
 Mask = NDArray[np.bool_]
 CONTRADICTION = 1e-4
+ENOUGH = 5
+"""Degrees of freedom of repeats that show the noise without a declaration."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,13 +63,21 @@ def noise_of(experiment: Experiment, keep: Mask | None = None) -> Noise:
         ratio = squares / declared**2
         lower = chi2.cdf(ratio, np.maximum(freedom, 1))
     p = np.where((freedom > 0) & (declared > 0), 2 * np.minimum(lower, 1 - lower), np.nan)
-    floor = np.fmax(declared, np.where(freedom >= 5, repeats, np.nan))
+    floor = np.fmax(declared, np.where(freedom >= ENOUGH, repeats, np.nan))
     _check(experiment, floor)
     factor = np.where(declared > 0, floor / np.where(declared > 0, declared, 1.0), np.nan)
     sigma = np.where(experiment.sigma > 0, experiment.sigma * factor, floor)
     return Noise(
         experiment.channels, declared, repeats, freedom, p, floor, np.where(experiment.read, sigma, np.nan)
     )
+
+
+def unknown(experiment: Experiment) -> list[str]:
+    """Channels of which neither a declaration nor repeats say how sure they are: `noise_of` refuses them."""
+    e = experiment
+    declared = _mean(e.sigma**2) > 0
+    known = declared | (_within(e, np.ones(len(e), bool))[1] >= ENOUGH)
+    return [c.name for c, k, read in zip(e.channels, known, e.axis_read, strict=True) if read and not k]
 
 
 LOUD = 10.0
@@ -147,5 +157,5 @@ def _check(experiment: Experiment, floor: Floats) -> None:
     if wrong:
         raise StiffmapError(
             f"{experiment.name}: the noise of {', '.join(wrong)} is zero or unknown; declare it (noise: in "
-            "experiment.yaml) or repeat readings at 5 or more conditions"
+            f"experiment.yaml) or repeat readings at {ENOUGH} or more conditions"
         )

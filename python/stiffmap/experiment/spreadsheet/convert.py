@@ -78,7 +78,7 @@ def understand(
         columns = [replace(c, meaning="note") if c.meaning in POSE else c for c in columns]
         used = [c for c in columns if c.meaning != "note"]
         known |= set(POSE)
-    _ask(sheet, known)
+    _ask(sheet, known, bool(drives))
     beside = _beside(sheet, columns)
     plain = (*WORDS, *COUNTED, *drives)
     found = {c.meaning: _unit(sheet, c, units, beside) for c in used if c.meaning not in plain}
@@ -100,7 +100,7 @@ def understand(
     )
 
 
-def _ask(sheet: Sheet, known_: set[str]) -> None:
+def _ask(sheet: Sheet, known_: set[str], joints: bool) -> None:
     lost = [a for a in POSE if a not in known_]
     if lost:
         _ask_column(
@@ -110,9 +110,10 @@ def _ask(sheet: Sheet, known_: set[str]) -> None:
             lost[0],
         )
     if not known_ & set(READINGS):
+        places = "--map px='HEADER' (py, pz) for measured positions; of differences " if joints else ""
         _ask_column(
             sheet,
-            "which column is a reading? Say --map dx='HEADER' (dy, dz, rx, ry, rz), several headers with | between them for "
+            f"which column is a reading? Say {places}--map dx='HEADER' (dy, dz, rx, ry, rz), several headers with | between them for "
             "repeats, or length='HEADER'; where a ball stood in one socket, --set px=0 --set py=0 --set pz=0",
             "reading",
         )

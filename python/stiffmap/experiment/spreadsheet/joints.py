@@ -15,10 +15,12 @@ from stiffmap.common.units import unit_of
 from stiffmap.experiment.channels import AXES
 from stiffmap.experiment.files.fields import SEEN
 from stiffmap.experiment.spreadsheet.answers import Meant
-from stiffmap.experiment.spreadsheet.guess import Column, find_column, guess
+from stiffmap.experiment.spreadsheet.guess import READINGS, Column, find_column, guess
 from stiffmap.solve.machine import Machine
 
 NUMBERED = r"(joint|axis|achse|gelenk|theta|q|j|a)[ _.-]?{}"
+MEASURED = r"([xyz])[ _.-]?meas(?:ured|\.)?"
+"""A header of a measured position, next to joints."""
 MOST_TURNS = 4.0 * math.pi
 """Of a joint; larger numbers are degrees."""
 DIFFERENCES = ("actual-minus-target", "target-minus-actual")
@@ -98,13 +100,19 @@ def as_seen(m: Meant, difference: str) -> None:
     """What was read as places in the instrument's own frame, where the table has them: frame, and place of the reflector on the
     tool, are then unknown.
 
-    Places are columns `px py pz`, or targets and differences side by side; `x y z` alone with joints are asked for.
+    Places are columns `px py pz`, or, where nothing else is a reading, `X meas`; or targets and differences side by side; `x y z`
+    alone with joints are asked for.
     """
     header = m.sheet.header
+    columns = guess(header, m.chosen)
+    if not any(k.meaning in READINGS for k in columns):
+        for k in columns:
+            if k.meaning == "note" and (found := re.fullmatch(MEASURED, k.name.lower())):
+                m.chosen[f"p{found[1]}"] = [header[k.index]]
     of = {k.meaning: k for k in guess(header, m.chosen) if k.repeat == 0}
     if any(s in of for s in SEEN):
         for s in SEEN:
-            if s in of:
+            if s in of and _said(m, of[s]) != "mm":
                 _in_mm(m, s, [(1.0, of[s])])
     elif "ll" in of:  # a wire's end sits somewhere on the tool; x y z are the controller's
         m.head, m.placed = {"tool": "offset_unknown"}, True
@@ -144,7 +152,11 @@ def turned(m: Meant, difference: str) -> None:
 def _in_mm(m: Meant, meaning: str, parts: Sequence[tuple[float, Column]]) -> None:
     total = np.zeros(len(m.sheet.lines))
     for sign, column in parts:
-        said = m.units.get(column.meaning, column.unit) or m.units.get("length", "")
-        size = m.sheet.size(column.index, column.meaning, "length", said)
+        size = m.sheet.size(column.index, column.meaning, "length", _said(m, column))
         total = total + sign * 1e3 * size * m.sheet.numbers(column.index)
-    m.add(f"{meaning} [mm]", total, meaning)
+    m.add(f"{meaning} of {' and '.join(column.name for _, column in parts)} [mm]", total, meaning)
+
+
+def _said(m: Meant, column: Column) -> str:
+    """The unit of a length, as it is said; empty where it is not."""
+    return m.units.get(column.meaning, column.unit) or m.units.get("length", "")

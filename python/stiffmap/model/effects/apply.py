@@ -31,7 +31,7 @@ def add_effect(
         Name of the element in the machine file (``actuator``, ``bar`` …), or ``machine``, ``base``,
         ``platform``; may be left out where only one is possible.
     legs
-        Names of the legs; left out: all that have the element.
+        Names of the legs, or the name of one; left out: all that have the element.
     parameters
         In SI units, and options in words.
 

@@ -55,7 +55,7 @@ def place_of(
     having = {leg for name, at in places for leg in at if name == element}
     order = [leg.name for leg in machine.legs]
     if isinstance(legs, str):
-        raise StiffmapError(f"{effect.kind}: legs: expected a list of leg names, got the text {legs!r}")
+        legs = (legs,)
     for leg in legs or ():
         if leg not in having:
             there = ", ".join(n for n in order if n in having) or "none"

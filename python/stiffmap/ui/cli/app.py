@@ -44,7 +44,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = joined(_words() if arguments is None else arguments)
     try:
         with plain_streams(), one_command():
-            build_command(given)(args=given, prog_name="stiffmap")
+            build_command(given)(args=given, prog_name="stiffmap", obj=tuple(given))
     except StiffmapError as error:
         for problem in error.problems if isinstance(error, FileErrors) else (error,):
             print(f"stiffmap: {one_line(problem)}", file=sys.stderr)

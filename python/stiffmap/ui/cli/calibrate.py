@@ -53,7 +53,11 @@ def command(
     )
     if output is not None:
         write(result, output)
-    print(result.to_json() if as_json else "\n".join([*result.lines(), "", *result.table(rows)]))
+    table = result.table(rows)
+    more = len(result.rows) - (len(table) - 1)
+    if more:
+        table.append(f"… {more} more, which the readings determine less well (--rows {len(result.rows)})")
+    print(result.to_json() if as_json else "\n".join([*result.lines(), "", *table]))
     finish(result.verdict not in ("as declared", "adjusted within tolerance"))
 
 

@@ -188,4 +188,5 @@ def _geometry(m: Machine, urdf: Path | None, dh: Path | None, output: Path | Non
         left = write_dh(m, dh)
     if urdf is not None and output is not None:
         left = write_urdf(m, urdf, output)
-    return {"not in the geometry": "; ".join(left) or "nothing"}
+    files = [str(f) for f in (dh, output if urdf is not None else None) if f is not None]
+    return {"file": ", ".join(files), "not in the geometry": "; ".join(left) or "nothing"}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterator, Sequence
 from itertools import islice
 from pathlib import Path
@@ -14,6 +15,7 @@ from rich.text import Text
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import number_in
 from stiffmap.common.outputs.option import written
+from stiffmap.experiment.noise.level import unknown
 from stiffmap.experiment.spreadsheet.from_table import FromTable, experiment_from_table
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import pairs
@@ -22,6 +24,7 @@ from stiffmap.ui.cli.output import table as table_of
 
 
 def command(
+    context: typer.Context,
     action: Annotated[str, typer.Argument(help="new: make a folder from a spreadsheet.")],
     file: Annotated[
         Path, typer.Argument(help="Spreadsheet: .xlsx, .csv, .txt (any separator and decimal sign).")
@@ -102,7 +105,7 @@ def command(
 
     Examples:
 
-      [cyan]stiffmap experiment new readings.xlsx --machine five-bar -o readings[/cyan]
+      [cyan]stiffmap experiment new readings.xlsx --machine five-bar --noise dx=1 --noise dy=1 -o readings[/cyan]
 
       [cyan]stiffmap experiment new points.csv --instrument tracker --machine hexapod --noise dx=0.01 -o points[/cyan]
 
@@ -126,7 +129,7 @@ def command(
             "columns": {names[c.index]: c.meaning for c in found.columns}, "units": found.units,
             "warnings": made.warnings}  # fmt: skip
     warnings = [Text(f"WARNING: {line}", "bold red") for line in made.warnings]
-    show(as_json, data, [*warnings, *made.remarks, *_told(made)])
+    show(as_json, data, [*warnings, *made.remarks, *_told(made, context.obj)])
 
 
 def _prompt(text: str) -> str:
@@ -138,8 +141,8 @@ def _prompt(text: str) -> str:
         ) from None
 
 
-def _told(table: FromTable) -> Iterator[Any]:
-    """What each column was taken for, the first rows, and what to do next."""
+def _told(table: FromTable, words: Sequence[str]) -> Iterator[Any]:
+    """What each column was taken for, the first rows, and what to do next; `words` are those of this command."""
     found, header, made = table.understood, table.sheet.header, table.experiment
     commands = table.commanded.columns if table.commanded else {}
     for c in found.columns:
@@ -170,13 +173,20 @@ def _told(table: FromTable) -> Iterator[Any]:
         head, rows = experiment_rows(made)
     yield table_of("the first rows, as understood", head, rows, padding=(0, 1, 0, 0))
     poses = int(made.groups.max()) + 1
-    yield f"{table.folder}: {len(made)} rows of {made.quantity} at {poses} poses; reads {', '.join(made.axes)}"
+    read = [p if (p := c.replace("d", "p", 1)) in found.header else c for c in made.axes]
+    yield f"{table.folder}: {len(made)} rows of {made.quantity} at {poses} poses; reads {', '.join(read)}"
     declared = np.all(~made.read | (made.sigma > 0), axis=0)
     each = zip(made.channels, declared, made.axis_read, strict=True)
     silent = [c.name for c, known, read in each if read and not known]
     if silent:
         yield f"no noise of {', '.join(silent)} is declared: repeats must show it (five or more), or say --noise {silent[0]}=…"
-    yield Text.assemble("next: ", (f"stiffmap residual {table.machine} {table.folder}", "cyan"))
+    then = f"stiffmap residual {table.machine} {table.folder}"
+    if lost := unknown(made):  # which no command would take
+        again = ["stiffmap", *words, *(() if "--overwrite" in words else ["--overwrite"])]
+        own = {c for c in lost if {c, c.replace("d", "p", 1)} & found.factors.keys()}
+        units = {c: "the unit of the sheet" if c in own else found.units.get(c, "mm") for c in lost}
+        then = " ".join([shlex.join(again), *(f"--noise {c}=<one sigma in {u}>" for c, u in units.items())])
+    yield Text.assemble("next: ", (then, "cyan"))
 
 
 def _numbers(given: Sequence[str] | None, name: str) -> dict[str, float]:

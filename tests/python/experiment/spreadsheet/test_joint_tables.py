@@ -149,9 +149,39 @@ def test_columns_go_by_name_by_number_or_as_they_are_mapped(
 
 
 @pytest.mark.parametrize(
+    "head", ["X meas [mm],Y meas [mm],Z meas [mm]", "x_measured [mm],y_measured [mm],z_measured [mm]"]
+)
+def test_measured_positions_are_places_and_named_once(
+    head: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    joints = ",".join(f"q{i} [deg]" for i in range(1, 7))
+    text = f"{joints},{head}\n0,-60,90,-120,-90,0,2000,10,-20\n"
+    out = tmp_path / "e"
+    assert (
+        main(["experiment", "new", write(tmp_path, "t.csv", text), "--machine", "ur10", "-o", str(out)]) == 0
+    )
+    told = capsys.readouterr().out
+    assert "notes.csv" not in told and f"'{head.split(',')[0]}': px, mm" in told
+    assert "reads px, py, pz" in told and "--noise dx=<one sigma in mm>" in told
+    e = sm.load_experiment(out)
+    assert e.seen is not None and (e.frame, e.tool) == ("unknown", "unknown")
+    assert e.seen[0] == pytest.approx([2.0, 0.01, -0.02])
+    mapped = [x for a, h in zip("xyz", ("m", "n", "o"), strict=True) for x in ("--map", f"p{a}={h}")]
+    text = f"{joints},m [in],n [in],o [in]\n0,-60,90,-120,-90,0,80,10,-20\n"
+    file = write(tmp_path, "m.csv", text)
+    arguments = ["experiment", "new", file, "--machine", "ur10", "-o", str(out), *mapped]
+    assert main([*arguments, "--overwrite"]) == 0
+    told = capsys.readouterr().out
+    assert "'px of m [mm]': px, mm" in told
+    e = sm.load_experiment(out)
+    assert e.seen is not None and e.seen[0] == pytest.approx([80 * 0.0254, 0.254, -20 * 0.0254])
+
+
+@pytest.mark.parametrize(
     ("head", "more", "asked"),
     [
         ("q1 [deg],q2 [deg],q3 [deg],q4 [deg],q5 [deg],dx [mm]", [], "which column commands arm.wrist_3? Say --map"),
+        ("q1 [deg],q2 [deg],q3 [deg],q4 [deg],q5 [deg],q6 [deg],m,n,o", [], "Say --map px='HEADER' (py, pz) for measured positions"),
         ("q1,q2,q3,q4,q5,q6,dx [mm]", [], "(arm.base) has no unit of angles"),
         ("q1,q2,q3,q4,q5,q6,dx [mm]", ["--unit", "joints=mm"], "has no unit of angles"),
         ("q1 [deg],q2 [deg],q3 [deg],q4 [deg],q5 [deg],q6 [deg],x,y,z", [], "if an instrument read them, say --map px='x'"),

@@ -76,6 +76,22 @@ def test_a_workbook_reads_as_its_text(tmp_path: Path, capsys: pytest.CaptureFixt
     assert "no sheet 'Q'; there are: Sheet" in capsys.readouterr().err
 
 
+def test_the_next_command_is_one_that_is_not_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = "x [mm],y [mm],z [mm],fx [N],dx [um],dy [um]\n0,416,0,10,5,7\n0,420,0,10,5,7\n"
+    file, out = write(tmp_path, "t.csv", text), tmp_path / "e"
+    last = new(capsys, file, out)[1].splitlines()[-1]
+    assert last.startswith("next: stiffmap experiment new") and "--noise dx=<one sigma in um>" in last
+    words = last.replace("<one sigma in um>", "1").split()[2:]
+    assert main(words) == 0
+    last = capsys.readouterr().out.splitlines()[-1]
+    assert last == f"next: stiffmap residual five-bar {out}"
+    assert main(last.split()[2:]) in (0, 1)
+    same = text + "0,420,0,10,5.1,7.1\n" * 5  # repeats show the noise
+    assert "next: stiffmap residual" in new(capsys, write(tmp_path, "r.csv", same), tmp_path / "r")[1]
+
+
 def test_everything_may_be_guessed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     text = "id\tx (mm)\ty (mm)\tz (mm)\tFx (kN)\tdx 1 (µm)\tdx 2 (µm)\tdy 1 (µm)\tdy 2 (µm)\n1\t0\t400\t0\t0.1\t5\t6\t7\t8\n"
     code, out, _ = new(capsys, write(tmp_path, "t.txt", text), tmp_path / "e", "--json")

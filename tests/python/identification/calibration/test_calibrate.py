@@ -149,6 +149,10 @@ def test_at_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     told = json.loads(capsys.readouterr().out)
     assert told["verdict"] == "adjusted within tolerance"
     assert {p.name for p in (tmp_path / "out").iterdir()} == {"calibration.json", "table.txt", "machine.yaml"}
+    assert main(["calibrate", "linear-delta", str(tmp_path / "twin"), "--rows", "3"]) == 0
+    last = capsys.readouterr().out.splitlines()[-1]
+    many = len(told["table"])
+    assert last == f"… {many - 3} more, which the readings determine less well (--rows {many})"
     assert main(["calibrate", "linear-delta", str(tmp_path / "twin"), "--exclude", "wings"]) == 2
     assert "unknown group 'wings'" in capsys.readouterr().err
 

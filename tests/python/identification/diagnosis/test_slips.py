@@ -17,6 +17,7 @@ from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.identification.candidates.plan import plan_of
 from stiffmap.identification.diagnosis.report.findings import Effect
 from stiffmap.identification.diagnosis.report.sentences import aliases, measured, next_step, opening
+from stiffmap.identification.diagnosis.report.wording import effect_text
 from stiffmap.identification.diagnosis.slips import find
 from stiffmap.identification.diagnosis.slips.find import Found, find_slip
 from stiffmap.identification.diagnosis.slips.slip import Slip
@@ -199,6 +200,9 @@ def test_aliases_stand_in_the_headline() -> None:
     assert aliases(replace(effect, aliases=[])) == ""
     made = replace(effect, aliases=[{"kind": "compliance", "element": "actuator", "legs": ["z"]}] * 2)
     assert aliases(made).count("(drive of leg z)") == 1
+    assert effect_text(made).endswith(
+        "(these readings cannot distinguish it from compliance of actuator, leg z)"
+    )
 
 
 @pytest.mark.parametrize(

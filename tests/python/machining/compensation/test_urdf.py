@@ -177,8 +177,12 @@ def test_what_an_origin_cannot_hold_is_said(tmp_path: Path, capsys: pytest.Captu
     ]
     more = ["--effect", "periodic_error q4 amplitude=1mrad period=1rad"]
     assert main([*call, *more, "-o", str(out), "--json"]) == 0
-    said = json.loads(capsys.readouterr().out)["not in the geometry"]
-    assert said == "arm.q1: compliance of the drive; arm.a: compliance; arm.q4: errors along its travel"
+    said = json.loads(capsys.readouterr().out)
+    assert said["file"] == str(out)
+    assert (
+        said["not in the geometry"]
+        == "arm.q1: compliance of the drive; arm.a: compliance; arm.q4: errors along its travel"
+    )
     assert b'rpy="0.1 -1.57 3.14" xyz="' in out.read_bytes()
     for wrong in ([], ["-o", str(file)], ["-o", str(tmp_path / "c.csv"), "poses.csv"]):
         assert main([*call, *wrong]) == 2

@@ -22,7 +22,7 @@ BAD = {
     "no leg 'w' has it; legs that do: x, y, z": {
         "kind": "dead_zone", "element": "actuator", "legs": ["w"], "half_width": 1e-5,
     },
-    "expected a list of leg names": {**GAP, "legs": "y", "half_width": 1e-5},
+    "no leg 'xy' has it; legs that do: x, y, z": {**GAP, "legs": "xy", "half_width": 1e-5},
     "half_width: expected 0 to 0.01 m, got -1e-05": {"kind": "dead_zone", **DRIVE, "half_width": -1e-5},
     "half_width: expected 0 to 0.01 m, got 12": {"kind": "dead_zone", **DRIVE, "half_width": 12},
     "half_width: expected a finite number in m, got nan": {**GAP, "half_width": np.nan},
@@ -58,6 +58,7 @@ def test_effects_that_exclude_each_other(orthoglide, size):
     with pytest.raises(StiffmapError, match=r"exclude each other on actuator, leg y; remove one"):
         machine.with_effect(**DRIVE, **size)
     other = orthoglide.with_effect("dead_zone", element="actuator", legs=["x"], half_width=1e-5)
+    assert other == orthoglide.with_effect("dead_zone", element="actuator", legs="x", half_width=1e-5)
     assert len(other.with_effect(**DRIVE, **size).description.effects) == 2
 
 

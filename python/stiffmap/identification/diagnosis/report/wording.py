@@ -16,7 +16,7 @@ from stiffmap.solve.validity import Validity
 
 DISPLAY_UNITS = {"m": (1e3, "mm"), "m/N": (1e3, "mm/N"), "rad": (1e3, "mrad"), "1/m": (1e-3, "1/mm")}
 LISTED = 5
-"""Steps left out, and numbers, that are named."""
+"""Steps left out, numbers, and what cannot be distinguished from an effect: how many are named."""
 VERDICTS = {
     "none": "no effect above the limits of this experiment",
     "effects": "the declared machine lacks what is named below",
@@ -118,8 +118,10 @@ def effect_text(e: Effect) -> str:
         at, *ends = digits(factor, *numbers)
         text = f"{name} {at} [{', '.join(ends)}]"
         values.append(text if label == "1" else f"{text} {label}")
-    n = len(e.aliases)
-    same = f" (these readings cannot distinguish it from {n} other{'s' if n > 1 else ''})" if n else ""
+    others = list(dict.fromkeys(words(a["kind"], a["element"], a["legs"]) for a in e.aliases))
+    more = [f"{len(others) - LISTED} more"] if len(others) > LISTED else []
+    same = "; ".join([*others[:LISTED], *more])
+    same = f" (these readings cannot distinguish it from {same})" if same else ""
     return f"{words(*e.place)}: {', '.join(values)}{same}"
 
 
