@@ -236,6 +236,6 @@ def test_a_length_that_is_changed_by_hand_moves_the_home_coordinates() -> None:
     """The starter says ``solve: true``: its home coordinates are a first guess."""
     text = machine_text("3-rrr", "mine", {})
     longer = text.replace("translation: [200, 0, 0]", "translation: [220, 0, 0]")
-    assert longer.count("220") == 1 and longer != text
+    assert longer.count("translation: [220, 0, 0]") == 1
     machine = sm.load_machine(longer)
     assert machine.solve(machine.description.home.p, [100.0, 0, 0, 0, 0, 0]).ok
