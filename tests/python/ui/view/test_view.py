@@ -296,6 +296,7 @@ def test_meshes_of_a_urdf_stand_on_the_joints(arm: Path) -> None:
     turn = Rotation.from_matrix(at.rotation).as_rotvec()
     with View(model_of(machine, at.position, rotation=turn, meshes=arm)) as v:
         assert v._viewer.worker.idle(60) and not v._viewer.error and not v._viewer.model.message
+        assert "the machine is rigid" in v._viewer.controls._status.content
         handles = {h.name: h for h in v._viewer.scene._meshes._shown._joint_frames}
         drawn = [
             trimesh.load_mesh(io.BytesIO(m.glb_data), file_type="glb")
