@@ -102,3 +102,12 @@ def test_a_header_may_name_its_unit(tmp_path: Path) -> None:
         with pytest.raises(sm.StiffmapError, match=words) as caught:
             with_header(tmp_path, f",{HEADERS},".replace(f",{column},", f",{header},").strip(","), more)
         assert "data.csv" in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_each_column_has_the_unit_of_its_own_header(tmp_path: Path) -> None:
+    """Not that of the first column of its quantity."""
+    head = HEAD.replace("force: N}", "force: N, angle: mrad}").replace("dx: 0.003", "dx: 0.003, rx: 0.1")
+    rows = "id,x,y,z,fx,dx,rx [deg],ry [rad],rz\n1,0,0,0,100,0.05,1,0.01,2\n"
+    e = sm.load_experiment(write(tmp_path, head, rows))
+    assert e.axes == ("dx", "rx", "ry", "rz")
+    np.testing.assert_allclose(e.reading[0, [0, 3, 4, 5]], [5e-5, np.deg2rad(1), 0.01, 2e-3], rtol=1e-12)
