@@ -26,18 +26,18 @@ Row = tuple[str, float, str, str]
 """Label, length of the bar (-1 … 1), colour, text."""
 
 
-RIGID = 1e-15
-"""m/N, below which a compliance is round-off."""
+RIGID = 1e-12
+"""m and m/N, below which a deflection and a compliance are round-off."""
 
 
 def status_line(moment: Moment, solution: Solution, message: str, error: str) -> str:
     """Where the tool is, how far it moves, what is wrong; a live region for screen readers."""
     s = moment.state
     at = ", ".join(f"{1e3 * v:.1f}" for v in s.position)
-    if bool(solution.ok) and np.abs(solution.compliance[:3, :3]).max() < RIGID:
+    size = float(np.linalg.norm(solution.displacement[:3]))
+    if bool(solution.ok) and max(size, np.abs(solution.compliance[:3, :3]).max()) < RIGID:
         said = "the machine is rigid: no spring and no drive yields, so nothing deflects"
     elif bool(solution.ok):
-        size = float(np.linalg.norm(solution.displacement[:3]))
         unit, factor, decimals = length_unit(size)
         parts = ", ".join(f"{factor * v:z.{decimals}f}" for v in solution.displacement[:3])
         said = f"the tool moves <b>{length_text(size)}</b> ({parts}) {unit}"
