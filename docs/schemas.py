@@ -83,6 +83,9 @@ def main() -> None:
     from tests.python.project.docs.json_calls import CALLS
     from tests.python.project.docs.test_help import make_workshop
 
+    from stiffmap.ui.view.open import View
+
+    View.wait = View.close  # type: ignore[method-assign]  # serves until it is interrupted
     FOLDER.mkdir(exist_ok=True)
     with tempfile.TemporaryDirectory() as folder:
         make_workshop(Path(folder))

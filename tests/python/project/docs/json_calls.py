@@ -51,7 +51,11 @@ CALLS: dict[str, tuple[str, ...]] = {
     "efforts": ("efforts orthoglide-revised cut.yaml", "efforts ur10 path.csv --feed 600"),
     "optimize": ("optimize my_design.yaml --generations 1 -o opt",),
     "paper": ("paper --points 5 -o pap",),
-    "link": ("link bar.yaml --quick --size 6 -o b.yaml",),
+    "link": (
+        "link bar.yaml --quick --size 6 -o b.yaml",
+        "link bracket.step --fixed face3 --loaded face7 --material aluminium --size 4 --quick",
+        "link field.csv --cases cases.csv --reference 310,0,0",
+    ),
     "experiment": (
         "experiment new clocks.csv --machine five-bar --map dx='Uhr 1|Uhr 2' --set z=0 --overwrite -o clocks",
         "experiment new more_clocks.csv --machine five-bar --set z=0 --overwrite -o more_clocks",
@@ -92,7 +96,7 @@ CALLS: dict[str, tuple[str, ...]] = {
         "lobes linear-delta --process slot --mode 1243,6.2,0.048,x --mode 1747,2.9,0.1,y --points 4,3",
     ),
     "taps": ("taps examples/taps/kr210.yaml examples/taps/taps.csv --only compliance",),
-    "view": ("view five-bar --html v.html",),
+    "view": ("view five-bar --html v.html", "view five-bar --no-browser --port 0"),
 }
 COSTLY = {
     "optimize",

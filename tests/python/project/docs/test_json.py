@@ -39,7 +39,8 @@ def test_quick_commands_obey_their_schema(
     name: str, workshop: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     if name == "view":
-        pytest.importorskip("viser", reason="needs the extra [view]")
+        opening = pytest.importorskip("stiffmap.ui.view.open", reason="needs the extra [view]")
+        monkeypatch.setattr(opening.View, "wait", opening.View.close)  # serves until it is interrupted
     jsonschema = pytest.importorskip("jsonschema")
     monkeypatch.chdir(workshop)
     for call in CALLS[name]:
