@@ -27,6 +27,7 @@ STEEL = 8000.0
 SOLID = (1e7, 2e12)
 """Pa: from rubber to diamond."""
 NAMES = "xyz"
+RIGID = "the machine is rigid: no spring and no drive yields, so nothing deflects"
 
 
 def advice(machine: Machine, path: str | PathLike[str]) -> list[str]:
@@ -116,7 +117,7 @@ def _trial(machine: Machine) -> list[str]:
     )
     if trial.stiffness is not None or elastic or description.external_springs:
         return trial.findings
-    return ["the machine is rigid: no spring and no drive yields, so nothing deflects"]
+    return [RIGID]
 
 
 def _numbers(machine: Machine, path: str | PathLike[str]) -> Iterator[str]:

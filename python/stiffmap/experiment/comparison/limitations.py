@@ -32,8 +32,8 @@ def refuse_unreachable(experiment: Experiment, base: Floats) -> None:
     """Raises StiffmapError naming the rows whose readings `base` (n, c) has no prediction for."""
     failed = np.asarray((experiment.read & ~np.isfinite(base)).any(axis=1))
     if failed.any():
-        told = rows_in_words(experiment, failed, "the machine has no equilibrium at")
-        raise StiffmapError(f"{experiment.name}: {told}")
+        text = rows_in_words(experiment, failed, "the machine has no equilibrium at")
+        raise StiffmapError(f"{experiment.name}: {text}")
 
 
 def limitations(experiment: Experiment, noise: Noise, machine: Machine) -> list[str]:

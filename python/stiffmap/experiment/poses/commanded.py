@@ -78,10 +78,10 @@ def without(experiment: Experiment, failed: Mask, why: str, cause: str = OUT_OF_
     """The experiment without the rows `failed` (n,), which it then names; StiffmapError if none is left."""
     if not failed.any():
         return experiment
-    told = rows_in_words(experiment, failed, why, cause)
+    text = rows_in_words(experiment, failed, why, cause)
     if failed.all():
-        raise StiffmapError(f"{experiment.name}: {told}")
-    return replace(experiment.rows(~failed), out_of_reach=(*experiment.out_of_reach, told))
+        raise StiffmapError(f"{experiment.name}: {text}")
+    return replace(experiment.rows(~failed), out_of_reach=(*experiment.out_of_reach, text))
 
 
 def rows_in_words(experiment: Experiment, failed: Mask, why: str, cause: str = OUT_OF_REACH) -> str:

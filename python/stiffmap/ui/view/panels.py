@@ -8,6 +8,7 @@ from html import escape
 import numpy as np
 
 from stiffmap.common.number_text import length_text, length_unit, percents
+from stiffmap.solve.advice import RIGID
 from stiffmap.solve.budget import DeflectionBudget
 from stiffmap.solve.solution import Solution
 from stiffmap.solve.status import Status
@@ -26,7 +27,7 @@ Row = tuple[str, float, str, str]
 """Label, length of the bar (-1 … 1), colour, text."""
 
 
-RIGID = 1e-12
+DUST = 1e-12
 """m and m/N, below which a deflection and a compliance are round-off."""
 
 
@@ -35,8 +36,8 @@ def status_line(moment: Moment, solution: Solution, message: str, error: str) ->
     s = moment.state
     at = ", ".join(f"{1e3 * v:.1f}" for v in s.position)
     size = float(np.linalg.norm(solution.displacement[:3]))
-    if bool(solution.ok) and max(size, np.abs(solution.compliance[:3, :3]).max()) < RIGID:
-        said = "the machine is rigid: no spring and no drive yields, so nothing deflects"
+    if bool(solution.ok) and max(size, np.abs(solution.compliance[:3, :3]).max()) < DUST:
+        said = RIGID
     elif bool(solution.ok):
         unit, factor, decimals = length_unit(size)
         parts = ", ".join(f"{factor * v:z.{decimals}f}" for v in solution.displacement[:3])

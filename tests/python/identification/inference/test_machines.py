@@ -145,7 +145,7 @@ def test_a_turn_that_changes_nothing_is_not_determined() -> None:
 
 
 def test_a_fold_is_the_fit_of_its_own_readings() -> None:
-    """With the slopes of the whole; a strong effect, and half of the rows, so that the fold lies clearly beside the whole."""
+    """With the slopes of the whole; a strong effect, and half of the rows, so that the fold lies clearly apart from the whole."""
     machine = sm.load_machine("ur10")
     p = Predictor(machine, random_plan(machine, "position", poses=16, seed=1))
     kind = registry.get("tcp_offset")
