@@ -8,14 +8,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.python.project.docs.json_schemas import obeys
 
 import stiffmap as sm
 from stiffmap.experiment import Predictor, random_plan, simulate
 from stiffmap.identification.candidates.plan import plan_of
 from stiffmap.model.description import AppliedEffect
 
-ROOT = Path(__file__).parents[4]
-SETS = ROOT / "examples" / "experiments"
+SETS = Path(__file__).parents[4] / "examples" / "experiments"
 pytestmark = pytest.mark.filterwarnings("ignore::RuntimeWarning")
 
 
@@ -34,12 +34,6 @@ def only(d: sm.Diagnosis) -> tuple[str, str, list[str]]:
     return (d.effects[0].kind, d.effects[0].element, list(d.effects[0].legs))
 
 
-def obeys_its_schema(d: sm.Diagnosis) -> None:
-    jsonschema = pytest.importorskip("jsonschema")
-    form = json.loads((ROOT / "docs/schemas/diagnose.json").read_text(encoding="utf-8"))
-    jsonschema.Draft202012Validator(form).validate(json.loads(d.to_json()))
-
-
 def holds(d: sm.Diagnosis, name: str, truth: float) -> bool:
     _, low, high, _ = d.effects[0].parameters[name]
     return low <= truth <= high
@@ -56,7 +50,7 @@ def test_known_position_sets(
     machine: sm.Machine, folder: str, place: tuple[str, str, list[str]], parameter: str, truth: float
 ) -> None:
     d = sm.diagnose(machine, SETS / folder)
-    obeys_its_schema(d)
+    obeys("diagnose", d.to_json())
     assert d.verdict == "effects" and only(d) == place
     assert holds(d, parameter, truth)
     assert d.after.ratio <= 1.05 < d.before.ratio
@@ -76,7 +70,7 @@ def test_known_deflection_sets(
     machine: sm.Machine, folder: str, place: tuple[str, str, list[str]] | None, parameter: str, truth: float
 ) -> None:
     d = sm.diagnose(machine, SETS / folder)
-    obeys_its_schema(d)
+    obeys("diagnose", d.to_json())
     if place is None:
         assert d.verdict == "none" and not d.effects and not d.unexplained
         return
