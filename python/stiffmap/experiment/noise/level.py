@@ -64,7 +64,11 @@ def noise_of(experiment: Experiment, keep: Mask | None = None) -> Noise:
         lower = chi2.cdf(ratio, np.maximum(freedom, 1))
     p = np.where((freedom > 0) & (declared > 0), 2 * np.minimum(lower, 1 - lower), np.nan)
     floor = np.fmax(declared, np.where(freedom >= ENOUGH, repeats, np.nan))
-    _check(experiment, floor)
+    if lost := _lost(experiment, floor):
+        raise StiffmapError(
+            f"{experiment.name}: the noise of {', '.join(lost)} is zero or unknown; declare it (noise: in "
+            f"experiment.yaml) or repeat readings at {ENOUGH} or more conditions"
+        )
     factor = np.where(declared > 0, floor / np.where(declared > 0, declared, 1.0), np.nan)
     sigma = np.where(experiment.sigma > 0, experiment.sigma * factor, floor)
     return Noise(
@@ -74,10 +78,16 @@ def noise_of(experiment: Experiment, keep: Mask | None = None) -> Noise:
 
 def unknown(experiment: Experiment) -> list[str]:
     """Channels of which neither a declaration nor repeats say how sure they are: `noise_of` refuses them."""
-    e = experiment
-    declared = _mean(e.sigma**2) > 0
-    known = declared | (_within(e, np.ones(len(e), bool))[1] >= ENOUGH)
-    return [c.name for c, k, read in zip(e.channels, known, e.axis_read, strict=True) if read and not k]
+    squares, freedom = _within(experiment, np.ones(len(experiment), bool))
+    return _lost(
+        experiment, np.fmax(_mean(experiment.sigma**2), np.where(freedom >= ENOUGH, squares, np.nan))
+    )
+
+
+def _lost(experiment: Experiment, floor: Floats) -> list[str]:
+    """Channels that were read and have no positive floor (c,)."""
+    read = zip(experiment.channels, floor, experiment.axis_read, strict=True)
+    return [c.name for c, f, any_ in read if any_ and not f > 0]
 
 
 LOUD = 10.0
@@ -149,13 +159,3 @@ def _within(
     mean = total / np.maximum(count, 1)
     squares = np.where(read, (values - mean[condition]) ** 2, 0.0).sum(axis=0)
     return squares, np.maximum(count - 1, 0).sum(axis=0).astype(np.intp)
-
-
-def _check(experiment: Experiment, floor: Floats) -> None:
-    read = zip(experiment.channels, floor, experiment.axis_read, strict=True)
-    wrong = [c.name for c, f, any_ in read if any_ and not f > 0]
-    if wrong:
-        raise StiffmapError(
-            f"{experiment.name}: the noise of {', '.join(wrong)} is zero or unknown; declare it (noise: in "
-            f"experiment.yaml) or repeat readings at {ENOUGH} or more conditions"
-        )
