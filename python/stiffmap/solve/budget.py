@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -11,6 +12,7 @@ from numpy.typing import ArrayLike
 from stiffmap.common.broadcasting import Floats, real_array
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.html import table, titled
+from stiffmap.common.number_text import percents
 from stiffmap.common.short import short_repr
 from stiffmap.model.description import Cable
 from stiffmap.model.description.sources import in_words, source_of
@@ -28,6 +30,14 @@ STEP = 1e-3
 """Of the load, of the central differences of internal wrenches."""
 PIECES = 16
 """Of the load, over which the stretch of cables is summed."""
+NAMED = 3
+"""Elements that a sentence names."""
+
+
+def in_shares(shares: Mapping[str, float]) -> str:
+    """``57 % from z.foot, 21 % from z.bar``: of shares by element, the largest first."""
+    named = zip(shares, percents(list(shares.values())), strict=True)
+    return ", ".join(f"{share} % from {name}" for name, share in list(named)[:NAMED])
 
 
 @short_repr

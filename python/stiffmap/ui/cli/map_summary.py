@@ -13,16 +13,16 @@ from rich.text import Text
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.number_text import length_text, percents, vector_text
+from stiffmap.common.number_text import length_text, vector_text
 from stiffmap.model.description.sources import in_words as source_words
-from stiffmap.solve.budget import deflection_budget
+from stiffmap.solve.budget import deflection_budget, in_shares
 from stiffmap.solve.machine import Machine
 from stiffmap.ui.cli.inputs import MM
 from stiffmap.ui.cli.output import failed, table
 from stiffmap.workspace.maps.plan import BEYOND
 
-RANKED, NAMED = 8, 3
-"""Numbers in the table of shares in the variance, and elements that the sentence of the worst pose names."""
+RANKED = 8
+"""Numbers in the table of shares in the variance."""
 
 
 def across(ds: xr.Dataset) -> str:
@@ -225,10 +225,8 @@ def _worst(ds: Any) -> tuple[float, str, list[float], Any] | None:
 def in_words(worst: dict[str, Any]) -> str:
     """``worst pose of the map: (300, 300, -200) mm, 932.5 µm in space under …, 57 % from z.foot …; 83 % of it …``."""
     at = ", ".join(f"{v / MM:.4g}" for v in worst["position"])
-    named = zip(worst["shares"], percents(list(worst["shares"].values())), strict=True)
-    parts = ", ".join(f"{share} % from {n}" for n, share in list(named)[:NAMED])
     rests = source_words(worst["sources"])
     return (
         f"worst pose of the map: ({at}) mm, {length_text(worst['deflection'])} in space under {worst['case']}; "
-        f"{parts}{'; ' + rests if rests else ''}"
+        f"{in_shares(worst['shares'])}{'; ' + rests if rests else ''}"
     )

@@ -144,3 +144,20 @@ def test_limits_of_the_workspace_from_a_file(tmp_path):
     assert none.worst == 0 and none.extra["box"].guarantee == "none"
     with pytest.raises(sm.StiffmapError, match="clearance: expected a positive"):
         sm.measures(machine, clearance=-0.1)
+
+
+@pytest.mark.parametrize(("leg", "spring"), [("x", "foot"), ("y", "actuator")])
+def test_the_largest_deflection_names_the_spring_that_yields_most(leg, spring):
+    machine = sm.load_machine("orthoglide-revised")
+    weak = machine.with_effect("compliance", element=spring, legs=[leg], scale=50)
+    note = sm.measures(weak, only=["deflection"], nodes=3, coarse=2)["deflection"].found.note
+    assert f"% from {leg}.{spring}," in note and int(note.split("; ")[1].split(" %")[0]) > 50, note
+
+
+def test_what_no_pose_keeps_is_named_with_its_bound():
+    machine = sm.load_machine("hexapod")
+    table = sm.measures(machine, only=["largest_box", "workspace"], nodes=3, coarse=2)
+    for name in ("largest_box", "workspace"):
+        row = table[name].found
+        assert row.worst == 0 and "transmission above 2" in row.note and "no pose" in row.note
+    assert sm.largest_box("orthoglide-revised", region=[[5, 5, 5], [6, 6, 6]]).limited_by == ("reach",)

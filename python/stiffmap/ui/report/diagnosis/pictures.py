@@ -136,14 +136,13 @@ def loops(d: Findings) -> Figure:
 
 
 def shared_out(d: Findings) -> Figure:
-    """Bars of the shares, the largest first, on a logarithmic scale."""
+    """Bars of the shares, the largest first."""
     found = [(name, 100 * s) for name, s in sorted(d.shares.items(), key=lambda s: s[1]) if s >= LEAST_SHARE]
     figure = new_figure(7, 0.8 + 0.35 * len(found))
     effects = {str(e).partition(":")[0] for e in d.effects}
     rows = [(n, s, AFTER if n in effects else "0.7", percent(s / 100)) for n, s in found]
     ax = _bars(figure, rows)
-    ax.set_xscale("log")
-    ax.set(xlabel="share of the squares, %", xlim=(50 * LEAST_SHARE, 400))
+    ax.set(xlabel="share of the squares, %", xlim=(0, 115))
     return figure
 
 

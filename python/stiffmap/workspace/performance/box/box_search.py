@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.workspace.performance.box.cells import shrink
+from stiffmap.workspace.performance.box.inside import REACH
 from stiffmap.workspace.performance.box.proof import BOX, Judge, judge_cells
 from stiffmap.workspace.performance.limits.limits import Bounds
 
@@ -102,10 +103,17 @@ class BoxSearch:
         self.witnesses = np.concatenate([grid[~good], self._pull(inside, outside, 6)])
         nodes = grid[good]
         if not len(nodes):
+            self.names = self._broken(grid.reshape(-1, 3))
             return []
         room = self._room(self._tree(), nodes)
         order = np.argsort(-room, kind="stable")[:count]
         return [(nodes[i], float(room[i])) for i in order]
+
+    def _broken(self, local: Floats) -> tuple[str, ...]:
+        """Limits that points break, the one that most of them break first; reach where no point closes."""
+        closed, limits = self.bounds.at(self.base(local))
+        counts = {limit.name: int((closed & ~(limit.value <= limit.most)).sum()) for limit in limits}
+        return tuple(sorted((n for n in counts if counts[n]), key=lambda n: -counts[n])) or (REACH,)
 
     def _pull(self, inside: Floats, outside: Floats, steps: int) -> Floats:
         """Broken points on the way to points that hold, as near to those as bisection comes."""

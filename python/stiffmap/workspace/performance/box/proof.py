@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from stiffmap.common.broadcasting import Floats, thread_count
 from stiffmap.common.tasks import workers
-from stiffmap.workspace.performance.limits.limits import Bounds
+from stiffmap.workspace.performance.limits.limits import Bounds, factor_limits
 from stiffmap.workspace.performance.motion.closing import kernel_starts
 from stiffmap.workspace.performance.motion.scaling import revolute_drives
 from stiffmap.workspace.performance.motion.zonotopes import corners
@@ -188,20 +188,20 @@ def _factors_over(
     from W = J^-1 (n, d, d), its change to the cell's faces (n, 3, d, d), the Frobenius norm of the rest (n,)."""
     low, high = transmission
     n, d = len(w), w.shape[-1]
-    sphere, sort = factors == "sphere", "transmission" if factors == "sphere" else "cube factor"
+    sphere, (below, above) = factors == "sphere", factor_limits(factors, transmission)
     out = []
 
     def add(name: str, ok: NDArray[np.bool_], values: Floats, rest: Floats, bound: float) -> None:
         """Of the cells that are `ok`: values (k, 8) at the corners."""
         value, miss, corner = np.full(n, np.nan), np.full(n, np.inf), np.zeros(n, dtype=np.int64)
         value[ok], miss[ok], corner[ok] = values.max(axis=1), rest, values.argmax(axis=1)
-        out.append((f"{sort} {name}", value, miss, bound, corner))
+        out.append((name, value, miss, bound, corner))
 
     ok = np.isfinite(w).all(axis=(1, 2)) & np.isfinite(slack)
     if low > 0:
         at = w[ok][:, None] + np.einsum("ck,nkab->ncab", BOX, step[ok])
         values = _largest(at) if sphere else np.linalg.norm(at, axis=3).max(axis=2)
-        add("below", ok, values, slack[ok], 1 / low)
+        add(below, ok, values, slack[ok], 1 / low)
     if not np.isfinite(high):
         return out
     ok = ok & (np.abs(np.linalg.det(np.where(ok[:, None, None], w, np.eye(d)))) > 1e-12)
@@ -217,7 +217,7 @@ def _factors_over(
         values = _largest(at)
     else:
         values, rest = np.linalg.norm(at @ corners(d).T, axis=2).max(axis=2), rest * np.sqrt(d)
-    add("above", ok, values, rest, high)
+    add(above, ok, values, rest, high)
     return out
 
 

@@ -48,7 +48,8 @@ class Workspace:
     cut: bool
     """Whether the workspace reaches the region's border, so that there may be more of it outside."""
     limited_by: tuple[tuple[str, float], ...]
-    """What ends it: limit, and the share of the poses next to the border that break it; the largest first."""
+    """What ends it: limit, and the share of the poses next to the border (of all where none is inside) that break it;
+    the largest first."""
     drawn: Judged = field(repr=False)
     """All poses drawn."""
     ask: Inside = field(repr=False)
@@ -195,12 +196,11 @@ def _draw(
 
 
 def _limiting(drawn: Judged) -> tuple[tuple[str, float], ...]:
-    """What the poses break that are outside but have one inside for a neighbour."""
-    if not drawn.inside.any() or drawn.inside.all():
-        return ()
-    step = np.median(cKDTree(drawn.position).query(drawn.position, 2)[0][:, 1])
-    far = cKDTree(drawn.position[drawn.inside]).query(drawn.position)[0]
-    border = ~drawn.inside & (far < 2 * step)
+    """What the poses break that are outside but have one inside for a neighbour; all poses where none is inside."""
+    border = ~drawn.inside
+    if drawn.inside.any():
+        step = np.median(cKDTree(drawn.position).query(drawn.position, 2)[0][:, 1])
+        border &= cKDTree(drawn.position[drawn.inside]).query(drawn.position)[0] < 2 * step
     if not border.any():
         return ()
     shares = {name: float(bad[border].mean()) for name, bad in drawn.causes().items()}

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from stiffmap.common.broadcasting import Floats
+from stiffmap.common.number_text import vector_text
+from stiffmap.solve.budget import deflection_budget, in_shares
 from stiffmap.solve.status import Status
 from stiffmap.workspace.maps.inputs import plane_axes
 from stiffmap.workspace.performance.limits.deflection import TURNS, worst_deflection
@@ -24,7 +26,14 @@ def compute(case: Case) -> Found:
         case.machine, box=np.stack([case.low, case.high]), force=case.force, plane=case.plane,
         nodes=case.coarse, turns=TURNS, rotation=case.rotation, gravity=case.gravity, threads=case.threads,
     )  # fmt: skip
-    found = over_poses(d.positions, d.values, "low", f"under {case.force:.4g} N", direction=d.direction)
+    note = f"under {case.force:.4g} N"
+    if np.isfinite(d.value):
+        wrench = np.append(case.force * d.direction, np.zeros(3))
+        budget = deflection_budget(
+            case.machine, d.position, wrench, rotation=case.rotation, gravity=case.gravity
+        )
+        note += f" along {vector_text(d.direction, 3)}; {in_shares({n: s for n, _, s in budget.ranked()})}"
+    found = over_poses(d.positions, d.values, "low", note, direction=d.direction)
     return Found(**{**found.__dict__, "worst": d.value, "worst_at": d.position})
 
 

@@ -18,6 +18,8 @@ def compute(case: Case) -> Found:
             f"{case.machine.name}: the workspace is flat: {w.volume:.4g} m{'²' if w.dimension == 2 else ''}"
         )
     ends = ", ".join(f"{name} {100 * share:.0f} %" for name, share in w.limited_by[:4])
+    if w.volume == 0:
+        return Found(0.0, note=f"no pose is inside; of all drawn, broken: {ends}", extra={"workspace": w})
     note = f"± {w.error:.2g} m³ (standard error){', more outside of the region' if w.cut else ''}; ends by {ends or 'nothing found'}"
     return Found(w.volume, note=note, extra={"workspace": w})
 

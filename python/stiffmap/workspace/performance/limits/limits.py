@@ -38,6 +38,12 @@ class Limit:
     """(n, a): a lower estimate of the value at a neighbour is left·(array there), the value being convex."""
 
 
+def factor_limits(factors: str, transmission: tuple[float, float]) -> tuple[str, str]:
+    """Names of the limits of a transmission range: ``transmission below 0.5``, ``transmission above 2``."""
+    sort = "transmission" if factors == "sphere" else "cube factor"
+    return f"{sort} below {transmission[0]:g}", f"{sort} above {transmission[1]:g}"
+
+
 KNOWN = 4000
 """Closed poses that are kept as starts, about."""
 
@@ -153,16 +159,14 @@ class Bounds:
         j = weighted(self.machine, k.jacobian, self.size, "all")
         low, high = self.transmission
         sphere, out = self.factors == "sphere", list[Limit]()
-        word = "transmission" if sphere else "cube factor"
+        below, above = factor_limits(self.factors, self.transmission)
         if np.isfinite(high):
-            above = convex(f"{word} above", j, high, closed, spectral if sphere else vertices)
+            most = convex(above, j, high, closed, spectral if sphere else vertices)
             # the change of a corner is at most sqrt(d) times that of the matrix
             scale = 1.0 if sphere else float(np.sqrt(j.shape[2]))
-            out.append(replace(above, array=scale * above.array, left=above.left / scale))
+            out.append(replace(most, array=scale * most.array, left=most.left / scale))
         if low > 0:
-            out.append(
-                convex(f"{word} below", inverse_rows(j), 1 / low, closed, spectral if sphere else rows)
-            )
+            out.append(convex(below, inverse_rows(j), 1 / low, closed, spectral if sphere else rows))
         return out
 
     @cached_property
