@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from stiffmap.common.broadcasting import Floats, real_array
+from stiffmap.common.broadcasting import Floats, real_array, whole_number
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.tasks import workers
 from stiffmap.machining.chatter.coupling import coupling_depth
@@ -45,6 +45,7 @@ def stability_lobes(
     *,
     speeds: ArrayLike | None = None,
     depths: ArrayLike | None = None,
+    diagram: tuple[int, int] = (SPEEDS, DEPTHS),
     feed: ArrayLike | None = None,
     tool: ArrayLike | None = None,
     also: Iterable[Any] = (),
@@ -66,6 +67,8 @@ def stability_lobes(
         (3,) m, base axes; None: the machine's home.
     speeds, depths
         (speed,) rad/s and (depth,) m, rising; None: around the process's speed, up to four times the least limit.
+    diagram
+        How many speeds and depths there are where they are not given.
     feed, tool
         (3,) directions of the feed, and from the tool's tip to its holder, base axes. None: the tool stands along the flange's
         axis (z of the machine's tool frame), and feeds along the first of x, y that goes across it.
@@ -94,6 +97,10 @@ def stability_lobes(
     """
     if method not in METHODS:
         raise StiffmapError(f"method: expected one of {', '.join(METHODS)}, got {method!r}")
+    if np.shape(diagram) != (2,):
+        raise StiffmapError(f"diagram: expected numbers of speeds and of depths, got {diagram!r}")
+    for count in diagram:
+        whole_number(count, "diagram", 2, what="numbers of speeds and of depths, 2 or more")
     if isinstance(machine, str | PathLike):
         machine = as_machine(machine)
     p = milling_process(process)
@@ -107,9 +114,17 @@ def stability_lobes(
     frequency = frequencies_of(modes.frequency)
     depth0, angle = limits(modes.receptance(frequency), p)
     least = least_depth(frequency, modes.receptance, p)
-    s = _axis(speeds, "speeds", "rad/s") if speeds is not None else p.spindle * np.linspace(0.25, 1.5, SPEEDS)
+    s = (
+        _axis(speeds, "speeds", "rad/s")
+        if speeds is not None
+        else p.spindle * np.linspace(0.25, 1.5, diagram[0])
+    )
     top = HIGHEST * least if np.isfinite(least) else p.cut.axial
-    d = _axis(depths, "depths", "m") if depths is not None else np.linspace(0, max(top, 1e-9), DEPTHS + 1)[1:]
+    d = (
+        _axis(depths, "depths", "m")
+        if depths is not None
+        else np.linspace(0, max(top, 1e-9), diagram[1] + 1)[1:]
+    )
     zero = at_periods(frequency, depth0, angle, 2 * pi / (p.tool.teeth * s))
     own = np.array([p.spindle])
     ds = xr.Dataset(

@@ -85,6 +85,7 @@ def command(
     given: dict[str, Any] = {
         "speeds": None if ends is None else np.linspace(ends[0], ends[1], many[0]),
         "depths": None if depth is None else MM * np.linspace(0, depth, many[1] + 1)[1:],
+        "diagram": tuple(many.tolist()),
         "feed": in_si(feed, "feed", 3, 1.0),
         "tool": in_si(tool, "tool", 3, 1.0), "also": _modes(mode), "method": method,
         "rotation": rotation(rotation_), "gravity": gravity(gravity_), "threads": threads,

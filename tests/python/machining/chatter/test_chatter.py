@@ -367,3 +367,14 @@ def test_a_tool_stands_along_the_flange_by_default(capsys):
     said = capsys.readouterr().out
     assert "damping assumed: 2 % of every mode" in said.splitlines()[0]
     assert "tool from tip to holder along (0, 0, 1), feed along (1, 0, 0)" in said
+
+
+def test_a_diagram_has_the_points_that_are_asked_for_whatever_its_ends(tmp_path):
+    for i, ends in enumerate(([], ["--speeds", "2000,3000"], ["--depth", "1"])):
+        to = tmp_path / str(i)
+        main(["lobes", "five-bar", "--process", "slot", "--points", "4,3", *ends, "-o", str(to)])
+        with xr.open_dataset(to / "lobes.nc") as ds:
+            assert dict(ds.multiplier.sizes) == {"speed": 4, "depth": 3}
+    for bad in (5, (1, 3), (4, 3.5), "ab"):
+        with pytest.raises(sm.StiffmapError, match="diagram: expected numbers of speeds and of depths"):
+            sm.stability_lobes("five-bar", "slot", diagram=bad)
