@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 
 @dataclass(frozen=True)
@@ -30,6 +31,16 @@ class Parameter:
     angular_scale: float | None = None
     plausible: tuple[float, float] | None = None
     recorded: str = ""
+
+    @cached_property
+    def turning(self) -> Parameter:
+        """The parameter on a joint that turns."""
+        return replace(
+            self,
+            unit=self.angular or self.unit,
+            upper=self.angular_upper or self.upper,
+            scale=self.angular_scale or self.scale,
+        )
 
 
 @dataclass(frozen=True)
