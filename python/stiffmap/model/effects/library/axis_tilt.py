@@ -12,7 +12,7 @@ from stiffmap.model.effects.types import EffectType, Placed
 
 def tilted(e: Joint, placed: Placed) -> Elements:
     """The rotation before the joint, and its inverse behind it."""
-    turn = rotation_of(placed)
+    turn = rotation_of(placed.values)
     before = built(f"{e.name}_axis_tilt", about(home_position(e), turn))
     return (before, e, built(f"{e.name}_axis_tilt_back", Pose.of(rotation=turn.T)))
 

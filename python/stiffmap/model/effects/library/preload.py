@@ -13,7 +13,7 @@ from stiffmap.model.effects.types import EffectType, Placed
 
 def pulled(e: Spring, placed: Placed) -> Elements:
     """Moves the deflection at which the spring is free of force."""
-    x, y, z = translation_of(placed, "rest_")
+    x, y, z = translation_of(placed.values, "rest_")
     a, b, c, *rotations = e.rest
     return (replace(e, rest=(a + x, b + y, c + z, *rotations)),)
 

@@ -30,7 +30,7 @@ def spring_at(end: str) -> dict[str, Any]:
     """What effects share that put an isotropic spring at a pivot, before all of the ``base`` or behind the ``platform``."""
 
     def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
-        elements, pivot = getattr(description, end), translation_of(placed, "pivot_")
+        elements, pivot = getattr(description, end), translation_of(placed.values, "pivot_")
         name = fresh(placed.kind, elements)
         there, back = (Offset(f"{name}_{way}", Pose.of(p)) for way, p in (("there", pivot), ("back", -pivot)))
         new = (there, Spring(name, compliance=isotropic(placed)), back)

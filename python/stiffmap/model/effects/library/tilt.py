@@ -12,7 +12,7 @@ from stiffmap.model.effects.types import EffectType, Placed
 
 def tilted(e: Joint, placed: Placed) -> Elements:
     """A rotation about the joint's home position, before the joint."""
-    return (built(f"{e.name}_tilt", about(home_position(e), rotation_of(placed))), e)
+    return (built(f"{e.name}_tilt", about(home_position(e), rotation_of(placed.values))), e)
 
 
 EFFECT = EffectType(
