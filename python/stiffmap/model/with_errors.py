@@ -27,8 +27,8 @@ from stiffmap.model.description import (
 from stiffmap.model.description.strokes import as_rows
 from stiffmap.model.effects import apply_records
 from stiffmap.model.effects.edit import built as as_built
-from stiffmap.model.effects.edit import shifted
 from stiffmap.model.effects.library.geometry import about, home_position
+from stiffmap.model.effects.library.length import longer
 
 FRAME = ("x", "y", "z", "rx", "ry", "rz")
 END = "end"
@@ -101,19 +101,8 @@ def _changed(e: Element, change: Mapping[str, Any]) -> Element:
     return e
 
 
-def _length(e: Element, by: float) -> Element:
-    assert isinstance(e, Offset)
-    return shifted(e, by * (e.nominal.p / np.linalg.norm(e.nominal.p)))
-
-
-def _with_error(e: Element, error: CommandError) -> Element:
-    assert isinstance(e, Joint)
+def _with_error(e: Joint, error: CommandError) -> Element:
     return replace(e, command_errors=(*e.command_errors, error))
-
-
-def _gain(e: Element, by: float) -> Element:
-    assert isinstance(e, Joint)
-    return _with_error(e, CommandError(slope=by, reference=e.home[0]))
 
 
 def _compliance(e: Element, by: float) -> Element:
@@ -128,17 +117,16 @@ def _compliance(e: Element, by: float) -> Element:
     return replace(e, stiffness=as_rows(np.array(e.stiffness) / factor))
 
 
-def _mass(e: Element, by: float) -> Element:
-    assert isinstance(e, Body)
+def _mass(e: Body, by: float) -> Element:
     factor = float(np.exp(by))
     inertia = tuple(tuple(v * factor for v in row) for row in e.inertia)
     return replace(e, mass=e.mass * factor, inertia=inertia)  # type: ignore[arg-type]
 
 
-CHANGES: dict[str, tuple[tuple[type, ...], Callable[[Element, Any], Element]]] = {
-    "length": ((Offset,), _length),
+CHANGES: dict[str, tuple[tuple[type, ...], Callable[[Any, Any], Element]]] = {
+    "length": ((Offset,), longer),
     "zero": ((Joint,), lambda e, by: _with_error(e, CommandError(offset=by))),
-    "gain": ((Joint,), _gain),
+    "gain": ((Joint,), lambda e, by: _with_error(e, CommandError(slope=by, reference=e.home[0]))),
     "travel": ((Joint,), lambda e, knots: _with_error(e, CommandError(knots=knots))),
     "compliance": ((Joint, Spring), _compliance),
     "mass": ((Body,), _mass),

@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from stiffmap.common.kept import Kept
 from stiffmap.experiment.experiment import Experiment, Floats, Integers, Mask
-from stiffmap.model.description.rigid import nominal_geometry, straight
+from stiffmap.model.description.alike import nominal_geometry, straight
 from stiffmap.solve.closing import of_drives
 from stiffmap.solve.kinematics import forward_kinematics, inverse_kinematics
 from stiffmap.solve.machine import Machine

@@ -24,7 +24,7 @@ from stiffmap.model.description import (
     tree,
 )
 from stiffmap.model.description.numbers import with_entry
-from stiffmap.model.description.tree import Elements, of_same_sequence
+from stiffmap.model.description.tree import of_same_sequence
 
 
 def split(address: str) -> tuple[str, str]:
@@ -128,7 +128,8 @@ def machine_fields(d: MachineDescription) -> Iterator[tuple[str, Field]]:
 def bar_offset(d: MachineDescription, full: str) -> str | None:
     """Full name of the offset that is the length of the link of a spring: the one before it; None: there is none, or it is
     not as long as the beam from which the spring was computed."""
-    sequence, name = _sequence_of(d, full), full.rpartition(".")[2]
+    around, _, name = full.rpartition(".")
+    sequence = [e for other, e in tree.all_elements(d) if other.rpartition(".")[0] == around]
     k = next((i for i, e in enumerate(sequence) if isinstance(e, Spring) and e.name == name), 0)
     spring = sequence[k] if sequence else None
     before = next((e for e in reversed(sequence[:k]) if not isinstance(e, Body | Point)), None)
@@ -139,18 +140,3 @@ def bar_offset(d: MachineDescription, full: str) -> str | None:
         if abs(fields(before)["length"].value - length) > 1e-9 * length:
             return None
     return of_same_sequence(full, before.name)
-
-
-def _sequence_of(d: MachineDescription, full: str) -> Elements:
-    """The sequence that holds the element of a full name."""
-    parts = full.split(".")
-    chain: Elements = (
-        getattr(d, parts[0])
-        if parts[0] in tree.ENDS
-        else next((leg.elements for leg in d.legs if leg.name == parts[0]), ())
-    )
-    for branch in parts[1:-1]:
-        chain = next(
-            (b.elements for e in chain if isinstance(e, Block) for b in e.branches if b.name == branch), ()
-        )
-    return chain

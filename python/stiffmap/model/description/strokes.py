@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -62,17 +61,10 @@ class TableStroke:
 def present_rows(stroke: TableStroke, compliance: Matrix6) -> tuple[Matrix6, ...]:
     """Rows of a table of which the first is now ``compliance``: every entry changes in the ratio in which that
     of the first row did, one that is zero there as the two diagonal terms next to it."""
-    first = stroke.rows[0]
-    if compliance == first:
+    if compliance == stroke.rows[0]:
         return stroke.rows
-
-    def ratio(i: int, j: int) -> float:
-        if first[i][j] != 0.0:
-            return compliance[i][j] / first[i][j]
-        return math.sqrt(ratio(i, i) * ratio(j, j)) if i != j else 1.0
-
-    factors = [[ratio(i, j) for j in range(6)] for i in range(6)]
-    return tuple(
-        tuple(tuple(v * f for v, f in zip(*both, strict=True)) for both in zip(row, factors, strict=True))
-        for row in stroke.rows
-    )
+    first = np.array(stroke.rows[0])
+    known = first != 0.0
+    ratio = np.divide(compliance, first, out=np.ones((6, 6)), where=known)
+    own = np.diag(ratio)
+    return tuple(as_rows(row * np.where(known, ratio, np.sqrt(np.outer(own, own)))) for row in stroke.rows)

@@ -9,7 +9,6 @@ from typing import Any
 from stiffmap.common.broadcasting import Floats
 from stiffmap.model.description import MachineDescription, Offset, Pose
 from stiffmap.model.description.tree import Edit, Elements, edit_sequences
-from stiffmap.model.effects.types import Apply, Placed
 
 Sites = Callable[[Elements], dict[str, tuple[int, ...]]]
 Change = Callable[[Any], Elements]
@@ -43,15 +42,6 @@ def change_sites(
         return out
 
     return edit_legs(description, legs, edit)
-
-
-def changing(sites: Sites, change: Callable[[Any, Placed], Elements]) -> Apply:
-    """The ``apply`` of an effect that makes other elements of each one at its place."""
-
-    def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
-        return change_sites(description, placed.legs, placed.element, sites, lambda e: change(e, placed))
-
-    return apply
 
 
 def splice(elements: Elements, i: int, piece: Elements) -> Elements:

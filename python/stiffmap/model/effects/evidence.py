@@ -1,9 +1,12 @@
-"""What an effect says of itself to measured data: how it acts on them, how it shows in them, what hides it."""
+"""What an effect says of itself: its parameters; how it acts on measured data, how it shows in them, what hides it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import product
 from typing import Any, Protocol
 
 import numpy as np
@@ -11,7 +14,54 @@ from numpy.typing import NDArray
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.model.description import AppliedEffect
-from stiffmap.model.effects.parameter import Parameter
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One number of an effect, in SI.
+
+    ``null`` is the value at which the effect vanishes (``None``: there is no fixed one), ``scale`` a
+    typical size for steps and plots, ``default`` the value of a parameter that is left out (``None``:
+    it must be given). A parameter that is not ``fitted`` says how the effect is meant (a pivot, a
+    recorded temperature) and is known beforehand. ``angular`` is the unit on a joint that turns, with an upper
+    bound and a typical size of its own where those of a length mean nothing.
+    """
+
+    name: str
+    unit: str
+    lower: float
+    upper: float
+    null: float | None
+    scale: float
+    doc: str
+    default: float | None = None
+    fitted: bool = True
+    angular: str = ""
+    angular_upper: float | None = None
+    angular_scale: float | None = None
+    plausible: tuple[float, float] | None = None
+    recorded: str = ""
+
+    @cached_property
+    def turning(self) -> Parameter:
+        """The parameter on a joint that turns."""
+        return replace(
+            self,
+            unit=self.angular or self.unit,
+            upper=self.angular_upper or self.upper,
+            scale=self.angular_scale or self.scale,
+        )
+
+
+@dataclass(frozen=True)
+class Option:
+    """A choice in words; the first one is the default. ``recorded``: an experiment says it row by row."""
+
+    name: str
+    choices: tuple[str, ...]
+    doc: str
+    recorded: bool = False
+
 
 RECORDS = ("temperature", "order", "hours", "approach", "branch", "setup", "motor")
 """What an effect may need of an experiment besides pose, load and reading; ``motor``: an encoder on the motor's side."""
@@ -150,16 +200,11 @@ def signatures_on_a_grid(probe: Probe, tried: Tried) -> Iterator[Signature]:
     free = [p for p in tried.parameters if p.null is None]
     sizes = [list(dict.fromkeys(min(max(s * p.scale, p.lower), p.upper) for s in STEPS)) for p in free]
     typical = [min(max(p.scale, p.lower), p.upper) for p in free]
-    if np.prod([len(s) for s in sizes], dtype=float) <= MOST:
-        points = (
-            np.array(np.meshgrid(*sizes, indexing="ij")).reshape(len(free), -1).T
-            if free
-            else np.zeros((1, 0))
-        )
-    else:
-        points = np.array([[*typical[:i], v, *typical[i + 1 :]] for i, s in enumerate(sizes) for v in s])
+    points: Iterable[Sequence[float]] = product(*sizes)
+    if math.prod(map(len, sizes)) > MOST:
+        points = [[*typical[:i], v, *typical[i + 1 :]] for i, s in enumerate(sizes) for v in s]
     for point in points:
-        yield Signature({p.name: float(v) for p, v in zip(free, point, strict=True)})
+        yield Signature({p.name: v for p, v in zip(free, point, strict=True)})
 
 
 def shares_of_load(probe: Probe, tried: Tried, name: str, shares: Sequence[float]) -> Iterator[Signature]:

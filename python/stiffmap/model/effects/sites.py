@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -19,8 +20,8 @@ from stiffmap.model.description import (
     Spring,
 )
 from stiffmap.model.description.tree import Elements, sequences
-from stiffmap.model.effects.edit import Sites
-from stiffmap.model.effects.types import Place
+from stiffmap.model.effects.edit import Sites, change_sites
+from stiffmap.model.effects.types import Place, Placed
 
 
 def named(match: Callable[[Element], bool]) -> Sites:
@@ -137,6 +138,15 @@ def places(description: MachineDescription, sites: Sites) -> list[Place]:
 def at_sites(sites: Sites) -> Callable[[MachineDescription], list[Place]]:
     """`places` of these sites as a function of the machine."""
     return lambda description: places(description, sites)
+
+
+def each(sites: Sites, change: Callable[[Any, Placed], Elements]) -> dict[str, Any]:
+    """``places`` and ``apply`` of an effect that makes other elements of each one at its place."""
+
+    def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
+        return change_sites(description, placed.legs, placed.element, sites, lambda e: change(e, placed))
+
+    return {"places": at_sites(sites), "apply": apply}
 
 
 def at(element: str) -> Callable[[MachineDescription], list[Place]]:

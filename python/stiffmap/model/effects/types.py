@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from stiffmap.model.description import MachineDescription
+from stiffmap.model.description import Joint, MachineDescription, Spring
+from stiffmap.model.description.tree import all_elements
 from stiffmap.model.effects.evidence import Drive, Load, Plan, Reading, Signatures
-from stiffmap.model.effects.parameter import Option as Option
-from stiffmap.model.effects.parameter import Parameter as Parameter
+from stiffmap.model.effects.evidence import Option as Option
+from stiffmap.model.effects.evidence import Parameter as Parameter
 
 Place = tuple[str, tuple[str, ...]]
 
@@ -22,6 +23,15 @@ class Placed:
     legs: tuple[str, ...]
     values: Mapping[str, float]
     options: Mapping[str, str]
+
+
+def is_revolute(description: MachineDescription, element: str) -> bool:
+    """Whether the joint of that name, or the spring's direction (``foot.k44``), turns."""
+    name, _, entry = element.partition(".")
+    named = [e for _, e in all_elements(description) if e.name == name]
+    if entry and any(isinstance(e, Spring) for e in named):
+        return int(entry[1]) > 3
+    return any(isinstance(e, Joint) and e.kind != "prismatic" for e in named)
 
 
 Apply = Callable[[MachineDescription, Placed], MachineDescription]
@@ -69,7 +79,7 @@ class EffectType:
     signature
         How it shows in readings; None: by differences, with parameters that have no null on a grid.
     at
-        Parameters with the units and bounds of one place (a revolute drive counts in rad).
+        Parameters with the units and bounds of one place; None: those with an angular unit have it where a joint turns.
     tried
         Places that a diagnosis tries as an explanation; None: all of them.
     moved
@@ -125,7 +135,10 @@ class EffectType:
         self, description: MachineDescription, element: str, legs: tuple[str, ...]
     ) -> tuple[Parameter, ...]:
         """Parameters with the units and bounds that hold at this place."""
-        return self.at(description, element, legs) if self.at else self.parameters
+        if self.at:
+            return self.at(description, element, legs)
+        turns = any(p.angular for p in self.parameters) and is_revolute(description, element)
+        return tuple(p.turning for p in self.parameters) if turns else self.parameters
 
     def units_of(self, name: str) -> tuple[str, ...]:
         """The unit of a parameter, and the one that it has on a joint that turns."""

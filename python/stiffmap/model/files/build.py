@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -43,12 +42,12 @@ def build(
     context = Context(file, document, folder, units, model.materials, Gathered())
     tried = context.attempt
     templates = {name: t for name, t in model.templates.items() if isinstance(t, list)}
-    legs = [tried(partial(build_leg, *leg, templates, context)) for leg in model.legs.items()]
+    legs = [tried(build_leg, *leg, templates, context) for leg in model.legs.items()]
     springs = [
-        tried(partial(_external_spring, name, s, context.at("external_springs", name).named(name, s)))
+        tried(_external_spring, name, s, context.at("external_springs", name).named(name, s))
         for name, s in model.external_springs.items()
     ]
-    home = tried(partial(build_pose, model.home, context.at("home"), "home.")) or Pose()
+    home = tried(build_pose, model.home, context.at("home"), "home.") or Pose()
     description = MachineDescription(
         task=tuple(c for c in TASK if c in model.task),
         freedoms=tuple(c for c in TASK if c in model.freedoms),
@@ -58,10 +57,10 @@ def build(
         platform=build_elements(model.platform, context.at("platform").inside("platform")),
         home=home,
         search_home=model.home is not None and model.home.solve,
-        workspace=tried(partial(build_workspace, model.workspace, context.at("workspace"), model.task, home)),
-        gravity=tried(partial(_gravity, model.gravity, context.at("gravity"))),
+        workspace=tried(build_workspace, model.workspace, context.at("workspace"), model.task, home),
+        gravity=tried(_gravity, model.gravity, context.at("gravity")),
         external_springs=tuple(s for s in springs if s is not None),
-        modal_damping=tried(partial(_ratios, model.modal_damping, context.at("modal_damping"))) or (),
+        modal_damping=tried(_ratios, model.modal_damping, context.at("modal_damping")) or (),
         title=model.title,
         source=model.source,
         extra=tuple((key, _tuples(value)) for key, value in model.extra.items()),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
 from itertools import pairwise
 from typing import Any
 
@@ -59,7 +58,7 @@ def build_elements(models: Sequence[ElementModel], context: Context) -> tuple[El
     elements = []
     for i, model in enumerate(models):
         here = context.at(i)
-        element = context.attempt(partial(build_element, model, here, (i, models)))
+        element = context.attempt(build_element, model, here, (i, models))
         if element is None:
             continue
         names = [element.name]

@@ -16,7 +16,7 @@ from stiffmap.model.files.schema.base import Number, suggestion
 def with_strokes(description: MachineDescription, gathered: Gathered) -> MachineDescription:
     """The machine with the strokes that its file gives; problems are kept in ``gathered``."""
     for use in gathered.strokes:
-        stroke = use.context.attempt(partial(_stroke, description, use))
+        stroke = use.context.attempt(_stroke, description, use)
         if stroke is not None:
             description = edit(description, use.full, partial(_with_stroke, stroke)) or description
     return description

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import NoReturn, TypeVar
+from typing import Any, NoReturn, TypeVar
 
 from stiffmap.common.errors import FileError, together
 from stiffmap.common.number_text import LARGEST, SMALLEST
@@ -79,10 +79,10 @@ class Context:
         """Raise an error at this place."""
         raise self.error(message)
 
-    def attempt(self, build: Callable[[], T]) -> T | None:
-        """What ``build`` makes; None where it fails, its problem kept for the end."""
+    def attempt(self, build: Callable[..., T], *given: Any) -> T | None:
+        """What ``build`` makes of what is given; None where it fails, its problem kept for the end."""
         try:
-            return build()
+            return build(*given)
         except FileError as problem:
             self.gathered.problems.append(problem)
             return None

@@ -7,8 +7,7 @@ are computed from the numbers of the file, in the file's units.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
 from typing import Any
 
 from stiffmap.common.arithmetic import sum_of_numbers
@@ -87,50 +86,46 @@ class _Expansion:
             self._fail(("legs", name), f"the template needs {', '.join(missing)} under 'with'")
             return leg
         source: KeyPath = ("templates", asked, "elements")
-        put = _Substitution(values, lambda path, message: self._fail(source + path, message))
         target: KeyPath = ("legs", name, "elements")
         for path, line in self.document.lines.items():
             if path[: len(source)] == source:
                 self.lines[target + path[len(source) :]] = line
         rest = {key: value for key, value in leg.items() if key not in ("template", "with")}
-        return {**rest, "elements": put.into(template["elements"], ())}
+        return {**rest, "elements": self._written(template["elements"], source, values)}
+
+    def _written(self, data: Any, path: KeyPath, values: Mapping[str, Any]) -> Any:
+        """Plain data with every reference replaced."""
+        if isinstance(data, dict):
+            return {key: self._written(value, (*path, key), values) for key, value in data.items()}
+        if isinstance(data, list):
+            return [self._written(value, (*path, i), values) for i, value in enumerate(data)]
+        if not isinstance(data, str) or "$" not in data:
+            return data
+        unknown = [name for name in _REFERENCE.findall(data) if name not in values]
+        if unknown:
+            near = suggestion(unknown[0], list(values))
+            self._fail(path, f"no parameter '{unknown[0]}'{near}; there are: {', '.join(values)}")
+            return data
+        alone = _REFERENCE.fullmatch(data.strip())
+        if alone:
+            return values[alone[1]]
+        try:
+            return sum_of_numbers(_REFERENCE.sub(lambda m: repr(_number(m[1], values)), data))
+        except (SyntaxError, TypeError, ZeroDivisionError, RecursionError, MemoryError):
+            self._fail(
+                path, f"expected $name, or numbers and $names with + - * / ( ); found {describe(data)}"
+            )
+            return data
 
     def _fail(self, path: KeyPath, message: str) -> None:
         line = self.document.line(path)
         self.problems.append(FileError(message, file=self.file, line=line, key=key_text(path)))
 
 
-@dataclass
-class _Substitution:
-    values: Mapping[str, Any]
-    fail: Callable[[KeyPath, str], None]
-
-    def into(self, data: Any, path: KeyPath) -> Any:
-        """Plain data with every reference replaced."""
-        if isinstance(data, dict):
-            return {key: self.into(value, (*path, key)) for key, value in data.items()}
-        if isinstance(data, list):
-            return [self.into(value, (*path, i)) for i, value in enumerate(data)]
-        if not isinstance(data, str) or "$" not in data:
-            return data
-        unknown = [name for name in _REFERENCE.findall(data) if name not in self.values]
-        if unknown:
-            near = suggestion(unknown[0], list(self.values))
-            self.fail(path, f"no parameter '{unknown[0]}'{near}; there are: {', '.join(self.values)}")
-            return data
-        alone = _REFERENCE.fullmatch(data.strip())
-        if alone:
-            return self.values[alone[1]]
-        try:
-            return sum_of_numbers(_REFERENCE.sub(lambda m: repr(self._number(m[1])), data))
-        except (SyntaxError, TypeError, ZeroDivisionError, RecursionError, MemoryError):
-            self.fail(path, f"expected $name, or numbers and $names with + - * / ( ); found {describe(data)}")
-            return data
-
-    def _number(self, name: str) -> float:
-        value = self.values[name]
-        if isinstance(value, dict):  # with its uncertainty, which a formula does not keep
-            value = value.get("value")
-        if isinstance(value, bool) or not isinstance(value, (int, float)):
-            raise TypeError(name)
-        return float(value)
+def _number(name: str, values: Mapping[str, Any]) -> float:
+    value = values[name]
+    if isinstance(value, dict):  # with its uncertainty, which a formula does not keep
+        value = value.get("value")
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise TypeError(name)
+    return float(value)

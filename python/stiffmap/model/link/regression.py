@@ -59,13 +59,11 @@ def structure(*, symmetric: bool, zeros: Bools | None = None, known: Bools | Non
     columns = []
     for i in range(6):
         for j in range(i if symmetric else 0, 6):
-            members = {(i, j), (j, i)} if symmetric else {(i, j)}
-            is_zero = zeros is not None and any(bool(zeros[m]) for m in members)
-            is_known = known is None or any(bool(known[m]) for m in members)
-            if not is_zero and is_known:
-                column = np.zeros(36)
-                column[[6 * a + b for a, b in members]] = 1.0
-                columns.append(column)
+            column = np.zeros((6, 6), dtype=bool)
+            column[i, j] = True
+            column |= column.T & symmetric
+            if not (zeros is not None and zeros[column].any()) and (known is None or known[column].any()):
+                columns.append(column.ravel().astype(float))
     return np.array(columns).T if columns else np.zeros((36, 0))
 
 

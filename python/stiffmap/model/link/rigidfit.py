@@ -40,12 +40,9 @@ def fit_factor(points: Floats, reference: Floats) -> Floats:
     to the reference point, where t gains a rotation term and a cross term, link (4).
     """
     centre = points.mean(axis=0)
-    S = skew(points - centre)
-    at_centroid = np.zeros((6, 6))
-    at_centroid[:3, :3] = np.eye(3) / len(points)
-    at_centroid[3:, 3:] = np.linalg.inv(np.einsum("nki,nkj->ij", S, S))
+    A = design_matrix(points, centre).reshape(-1, 6)
     T = twist_transport(reference - centre)
-    return np.asarray(T @ at_centroid @ T.T)
+    return np.asarray(T @ np.linalg.inv(A.T @ A) @ T.T)
 
 
 def fit_linear(points: Floats, displacements: Floats, reference: Floats) -> RigidFit:

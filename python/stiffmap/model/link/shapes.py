@@ -48,7 +48,7 @@ class Bar(_Shape):
     height: float = Length
 
     def reference(self) -> Floats:
-        """(3,) m, centre of the end face."""
+        """(3,) m, centre of the end face, of a fork the middle of its pin's axis."""
         return np.array([self.length, 0.0, 0.0])
 
     def default_size(self) -> float:
@@ -87,17 +87,14 @@ class HollowBar(Bar):
         return _end_faces(gmsh, 0, 0.0, 1e3 * self.length)
 
 
-class ForkBar(_Shape):
+class ForkBar(Bar):
     """Tube (or solid bar, ``wall = 0``) with a fork at both ends; loads enter through the pin holes.
 
     Two prongs, parallel to x-z and ``gap`` apart along y, carry a pin hole along y at ``length`` between the
     axes. ``width`` and ``height`` are the tube's; the prongs are as high as the tube.
     """
 
-    shape: Literal["fork-bar"] = "fork-bar"
-    length: float = Length
-    width: float = Length
-    height: float = Length
+    shape: Literal["fork-bar"] = "fork-bar"  # type: ignore[assignment]
     wall: float = Field(ge=0)
     fork: float = Length  # from the pin axis to the end of the tube
     prong: float = Length  # thickness of a prong
@@ -113,10 +110,6 @@ class ForkBar(_Shape):
         if self.wall and 2 * self.wall >= min(self.width, self.height):
             raise ValueError(f"wall: expected less than half of the smaller side, got {self.wall}")
         return self
-
-    def reference(self) -> Floats:
-        """(3,) m, middle of the far pin's axis."""
-        return np.array([self.length, 0.0, 0.0])
 
     def default_size(self) -> float:
         """Three times the thinnest part: one quadratic element through it."""

@@ -14,7 +14,7 @@ from stiffmap.common.kept import Kept
 from stiffmap.experiment import Experiment, random_plan, simulate
 from stiffmap.experiment.poses.configuration import coordinates_of, in_reach
 from stiffmap.identification.diagnosis.report.sentences import opening
-from stiffmap.model.description.rigid import nominal_geometry, straight
+from stiffmap.model.description.alike import nominal_geometry, straight
 
 
 def two_causes(machine: sm.Machine) -> Experiment:

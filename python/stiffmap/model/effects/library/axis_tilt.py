@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from stiffmap.model.description import Joint, Pose
 from stiffmap.model.description.tree import Elements
-from stiffmap.model.effects.edit import built, changing
+from stiffmap.model.effects.edit import built
 from stiffmap.model.effects.library.geometry import ANGLES, about, home_position, rotation_of, rotations
-from stiffmap.model.effects.sites import at_sites, joints
+from stiffmap.model.effects.sites import each, joints
 from stiffmap.model.effects.types import EffectType, Placed
 
 
 def tilted(e: Joint, placed: Placed) -> Elements:
     """The rotation before the joint, and its inverse behind it."""
-    turn = rotation_of(placed)
+    turn = rotation_of(placed.values)
     before = built(f"{e.name}_axis_tilt", about(home_position(e), turn))
     return (before, e, built(f"{e.name}_axis_tilt_back", Pose.of(rotation=turn.T)))
 
@@ -27,8 +27,7 @@ EFFECT = EffectType(
         "does nothing."
     ),
     parameters=rotations("rotation of the axis"),
-    places=at_sites(joints),
-    apply=changing(joints, tilted),
+    **each(joints, tilted),
     pivot="home position of the carriage; origin of a revolute joint",
     frame="local axes before the joint; about x, then the turned y, then the twice turned z",
     moves="the axis alone",

@@ -6,16 +6,11 @@ from functools import partial
 
 from stiffmap.model.description import Law
 from stiffmap.model.effects.evidence import shares_of_load
-from stiffmap.model.effects.library.drive_law import changing_law, in_unit_of_joint, linear
-from stiffmap.model.effects.sites import at_sites, elastic_directions, elastic_drives
+from stiffmap.model.effects.library.drive_law import linear, on_law
 from stiffmap.model.effects.types import EffectType, Parameter, Placed
 
 KNEES = (0.1, 0.25, 0.5, 0.8)
 """Shares of the largest load at which the compliance may change."""
-PARAMETERS = (
-    Parameter("ratio", "1", 1e-3, 1e3, 1.0, 0.1, "compliance beyond the knee over the declared one"),
-    Parameter("knee", "N", 1e-3, 1e6, None, 100.0, "force at which the compliance changes", angular="N·m"),
-)
 
 
 def law(old: Law, placed: Placed) -> Law:
@@ -34,13 +29,13 @@ EFFECT = EffectType(
         "beyond (a preloaded screw that opens, a stop that closes); of a drive, an elastic joint or an uncoupled "
         "direction of a link spring (element `foot.k22`)."
     ),
-    parameters=PARAMETERS,
-    places=at_sites(elastic_directions),
-    apply=changing_law(law),
+    parameters=(
+        Parameter("ratio", "1", 1e-3, 1e3, 1.0, 0.1, "compliance beyond the knee over the declared one"),
+        Parameter(
+            "knee", "N", 1e-3, 1e6, None, 100.0, "force at which the compliance changes", angular="N·m"
+        ),
+    ),
+    **on_law(law),
     signature=partial(shares_of_load, name="knee", shares=KNEES),
-    tried=at_sites(elastic_drives),
-    frame="the coordinate",
     excludes=("bilinear", "dead_zone", "hardening", "friction", "position_dependent_compliance", "tabulated"),
-    stage=10,
-    at=in_unit_of_joint(*PARAMETERS),
 )

@@ -6,8 +6,7 @@ from dataclasses import replace
 
 from stiffmap.model.description import Cable
 from stiffmap.model.description.tree import Elements
-from stiffmap.model.effects.edit import changing
-from stiffmap.model.effects.sites import at_sites, cables
+from stiffmap.model.effects.sites import cables, each
 from stiffmap.model.effects.types import EffectType, Parameter, Placed
 
 OFF = tuple(
@@ -29,8 +28,7 @@ EFFECT = EffectType(
     title="anchor of a cable",
     doc="The cable enters its guide (dx, dy, dz) away from where its controller believes.",
     parameters=OFF,
-    places=at_sites(cables),
-    apply=changing(cables, displaced),
+    **each(cables, displaced),
     frame="base axes",
     moves="nothing",
     vector=("dx", "dy", "dz"),

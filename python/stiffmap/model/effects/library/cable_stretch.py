@@ -6,8 +6,7 @@ from dataclasses import replace
 
 from stiffmap.model.description import Cable
 from stiffmap.model.description.tree import Elements
-from stiffmap.model.effects.edit import changing
-from stiffmap.model.effects.sites import at_sites, cables
+from stiffmap.model.effects.sites import cables, each
 from stiffmap.model.effects.types import EffectType, Parameter, Placed
 
 
@@ -25,8 +24,7 @@ EFFECT = EffectType(
         "still commanded for the declared one, so that its pretension changes as well."
     ),
     parameters=(Parameter("scale", "1", 0.05, 50.0, 1.0, 0.1, "of the compliance", plausible=(0.3, 5.0)),),
-    places=at_sites(cables),
-    apply=changing(cables, stretched),
+    **each(cables, stretched),
     moves="nothing",
     compared=("soft", "stiff"),
 )

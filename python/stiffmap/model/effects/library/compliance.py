@@ -12,7 +12,7 @@ from stiffmap.model.description import Element, Joint, Law, MachineDescription, 
 from stiffmap.model.description.strokes import as_rows
 from stiffmap.model.description.tree import Elements
 from stiffmap.model.effects.edit import change_sites
-from stiffmap.model.effects.sites import at_sites, found, joints, springs
+from stiffmap.model.effects.sites import at_sites, elastic_joints, found, springs
 from stiffmap.model.effects.types import EffectType, Parameter, Placed
 
 SCALE = Parameter("scale", "1", 1e-3, 1e3, 1.0, 0.1, "factor on the nominal compliance")
@@ -31,14 +31,9 @@ VALUE = Parameter(
 
 def sites(elements: Elements) -> dict[str, tuple[int, ...]]:
     """Elastic joints, link springs, and single entries of these by names such as ``foot.k11``."""
-    elastic = {n: at for n, at in joints(elements).items() if any(_law(elements[i]) is not None for i in at)}
     whole = springs(elements)
     entries = {f"{n}.k{i}{i}": at for n, at in whole.items() for i in range(1, 7) if _has(elements[at[0]], i)}
-    return {**elastic, **whole, **entries}
-
-
-def _law(e: Element) -> Law | None:
-    return e.law if isinstance(e, Joint) else None
+    return {**elastic_joints(elements), **whole, **entries}
 
 
 def _has(e: Element, i: int) -> bool:
@@ -119,9 +114,9 @@ def derived(description: MachineDescription, placed: Placed) -> dict[str, float]
     """The new total of a drive, m/N or rad/(N·m)."""
     if "value" in placed.values:
         return {}
-    elements = found(description, placed.legs, placed.element, sites)
-    laws = [law for e in elements if (law := _law(e)) is not None]
-    return {"value": placed.values["scale"] / laws[0].stiffness} if laws else {}
+    first, *_ = found(description, placed.legs, placed.element, sites)
+    law = first.law if isinstance(first, Joint) else None
+    return {"value": placed.values["scale"] / law.stiffness} if law else {}
 
 
 EFFECT = EffectType(

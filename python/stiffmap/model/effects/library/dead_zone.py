@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from stiffmap.model.description import Law
-from stiffmap.model.effects.library.drive_law import changing_law, in_unit_of_joint, linear
-from stiffmap.model.effects.sites import at_sites, elastic_directions, elastic_drives
+from stiffmap.model.effects.library.drive_law import linear, on_law
 from stiffmap.model.effects.types import EffectType, Parameter, Placed
 
 HALF_WIDTH = Parameter(
@@ -37,11 +36,6 @@ EFFECT = EffectType(
         "about the centre, the declared stiffness beyond. Unloaded, it stands in the centre."
     ),
     parameters=(HALF_WIDTH,),
-    places=at_sites(elastic_directions),
-    apply=changing_law(law),
-    tried=at_sites(elastic_drives),
-    frame="the coordinate",
+    **on_law(law),
     excludes=("dead_zone", "hardening", "tabulated"),
-    stage=10,
-    at=in_unit_of_joint(HALF_WIDTH),
 )

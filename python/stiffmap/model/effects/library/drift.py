@@ -8,7 +8,7 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.description import AppliedEffect
 from stiffmap.model.effects.evidence import Plan
-from stiffmap.model.effects.library.geometry import AXES
+from stiffmap.model.effects.library.geometry import AXES, translation_of
 from stiffmap.model.effects.library.measurement import added, measured
 from stiffmap.model.effects.types import Option, Parameter
 
@@ -23,8 +23,7 @@ def drift(plan: Plan, term: AppliedEffect) -> Floats:
     clock = plan.hours if per == "hour" else plan.order
     if clock is None:
         raise StiffmapError(f"{plan.name}: drift per {per} needs a column '{column}'")
-    rates = dict(term.parameters)
-    rate = np.array([rates.get(a, 0.0) for a in AXES] + [0.0] * 3)
+    rate = np.concatenate([translation_of(dict(term.parameters), ""), np.zeros(3)])
     return np.asarray((clock - clock.min())[:, None] * rate)
 
 

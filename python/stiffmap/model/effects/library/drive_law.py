@@ -8,10 +8,10 @@ from typing import Any
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.description import Joint, Law, MachineDescription, Spring
-from stiffmap.model.description.tree import Elements, all_elements
+from stiffmap.model.description.tree import Elements
 from stiffmap.model.effects.edit import change_sites
-from stiffmap.model.effects.sites import elastic_directions
-from stiffmap.model.effects.types import Apply, Parameter, ParametersAt, Placed
+from stiffmap.model.effects.sites import at_sites, elastic_directions, elastic_drives
+from stiffmap.model.effects.types import Placed
 
 
 def change_law(
@@ -31,9 +31,16 @@ def change_law(
     return change_sites(description, placed.legs, placed.element, elastic_directions, element)
 
 
-def changing_law(change: Callable[[Law, Placed], Law]) -> Apply:
-    """The ``apply`` of an effect that makes another law of that at its place."""
-    return lambda description, placed: change_law(description, placed, lambda old: change(old, placed))
+def on_law(law: Callable[[Law, Placed], Law], **more: Any) -> dict[str, Any]:
+    """What effects share that make another law of that at their place; `more` as in `EffectType`."""
+    return {
+        "places": at_sites(elastic_directions),
+        "apply": lambda machine, placed: change_law(machine, placed, lambda old: law(old, placed)),
+        "tried": at_sites(elastic_drives),
+        "frame": "the coordinate",
+        "stage": 10,
+        **more,
+    }
 
 
 def _stiffness(e: Spring, i: int) -> float:
@@ -48,31 +55,3 @@ def linear(law: Law) -> Law:
     if law.cubic or law.knots:
         raise StiffmapError("the drive has a declared nonlinear law already, which this effect cannot join")
     return law
-
-
-def is_revolute(description: MachineDescription, element: str) -> bool:
-    """Whether the joint of that name, or the spring's direction (``foot.k44``), turns."""
-    entry = element.partition(".")[2]
-    if entry:
-        return int(entry[1]) > 3
-    named = [e for _, e in all_elements(description) if e.name == element]
-    return any(isinstance(e, Joint) and e.kind != "prismatic" for e in named)
-
-
-def in_unit_of_joint(*parameters: Parameter) -> ParametersAt:
-    """Parameters whose units become the angular ones where the joint turns."""
-
-    turning = tuple(
-        replace(
-            p,
-            unit=p.angular or p.unit,
-            upper=p.angular_upper or p.upper,
-            scale=p.angular_scale or p.scale,
-        )
-        for p in parameters
-    )
-
-    def at(description: MachineDescription, element: str, legs: tuple[str, ...]) -> tuple[Parameter, ...]:
-        return turning if is_revolute(description, element) else parameters
-
-    return at

@@ -10,12 +10,12 @@ from scipy.spatial.transform import Rotation
 from stiffmap.common.broadcasting import Floats
 from stiffmap.model.description import AppliedEffect
 from stiffmap.model.effects.evidence import Plan
-from stiffmap.model.effects.library.geometry import AXES
-from stiffmap.model.effects.library.measurement import added, measured, positions, rotation
+from stiffmap.model.effects.library.geometry import AXES, rotation_of, translation_of
+from stiffmap.model.effects.library.measurement import added, measured
 from stiffmap.model.effects.types import Parameter
 
 PARAMETERS = (
-    *positions("shift of every reading", 1e-4),
+    *(Parameter(a, "m", -1.0, 1.0, 0.0, 1e-4, f"shift of every reading along {a}") for a in AXES),
     *(
         Parameter(
             f"angle_{a}", "rad", -math.pi, math.pi, 0.0, 1e-4, f"turn of the instrument's frame about {a}"
@@ -30,8 +30,7 @@ def offset(plan: Plan, term: AppliedEffect) -> Floats:
     if plan.quantity != "position":
         return np.zeros((len(plan.position), 6))
     parameters = dict(term.parameters)
-    r = rotation(parameters)
-    shift = np.array([parameters.get(a, 0.0) for a in AXES])
+    r, shift = rotation_of(parameters), translation_of(parameters, "")
     turn = np.broadcast_to(Rotation.from_matrix(r).as_rotvec(), plan.position.shape)
     return np.hstack([shift + plan.position @ (r - np.eye(3)).T, turn])
 

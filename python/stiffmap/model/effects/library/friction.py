@@ -6,9 +6,9 @@ from dataclasses import replace
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.description import Law, MachineDescription
-from stiffmap.model.effects.library.drive_law import change_law, is_revolute
+from stiffmap.model.effects.library.drive_law import change_law
 from stiffmap.model.effects.sites import at_sites, elastic_directions, elastic_drives
-from stiffmap.model.effects.types import EffectType, Option, Parameter, ParametersAt, Placed
+from stiffmap.model.effects.types import EffectType, Option, Parameter, ParametersAt, Placed, is_revolute
 
 FORCE = Parameter("force", "N", 0.0, 1e5, 0.0, 10.0, "Coulomb level where it slides")
 TORQUE = Parameter("torque", "N·m", 0.0, 1e5, 0.0, 1.0, "Coulomb level where it turns")

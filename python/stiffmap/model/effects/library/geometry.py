@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
 from stiffmap.common.rotations import rotation_about
 from stiffmap.model.description import Joint, Pose
-from stiffmap.model.effects.types import Parameter, Placed
+from stiffmap.model.effects.types import Parameter
 
 AXES = "xyz"
 ERRORS, ANGLES = (tuple(f"{word}_{a}" for a in AXES) for word in ("error", "angle"))
@@ -23,16 +25,16 @@ def rotations(doc: str, axes: str = AXES) -> tuple[Parameter, ...]:
     return tuple(Parameter(f"angle_{a}", "rad", -0.1, 0.1, 0.0, 1e-4, f"{doc} about {a}") for a in axes)
 
 
-def translation_of(placed: Placed, prefix: str = "error_") -> NDArray[np.float64]:
+def translation_of(values: Mapping[str, float], prefix: str = "error_") -> NDArray[np.float64]:
     """(3,) m."""
-    return np.array([placed.values.get(f"{prefix}{a}", 0.0) for a in AXES])
+    return np.array([values.get(f"{prefix}{a}", 0.0) for a in AXES])
 
 
-def rotation_of(placed: Placed, share: float = 1.0) -> NDArray[np.float64]:
-    """(3, 3): about x, then about the turned y, then about the twice turned z."""
+def rotation_of(values: Mapping[str, float], share: float = 1.0) -> NDArray[np.float64]:
+    """(3, 3) Rx·Ry·Rz: about x, then about the turned y, then about the twice turned z."""
     out = np.eye(3)
     for a, axis in zip(AXES, np.eye(3), strict=True):
-        out = out @ rotation_about(axis, share * placed.values.get(f"angle_{a}", 0.0))
+        out = out @ rotation_about(axis, share * values.get(f"angle_{a}", 0.0))
     return out
 
 

@@ -6,8 +6,7 @@ from dataclasses import replace
 
 from stiffmap.model.description import Cable
 from stiffmap.model.description.tree import Elements
-from stiffmap.model.effects.edit import changing
-from stiffmap.model.effects.sites import at_sites, led_cables
+from stiffmap.model.effects.sites import each, led_cables
 from stiffmap.model.effects.types import EffectType, Parameter, Placed
 
 
@@ -26,7 +25,6 @@ EFFECT = EffectType(
         "stands still is a share of 1 - e^(-mu angle)."
     ),
     parameters=(Parameter("share", "1", -1.0, 1.0, 0.0, 0.05, "of the tension", plausible=(-0.3, 0.3)),),
-    places=at_sites(led_cables),
-    apply=changing(led_cables, rubbing),
+    **each(led_cables, rubbing),
     moves="nothing",
 )

@@ -8,6 +8,7 @@ own are a Prandtl-Ishlinskii model, which obeys Masing's rule.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -15,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.model.effects.evidence import shares_of_load
-from stiffmap.model.effects.library.drive_law import in_unit_of_joint
+from stiffmap.model.effects.library.dead_zone import HALF_WIDTH
 from stiffmap.model.effects.sites import at_sites, elastic_drives
 from stiffmap.model.effects.types import EffectType, Parameter
 
@@ -23,18 +24,13 @@ PARAMETERS = (
     Parameter("level", "N", 0.0, 1e6, 0.0, 1.0, "Coulomb level", default=0.0, angular="N·m"),
     Parameter("spread", "1", 0.0, 1.0, 0.0, 0.1, "half width of the levels about it, relative", default=0.0),
     Parameter("breakaway", "1", 1.0, 10.0, 1.0, 0.1, "level at standstill over it", default=1.0),
-    Parameter(
-        "half_width", "m", 0.0, 0.01, 0.0, 1e-5, "play to each side", default=0.0, angular="rad",
-        angular_upper=0.5, angular_scale=1e-4,
-    ),
+    replace(HALF_WIDTH, doc="play to each side", default=0.0),
     Parameter(
         "seat", "N", 1e-6, 1e6, None, 1.0, "force over which the play is crossed", default=1e-3, angular="N·m"
     ),
     Parameter("ratio", "1", 1e-3, 1e3, 1.0, 0.1, "compliance at large loads over that at small ones", default=1.0),
     Parameter("knee", "N", 1e-6, 1e6, None, 100.0, "force where it changes", default=100.0, angular="N·m"),
 )  # fmt: skip
-
-
 ELEMENTS = 16
 """Elements that stand for a spread of levels."""
 SEATS = (0.003, 0.03, 0.1)
@@ -98,5 +94,4 @@ EFFECT = EffectType(
     excludes=("hysteresis", "friction"),
     needs=("order",),
     drive=deflection,
-    at=in_unit_of_joint(*PARAMETERS),
 )

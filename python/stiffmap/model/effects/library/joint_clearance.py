@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from stiffmap.model.description import Joint, Law, MachineDescription, Offset, Pose, Spring
 from stiffmap.model.description.tree import Elements
 from stiffmap.model.effects.library.joint_compliance import insert, pins
-from stiffmap.model.effects.sites import at_sites, passive_joints
+from stiffmap.model.effects.sites import at_sites
 from stiffmap.model.effects.types import EffectType, Parameter, Placed
 
 CONTACT = 1e12  # N/m behind the gap: a quarter of a nanometre at 250 N
@@ -18,12 +18,7 @@ HOLDS = 1e7  # N: more than any pin bears
 
 def revolute_pins(elements: Elements) -> dict[str, tuple[int, ...]]:
     """Passive revolute joints and the two next to a link."""
-    turning = {
-        i
-        for at in passive_joints(elements).values()
-        for i in at
-        if isinstance(e := elements[i], Joint) and e.kind == "revolute"
-    }
+    turning = {i for i, e in enumerate(elements) if isinstance(e, Joint) and e.kind == "revolute"}
     return {n: at for n, at in pins(elements).items() if turning.issuperset(at)}
 
 

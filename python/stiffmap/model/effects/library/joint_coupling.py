@@ -7,10 +7,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from stiffmap.model.description import Cable, CommandError, Joint, MachineDescription
+from stiffmap.model.description import Cable, CommandError, Joint
 from stiffmap.model.description.tree import Elements
-from stiffmap.model.effects.library.command import add_command_error
-from stiffmap.model.effects.library.drive_law import in_unit_of_joint
+from stiffmap.model.effects.library.command import of_command
 from stiffmap.model.effects.sites import at_sites
 from stiffmap.model.effects.types import EffectType, Parameter, Placed
 
@@ -64,17 +63,10 @@ def _turns(e: Joint) -> bool:
     return e.kind == "revolute" and len(e.axes) == 1
 
 
-def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
+def coupled(placed: Placed) -> CommandError:
     """A command error that grows with the other joint's coordinate."""
     slope = placed.values["per_turn"] / (2.0 * math.pi)
-    error = CommandError(slope=slope, reference=None, of=placed.element.partition(".")[2])
-    return add_command_error(description, placed, error, pairs)
-
-
-def _parameters(
-    description: MachineDescription, element: str, legs: tuple[str, ...]
-) -> tuple[Parameter, ...]:
-    return in_unit_of_joint(PER_TURN)(description, element.partition(".")[0], legs)
+    return CommandError(slope=slope, reference=None, of=placed.element.partition(".")[2])
 
 
 EFFECT = EffectType(
@@ -87,11 +79,7 @@ EFFECT = EffectType(
         "screw that turns with its universal joint."
     ),
     parameters=(PER_TURN,),
-    places=at_sites(pairs),
+    **of_command(coupled, pairs),
     tried=at_sites(likely),
-    apply=apply,
     pivot="home coordinate of the other joint",
-    frame="the drive's axis",
-    moves="all that the drive carries",
-    at=_parameters,
 )

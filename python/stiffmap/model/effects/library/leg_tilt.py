@@ -12,7 +12,7 @@ from stiffmap.model.effects.types import EffectType, Placed
 
 def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
     """A rotation at the end of the offsets with which the leg begins."""
-    turn = built("leg_tilt", Pose.of(rotation=rotation_of(placed)))
+    turn = built("leg_tilt", Pose.of(rotation=rotation_of(placed.values)))
 
     def tilted(elements: Elements) -> Elements:
         i = next((i for i, e in enumerate(elements) if not isinstance(e, Offset)), 0)

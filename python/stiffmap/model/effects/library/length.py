@@ -6,8 +6,8 @@ import numpy as np
 
 from stiffmap.model.description import Element, Offset
 from stiffmap.model.description.tree import Elements
-from stiffmap.model.effects.edit import changing, shifted
-from stiffmap.model.effects.sites import at_sites, lengths
+from stiffmap.model.effects.edit import shifted
+from stiffmap.model.effects.sites import each, lengths
 from stiffmap.model.effects.types import EffectType, Parameter, Placed
 
 
@@ -33,8 +33,7 @@ EFFECT = EffectType(
         "that is its length."
     ),
     parameters=(Parameter("error", "m", -0.1, 0.1, 0.0, 1e-4, "added to the declared length"),),
-    places=at_sites(lengths),
-    apply=changing(lengths, changed),
+    **each(lengths, changed),
     pivot="the link's near end",
     frame="direction of the link",
     moves="all behind the link; nothing turns",

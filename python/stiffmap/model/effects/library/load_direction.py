@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from stiffmap.model.effects.library.measurement import ANGLES, measured, rotation, turned
+from stiffmap.model.effects.library.geometry import rotation_of
+from stiffmap.model.effects.library.measurement import ANGLES, measured, turned
 
 EFFECT = measured(
     "load_direction",
@@ -13,5 +14,5 @@ EFFECT = measured(
     320,
     frame="base axes; about x, then the turned y, then the twice turned z",
     pivot="the point where the force acts",
-    load=lambda wrench, plan, term: turned(wrench, rotation(dict(term.parameters))),
+    load=lambda wrench, plan, term: turned(wrench, rotation_of(dict(term.parameters))),
 )

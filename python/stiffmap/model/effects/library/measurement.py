@@ -12,7 +12,6 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.model.description import AppliedEffect
@@ -28,17 +27,6 @@ def gains(doc: str) -> tuple[Parameter, ...]:
     """``gain`` of all axes and ``gain_x`` … of single ones (they multiply)."""
     each = tuple(Parameter(f"gain_{a}", "1", 0.1, 10.0, 1.0, 0.01, f"{doc}, {a} axis alone") for a in AXES)
     return (Parameter("gain", "1", 0.1, 10.0, 1.0, 0.01, f"{doc}, all axes"), *each)
-
-
-def positions(doc: str, size: float) -> tuple[Parameter, ...]:
-    """``x``, ``y``, ``z`` (m)."""
-    return tuple(Parameter(a, "m", -1.0, 1.0, 0.0, size, f"{doc} along {a}") for a in AXES)
-
-
-def rotation(parameters: Mapping[str, float]) -> Floats:
-    """(3, 3) Rx·Ry·Rz of ``angle_x`` …"""
-    angles = [parameters.get(f"angle_{a}", 0.0) for a in AXES]
-    return np.asarray(Rotation.from_euler("XYZ", angles).as_matrix())
 
 
 def turned(values: Floats, r: Floats) -> Floats:

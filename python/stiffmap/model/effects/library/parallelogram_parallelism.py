@@ -21,7 +21,7 @@ def _turned(b: Branch, placed: Placed, share: float) -> Branch:
     pins = [i for i, e in enumerate(b.elements) if isinstance(e, Joint) and not e.actuated]
     i = pins[0] if placed.options["end"] == "proximal" else pins[-1]
     e = b.elements[i]
-    turn = Pose.of(rotation=rotation_of(placed, share))
+    turn = Pose.of(rotation=rotation_of(placed.values, share))
     name = f"{e.name}_parallelism"
     piece = (built(name, turn), e, built(f"{name}_back", turn.inverse()))
     return replace(b, elements=splice(b.elements, i, piece))

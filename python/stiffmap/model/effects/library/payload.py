@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
 from stiffmap.model.description import Body, ExternalSpring, MachineDescription, Point
 from stiffmap.model.description.pose import vector
 from stiffmap.model.effects.edit import fresh
 from stiffmap.model.effects.library.geometry import point, translation_of
-from stiffmap.model.effects.library.gravity import DOWN
+from stiffmap.model.effects.library.gravity import STANDARD
 from stiffmap.model.effects.sites import at
 from stiffmap.model.effects.types import EffectType, Parameter, Placed
 
@@ -20,7 +18,7 @@ FAR = 1e9
 
 def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
     """A body where the machine has gravity, else a weight alone: the machine's own stays left out."""
-    centre = vector(translation_of(placed, "com_"))
+    centre = vector(translation_of(placed.values, "com_"))
     name = fresh("payload", description.platform)
     if description.gravity is not None:
         body = Body(name, placed.values["mass"], centre)
@@ -33,11 +31,7 @@ def apply(description: MachineDescription, placed: Placed) -> MachineDescription
 def _weight(name: str, mass: float) -> ExternalSpring:
     """A dead force: a spring of no length to an anchor so far that neither size nor direction change
     (by 1e-9 per metre of motion)."""
-    down = np.array(DOWN) / np.linalg.norm(DOWN) * FAR
-    x, y, z = (float(v) for v in down)
-    return ExternalSpring(
-        f"weight_{name}", f"platform.{name}", (x, y, z), mass * float(np.linalg.norm(DOWN)) / FAR, 0.0
-    )
+    return ExternalSpring(f"weight_{name}", f"platform.{name}", (0.0, 0.0, -FAR), mass * STANDARD / FAR, 0.0)
 
 
 EFFECT = EffectType(

@@ -8,11 +8,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from stiffmap.common.broadcasting import Floats
-from stiffmap.model.description import AppliedEffect, CommandError, MachineDescription
+from stiffmap.model.description import AppliedEffect, CommandError
 from stiffmap.model.effects.evidence import Periods, Probe, Signature, Tried
-from stiffmap.model.effects.library.command import add_command_error
-from stiffmap.model.effects.library.drive_law import in_unit_of_joint
-from stiffmap.model.effects.sites import at_sites, drives
+from stiffmap.model.effects.library.command import of_command
 from stiffmap.model.effects.types import EffectType, Parameter, Placed
 
 SHORTEST = 2e-3
@@ -33,14 +31,10 @@ PARAMETERS = (
 )
 
 
-def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
+def wave(placed: Placed) -> CommandError:
     """amplitude sin(2 pi (u - home) / period + phase)."""
     a, period, phase = (placed.values[n] for n in ("amplitude", "period", "phase"))
-    return add_command_error(
-        description,
-        placed,
-        CommandError(amplitude=a, period=period, phase=phase, reference=None),
-    )
+    return CommandError(amplitude=a, period=period, phase=phase, reference=None)
 
 
 def signature(probe: Probe, tried: Tried) -> Iterator[Signature]:
@@ -92,11 +86,7 @@ EFFECT = EffectType(
         "coordinate u."
     ),
     parameters=PARAMETERS,
-    places=at_sites(drives),
-    apply=apply,
+    **of_command(wave),
     signature=signature,
     pivot="the drive's home coordinate",
-    frame="the drive's axis",
-    moves="all that the drive carries",
-    at=in_unit_of_joint(*PARAMETERS),
 )

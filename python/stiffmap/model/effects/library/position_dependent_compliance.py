@@ -7,9 +7,7 @@ from dataclasses import replace
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.description import Joint
 from stiffmap.model.description.tree import Elements
-from stiffmap.model.effects.edit import changing
-from stiffmap.model.effects.library.drive_law import in_unit_of_joint
-from stiffmap.model.effects.sites import at_sites, elastic_drives
+from stiffmap.model.effects.sites import each, elastic_drives
 from stiffmap.model.effects.types import EffectType, Parameter, Placed
 
 SLOPE = Parameter(
@@ -35,10 +33,8 @@ EFFECT = EffectType(
         "more the longer it is)."
     ),
     parameters=(SLOPE,),
-    places=at_sites(elastic_drives),
-    apply=changing(elastic_drives, sloped),
+    **each(elastic_drives, sloped),
     pivot="the drive's home coordinate",
     frame="the drive's coordinate",
     excludes=("hardening", "friction"),
-    at=in_unit_of_joint(SLOPE),
 )

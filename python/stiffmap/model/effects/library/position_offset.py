@@ -17,7 +17,7 @@ def find(description: MachineDescription) -> list[Place]:
 
 def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
     """An offset before the joint, at the leg's beginning, or (reversed) at its end."""
-    error, name = translation_of(placed), f"{placed.element}_position_offset"
+    error, name = translation_of(placed.values), f"{placed.element}_position_offset"
     if placed.element == "base":
         first = built(name, Pose.of(error))
         return edit_chains(description, placed.legs, lambda seq: splice(seq, 0, (first, seq[0])))

@@ -6,15 +6,14 @@ from dataclasses import replace
 
 from stiffmap.model.description import Spring
 from stiffmap.model.description.tree import Elements
-from stiffmap.model.effects.edit import changing
 from stiffmap.model.effects.library.geometry import translation_of, translations
-from stiffmap.model.effects.sites import at_sites, springs
+from stiffmap.model.effects.sites import each, springs
 from stiffmap.model.effects.types import EffectType, Placed
 
 
 def pulled(e: Spring, placed: Placed) -> Elements:
     """Moves the deflection at which the spring is free of force."""
-    x, y, z = translation_of(placed, "rest_")
+    x, y, z = translation_of(placed.values, "rest_")
     a, b, c, *rotations = e.rest
     return (replace(e, rest=(a + x, b + y, c + z, *rotations)),)
 
@@ -28,8 +27,7 @@ EFFECT = EffectType(
         "parallelogram both bars alike."
     ),
     parameters=translations("force-free deflection", "rest_"),
-    places=at_sites(springs),
-    apply=changing(springs, pulled),
+    **each(springs, pulled),
     frame="local axes of the spring",
     moves="all behind the link",
     vector=("rest_x", "rest_y", "rest_z"),

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from stiffmap.model.effects.library.measurement import ANGLES, measured, of_coordinates, rotation, turned
+from stiffmap.model.effects.library.geometry import rotation_of
+from stiffmap.model.effects.library.measurement import ANGLES, measured, of_coordinates, turned
 
 EFFECT = measured(
     "sensor_axes",
@@ -12,7 +13,7 @@ EFFECT = measured(
     ANGLES,
     350,
     frame="declared axes of the reading; about x, then the turned y, then the twice turned z",
-    reading=of_coordinates(lambda values, parameters: turned(values, rotation(parameters).T)),
+    reading=of_coordinates(lambda values, parameters: turned(values, rotation_of(parameters).T)),
     hidden=lambda plan: plan.frame == "unknown",
     certified=True,
 )

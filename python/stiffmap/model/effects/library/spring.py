@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 
-from stiffmap.model.description import Element, Offset, Pose, Spring
+from stiffmap.model.description import MachineDescription, Offset, Pose, Spring
 from stiffmap.model.description.strokes import Matrix6, as_rows
+from stiffmap.model.effects.edit import fresh
 from stiffmap.model.effects.library.geometry import point, translation_of
+from stiffmap.model.effects.sites import at
 from stiffmap.model.effects.types import Parameter, Placed
 
 PARAMETERS = (
     Parameter("translation", "m/N", 0.0, 1e-3, 0.0, 1e-9, "compliance of each translation"),
     Parameter("rotation", "rad/(N·m)", 0.0, 1.0, 0.0, 1e-7, "compliance of each rotation"),
 )
-
-PIVOT = point("pivot", "where the spring sits")
 
 
 def isotropic(placed: Placed) -> Matrix6:
@@ -23,9 +26,21 @@ def isotropic(placed: Placed) -> Matrix6:
     return as_rows(np.diag(diagonal))
 
 
-def spring_about(name: str, placed: Placed) -> tuple[Element, ...]:
-    """The isotropic spring at the pivot, seen from the frame where it is inserted."""
-    pivot = translation_of(placed, "pivot_")
-    there, back = Pose.of(pivot), Pose.of(-pivot)
-    spring = Spring(name, compliance=isotropic(placed))
-    return (Offset(f"{name}_there", there), spring, Offset(f"{name}_back", back))
+def spring_at(end: str) -> dict[str, Any]:
+    """What effects share that put an isotropic spring at a pivot, before all of the ``base`` or behind the ``platform``."""
+
+    def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
+        elements, pivot = getattr(description, end), translation_of(placed.values, "pivot_")
+        name = fresh(placed.kind, elements)
+        there, back = (Offset(f"{name}_{way}", Pose.of(p)) for way, p in (("there", pivot), ("back", -pivot)))
+        new = (there, Spring(name, compliance=isotropic(placed)), back)
+        changed: dict[str, Any] = {end: (*new, *elements) if end == "base" else (*elements, *new)}
+        return replace(description, **changed)
+
+    return {
+        "parameters": (*PARAMETERS, *point("pivot", "where the spring sits")),
+        "places": at(end),
+        "apply": apply,
+        "vector": ("translation", "rotation"),
+        "stage": 50,
+    }

@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.model.description import CommandError, GuideError, Joint
+from stiffmap.model.description import GuideError, Joint
 from stiffmap.model.description.tree import Elements
-from stiffmap.model.effects.edit import changing
 from stiffmap.model.effects.library import periodic_error
-from stiffmap.model.effects.sites import at_sites, guides
+from stiffmap.model.effects.sites import each, guides
 from stiffmap.model.effects.types import EffectType, Option, Placed
 
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
@@ -27,9 +26,8 @@ def bent(e: Joint, placed: Placed) -> Elements:
     along = sum(a * b for a, b in zip(axis, e.axes[0], strict=True))
     if abs(along) > 1e-9:
         raise StiffmapError(f"across={placed.options['across']} is not across the guide {e.axes[0]}")
-    amplitude, period, phase = (placed.values[p.name] for p in PARAMETERS)
-    error = CommandError(amplitude=amplitude, period=period, phase=phase, reference=None)
-    return (replace(e, guide_errors=(*e.guide_errors, GuideError(axis, error))),)
+    error = GuideError(axis, periodic_error.wave(placed))
+    return (replace(e, guide_errors=(*e.guide_errors, error)),)
 
 
 EFFECT = EffectType(
@@ -42,8 +40,7 @@ EFFECT = EffectType(
         "stroke s is the half wave period = 2s."
     ),
     parameters=PARAMETERS,
-    places=at_sites(guides),
-    apply=changing(guides, bent),
+    **each(guides, bent),
     pivot="the drive's home coordinate",
     frame="axes of the guide before it moves",
     moves="all that the drive carries, without turning",

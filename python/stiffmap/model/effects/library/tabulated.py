@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import pairwise
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.model.description import Law, MachineDescription
-from stiffmap.model.effects.library.drive_law import changing_law, is_revolute, linear
-from stiffmap.model.effects.sites import at_sites, elastic_directions
+from stiffmap.model.description import Law
+from stiffmap.model.effects.library.drive_law import linear, on_law
 from stiffmap.model.effects.types import EffectType, Parameter, Placed
 
 POINTS = 4
@@ -34,12 +32,6 @@ def law(old: Law, placed: Placed) -> Law:
     return Law((f1 - f0) / (a1 - a0), knots=(*mirrored, *points))
 
 
-def at(description: MachineDescription, element: str, legs: tuple[str, ...]) -> tuple[Parameter, ...]:
-    """Steps in rad where it turns."""
-    turns = is_revolute(description, element)
-    return (replace(STEP, unit=STEP.angular) if turns else STEP, *FACTORS)
-
-
 EFFECT = EffectType(
     kind="tabulated",
     precedence=50,
@@ -50,9 +42,7 @@ EFFECT = EffectType(
         "points and through zero, the same in both directions; the last piece goes on beyond. The force must rise."
     ),
     parameters=(STEP, *FACTORS),
-    places=at_sites(elastic_directions),
-    apply=changing_law(law),
-    frame="the coordinate",
+    **on_law(law, tried=lambda description: []),
     vector=tuple(p.name for p in FACTORS),
     excludes=(
         "tabulated",
@@ -62,7 +52,4 @@ EFFECT = EffectType(
         "friction",
         "position_dependent_compliance",
     ),
-    stage=10,
-    at=at,
-    tried=lambda description: [],
 )

@@ -13,7 +13,7 @@ from stiffmap.model.effects.types import EffectType, Placed
 
 def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
     """An offset behind all platform elements."""
-    new = built(fresh("tcp_offset", description.platform), Pose.of(translation_of(placed)))
+    new = built(fresh("tcp_offset", description.platform), Pose.of(translation_of(placed.values)))
     return replace(description, platform=(*description.platform, new))
 
 

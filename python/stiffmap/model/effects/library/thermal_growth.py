@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from stiffmap.model.description import Element
 from stiffmap.model.description.tree import Elements
-from stiffmap.model.effects.edit import changing
 from stiffmap.model.effects.library.length import longer
-from stiffmap.model.effects.sites import at_sites, lengths
+from stiffmap.model.effects.sites import each, lengths
 from stiffmap.model.effects.types import EffectType, Parameter, Placed
 
 PARAMETERS = (
@@ -47,8 +46,7 @@ EFFECT = EffectType(
     title="thermal growth of a link",
     doc="The link is longer by coefficient·temperature_difference times its declared length.",
     parameters=PARAMETERS,
-    places=at_sites(lengths),
-    apply=changing(lengths, grown),
+    **each(lengths, grown),
     pivot="the link's near end",
     frame="direction of the link",
     moves="all behind the link; nothing turns",
