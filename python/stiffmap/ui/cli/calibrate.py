@@ -5,9 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
-
-import typer
 
 from stiffmap.common.outputs import make_folder, write_rows, write_text
 from stiffmap.common.outputs.option import written
@@ -16,19 +13,18 @@ from stiffmap.identification.inference.travel import Profile
 from stiffmap.identification.numbers import Tolerances
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import finish
+from stiffmap.ui.cli.options import option
 
 
 def command(
     machine: options.Declared,
     data: options.Experiment,
-    output: Annotated[Path | None, written(help="Folder for calibration.json and table.txt.")] = None,
+    output: Path | None = written("Folder for calibration.json and table.txt."),
     tolerance: options.Spread = 1.0,
-    exclude: Annotated[
-        list[str] | None, typer.Option(help="Group that is known to be right; may be repeated.")
-    ] = None,
+    exclude: list[str] | None = option("Group that is known to be right; may be repeated."),
     budget: options.Budget = None,
-    rows: Annotated[int, typer.Option(help="Unknowns to list.")] = 20,
-    seed: Annotated[int, typer.Option(help="Seed of the folds.")] = 0,
+    rows: int = option("Unknowns to list.", 20),
+    seed: int = option("Seed of the folds.", 0),
     threads: options.Threads = None,
     as_json: options.Json = False,
 ) -> None:

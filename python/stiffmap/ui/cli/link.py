@@ -6,9 +6,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, cast
-
-import typer
+from typing import Any, cast
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs.option import written
@@ -24,6 +22,7 @@ from stiffmap.model.link.result import Link
 from stiffmap.model.link.solve import Material, Setup
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import in_si
+from stiffmap.ui.cli.options import argument, option
 from stiffmap.ui.cli.output import show
 
 FIELDS = {".csv", ".dat", ".frd", ".vtk", ".vtu", ".lis", ".txt"}
@@ -40,34 +39,23 @@ Examples:
 
 
 def command(
-    part: Annotated[
-        Path, typer.Argument(help="beam.yaml, .step, .msh, or a field: .csv .dat .frd .vtu .lis")
-    ],
-    fixed: Annotated[str, typer.Option(help="Face that is held; a+b joins faces.")] = "fixed",
-    loaded: Annotated[str, typer.Option(help="Face that carries the load and the spring.")] = "loaded",
-    material: Annotated[
-        str | None, typer.Option(help="A name (steel, aluminium, ...) or 70GPa,0.33.")
-    ] = None,
-    cases: Annotated[Path | None, typer.Option(help="CSV of wrenches: fx [N] ... mz [N*mm].")] = None,
-    reference: Annotated[
-        str | None, typer.Option(help="x,y,z of the spring in mm; else the face's centre.")
-    ] = None,
-    size: Annotated[float | None, typer.Option(help="Edge length of the elements in mm.")] = None,
-    unit: Annotated[str | None, typer.Option(help="Length unit of a file that does not carry it.")] = None,
-    nodes: Annotated[Path | None, typer.Option(help="Coordinates for .dat and .lis: node x y z.")] = None,
-    solver: Annotated[str, typer.Option(help="auto, ccx or skfem.")] = "auto",
-    quick: Annotated[
-        bool, typer.Option("--quick", help="One mesh, one boundary: no share of these.")
-    ] = False,
-    support: Annotated[
-        str,
-        typer.Option(
-            help="Besides clamped, for the boundary's share: bed (bolted down), soft (pin in hole)."
-        ),
-    ] = "bed",
-    zeros: Annotated[bool, typer.Option("--zeros", help="Set insignificant entries to zero.")] = False,
-    out: Annotated[Path | None, written("-o", "--out", help="Link file to write (YAML).")] = None,
-    picture: Annotated[Path | None, written("--picture", help="PNG to write.")] = None,
+    part: Path = argument("beam.yaml, .step, .msh, or a field: .csv .dat .frd .vtu .lis"),
+    fixed: str = option("Face that is held; a+b joins faces.", "fixed"),
+    loaded: str = option("Face that carries the load and the spring.", "loaded"),
+    material: str | None = option("A name (steel, aluminium, ...) or 70GPa,0.33."),
+    cases: Path | None = option("CSV of wrenches: fx [N] ... mz [N*mm]."),
+    reference: str | None = option("x,y,z of the spring in mm; else the face's centre."),
+    size: float | None = option("Edge length of the elements in mm."),
+    unit: str | None = option("Length unit of a file that does not carry it."),
+    nodes: Path | None = option("Coordinates for .dat and .lis: node x y z."),
+    solver: str = option("auto, ccx or skfem.", "auto"),
+    quick: bool = option("One mesh, one boundary: no share of these.", False, "--quick"),
+    support: str = option(
+        "Besides clamped, for the boundary's share: bed (bolted down), soft (pin in hole).", "bed"
+    ),
+    zeros: bool = option("Set insignificant entries to zero.", False, "--zeros"),
+    out: Path | None = written("Link file to write (YAML).", None, "-o", "--out"),
+    picture: Path | None = written("PNG to write.", None, "--picture"),
     as_json: options.Json = False,
 ) -> None:
     """Identify a link's 6x6 spring, with error bars, from a part or a displacement field."""

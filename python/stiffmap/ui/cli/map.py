@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 import typer
@@ -28,6 +28,7 @@ from stiffmap.ui.cli.map_summary import (
     uncertainty_told,
     worst_pose,
 )
+from stiffmap.ui.cli.options import option
 from stiffmap.ui.cli.output import failed_in_words, show
 from stiffmap.workspace.maps.inputs import magnitude, plane_axes
 
@@ -35,57 +36,44 @@ from stiffmap.workspace.maps.inputs import magnitude, plane_axes
 def command(
     context: typer.Context,
     machine: options.Machine,
-    output: Annotated[Path, written(help="Folder for the map and its pictures.")] = Path("stiffmap-map"),
-    z: Annotated[
-        list[float] | None,
-        typer.Option(help="z-plane in mm; repeatable. [default: lowest, 0, highest of the workspace]"),
-    ] = None,
-    y: Annotated[list[float] | None, typer.Option(help="Planes across y instead, in mm; repeatable.")] = None,
-    x: Annotated[list[float] | None, typer.Option(help="Planes across x instead, in mm; repeatable.")] = None,
-    points: Annotated[
-        int, typer.Option(help="Positions along each axis of a plane, over the whole workspace.")
-    ] = 101,
+    output: Path = written("Folder for the map and its pictures.", Path("stiffmap-map")),
+    z: list[float] | None = option(
+        "z-plane in mm; repeatable. [default: lowest, 0, highest of the workspace]"
+    ),
+    y: list[float] | None = option("Planes across y instead, in mm; repeatable."),
+    x: list[float] | None = option("Planes across x instead, in mm; repeatable."),
+    points: int = option("Positions along each axis of a plane, over the whole workspace.", 101),
     force: options.Force = "300",
-    toolpath: Annotated[
-        str | None,
-        typer.Option(
-            help="Along a path of the tool instead of over planes: CSV or YAML, as for `efforts`; or a shipped one: trim."
-        ),
-    ] = None,
+    toolpath: str | None = option(
+        "Along a path of the tool instead of over planes: CSV or YAML, as for `efforts`; or a shipped one: trim."
+    ),
     plane: options.Plane = "xy",
     tolerance: options.Tolerance = 0.25,
-    directions: Annotated[
-        int,
-        typer.Option(
-            help="Force directions solved before the extremes are searched; 16 or more for machines with play."
-        ),
-    ] = 4,
+    directions: int = option(
+        "Force directions solved before the extremes are searched; 16 or more for machines with play.", 4
+    ),
     effect: options.Effects = None,
     gravity_: options.Gravity = None,
-    compliance: Annotated[bool, typer.Option(help="Keep the 6x6 compliance of every pose.")] = False,
-    uncertainty: Annotated[
-        bool,
-        typer.Option("--uncertainty", help="Standard deviation of the map, from links and `u` of the file."),
-    ] = False,
-    zarr: Annotated[bool, typer.Option("--zarr", help="Write Zarr instead of NetCDF.")] = False,
-    resume: Annotated[bool, typer.Option("--resume", help="Take up an interrupted run.")] = False,
-    pictures: Annotated[bool, typer.Option(help="Draw the maps, and write them as a report (HTML).")] = True,
-    formats: Annotated[
-        str, typer.Option("--format", help="Formats of the pictures: png, svg, pdf, or several as png,pdf.")
-    ] = "png",
-    tables: Annotated[
-        str | None, typer.Option("--table", help="Write the map as a table too: csv, xlsx, or csv,xlsx.")
-    ] = None,
-    own_scales: Annotated[
-        bool, typer.Option("--own-scales", help="A colour scale for each plane instead of a common one.")
-    ] = False,
-    estimate: Annotated[
-        bool,
-        typer.Option("--estimate", help="Only say how long it will take, and the memory and disk it needs."),
-    ] = False,
-    statistics: Annotated[
-        bool, typer.Option("--statistics", help="Maxima, percentiles and shares only; no map is stored.")
-    ] = False,
+    compliance: bool = option("Keep the 6x6 compliance of every pose.", False),
+    uncertainty: bool = option(
+        "Standard deviation of the map, from links and `u` of the file.", False, "--uncertainty"
+    ),
+    zarr: bool = option("Write Zarr instead of NetCDF.", False, "--zarr"),
+    resume: bool = option("Take up an interrupted run.", False, "--resume"),
+    pictures: bool = option("Draw the maps, and write them as a report (HTML).", True),
+    formats: str = option(
+        "Formats of the pictures: png, svg, pdf, or several as png,pdf.", "png", "--format"
+    ),
+    tables: str | None = option("Write the map as a table too: csv, xlsx, or csv,xlsx.", None, "--table"),
+    own_scales: bool = option(
+        "A colour scale for each plane instead of a common one.", False, "--own-scales"
+    ),
+    estimate: bool = option(
+        "Only say how long it will take, and the memory and disk it needs.", False, "--estimate"
+    ),
+    statistics: bool = option(
+        "Maxima, percentiles and shares only; no map is stored.", False, "--statistics"
+    ),
     scheduler: options.Scheduler = None,
     method: options.Method = "fast",
     threads: options.Threads = None,

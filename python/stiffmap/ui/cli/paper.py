@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
-
-import typer
 
 from stiffmap.common.outputs import make_folder, write_text
 from stiffmap.common.outputs.option import written
 from stiffmap.ui.cli import options
+from stiffmap.ui.cli.options import option
 from stiffmap.ui.cli.output import show
 from stiffmap.ui.paper import Results, Statement, all_statements, compute
 from stiffmap.ui.paper.table import as_csv, as_markdown, as_rich, count, count_text
@@ -18,9 +16,9 @@ NO_CURVES = "The paper prints no numbers of the curves in Figures 5 to 7; the nu
 
 
 def command(
-    output: Annotated[Path | None, written(help="Folder for figures and tables.")] = None,
-    points: Annotated[int, typer.Option(help="Positions along x and y of the error maps.")] = 101,
-    figures: Annotated[bool, typer.Option(help="Draw Figures 5 to 7 (with -o).")] = True,
+    output: Path | None = written("Folder for figures and tables."),
+    points: int = option("Positions along x and y of the error maps.", 101),
+    figures: bool = option("Draw Figures 5 to 7 (with -o).", True),
     threads: options.Threads = None,
     as_json: options.Json = False,
 ) -> None:
