@@ -14,7 +14,7 @@ from stiffmap.solve.check import FileCheck, check_file
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.trial import tried
 from stiffmap.ui.cli import options
-from stiffmap.ui.cli.options import argument, option
+from stiffmap.ui.cli.options import argument, flag
 from stiffmap.ui.cli.output import show
 
 MOST_CHANGES = 12
@@ -22,7 +22,7 @@ MOST_CHANGES = 12
 
 def command(
     file: str = argument("Machine file, or the name of a shipped machine."),
-    strict: bool = option("Exit with 1 where there are warnings.", False, "--strict"),
+    strict: bool = flag("Exit with 1 where there are warnings.", "--strict"),
     as_json: options.Json = False,
 ) -> None:
     """Validate a machine file and look it over: keys, units, home, free motions, reach, odd numbers.

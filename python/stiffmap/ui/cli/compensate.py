@@ -81,7 +81,7 @@ def command(
 
       [cyan]stiffmap compensate result/machine.yaml --check held_out[/cyan]
     """
-    if axis is None and poses is None and urdf is None and dh is None and check is None:
+    if all(given is None for given in (axis, poses, urdf, dh, check)):
         raise StiffmapError("compensate: give a CSV of wanted poses, --axis, --urdf, --dh or --check")
     if axis is None and urdf is not None and (output is None or poses is not None):
         raise StiffmapError(

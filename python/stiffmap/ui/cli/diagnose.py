@@ -13,7 +13,8 @@ from stiffmap.identification.diagnosis.report.sentences import next_step
 from stiffmap.identification.numbers import Tolerances
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import finish
-from stiffmap.ui.cli.options import option
+from stiffmap.ui.cli.options import flag, option
+from stiffmap.ui.cli.output import show
 
 
 def command(
@@ -26,7 +27,7 @@ def command(
     budget: options.Budget = None,
     tolerance: options.Spread = 1.0,
     date: str | None = option("Date that the report bears, as you write it."),
-    quiet: bool = option("Say nothing of what is being tried.", False, "--quiet"),
+    quiet: bool = flag("Say nothing of what is being tried.", "--quiet"),
     as_json: options.Json = False,
 ) -> None:
     """Which physical effect a machine lacks, where it sits, how large it is, and how sure that is.
@@ -56,11 +57,8 @@ def command(
     )
     if output is not None:
         write(result, output, date, [p for p in (Path(machine), Path(data)) if p.exists()])
-    print(result.to_json() if as_json else result)
-    if not as_json:
-        print(f"next: {next_step(result)}")
-        if output is not None:
-            print(f"wrote {output}: start with report.html")
+    wrote = None if output is None else f"wrote {output}: start with report.html"
+    show(as_json, result.as_plain(), [str(result), f"next: {next_step(result)}", wrote])
     finish(result.verdict != "none")
 
 

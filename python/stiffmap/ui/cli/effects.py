@@ -13,7 +13,7 @@ from stiffmap.model.files.shipped import machine_names
 from stiffmap.solve.machine import Machine, load_machine
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.options import argument, option
-from stiffmap.ui.cli.output import print_json, say
+from stiffmap.ui.cli.output import show
 
 
 def command(
@@ -44,16 +44,16 @@ def command(
         chosen = [get(k) for k in meant]
     else:
         chosen = [get(kind)] if kind else [get(k) for k in kinds()]
-    if as_json:
-        print_json([_plain(e, machine) for e in chosen])
-        return
-    for effect in chosen:
-        names = ", ".join(f"{p.name} ({p.unit})" if p.unit != "1" else p.name for p in effect.parameters)
-        say(Text.assemble((effect.kind, "bold"), f"  {effect.title}: {names}"))
-        if machine is not None:
-            say(f"    on {', '.join(_where(effect, machine)) or 'nothing of this machine'}")
-    if kind:
-        say(*_definition(chosen[0]))
+    told = [line for e in chosen for line in _lines(e, machine)]
+    show(as_json, [_plain(e, machine) for e in chosen], [*told, *(_definition(chosen[0]) if kind else ())])
+
+
+def _lines(effect: EffectType, machine: Machine | None) -> Iterator[str | Text]:
+    """An effect and its parameters, and where it can be."""
+    names = ", ".join(f"{p.name} ({p.unit})" if p.unit != "1" else p.name for p in effect.parameters)
+    yield Text.assemble((effect.kind, "bold"), f"  {effect.title}: {names}")
+    if machine is not None:
+        yield f"    on {', '.join(_where(effect, machine)) or 'nothing of this machine'}"
 
 
 def _where(effect: EffectType, machine: Machine) -> list[str]:

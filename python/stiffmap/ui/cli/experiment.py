@@ -19,7 +19,7 @@ from stiffmap.experiment.noise.level import unknown
 from stiffmap.experiment.spreadsheet.from_table import FromTable, experiment_from_table
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import pairs
-from stiffmap.ui.cli.options import argument, option
+from stiffmap.ui.cli.options import argument, flag, option
 from stiffmap.ui.cli.output import show
 from stiffmap.ui.cli.output import table as table_of
 
@@ -63,7 +63,7 @@ def command(
     record: list[str] | None = option(
         "For the report: operator, instrument, certificate, date, temperature or notes, e.g. operator=Miller."
     ),
-    dialogue: bool = option("Ask what cannot be guessed, and remember the answers.", False, "--dialogue"),
+    dialogue: bool = flag("Ask what cannot be guessed, and remember the answers.", "--dialogue"),
     overwrite: options.Overwrite = False,
     as_json: options.Json = False,
 ) -> None:

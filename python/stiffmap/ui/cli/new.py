@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +14,8 @@ from stiffmap.common.outputs import new_file, write_text
 from stiffmap.model.files.shipped import starter_text
 from stiffmap.solve.starters import CLASSES, class_of, machine_text
 from stiffmap.ui.cli import options
-from stiffmap.ui.cli.options import argument, option
-from stiffmap.ui.cli.output import print_json, show
+from stiffmap.ui.cli.options import argument, flag, option
+from stiffmap.ui.cli.output import show
 
 DIMENSIONS = {
     "radius": "mm, of the circle on which the legs stand on the base",
@@ -44,7 +45,7 @@ def command(
     kind: str | None = option(
         "Start from a machine of this class; --list names them.", None, "--from", metavar="CLASS"
     ),
-    listed: bool = option("List the classes and their dimensions.", False, "--list"),
+    listed: bool = flag("List the classes and their dimensions.", "--list"),
     radius: Length = _dimension("radius"),
     platform: Length = _dimension("platform"),
     arm: Length = _dimension("arm"),
@@ -76,7 +77,8 @@ def command(
     dimensions = {"radius": radius, "platform": platform, "arm": arm, "forearm": forearm, "rod": rod, "height": height,
                   "stroke": stroke, "reach": reach, "tube": tube, "wall": wall, "drive": drive}  # fmt: skip
     if listed:
-        _list(as_json)
+        classes = {n: {"title": c.title, "dimensions": dict(c.defaults)} for n, c in CLASSES.items()}
+        show(as_json, classes, _class_lines())
         return
     if file is None:
         raise StiffmapError("new: expected a file to write, such as my_machine.yaml (or --list)")
@@ -98,10 +100,7 @@ def command(
     show(as_json, data, [told])
 
 
-def _list(as_json: bool) -> None:
-    if as_json:
-        print_json({n: {"title": c.title, "dimensions": dict(c.defaults)} for n, c in CLASSES.items()})
-        return
+def _class_lines() -> Iterator[str]:
     for name, c in CLASSES.items():
-        print(f"{name:<13}{c.title}\n{'':13}" + " ".join(f"--{k} {v:g}" for k, v in c.defaults.items()))
-    print("lengths in mm; --drive in N/µm where drives slide, in kN·m/rad where they turn")
+        yield f"{name:<13}{c.title}\n{'':13}" + " ".join(f"--{k} {v:g}" for k, v in c.defaults.items())
+    yield "lengths in mm; --drive in N/µm where drives slide, in kN·m/rad where they turn"

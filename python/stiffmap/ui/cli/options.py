@@ -15,6 +15,11 @@ def option(help: str, default: Any = None, *names: str, **more: Any) -> Any:
     return typer.Option(default, *names, help=help, **more)
 
 
+def flag(help: str, name: str) -> Any:
+    """An option without a value, which is not set by default."""
+    return option(help, False, name)
+
+
 def argument(help: str, default: Any = ...) -> Any:
     """An argument of one command, required where it has no default."""
     return typer.Argument(default, help=help)

@@ -22,7 +22,7 @@ from stiffmap.identification.planning.estimate import fitted
 from stiffmap.solve.machine import Machine, load_machine
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import MM, in_si, numbers
-from stiffmap.ui.cli.options import argument, option
+from stiffmap.ui.cli.options import argument, flag, option
 from stiffmap.ui.cli.output import show
 
 
@@ -34,7 +34,7 @@ def command(
     taps: int | None = option("In place of --identify: so many poses for tap tests, best first."),
     output: Path | None = written("CSV file of the rows chosen."),
     rival: list[str] | None = option("Explanation to separate from; repeatable.", None, "--rival"),
-    for_map: bool = option("Make the map at the workpiece certain instead of the numbers.", False, "--map"),
+    for_map: bool = flag("Make the map at the workpiece certain instead of the numbers.", "--map"),
     at: list[str] | None = option("Point of the workpiece, mm, as 100,0,50; repeatable (with --map)."),
     rows: int = option("Rows to measure.", 12),
     quantity: options.Quantity = "deflection",
