@@ -6,6 +6,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -84,20 +85,23 @@ def command(
       [cyan]stiffmap simulate orthoglide-revised --plan experiments/servo --effect 'dead_zone actuator y half_width=5um' -o twin[/cyan]
     """
     chosen = load_machine(machine)
-    size = in_si(noise)
-    layout = _layout(
-        chosen,
-        plan,
-        quantity,
-        poses,
-        loads,
-        _sizes(forces),
-        repeats,
-        _axes(read),
-        size,
-        1e-3 * angle_noise,
-        seed,
-    )
+    strengths, axes, size = _sizes(forces), _axes(read), in_si(noise)
+    if quantity not in make.MICRO:
+        raise StiffmapError(f"--quantity: expected deflection or position, got {quantity!r}")
+    if size is not None and size <= 0:
+        raise StiffmapError(f"--noise: expected a standard deviation above zero, got {noise:g} mm")
+    for name, value in (("poses", poses), ("repeats", repeats)):
+        if value < 1:
+            raise StiffmapError(f"--{name}: expected at least 1, got {value}")
+    how: dict[str, Any] = {"axes": axes, "noise": size, "angle_noise": 1e-3 * angle_noise}
+    if (path := Path(plan)).suffix == ".csv":
+        layout = load_plan(path, chosen, quantity, **how)
+    elif path.exists():
+        layout = _repeated(load_experiment(path), size)
+    else:
+        where = _poses(chosen, plan, poses, seed)
+        own = _loads(loads, strengths, len(where), seed)
+        layout = make.plan_of_poses(chosen, quantity, where, own, repeats=repeats, **how)
     layout = _channels(layout, chosen, joint or [], distances, size)
     layout = make.with_branches(layout) if branches else layout
     layout = make.with_approach(layout, seed) if approach else layout
@@ -139,39 +143,6 @@ def _axes(text: str) -> tuple[str, ...]:
     if wrong or not wanted:
         raise StiffmapError(f"--read: expected axes of {', '.join(AXES)}, got '{text}'")
     return wanted
-
-
-def _layout(
-    machine: Machine,
-    plan: str,
-    quantity: str,
-    poses: int,
-    loads: str,
-    forces: Sequence[float],
-    repeats: int,
-    read: Sequence[str],
-    noise: float | None,
-    angle_noise: float,
-    seed: int,
-) -> Experiment:
-    """The plan that ``--plan`` and the other options describe."""
-    if quantity not in make.MICRO:
-        raise StiffmapError(f"--quantity: expected deflection or position, got {quantity!r}")
-    if noise is not None and noise <= 0:
-        raise StiffmapError(f"--noise: expected a standard deviation above zero, got {1e3 * noise:g} mm")
-    for name, value in (("poses", poses), ("repeats", repeats)):
-        if value < 1:
-            raise StiffmapError(f"--{name}: expected at least 1, got {value}")
-    path = Path(plan)
-    if path.suffix == ".csv":
-        return load_plan(path, machine, quantity, axes=read, noise=noise, angle_noise=angle_noise)
-    if path.exists():
-        return _repeated(load_experiment(path), noise)
-    where = _poses(machine, plan, poses, seed)
-    own = _loads(loads, forces, len(where), seed)
-    return make.plan_of_poses(
-        machine, quantity, where, own, repeats=repeats, axes=read, noise=noise, angle_noise=angle_noise
-    )
 
 
 def _repeated(plan: Experiment, noise: float | None) -> Experiment:

@@ -33,7 +33,7 @@ def command(
         "What the colours show: deflection, worst, stiffness, margin, status, frequency, dynamic.",
         "deflection",
     ),
-    tolerance: float = option("Tolerated deflection, mm.", 0.25),
+    tolerance: options.Tolerance = 0.25,
     frequency: float = option("Of the dynamic stiffness, Hz.", 0.0),
     magnify: float | None = option("Magnification of the deflected machine. [default: a round one]"),
     changes: list[str] | None = option(
@@ -81,13 +81,18 @@ def command(
     model = _model(machine, effect, link, meshes, at=at, rotation=rotation, force=force, moment=moment, gravity=gravity,
                    plane=plane, quantity=quantity, tolerance=tolerance, frequency=frequency, magnify=magnify,
                    changes=changes, start=start)  # fmt: skip
-    from stiffmap.ui.view.open import data_of
+    from stiffmap.ui.view.open import View, data_of
 
     data = data_of(model.declared, experiment, diagnosis, path)
+    name = model.declared.name
     if html is not None or picture is not None:
-        _write(model, data, html, picture, as_json)
+        show(as_json, {"machine": name}, [], _written(model, data, html, picture))
         return
-    _serve(model, data, host, port, browser, as_json)
+    opened = View(model, host, port, data)
+    show(as_json, {"machine": name, "url": opened.url}, [f"{name}: {opened.url}", "Ctrl-C ends it"])
+    if browser:
+        webbrowser.open(opened.url)
+    opened.wait()
 
 
 def _model(
@@ -142,21 +147,9 @@ def _change(text: str) -> tuple[str, float]:
     raise StiffmapError(f"--set: expected ADDRESS=VALUE, such as x.foot/beam.EIx=4000; got '{text}'")
 
 
-def _write(model: Any, data: Any, html: Path | None, picture: Path | None, as_json: bool) -> None:
+def _written(model: Any, data: Any, html: Path | None, picture: Path | None) -> list[Path]:
     from stiffmap.ui.plot import save
     from stiffmap.ui.view.outputs import view_figure, write_page
 
     files = [] if html is None else [write_page(model.moment, html, data)]
-    files += [] if picture is None else [save(view_figure(model.moment), picture)]
-    show(as_json, {"machine": model.declared.name}, [], files)
-
-
-def _serve(model: Any, data: Any, host: str, port: int | None, browser: bool, as_json: bool) -> None:
-    from stiffmap.ui.view.open import View
-
-    opened = View(model, host, port, data)
-    name = model.declared.name
-    show(as_json, {"machine": name, "url": opened.url}, [f"{name}: {opened.url}", "Ctrl-C ends it"])
-    if browser:
-        webbrowser.open(opened.url)
-    opened.wait()
+    return files if picture is None else [*files, save(view_figure(model.moment), picture)]
