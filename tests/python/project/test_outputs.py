@@ -88,7 +88,7 @@ def test_every_output_of_a_command_is_reserved_before_it_computes() -> None:
             option = next(
                 (
                     m
-                    for m in getattr(parameter.annotation, "__metadata__", ())
+                    for m in (*getattr(parameter.annotation, "__metadata__", ()), parameter.default)
                     if isinstance(m, typer.models.OptionInfo)
                 ),
                 None,

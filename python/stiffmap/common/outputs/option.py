@@ -11,12 +11,12 @@ from stiffmap.common.outputs.alone import reserved
 from stiffmap.common.outputs.keeping import check_replaceable
 
 
-def written(*names: str, help: str) -> Any:
+def written(help: str, default: Any = None, *names: str) -> Any:
     """Option for a file or folder that a command writes: no other job writes there while the command runs.
 
-    `names` as of ``typer.Option``; ``-o, --output`` where there are none.
+    `default` and `names` as of ``typer.Option``; ``-o, --output`` where there are no names.
     """
-    return typer.Option(*(names or ("-o", "--output")), help=help, callback=_alone)
+    return typer.Option(default, *(names or ("-o", "--output")), help=help, callback=_alone)
 
 
 def _alone(context: typer.Context, path: Path | None) -> Path | None:

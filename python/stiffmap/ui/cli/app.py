@@ -13,7 +13,7 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from inspect import getdoc
-from typing import Annotated, Any
+from typing import Any
 
 import typer
 from rich.markup import escape
@@ -23,6 +23,7 @@ from stiffmap.common.number_text import number_in
 from stiffmap.common.outputs.keeping import one_command
 from stiffmap.ui.cli.commands import COMMANDS, Command
 from stiffmap.ui.cli.loading import import_all, load
+from stiffmap.ui.cli.options import option
 
 BAD_INPUT = 2
 DEFECT = 70
@@ -156,13 +157,10 @@ def _without_effects(arguments: Sequence[str]) -> list[str]:
 
 
 def _root(
-    effects_from: Annotated[
-        list[str],
-        typer.Option(metavar="FILE", help="Python file that defines a kind of effect; may be repeated."),
-    ] = [],  # noqa: B006 - typer never changes it
-    version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
-    ] = False,
+    effects_from: list[str] = option(
+        "Python file that defines a kind of effect; may be repeated.", [], metavar="FILE"
+    ),
+    version: bool = option("Print the version.", False, "--version", callback=_version, is_eager=True),
 ) -> None:
     if effects_from:
         from stiffmap.model.effects import load_effects

@@ -6,13 +6,13 @@ import os
 import time
 from collections.abc import Callable, Mapping
 from statistics import median
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import typer
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.ui.cli import options
+from stiffmap.ui.cli.options import option
 from stiffmap.ui.cli.output import show, table
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ class Line(NamedTuple):
 
 
 def command(
-    rounds: Annotated[int, typer.Option(help="Measurements of each case; the median is shown.")] = 7,
+    rounds: int = option("Measurements of each case; the median is shown.", 7),
     as_json: options.Json = False,
 ) -> None:
     """Speed of this installation on this computer, in less than a minute.

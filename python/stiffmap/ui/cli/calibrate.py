@@ -5,30 +5,27 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
 
-import typer
-
-from stiffmap.common.outputs import make_folder, write_rows, write_text
+from stiffmap.common.outputs import write_rows
 from stiffmap.common.outputs.option import written
 from stiffmap.identification.calibration import Calibration, calibrate
 from stiffmap.identification.inference.travel import Profile
 from stiffmap.identification.numbers import Tolerances
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import finish
+from stiffmap.ui.cli.options import option
+from stiffmap.ui.cli.output import show, write_files
 
 
 def command(
     machine: options.Declared,
     data: options.Experiment,
-    output: Annotated[Path | None, written(help="Folder for calibration.json and table.txt.")] = None,
+    output: Path | None = written("Folder for calibration.json and table.txt."),
     tolerance: options.Spread = 1.0,
-    exclude: Annotated[
-        list[str] | None, typer.Option(help="Group that is known to be right; may be repeated.")
-    ] = None,
+    exclude: list[str] | None = option("Group that is known to be right; may be repeated."),
     budget: options.Budget = None,
-    rows: Annotated[int, typer.Option(help="Unknowns to list.")] = 20,
-    seed: Annotated[int, typer.Option(help="Seed of the folds.")] = 0,
+    rows: int = option("Unknowns to list.", 20),
+    seed: int = option("Seed of the folds.", 0),
     threads: options.Threads = None,
     as_json: options.Json = False,
 ) -> None:
@@ -57,17 +54,17 @@ def command(
     more = len(result.rows) - (len(table) - 1)
     if more:
         table.append(f"… {more} more, which the readings determine less well (--rows {len(result.rows)})")
-    print(result.to_json() if as_json else "\n".join([*result.lines(), "", *table]))
+    show(as_json, result.as_plain(), [*result.lines(), "", *table])
     finish(result.verdict not in ("as declared", "adjusted within tolerance"))
 
 
 def write(result: Calibration, folder: Path) -> None:
     """All files of a calibration; raises `FileError` where the folder cannot be written."""
-    write_text(make_folder(folder) / "calibration.json", result.to_json())
-    write_text(folder / "table.txt", "\n".join([*result.lines(), "", *result.table()]) + "\n")
+    text = "\n".join([*result.lines(), "", *result.table()]) + "\n"
+    contents = {"calibration.json": result.as_plain(), "table.txt": text, "machine.yaml": result.machine}
+    write_files(folder, contents.items())
     if result.profiles:
         write_rows(folder / "travel.csv", *profiles(result.profiles))
-    result.machine.save(folder / "machine.yaml")
 
 
 def profiles(found: Sequence[Profile]) -> tuple[list[str], list[list[str]]]:

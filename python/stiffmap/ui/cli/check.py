@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Annotated
 
 import typer
 from rich.text import Text
@@ -15,14 +14,15 @@ from stiffmap.solve.check import FileCheck, check_file
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.trial import tried
 from stiffmap.ui.cli import options
+from stiffmap.ui.cli.options import argument, flag
 from stiffmap.ui.cli.output import show
 
 MOST_CHANGES = 12
 
 
 def command(
-    file: Annotated[str, typer.Argument(help="Machine file, or the name of a shipped machine.")],
-    strict: Annotated[bool, typer.Option("--strict", help="Exit with 1 where there are warnings.")] = False,
+    file: str = argument("Machine file, or the name of a shipped machine."),
+    strict: bool = flag("Exit with 1 where there are warnings.", "--strict"),
     as_json: options.Json = False,
 ) -> None:
     """Validate a machine file and look it over: keys, units, home, free motions, reach, odd numbers.

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
-import typer
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs.option import written
@@ -27,6 +26,7 @@ from stiffmap.solve.machine import Machine
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import finish, in_si, machine_with, numbers
 from stiffmap.ui.cli.inputs import gravity as gravity_of
+from stiffmap.ui.cli.options import argument, option
 from stiffmap.ui.cli.output import show
 
 MM = 1e3
@@ -39,43 +39,24 @@ NAMED = 12
 
 def command(
     machine: options.Corrected,
-    poses: Annotated[
-        Path | None, typer.Argument(help="CSV of wanted poses: x,y,z in mm, loads, approach_x …")
-    ] = None,
-    output: Annotated[Path | None, written(help="CSV of commands, table of --axis, or URDF.")] = None,
+    poses: Path | None = argument("CSV of wanted poses: x,y,z in mm, loads, approach_x …", None),
+    output: Path | None = written("CSV of commands, table of --axis, or URDF."),
     effect: options.Effects = None,
-    force: Annotated[
-        str, typer.Option(help="Force at the tool in every pose, N, where the CSV has none.")
-    ] = "0,0,0",
+    force: str = option("Force at the tool in every pose, N, where the CSV has none.", "0,0,0"),
     gravity: options.Gravity = None,
-    urdf: Annotated[
-        Path | None,
-        typer.Option(help="The arm's own URDF: its joints get the corrected origins, all else is kept."),
-    ] = None,
-    dh: Annotated[
-        Path | None,
-        written("--dh", help="Write the geometry of a serial arm as Denavit-Hartenberg rows (CSV)."),
-    ] = None,
-    axis: Annotated[
-        str | None, typer.Option(help="Instead of poses: a controller's table of this axis, x, y or z.")
-    ] = None,
-    form: Annotated[
-        str, typer.Option("--format", help="Of the table: csv, linuxcnc, siemens or heidenhain.")
-    ] = "csv",
-    points: Annotated[int, typer.Option(help="Positions of the table, over the workspace.")] = 21,
-    through: Annotated[
-        str | None, typer.Option(help="A point of the table's line, mm. [default: home]")
-    ] = None,
-    case: Annotated[
-        str | None, typer.Option(help="Of a map with several loads: the one that the table is for, e.g. Fx.")
-    ] = None,
-    zero: Annotated[
-        float | None, typer.Option(help="Position (mm) of the reference point: the table is zero there.")
-    ] = None,
-    check: Annotated[
-        Path | None,
-        typer.Option(help="Readings that no fit saw: the error before, and what compensation would leave."),
-    ] = None,
+    urdf: Path | None = option("The arm's own URDF: its joints get the corrected origins, all else is kept."),
+    dh: Path | None = written(
+        "Write the geometry of a serial arm as Denavit-Hartenberg rows (CSV).", None, "--dh"
+    ),
+    axis: str | None = option("Instead of poses: a controller's table of this axis, x, y or z."),
+    form: str = option("Of the table: csv, linuxcnc, siemens or heidenhain.", "csv", "--format"),
+    points: int = option("Positions of the table, over the workspace.", 21),
+    through: str | None = option("A point of the table's line, mm. [default: home]"),
+    case: str | None = option("Of a map with several loads: the one that the table is for, e.g. Fx."),
+    zero: float | None = option("Position (mm) of the reference point: the table is zero there."),
+    check: Path | None = option(
+        "Readings that no fit saw: the error before, and what compensation would leave."
+    ),
     as_json: options.Json = False,
 ) -> None:
     """Commands at which a deflected machine with errors stands where it is wanted.
@@ -100,7 +81,7 @@ def command(
 
       [cyan]stiffmap compensate result/machine.yaml --check held_out[/cyan]
     """
-    if axis is None and poses is None and urdf is None and dh is None and check is None:
+    if all(given is None for given in (axis, poses, urdf, dh, check)):
         raise StiffmapError("compensate: give a CSV of wanted poses, --axis, --urdf, --dh or --check")
     if axis is None and urdf is not None and (output is None or poses is not None):
         raise StiffmapError(

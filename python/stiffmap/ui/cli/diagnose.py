@@ -5,9 +5,6 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
-
-import typer
 
 from stiffmap.common.outputs import make_folder, write_picture, write_text
 from stiffmap.common.outputs.option import written
@@ -16,21 +13,21 @@ from stiffmap.identification.diagnosis.report.sentences import next_step
 from stiffmap.identification.numbers import Tolerances
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import finish
+from stiffmap.ui.cli.options import flag, option
+from stiffmap.ui.cli.output import show
 
 
 def command(
     machine: options.Declared,
     data: options.Experiment,
-    output: Annotated[Path | None, written(help="Folder for report and files.")] = None,
-    seed: Annotated[int, typer.Option(help="Seed of the folds, and of the poses drawn of many.")] = 0,
+    output: Path | None = written("Folder for report and files."),
+    seed: int = option("Seed of the folds, and of the poses drawn of many.", 0),
     threads: options.Threads = None,
-    exclude: Annotated[
-        list[str] | None, typer.Option(help="Kind of effect or group of numbers known not to be; repeatable.")
-    ] = None,
+    exclude: list[str] | None = option("Kind of effect or group of numbers known not to be; repeatable."),
     budget: options.Budget = None,
     tolerance: options.Spread = 1.0,
-    date: Annotated[str | None, typer.Option(help="Date that the report bears, as you write it.")] = None,
-    quiet: Annotated[bool, typer.Option("--quiet", help="Say nothing of what is being tried.")] = False,
+    date: str | None = option("Date that the report bears, as you write it."),
+    quiet: bool = flag("Say nothing of what is being tried.", "--quiet"),
     as_json: options.Json = False,
 ) -> None:
     """Which physical effect a machine lacks, where it sits, how large it is, and how sure that is.
@@ -60,11 +57,8 @@ def command(
     )
     if output is not None:
         write(result, output, date, [p for p in (Path(machine), Path(data)) if p.exists()])
-    print(result.to_json() if as_json else result)
-    if not as_json:
-        print(f"next: {next_step(result)}")
-        if output is not None:
-            print(f"wrote {output}: start with report.html")
+    wrote = None if output is None else f"wrote {output}: start with report.html"
+    show(as_json, result.as_plain(), [str(result), f"next: {next_step(result)}", wrote])
     finish(result.verdict != "none")
 
 

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, Any
+from typing import Any
 
-import typer
 from rich.text import Text
 
 from stiffmap.model.effects import EffectType, get, kinds
@@ -13,18 +12,17 @@ from stiffmap.model.effects.synonyms import found_by
 from stiffmap.model.files.shipped import machine_names
 from stiffmap.solve.machine import Machine, load_machine
 from stiffmap.ui.cli import options
-from stiffmap.ui.cli.output import print_json, say
+from stiffmap.ui.cli.options import argument, option
+from stiffmap.ui.cli.output import show
 
 
 def command(
-    kind: Annotated[
-        str | None,
-        typer.Argument(
-            help="One kind: its definition and parameters; or a word for it, such as backlash, Spiel, sag; "
-            "or a machine: the effects and their places on it."
-        ),
-    ] = None,
-    on: Annotated[str | None, typer.Option(help="Machine: the elements and legs where each can be.")] = None,
+    kind: str | None = argument(
+        "One kind: its definition and parameters; or a word for it, such as backlash, Spiel, sag; "
+        "or a machine: the effects and their places on it.",
+        None,
+    ),
+    on: str | None = option("Machine: the elements and legs where each can be."),
     as_json: options.Json = False,
 ) -> None:
     """List the effects that a machine can have beyond what is declared, for --effect and with_effect.
@@ -46,16 +44,16 @@ def command(
         chosen = [get(k) for k in meant]
     else:
         chosen = [get(kind)] if kind else [get(k) for k in kinds()]
-    if as_json:
-        print_json([_plain(e, machine) for e in chosen])
-        return
-    for effect in chosen:
-        names = ", ".join(f"{p.name} ({p.unit})" if p.unit != "1" else p.name for p in effect.parameters)
-        say(Text.assemble((effect.kind, "bold"), f"  {effect.title}: {names}"))
-        if machine is not None:
-            say(f"    on {', '.join(_where(effect, machine)) or 'nothing of this machine'}")
-    if kind:
-        say(*_definition(chosen[0]))
+    told = [line for e in chosen for line in _lines(e, machine)]
+    show(as_json, [_plain(e, machine) for e in chosen], [*told, *(_definition(chosen[0]) if kind else ())])
+
+
+def _lines(effect: EffectType, machine: Machine | None) -> Iterator[str | Text]:
+    """An effect and its parameters, and where it can be."""
+    names = ", ".join(f"{p.name} ({p.unit})" if p.unit != "1" else p.name for p in effect.parameters)
+    yield Text.assemble((effect.kind, "bold"), f"  {effect.title}: {names}")
+    if machine is not None:
+        yield f"    on {', '.join(_where(effect, machine)) or 'nothing of this machine'}"
 
 
 def _where(effect: EffectType, machine: Machine) -> list[str]:
@@ -70,9 +68,8 @@ def _where(effect: EffectType, machine: Machine) -> list[str]:
 def _definition(effect: EffectType) -> Iterator[str]:
     yield effect.doc
     yield f"pivot: {effect.pivot}; frame: {effect.frame}; moves: {effect.moves}"
-    for option in effect.options:
-        choices = ", ".join(option.choices)
-        yield f"option {option.name}: {choices} (the first by default); {option.doc}"
+    for o in effect.options:
+        yield f"option {o.name}: {', '.join(o.choices)} (the first by default); {o.doc}"
     for p in effect.parameters:
         unit = f"{p.unit}, {p.angular} where it turns" if p.angular else p.unit
         null = "" if p.null is None else f"; none at {p.null:g}"

@@ -6,7 +6,7 @@ import shlex
 from collections.abc import Iterator, Sequence
 from itertools import islice
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 import typer
@@ -19,82 +19,51 @@ from stiffmap.experiment.noise.level import unknown
 from stiffmap.experiment.spreadsheet.from_table import FromTable, experiment_from_table
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import pairs
+from stiffmap.ui.cli.options import argument, flag, option
 from stiffmap.ui.cli.output import show
 from stiffmap.ui.cli.output import table as table_of
 
 
 def command(
     context: typer.Context,
-    action: Annotated[str, typer.Argument(help="new: make a folder from a spreadsheet.")],
-    file: Annotated[
-        Path, typer.Argument(help="Spreadsheet: .xlsx, .csv, .txt (any separator and decimal sign).")
-    ],
-    output: Annotated[Path, written(help="Folder of the experiment.")],
-    machine: Annotated[
-        str | None, typer.Option(help="Declared machine: shipped name or machine file; or give --dh.")
-    ] = None,
-    dh: Annotated[
-        Path | None,
-        typer.Option(
-            "--dh",
-            help="Instead: table of Denavit and Hartenberg of a serial arm, of which machine.yaml is made.",
-        ),
-    ] = None,
+    action: str = argument("new: make a folder from a spreadsheet."),
+    file: Path = argument("Spreadsheet: .xlsx, .csv, .txt (any separator and decimal sign)."),
+    output: Path = written("Folder of the experiment.", ...),
+    machine: str | None = option("Declared machine: shipped name or machine file; or give --dh."),
+    dh: Path | None = option(
+        "Instead: table of Denavit and Hartenberg of a serial arm, of which machine.yaml is made.",
+        None,
+        "--dh",
+    ),
     dh_convention: options.DhConvention = "standard",
-    difference: Annotated[
-        str,
-        typer.Option(help="What differences in the file are: actual-minus-target or target-minus-actual."),
-    ] = "actual-minus-target",
-    quantity: Annotated[
-        str | None,
-        typer.Option(
-            help="deflection (loaded minus unloaded) or position (measured minus commanded). "
-            "[default: the instrument's, else deflection]"
-        ),
-    ] = None,
-    instrument: Annotated[
-        str | None,
-        typer.Option(
-            help="What wrote the file: tracker, dial-gauges, ball-bar, iso-9283, or a mapping file."
-        ),
-    ] = None,
-    mapped: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--map",
-            help="What a column is, by header or number, e.g. dx='Uhr 1 [µm]', x=2; repeats: dx='Uhr 1|Uhr 2'; "
-            "the other sign: fz='-Last [kg]'; repeatable.",
-        ),
-    ] = None,
-    unit: Annotated[
-        list[str] | None,
-        typer.Option(help="Unit of a column without one, e.g. dx=um; length=mm, joints=deg: of all of them."),
-    ] = None,
-    constant: Annotated[
-        list[str] | None, typer.Option("--set", help="What is the same in all rows, mm and N, e.g. z=0.")
-    ] = None,
-    noise: Annotated[
-        list[str] | None, typer.Option(help="One standard deviation of a reading in its unit, e.g. dx=2.")
-    ] = None,
-    sheet: Annotated[
-        str | None, typer.Option(help="Sheet of the workbook. [default: the first that fits]")
-    ] = None,
-    header: Annotated[
-        str | None,
-        typer.Option(help="Names of the columns of a table that has none, e.g. id,x,y,z,dx,dy,dz."),
-    ] = None,
-    which: Annotated[
-        int | None, typer.Option("--table", help="Which of several tables on a sheet, from 1.")
-    ] = None,
-    record: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="For the report: operator, instrument, certificate, date, temperature or notes, e.g. operator=Miller."
-        ),
-    ] = None,
-    dialogue: Annotated[
-        bool, typer.Option("--dialogue", help="Ask what cannot be guessed, and remember the answers.")
-    ] = False,
+    difference: str = option(
+        "What differences in the file are: actual-minus-target or target-minus-actual.", "actual-minus-target"
+    ),
+    quantity: str | None = option(
+        "deflection (loaded minus unloaded) or position (measured minus commanded). "
+        "[default: the instrument's, else deflection]"
+    ),
+    instrument: str | None = option(
+        "What wrote the file: tracker, dial-gauges, ball-bar, iso-9283, or a mapping file."
+    ),
+    mapped: list[str] | None = option(
+        "What a column is, by header or number, e.g. dx='Uhr 1 [µm]', x=2; repeats: dx='Uhr 1|Uhr 2'; "
+        "the other sign: fz='-Last [kg]'; repeatable.",
+        None,
+        "--map",
+    ),
+    unit: list[str] | None = option(
+        "Unit of a column without one, e.g. dx=um; length=mm, joints=deg: of all of them."
+    ),
+    constant: list[str] | None = option("What is the same in all rows, mm and N, e.g. z=0.", None, "--set"),
+    noise: list[str] | None = option("One standard deviation of a reading in its unit, e.g. dx=2."),
+    sheet: str | None = option("Sheet of the workbook. [default: the first that fits]"),
+    header: str | None = option("Names of the columns of a table that has none, e.g. id,x,y,z,dx,dy,dz."),
+    which: int | None = option("Which of several tables on a sheet, from 1.", None, "--table"),
+    record: list[str] | None = option(
+        "For the report: operator, instrument, certificate, date, temperature or notes, e.g. operator=Miller."
+    ),
+    dialogue: bool = flag("Ask what cannot be guessed, and remember the answers.", "--dialogue"),
     overwrite: options.Overwrite = False,
     as_json: options.Json = False,
 ) -> None:

@@ -5,9 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated
 
-import typer
 from rich.text import Text
 
 from stiffmap.common.errors import FileError
@@ -17,29 +15,21 @@ from stiffmap.model.urdf import Imported, import_urdf
 from stiffmap.solve.machine import Machine
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import pairs
+from stiffmap.ui.cli.options import argument, option
 from stiffmap.ui.cli.output import show
 
 TABLES = (".csv", ".txt", ".tsv", ".xlsx", ".xlsm")
 
 
 def command(
-    urdf: Annotated[
-        Path, typer.Argument(help="URDF file, or a table of Denavit and Hartenberg (.csv, .txt, .xlsx).")
-    ],
-    sidecar: Annotated[
-        Path | None, typer.Option(help="YAML with what a URDF lacks: loops, motors, compliances.")
-    ] = None,
-    output: Annotated[Path | None, written(help="Machine file to write. [default: NAME.yaml]")] = None,
+    urdf: Path = argument("URDF file, or a table of Denavit and Hartenberg (.csv, .txt, .xlsx)."),
+    sidecar: Path | None = option("YAML with what a URDF lacks: loops, motors, compliances."),
+    output: Path | None = written("Machine file to write. [default: NAME.yaml]"),
     dh_convention: options.DhConvention = "standard",
-    unit: Annotated[
-        list[str] | None, typer.Option(help="Unit of a column of the table without one, e.g. a=mm.")
-    ] = None,
-    tip: Annotated[
-        str | None,
-        typer.Option(
-            help="Link of the URDF that is the tool. [default: tool0 and the like, or the only end]"
-        ),
-    ] = None,
+    unit: list[str] | None = option("Unit of a column of the table without one, e.g. a=mm."),
+    tip: str | None = option(
+        "Link of the URDF that is the tool. [default: tool0 and the like, or the only end]"
+    ),
     overwrite: options.Overwrite = False,
     as_json: options.Json = False,
 ) -> None:
@@ -59,11 +49,11 @@ def command(
       [cyan]stiffmap import arm.urdf --tip tool -o tool.yaml[/cyan]
     """
     table = urdf.suffix.lower() in TABLES
-    for option, given in {"--sidecar": sidecar, "--tip": tip}.items() if table else [("--unit", unit)]:
+    for name, given in {"--sidecar": sidecar, "--tip": tip}.items() if table else [("--unit", unit)]:
         if given:
             expected, other = ("URDF", "table") if table else ("table", "URDF")
             raise FileError(
-                f"{option}: expected a {expected} with this option, found a {other}", file=str(urdf)
+                f"{name}: expected a {expected} with this option, found a {other}", file=str(urdf)
             )
     found = _of_table(urdf, dh_convention, unit) if table else import_urdf(urdf, sidecar, tip=tip)
     machine = Machine(found.description)

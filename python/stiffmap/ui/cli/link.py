@@ -6,9 +6,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, cast
-
-import typer
+from typing import Any, cast
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs.option import written
@@ -24,79 +22,82 @@ from stiffmap.model.link.result import Link
 from stiffmap.model.link.solve import Material, Setup
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import in_si
+from stiffmap.ui.cli.options import argument, flag, option
 from stiffmap.ui.cli.output import show
 
 FIELDS = {".csv", ".dat", ".frd", ".vtk", ".vtu", ".lis", ".txt"}
 
-EXAMPLES = """
-Examples:
-
-  [cyan]stiffmap link bar.yaml --out bar-link.yaml --picture bar.png[/cyan]
-
-  [cyan]stiffmap link bracket.step --fixed face3 --loaded face7 --material aluminium --size 4[/cyan]
-
-  [cyan]stiffmap link field.csv --cases cases.csv --reference 310,0,0[/cyan]
-"""
-
 
 def command(
-    part: Annotated[
-        Path, typer.Argument(help="beam.yaml, .step, .msh, or a field: .csv .dat .frd .vtu .lis")
-    ],
-    fixed: Annotated[str, typer.Option(help="Face that is held; a+b joins faces.")] = "fixed",
-    loaded: Annotated[str, typer.Option(help="Face that carries the load and the spring.")] = "loaded",
-    material: Annotated[
-        str | None, typer.Option(help="A name (steel, aluminium, ...) or 70GPa,0.33.")
-    ] = None,
-    cases: Annotated[Path | None, typer.Option(help="CSV of wrenches: fx [N] ... mz [N*mm].")] = None,
-    reference: Annotated[
-        str | None, typer.Option(help="x,y,z of the spring in mm; else the face's centre.")
-    ] = None,
-    size: Annotated[float | None, typer.Option(help="Edge length of the elements in mm.")] = None,
-    unit: Annotated[str | None, typer.Option(help="Length unit of a file that does not carry it.")] = None,
-    nodes: Annotated[Path | None, typer.Option(help="Coordinates for .dat and .lis: node x y z.")] = None,
-    solver: Annotated[str, typer.Option(help="auto, ccx or skfem.")] = "auto",
-    quick: Annotated[
-        bool, typer.Option("--quick", help="One mesh, one boundary: no share of these.")
-    ] = False,
-    support: Annotated[
-        str,
-        typer.Option(
-            help="Besides clamped, for the boundary's share: bed (bolted down), soft (pin in hole)."
-        ),
-    ] = "bed",
-    zeros: Annotated[bool, typer.Option("--zeros", help="Set insignificant entries to zero.")] = False,
-    out: Annotated[Path | None, written("-o", "--out", help="Link file to write (YAML).")] = None,
-    picture: Annotated[Path | None, written("--picture", help="PNG to write.")] = None,
+    part: Path = argument("beam.yaml, .step, .msh, or a field: .csv .dat .frd .vtu .lis"),
+    fixed: str = option("Face that is held; a+b joins faces.", "fixed"),
+    loaded: str = option("Face that carries the load and the spring.", "loaded"),
+    material: str | None = option("A name (steel, aluminium, ...) or 70GPa,0.33."),
+    cases: Path | None = option("CSV of wrenches: fx [N] ... mz [N*mm]."),
+    reference: str | None = option("x,y,z of the spring in mm; else the face's centre."),
+    size: float | None = option("Edge length of the elements in mm."),
+    unit: str | None = option("Length unit of a file that does not carry it."),
+    nodes: Path | None = option("Coordinates for .dat and .lis: node x y z."),
+    solver: str = option("auto, ccx or skfem.", "auto"),
+    quick: bool = flag("One mesh, one boundary: no share of these.", "--quick"),
+    support: str = option(
+        "Besides clamped, for the boundary's share: bed (bolted down), soft (pin in hole).", "bed"
+    ),
+    zeros: bool = flag("Set insignificant entries to zero.", "--zeros"),
+    out: Path | None = written("Link file to write (YAML).", None, "-o", "--out"),
+    picture: Path | None = written("PNG to write.", None, "--picture"),
     as_json: options.Json = False,
 ) -> None:
-    """Identify a link's 6x6 spring, with error bars, from a part or a displacement field."""
+    """Identify a link's 6x6 spring, with error bars, from a part or a displacement field.
+
+    Examples:
+
+      [cyan]stiffmap link bar.yaml --out bar-link.yaml --picture bar.png[/cyan]
+
+      [cyan]stiffmap link bracket.step --fixed face3 --loaded face7 --material aluminium --size 4[/cyan]
+
+      [cyan]stiffmap link field.csv --cases cases.csv --reference 310,0,0[/cyan]
+    """
     wrenches = UNIT_WRENCHES if cases is None else read_cases(cases)
-    place = in_si(reference, "reference", 3)
+    place, edge = in_si(reference, "reference", 3), in_si(size)
+    found: PartLink | None = None
     if part.suffix.lower() in FIELDS:
         if cases is None or place is None:
             raise StiffmapError(f"{part}: a displacement field needs --cases FILE and --reference x,y,z")
+        name = part.stem
         link = identify_link(*_field(part, unit, nodes, wrenches), wrenches, reference=place)
-        _finish(link.with_zeros() if zeros else link, None, part.stem, out, picture, as_json)
-        return
-    mesher, made_of, name, centre = _part(part, unit, None if material is None else read_material(material))
-    edge = in_si(size)
-    found = link_from_part(
-        mesher,
-        made_of,
-        Setup(fixed, loaded, _reference(mesher, loaded, place, centre, edge)),
-        wrenches,
-        size=edge,
-        solver=cast(Solver, solver),
-        study=not quick,
-        other_support=cast(Support, support),
-        refine=not quick and part.suffix.lower() not in MESH,
-    )
-    link = found.link.with_zeros() if zeros else found.link
-    _finish(link, replace(found, link=link), name, out, picture, as_json)
+    else:
+        mesher, made_of, name, centre = _part(
+            part, unit, None if material is None else read_material(material)
+        )
+        found = link_from_part(
+            mesher,
+            made_of,
+            Setup(fixed, loaded, _reference(mesher, loaded, place, centre, edge)),
+            wrenches,
+            size=edge,
+            solver=cast(Solver, solver),
+            study=not quick,
+            other_support=cast(Support, support),
+            refine=not quick and part.suffix.lower() not in MESH,
+        )
+        link = found.link
+    link = link.with_zeros() if zeros else link
+    if found is None:
+        even = (link.compliance + link.compliance.T) / 2
+        file = LinkFile(even, link.covariance, link.reference, {"source": "field"}, name)
+    else:
+        found = replace(found, link=link)
+        file = found.file(name)
+    if out is not None:
+        save_link(file, out)
+    if picture is not None:
+        from stiffmap.ui.plot.link import draw_link
 
-
-command.__doc__ = f"{command.__doc__}\n{EXAMPLES}"
+        draw_link(link, picture, found)
+    told = [link.report(), *([] if found is None else _of_part(found, link))]
+    told += [f"wrote {path}" for path in (out, picture) if path is not None]
+    show(as_json, as_data(link, found, file), told)
 
 
 def _field(path: Path, unit: str | None, nodes: Path | None, wrenches: Floats) -> tuple[Floats, Floats]:
@@ -136,25 +137,6 @@ def _reference(
         return centre
     mesh = mesher(size)
     return face_area_centre(mesh.nodes, mesh.face(loaded))[1]
-
-
-def _finish(
-    link: Link, part: PartLink | None, name: str, out: Path | None, picture: Path | None, as_json: bool
-) -> None:
-    if part is None:
-        even = (link.compliance + link.compliance.T) / 2
-        file = LinkFile(even, link.covariance, link.reference, {"source": "field"}, name)
-    else:
-        file = part.file(name)
-    if out is not None:
-        save_link(file, out)
-    if picture is not None:
-        from stiffmap.ui.plot.link import draw_link
-
-        draw_link(link, picture, part)
-    told = [link.report(), *([] if part is None else _of_part(part, link))]
-    told += [f"wrote {path}" for path in (out, picture) if path is not None]
-    show(as_json, as_data(link, part, file), told)
 
 
 def _of_part(part: PartLink, link: Link) -> Iterator[str]:

@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
-import typer
 import xarray as xr
 
 from stiffmap.common.errors import StiffmapError
@@ -16,6 +15,7 @@ from stiffmap.machining.chatter import stability_lobes
 from stiffmap.machining.process import Process, load_process
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import MM, finish, gravity, in_si, machine_with, numbers, position, rotation
+from stiffmap.ui.cli.options import option
 from stiffmap.ui.cli.output import show, write_files
 
 RPM = 60 / (2 * math.pi)
@@ -23,33 +23,24 @@ RPM = 60 / (2 * math.pi)
 
 def command(
     machine: options.Machine,
-    process: Annotated[str, typer.Option(help="Process file, or a shipped name: slot.")],
+    process: str = option("Process file, or a shipped name: slot.", ...),
     at: options.Places = None,
-    feed: Annotated[
-        str | None, typer.Option(help="Direction of the feed, base axes. [default: x, or y across the tool]")
-    ] = None,
-    tool: Annotated[
-        str | None,
-        typer.Option(help="Direction from the tool's tip to its holder, base axes. [default: the flange's]"),
-    ] = None,
+    feed: str | None = option("Direction of the feed, base axes. [default: x, or y across the tool]"),
+    tool: str | None = option(
+        "Direction from the tool's tip to its holder, base axes. [default: the flange's]"
+    ),
     rotation_: options.Rotation = None,
-    speeds: Annotated[
-        str | None, typer.Option(help="Lowest and highest speed, rpm, e.g. 2000,12000.")
-    ] = None,
-    depth: Annotated[float | None, typer.Option(help="Top of the diagram, mm.")] = None,
-    points: Annotated[str, typer.Option(help="Number of speeds and of depths.")] = "120,80",
-    damping: Annotated[
-        str | None,
-        typer.Option(help="Damping ratios of the modes in %, e.g. 2 or 3,1.5; default: the machine file's."),
-    ] = None,
-    mode: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="A mode of spindle and tool besides: Hz, damping in %, modal mass in kg, direction x or y of the cut, e.g. "
-            "1243,6.2,0.048,x; repeatable."
-        ),
-    ] = None,
-    method: Annotated[str, typer.Option(help="semi-discretization or 'zero order'.")] = "semi-discretization",
+    speeds: str | None = option("Lowest and highest speed, rpm, e.g. 2000,12000."),
+    depth: float | None = option("Top of the diagram, mm."),
+    points: str = option("Number of speeds and of depths.", "120,80"),
+    damping: str | None = option(
+        "Damping ratios of the modes in %, e.g. 2 or 3,1.5; default: the machine file's."
+    ),
+    mode: list[str] | None = option(
+        "A mode of spindle and tool besides: Hz, damping in %, modal mass in kg, direction x or y of the cut, e.g. "
+        "1243,6.2,0.048,x; repeatable."
+    ),
+    method: str = option("semi-discretization or 'zero order'.", "semi-discretization"),
     effect: options.Effects = None,
     gravity_: options.Gravity = None,
     output: options.Folder = None,

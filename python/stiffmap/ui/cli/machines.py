@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from itertools import chain
+
 from rich.padding import Padding
 from rich.text import Text
 
 from stiffmap.model.files import shipped_machines
 from stiffmap.ui.cli import options
-from stiffmap.ui.cli.output import print_json, say
+from stiffmap.ui.cli.output import show
 
 
 def command(as_json: options.Json = False) -> None:
@@ -20,11 +22,7 @@ def command(as_json: options.Json = False) -> None:
       [cyan]stiffmap machines --json[/cyan]
     """
     shipped = shipped_machines()
-    if as_json:
-        print_json(
-            [{"name": m.name, "title": m.title, "source": m.source, "file": str(m.path)} for m in shipped]
-        )
-        return
-    for machine in shipped:
-        say(Text.assemble((machine.name, "bold"), f"  {machine.title}"))
-        say(Padding(Text(machine.source, "dim"), (0, 0, 0, 2)))
+    data = [{"name": m.name, "title": m.title, "source": m.source, "file": m.path} for m in shipped]
+    titles = (Text.assemble((m.name, "bold"), f"  {m.title}") for m in shipped)
+    sources = (Padding(Text(m.source, "dim"), (0, 0, 0, 2)) for m in shipped)
+    show(as_json, data, chain.from_iterable(zip(titles, sources, strict=True)))

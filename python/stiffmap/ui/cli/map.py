@@ -4,88 +4,62 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 import typer
-from rich.text import Text
+import xarray as xr
+from rich.table import Table
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs import make_folder
 from stiffmap.common.outputs.option import written
 from stiffmap.solve.machine import Machine
+from stiffmap.solve.status import Status
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import MM, finish, force_given, gravity, machine_with
-from stiffmap.ui.cli.map_big import print_estimate, print_statistics
-from stiffmap.ui.cli.map_files import Wanted, write_map_files
-from stiffmap.ui.cli.map_summary import (
-    as_table,
-    beyond,
-    failures,
-    in_words,
-    summary,
-    uncertainty_data,
-    uncertainty_told,
-    worst_pose,
-)
-from stiffmap.ui.cli.output import failed_in_words, show
+from stiffmap.ui.cli.map_files import write_map_files
+from stiffmap.ui.cli.map_summary import MapSummary
+from stiffmap.ui.cli.options import flag, option
+from stiffmap.ui.cli.output import failed_in_words, show, table
 from stiffmap.workspace.maps.inputs import magnitude, plane_axes
 
 
 def command(
     context: typer.Context,
     machine: options.Machine,
-    output: Annotated[Path, written(help="Folder for the map and its pictures.")] = Path("stiffmap-map"),
-    z: Annotated[
-        list[float] | None,
-        typer.Option(help="z-plane in mm; repeatable. [default: lowest, 0, highest of the workspace]"),
-    ] = None,
-    y: Annotated[list[float] | None, typer.Option(help="Planes across y instead, in mm; repeatable.")] = None,
-    x: Annotated[list[float] | None, typer.Option(help="Planes across x instead, in mm; repeatable.")] = None,
-    points: Annotated[
-        int, typer.Option(help="Positions along each axis of a plane, over the whole workspace.")
-    ] = 101,
+    output: Path = written("Folder for the map and its pictures.", Path("stiffmap-map")),
+    z: list[float] | None = option(
+        "z-plane in mm; repeatable. [default: lowest, 0, highest of the workspace]"
+    ),
+    y: list[float] | None = option("Planes across y instead, in mm; repeatable."),
+    x: list[float] | None = option("Planes across x instead, in mm; repeatable."),
+    points: int = option("Positions along each axis of a plane, over the whole workspace.", 101),
     force: options.Force = "300",
-    toolpath: Annotated[
-        str | None,
-        typer.Option(
-            help="Along a path of the tool instead of over planes: CSV or YAML, as for `efforts`; or a shipped one: trim."
-        ),
-    ] = None,
+    toolpath: str | None = option(
+        "Along a path of the tool instead of over planes: CSV or YAML, as for `efforts`; or a shipped one: trim."
+    ),
     plane: options.Plane = "xy",
     tolerance: options.Tolerance = 0.25,
-    directions: Annotated[
-        int,
-        typer.Option(
-            help="Force directions solved before the extremes are searched; 16 or more for machines with play."
-        ),
-    ] = 4,
+    directions: int = option(
+        "Force directions solved before the extremes are searched; 16 or more for machines with play.", 4
+    ),
     effect: options.Effects = None,
     gravity_: options.Gravity = None,
-    compliance: Annotated[bool, typer.Option(help="Keep the 6x6 compliance of every pose.")] = False,
-    uncertainty: Annotated[
-        bool,
-        typer.Option("--uncertainty", help="Standard deviation of the map, from links and `u` of the file."),
-    ] = False,
-    zarr: Annotated[bool, typer.Option("--zarr", help="Write Zarr instead of NetCDF.")] = False,
-    resume: Annotated[bool, typer.Option("--resume", help="Take up an interrupted run.")] = False,
-    pictures: Annotated[bool, typer.Option(help="Draw the maps, and write them as a report (HTML).")] = True,
-    formats: Annotated[
-        str, typer.Option("--format", help="Formats of the pictures: png, svg, pdf, or several as png,pdf.")
-    ] = "png",
-    tables: Annotated[
-        str | None, typer.Option("--table", help="Write the map as a table too: csv, xlsx, or csv,xlsx.")
-    ] = None,
-    own_scales: Annotated[
-        bool, typer.Option("--own-scales", help="A colour scale for each plane instead of a common one.")
-    ] = False,
-    estimate: Annotated[
-        bool,
-        typer.Option("--estimate", help="Only say how long it will take, and the memory and disk it needs."),
-    ] = False,
-    statistics: Annotated[
-        bool, typer.Option("--statistics", help="Maxima, percentiles and shares only; no map is stored.")
-    ] = False,
+    compliance: bool = option("Keep the 6x6 compliance of every pose.", False),
+    uncertainty: bool = flag(
+        "Standard deviation of the map, from links and `u` of the file.", "--uncertainty"
+    ),
+    zarr: bool = flag("Write Zarr instead of NetCDF.", "--zarr"),
+    resume: bool = flag("Take up an interrupted run.", "--resume"),
+    pictures: bool = option("Draw the maps, and write them as a report (HTML).", True),
+    formats: str = option(
+        "Formats of the pictures: png, svg, pdf, or several as png,pdf.", "png", "--format"
+    ),
+    tables: str | None = option("Write the map as a table too: csv, xlsx, or csv,xlsx.", None, "--table"),
+    own_scales: bool = flag("A colour scale for each plane instead of a common one.", "--own-scales"),
+    estimate: bool = flag("Only say how long it will take, and the memory and disk it needs.", "--estimate"),
+    statistics: bool = flag("Maxima, percentiles and shares only; no map is stored.", "--statistics"),
     scheduler: options.Scheduler = None,
     method: options.Method = "fast",
     threads: options.Threads = None,
@@ -124,69 +98,36 @@ def command(
 
       [cyan]stiffmap map orthoglide-revised --toolpath trim -o results[/cyan]
     """
+    import stiffmap
+
     kinds = named_formats(formats, "--format", ("png", "svg", "pdf")) if pictures else []
     sheets = named_formats(tables, "--table", ("csv", "xlsx")) if tables else []
     m = machine_with(machine, effect)
+    how: dict[str, Any] = {"gravity": gravity(gravity_), "method": method, "threads": threads}
     if toolpath is not None:
         from stiffmap.ui.cli.map_toolpath import map_toolpath
 
-        how = {"gravity": gravity(gravity_), "method": method, "threads": threads}
         map_toolpath(m, toolpath, force, how, output, kinds, as_json)
         return
     call: dict[str, Any] = {
-        **planes({"x": x, "y": y, "z": z}),
-        "points": points,
-        "wrench": cases(plane, force),
-        "plane": plane,
-        "directions": directions,
-        "tolerance": MM * tolerance,
-        "gravity": gravity(gravity_),
-        "compliance": compliance,
-        "uncertainty": uncertainty,
-        "method": method,
-        "threads": threads,
-    }
-    given = assumptions(context, force, tolerance)
+        **planes({"x": x, "y": y, "z": z}), **how, "points": points, "wrench": cases(plane, force), "plane": plane,
+        "directions": directions, "tolerance": MM * tolerance, "compliance": compliance, "uncertainty": uncertainty,
+    }  # fmt: skip
     if estimate:
-        print_estimate(m, call, as_json)
-    elif statistics:
-        print_statistics(m, call, plane, given, scheduler, as_json)
-    else:
-        target = make_folder(output) / ("map.zarr" if zarr else "map.nc")
-        how = {
-            "scheduler": scheduler,
-            "progress": False if as_json else None,
-            "out": target,
-            "resume": resume,
-        }
-        wanted = Wanted(output, plane, tolerance, given, kinds, sheets, own_scales, uncertainty)
-        _map(m, call, how, wanted, as_json)
-
-
-def _map(machine: Machine, call: dict[str, Any], how: dict[str, Any], wanted: Wanted, as_json: bool) -> None:
-    """Compute, write, print; ends the command."""
-    import stiffmap
-
-    ds = stiffmap.error_map(machine, **call, **how)
-    rows, failed = summary(ds, wanted.plane, MM * wanted.tolerance), failures(ds)
-    worst = worst_pose(machine, ds, call["gravity"])
-    table = as_table(ds, rows, wanted.plane, wanted.tolerance)
-    files = [how["out"], *write_map_files(machine, ds, wanted, table, worst, failed, call["gravity"])]
-    band = uncertainty_data(ds, wanted.plane) if wanted.uncertainty else None
-    far = beyond(ds)
-    data: dict[str, Any] = {"machine": machine.name, "rows": rows, "failed": failed, "files": files}
-    told: list[Any] = [wanted.given, table]
-    if band is not None:
-        told += uncertainty_told(ds, band, wanted.plane)
-    if worst is not None:
-        told.append(in_words(worst))
-    if far is not None:
-        words = f"{100 * far['share']:.3g} % of it beyond what the machine was calibrated by ({far['calibrated_by']})"
-        told.append(Text(words, "yellow" if far["share"] else ""))
-    data |= {"worst_pose": worst} | ({} if far is None else {"beyond_calibration": far})
-    data |= {} if band is None else {"uncertainty": band}
-    show(as_json, data, [*told, *failed_in_words(failed)], files)
-    finish(bool(failed))
+        found = stiffmap.map_estimate(m, **call)
+        show(as_json, vars(found), [str(found)])
+        return
+    given = assumptions(context, force, tolerance)
+    call |= {"scheduler": scheduler, "progress": False if as_json else None}
+    if statistics:
+        show_statistics(m, stiffmap.map_statistics(m, **call), plane, given, as_json)
+        return
+    target = make_folder(output) / ("map.zarr" if zarr else "map.nc")
+    ds = stiffmap.error_map(m, **call, out=target, resume=resume).load()
+    result = MapSummary(m, ds, plane, MM * tolerance, given, how["gravity"], uncertainty)
+    files = [target, *write_map_files(result, output, kinds, sheets, own_scales)]
+    show(as_json, result.as_plain(files), result.lines(), files)
+    finish(bool(result.failed))
 
 
 def assumptions(context: typer.Context, force: str, tolerance: float) -> str:
@@ -234,3 +175,48 @@ def cases(plane: str, text: str) -> dict[str, list[float]]:
     if vector is not None:
         return {"F": [*vector, 0.0, 0.0, 0.0]}
     return {f"F{'xyz'[i]}": [size if k == i else 0.0 for k in range(6)] for i in plane_axes(plane)}
+
+
+def show_statistics(machine: Machine, ds: xr.Dataset, plane: str, given: str, as_json: bool) -> None:
+    """Figures of a map that is not stored; exits with 1 where poses failed."""
+    rows = statistics_rows(ds, plane)
+    counts = {s.name: int(ds.status_count.sel(status=int(s)).sum()) for s in Status if s}
+    failed = {name: count for name, count in counts.items() if count}
+    lost = failed_in_words(failed, "solves of the load cases")
+    data = {"machine": machine.name, "rows": rows, "failed": failed}
+    show(as_json, data, [given, _statistics_table(ds, rows), *lost])
+    finish(bool(failed))
+
+
+def statistics_rows(ds: xr.Dataset, plane: str) -> list[dict[str, Any]]:
+    """A row per plane and force: largest value (m), its pose (m), percentiles (m), share of the area within."""
+    rows = []
+    for z in ds.z.values:
+        here = ds.sel(z=z)
+        for force in ("worst", "best", *map(str, ds.case.values)):
+            name = f"{force}_deflection_{plane}" if force in ("worst", "best") else f"deflection_{plane}"
+            one = here if force in ("worst", "best") else here.sel(case=force)
+            percentiles = zip(
+                ds.percentile.values.tolist(), one[f"{name}_percentile"].values.tolist(), strict=True
+            )
+            rows.append(
+                {"z": float(z), "force": force, "max": float(one[f"{name}_max"]),
+                 "at": one[f"{name}_max_position"].values.tolist(), "percentiles": dict(percentiles),
+                 "share_within": float(one[f"{name}_within"])}
+            )  # fmt: skip
+    return rows
+
+
+def _statistics_table(ds: xr.Dataset, rows: list[dict[str, Any]]) -> Table:
+    percent = [f"{p:g} %" for p in ds.percentile.values]
+    out = table(
+        f"{ds.attrs['machine']}: deflection in the plane, mm, under {ds.attrs['turning_force_N']:g} N",
+        ("z, mm", "force", *percent, "max", "at x, y", f"within {1e3 * ds.attrs['tolerance_m']:g} mm"),
+        left=("force",),
+    )
+    for r in rows:
+        name = f"{r['force']} direction" if r["force"] in ("worst", "best") else r["force"]
+        values = (f"{1e3 * v:.3f}" for v in (*r["percentiles"].values(), r["max"]))
+        place = f"{1e3 * r['at'][0]:.0f}, {1e3 * r['at'][1]:.0f}"
+        out.add_row(f"{1e3 * r['z']:g}", name, *values, place, f"{100 * r['share_within']:.1f} %")
+    return out

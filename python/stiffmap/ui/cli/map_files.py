@@ -3,19 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
-from rich.table import Table
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.solve.machine import Machine
-from stiffmap.solve.status import Status
-from stiffmap.ui.cli.inputs import MM
-from stiffmap.ui.cli.map_summary import deviation_figures, in_words, readings
+from stiffmap.ui.cli.map_summary import MapSummary, deviation_figures, in_words, readings
 from stiffmap.ui.cli.output import as_text, write_files
 from stiffmap.workspace.maps.table import write_map_table
 
@@ -23,85 +17,61 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-@dataclass(frozen=True)
-class Wanted:
-    """What is asked for next to the map."""
-
-    output: Path
-    plane: str
-    tolerance: float
-    """mm."""
-    given: str
-    """Force and tolerance, and where they come from."""
-    kinds: Sequence[str]
-    """Endings of the pictures; none: no pictures and no report."""
-    tables: Sequence[str]
-    own_scales: bool
-    uncertainty: bool
-
-
 def write_map_files(
-    machine: Machine,
-    ds: xr.Dataset,
-    wanted: Wanted,
-    table: Table,
-    worst: dict[str, Any] | None,
-    failed: dict[str, int],
-    gravity: Any = None,
+    result: MapSummary, folder: Path, kinds: Sequence[str], tables: Sequence[str], own_scales: bool
 ) -> list[Path]:
-    """Pictures of the map and of the machine at its worst pose, tables, deviations, report."""
-    figures = map_figures(ds, wanted.plane, MM * wanted.tolerance, wanted.own_scales) if wanted.kinds else {}
-    figures |= loaded(machine, worst, gravity) if figures and worst is not None else {}
-    named = ((f"map-{n}.{kind}", f) for n, f in figures.items() for kind in wanted.kinds)
-    files = write_files(wanted.output, named)
-    files += [write_map_table(ds, wanted.output / f"map.{kind}") for kind in wanted.tables]
-    if wanted.uncertainty and figures:
-        files += write_files(wanted.output, deviation_figures(ds, wanted.plane))
+    """Pictures of the map and of the machine at its worst pose, tables, deviations, report.
+
+    `kinds` are the endings of the pictures; none: no pictures and no report.
+    """
+    figures = map_figures(result, own_scales) | loaded(result) if kinds else {}
+    named = ((f"map-{n}.{kind}", f) for n, f in figures.items() for kind in kinds)
+    files = write_files(folder, named)
+    files += [write_map_table(result.ds, folder / f"map.{kind}") for kind in tables]
+    if result.uncertainty and figures:
+        files += write_files(folder, deviation_figures(result.ds, result.plane))
     if figures:
-        files.append(write_report(ds, wanted, table, worst, failed, figures))
+        files.append(write_report(result, folder / "report.html", figures))
     return files
 
 
-def map_figures(ds: xr.Dataset, plane: str, tolerance: float, own_scales: bool) -> dict[str, Figure]:
+def map_figures(result: MapSummary, own_scales: bool) -> dict[str, Figure]:
     """One picture per reading of the force's direction."""
     from stiffmap.ui.plot import map_figure
 
     return {
-        n: map_figure(ds, tolerance=tolerance, common_scale=not own_scales, **how)
-        for n, how in readings(ds, plane).items()
+        n: map_figure(result.ds, tolerance=result.tolerance, common_scale=not own_scales, **how)
+        for n, how in readings(result.ds, result.plane).items()
     }
 
 
-def loaded(machine: Machine, worst: dict[str, Any], gravity: Any) -> dict[str, Figure]:
-    """The machine deformed at the worst pose; nothing where it has no stable shape without the load."""
+def loaded(result: MapSummary) -> dict[str, Figure]:
+    """The machine deformed at the worst pose; nothing where there is none, or no stable shape without the load."""
     from stiffmap.ui.plot import loaded_figure
 
+    worst = result.worst
+    if worst is None:
+        return {}
     try:
-        return {
-            "loaded": loaded_figure(machine, worst["position"], np.array(worst["wrench"]), gravity=gravity)
-        }
+        wrench = np.array(worst["wrench"])
+        return {"loaded": loaded_figure(result.machine, worst["position"], wrench, gravity=result.gravity)}
     except StiffmapError:
         return {}
 
 
-def write_report(
-    ds: xr.Dataset,
-    wanted: Wanted,
-    table: Table,
-    worst: dict[str, Any] | None,
-    failed: dict[str, int],
-    figures: dict[str, Figure],
-) -> Path:
+def write_report(result: MapSummary, path: Path, figures: dict[str, Figure]) -> Path:
     """The map as one page: its worst pose in words, the table, the pictures."""
     from stiffmap.ui.report.sheet import Sheet, write_sheet
 
+    ds, table = result.ds, result.table()
     head, rows = as_text(table)
-    names = {s.name: s.name.lower().replace("_", " ") for s in Status}
-    lines = [f"{n} poses have no value: {names[name]}." for name, n in failed.items()]
+    lines = [
+        f"{n} poses have no value: {name.lower().replace('_', ' ')}." for name, n in result.failed.items()
+    ]
     sheet = Sheet(
         title=f"Error map of {ds.attrs['machine']}",
-        answer=_answer(ds, wanted, worst),
-        lines=[wanted.given, *lines, f"{table.title}."],
+        answer=_answer(result),
+        lines=[result.given, *lines, f"{table.title}."],
         head=head,
         rows=rows,
         numbers=(1, 3, 4, 5, 6),
@@ -114,18 +84,19 @@ def write_report(
     }
     pictures = {captions.get(n, f"Deflection under the force {n}."): f for n, f in figures.items()}
     digests = {f"machine {ds.attrs['machine']}, as loaded": ds.attrs["machine_digest"]}
-    return write_sheet(wanted.output / "report.html", sheet, pictures, digests)
+    return write_sheet(path, sheet, pictures, digests)
 
 
-def _answer(ds: xr.Dataset, wanted: Wanted, worst: dict[str, Any] | None) -> str:
+def _answer(result: MapSummary) -> str:
     """How much of the map keeps the tolerance, and the worst pose."""
-    size = ds[f"worst_deflection_{wanted.plane}"].values
-    within = 100 * float((size[np.isfinite(size)] <= MM * wanted.tolerance).sum() / size.size)
+    ds, plane = result.ds, result.plane
+    size = ds[f"worst_deflection_{plane}"].values
+    within = 100 * float((size[np.isfinite(size)] <= result.tolerance).sum() / size.size)
     text = (
-        f"Under {ds.attrs['turning_force_N']:g} N in the worst direction of the {wanted.plane} plane, {within:.1f} % of the "
-        f"positions deflect by less than {wanted.tolerance:g} mm."
+        f"Under {ds.attrs['turning_force_N']:g} N in the worst direction of the {plane} plane, {within:.1f} % of the "
+        f"positions deflect by less than {1e3 * result.tolerance:g} mm."
     )
-    if worst is None:
+    if result.worst is None:
         return text
-    told = in_words(worst)
+    told = in_words(result.worst)
     return f"{text} {told[0].upper()}{told[1:]}."

@@ -3,7 +3,10 @@ elements that its deflection comes from."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,11 +21,113 @@ from stiffmap.model.description.sources import in_words as source_words
 from stiffmap.solve.budget import deflection_budget, in_shares
 from stiffmap.solve.machine import Machine
 from stiffmap.ui.cli.inputs import MM
-from stiffmap.ui.cli.output import failed, table
+from stiffmap.ui.cli.output import failed, failed_in_words, table
 from stiffmap.workspace.maps.plan import BEYOND
 
 RANKED = 8
 """Numbers in the table of shares in the variance."""
+
+
+@dataclass(frozen=True)
+class MapSummary:
+    """An error map with what a person or a program asks of it first."""
+
+    machine: Machine
+    ds: xr.Dataset
+    plane: str
+    tolerance: float
+    """m."""
+    given: str
+    """Force and tolerance, and where they come from."""
+    gravity: Any
+    uncertainty: bool
+    """Whether the standard deviations are reported."""
+
+    @cached_property
+    def rows(self) -> list[dict[str, Any]]:
+        """The table's rows, as of `summary`."""
+        return summary(self.ds, self.plane, self.tolerance)
+
+    @cached_property
+    def failed(self) -> dict[str, int]:
+        """Number of poses per status in which some load or direction failed."""
+        return failed(np.maximum(self.ds.direction_status.values, self.ds.status.max("case").values))
+
+    @cached_property
+    def worst(self) -> dict[str, Any] | None:
+        """As of `worst_pose`."""
+        return worst_pose(self.machine, self.ds, self.gravity)
+
+    @cached_property
+    def band(self) -> dict[str, Any]:
+        """Standard deviations (m) and where they come from."""
+        from stiffmap.workspace.maps import uncertainty_ranking
+
+        ranking = uncertainty_ranking(self.ds)
+        return {
+            "rows": band(self.ds, self.plane),
+            "ranking": [{"number": str(p.parameter.values), "share": float(p)} for p in ranking],
+            "method": self.ds.attrs["uncertainty_method"],
+            "left_out": self.ds.attrs["uncertainty_left_out"],
+        }
+
+    def as_plain(self, files: Sequence[Path]) -> dict[str, Any]:
+        """Data of JSON, SI, with the files that were written."""
+        out: dict[str, Any] = {"machine": self.machine.name, "rows": self.rows, "failed": self.failed}
+        out |= {"files": files, "worst_pose": self.worst}
+        if BEYOND in self.ds:  # poses and loads beyond what a calibrated machine was calibrated by
+            far = self.ds[BEYOND]
+            out["beyond_calibration"] = {
+                "share": float(far.mean()), "calibrated_by": str(far.attrs["calibrated_by"]),
+            }  # fmt: skip
+        return out | ({"uncertainty": self.band} if self.uncertainty else {})
+
+    def lines(self) -> Iterator[str | Table | Text]:
+        """For the terminal, mm and per cent."""
+        yield self.given
+        yield self.table()
+        yield from self._deviations() if self.uncertainty else ()
+        if self.worst is not None:
+            yield in_words(self.worst)
+        if BEYOND in self.ds:
+            share, by = float(self.ds[BEYOND].mean()), self.ds[BEYOND].attrs["calibrated_by"]
+            words = f"{100 * share:.3g} % of it beyond what the machine was calibrated by ({by})"
+            yield Text(words, "yellow" if share else "")
+        yield from failed_in_words(self.failed)
+
+    def table(self) -> Table:
+        """Deflections, mm."""
+        force, within = self.ds.attrs["turning_force_N"], f"within {1e3 * self.tolerance:g} mm"
+        title = f"{self.machine.name}: deflection in the {self.plane} plane, mm, under {force:g} N"
+        cells = (
+            [f"{1e3 * r[k]:.3f}" if np.isfinite(r[k]) else "–" for k in ("min", "median", "max")]
+            + [f"{100 * r['share_within']:.1f} %"]
+            for r in self.rows
+        )
+        return self._by_plane(title, ("min", "median", "max", within), self.rows, cells)
+
+    def _deviations(self) -> Iterator[Table | Text]:
+        title = f"standard deviation of the deflection in the {self.plane} plane, mm"
+        rows = self.band["rows"]
+        cells = (
+            [f"{1e3 * r['median_std']:.4f}", f"{1e3 * r['max_std']:.4f}", f"{100 * r['max_relative']:.1f} %"]
+            for r in rows
+        )
+        yield self._by_plane(title, ("median", "max", "max, relative"), rows, cells)
+        shares = ((r["number"], f"{100 * r['share']:.2f} %") for r in self.band["ranking"][:RANKED])
+        title = "share in the variance of the deflection, whole map"
+        yield table(title, ("number", "share"), shares, left=("number",))
+        if self.band["left_out"]:
+            yield Text(f"not propagated: {self.band['left_out']}", "yellow")
+
+    def _by_plane(
+        self, title: str, heads: Sequence[str], rows: list[dict[str, Any]], cells: Iterable[list[str]]
+    ) -> Table:
+        """A row per plane and reading of the force's direction."""
+        axis = across(self.ds)
+        first = ([f"{1e3 * r[axis]:g}", label(self.ds, self.plane, r["force"])] for r in rows)
+        whole = (a + b for a, b in zip(first, cells, strict=True))
+        return table(title, (f"{axis}, mm", "force", *heads), whole, left=("force",))
 
 
 def across(ds: xr.Dataset) -> str:
@@ -77,34 +182,6 @@ def _sizes(values: Floats, tolerance: float) -> dict[str, float]:
     return {"min": float(least), "median": float(median), "max": float(most), "share_within": share}
 
 
-def failures(ds: xr.Dataset) -> dict[str, int]:
-    """Number of poses per status in which some load or direction failed."""
-    return failed(np.maximum(ds.direction_status.values, ds.status.max("case").values))
-
-
-def beyond(ds: xr.Dataset) -> dict[str, Any] | None:
-    """Share of the map (poses and loads) beyond what a calibrated machine was calibrated by; None: it was not."""
-    if BEYOND not in ds:
-        return None
-    return {"share": float(ds[BEYOND].mean()), "calibrated_by": str(ds[BEYOND].attrs["calibrated_by"])}
-
-
-def as_table(ds: xr.Dataset, rows: list[dict[str, Any]], plane: str, tolerance: float) -> Table:
-    """For the terminal, mm."""
-    axis = across(ds)
-    out = table(
-        f"{ds.attrs['machine']}: deflection in the {plane} plane, mm, under {ds.attrs['turning_force_N']:g} N",
-        (f"{axis}, mm", "force", "min", "median", "max", f"within {tolerance:g} mm"),
-        left=("force",),
-    )
-    for r in rows:
-        sizes = (f"{1e3 * r[k]:.3f}" if np.isfinite(r[k]) else "–" for k in ("min", "median", "max"))
-        out.add_row(
-            f"{1e3 * r[axis]:g}", label(ds, plane, r["force"]), *sizes, f"{100 * r['share_within']:.1f} %"
-        )
-    return out
-
-
 def band(ds: xr.Dataset, plane: str) -> list[dict[str, Any]]:
     """Per plane and reading of the force's direction: median and largest standard deviation (m) of the
     deflection in the plane, and the largest relative to its deflection."""
@@ -122,47 +199,13 @@ def _readings(ds: xr.Dataset, plane: str) -> dict[str, dict[str, Any]]:
 
 def _deviations(size: Any, std: Any) -> dict[str, float]:
     good = np.isfinite(std) & (size > 0)
-    if not good.any():
-        return {"median_std": np.nan, "max_std": np.nan, "max_relative": np.nan}
-    relative = std[good] / size[good]
+    sizes = std[good] if good.any() else np.array([np.nan])
+    relative = std[good] / size[good] if good.any() else sizes
     return {
-        "median_std": float(np.median(std[good])),
-        "max_std": float(std[good].max()),
+        "median_std": float(np.median(sizes)),
+        "max_std": float(sizes.max()),
         "max_relative": float(relative.max()),
     }
-
-
-def uncertainty_data(ds: xr.Dataset, plane: str) -> dict[str, Any]:
-    """For ``--json``, SI."""
-    from stiffmap.workspace.maps import uncertainty_ranking
-
-    ranking = uncertainty_ranking(ds)
-    return {
-        "rows": band(ds, plane),
-        "ranking": [{"number": str(p.parameter.values), "share": float(p)} for p in ranking],
-        "method": ds.attrs["uncertainty_method"],
-        "left_out": ds.attrs["uncertainty_left_out"],
-    }
-
-
-def uncertainty_told(ds: xr.Dataset, data: dict[str, Any], plane: str) -> Iterator[Table | Text]:
-    """Two tables, mm and per cent."""
-    axis = across(ds)
-    out = table(
-        f"standard deviation of the deflection in the {plane} plane, mm",
-        (f"{axis}, mm", "force", "median", "max", "max, relative"),
-        left=("force",),
-    )
-    for r in data["rows"]:
-        sizes = [f"{1e3 * r[k]:.4f}" for k in ("median_std", "max_std")]
-        relative = f"{100 * r['max_relative']:.1f} %"
-        out.add_row(f"{1e3 * r[axis]:g}", label(ds, plane, r["force"]), *sizes, relative)
-    yield out
-    shares = ((r["number"], f"{100 * r['share']:.2f} %") for r in data["ranking"][:RANKED])
-    title = "share in the variance of the deflection, whole map"
-    yield table(title, ("number", "share"), shares, left=("number",))
-    if data["left_out"]:
-        yield Text(f"not propagated: {data['left_out']}", "yellow")
 
 
 def deviation_figures(ds: xr.Dataset, plane: str) -> Iterator[tuple[str, Any]]:

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import numpy as np
-import typer
 from rich import get_console
 from rich.table import Table
 from rich.text import Text
@@ -15,6 +14,7 @@ from rich.text import Text
 from stiffmap.common.outputs import make_folder
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import MM, finish, gravity, in_si, machine_with, numbers, words
+from stiffmap.ui.cli.options import option
 from stiffmap.ui.cli.output import as_text, show, write_files
 from stiffmap.ui.cli.output import table as table_of
 from stiffmap.workspace.maps.loading import machine_digest
@@ -27,37 +27,23 @@ if TYPE_CHECKING:
 
 def command(
     machine: options.Machine,
-    requirements: Annotated[
-        str | None, typer.Option(help="Requirements file, or a shipped one by name: trimming.")
-    ] = None,
-    box: Annotated[
-        str | None, typer.Option(help="Box of TCP positions in mm: xmin,xmax,ymin,ymax,zmin,zmax.")
-    ] = None,
-    force: Annotated[float | None, typer.Option(help="Force on the tool for deflections, N.")] = None,
-    plane: Annotated[
-        str | None, typer.Option(help="Plane of speeds, forces, deflections: xy, xz, yz.")
-    ] = None,
-    only: Annotated[str | None, typer.Option(help="Names of measures, separated by commas.")] = None,
-    nodes: Annotated[int, typer.Option(help="Nodes per edge for kinematic measures.")] = 51,
-    coarse: Annotated[int, typer.Option(help="Nodes per edge for deflection, frequency, acceleration.")] = 7,
-    length: Annotated[
-        float | None,
-        typer.Option(help="Characteristic length in mm, where units mix; default: the machine's."),
-    ] = None,
-    toolpath: Annotated[
-        Path | None,
-        typer.Option(
-            help="Motion file (CSV or YAML), or a shipped one (trim), for measures along the task's own path."
-        ),
-    ] = None,
-    clearance: Annotated[
-        float | None,
-        typer.Option(help="mm between members of different legs that workspace and largest box keep."),
-    ] = None,
-    deflection: Annotated[
-        float | None,
-        typer.Option(help="mm of deflection under the force that workspace and largest box keep to."),
-    ] = None,
+    requirements: str | None = option("Requirements file, or a shipped one by name: trimming."),
+    box: str | None = option("Box of TCP positions in mm: xmin,xmax,ymin,ymax,zmin,zmax."),
+    force: float | None = option("Force on the tool for deflections, N."),
+    plane: str | None = option("Plane of speeds, forces, deflections: xy, xz, yz."),
+    only: str | None = option("Names of measures, separated by commas."),
+    nodes: int = option("Nodes per edge for kinematic measures.", 51),
+    coarse: int = option("Nodes per edge for deflection, frequency, acceleration.", 7),
+    length: float | None = option("Characteristic length in mm, where units mix; default: the machine's."),
+    toolpath: Path | None = option(
+        "Motion file (CSV or YAML), or a shipped one (trim), for measures along the task's own path."
+    ),
+    clearance: float | None = option(
+        "mm between members of different legs that workspace and largest box keep."
+    ),
+    deflection: float | None = option(
+        "mm of deflection under the force that workspace and largest box keep to."
+    ),
     effect: options.Effects = None,
     gravity_: options.Gravity = None,
     output: options.Folder = None,

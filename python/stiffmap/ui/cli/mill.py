@@ -5,80 +5,53 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Iterator
-from typing import Annotated
-
-import typer
 
 from stiffmap.machining.milling import mill_job
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import MM, finish, in_si, machine_with, pairs
+from stiffmap.ui.cli.options import argument, option
 from stiffmap.ui.cli.output import show
 from stiffmap.ui.report.milling import summary, write_report
 
 
 def command(
     machine: options.Corrected,
-    path: Annotated[
-        str,
-        typer.Argument(
-            help="G-code, CL or CSV file; or an outline: washbasin, bathtub, rectangle, circle, pocket."
-        ),
-    ],
-    process: Annotated[str, typer.Option(help="Process file, or a shipped name: trimming, slot.")],
+    path: str = argument(
+        "G-code, CL or CSV file; or an outline: washbasin, bathtub, rectangle, circle, pocket."
+    ),
+    process: str = option("Process file, or a shipped name: trimming, slot.", ...),
     output: options.Folder = None,
-    at: Annotated[
-        str | None, typer.Option(help="Origin of the part on the machine, mm. [default: the machine's home]")
-    ] = None,
-    turn: Annotated[float, typer.Option(help="Turn of the part about z, deg.")] = 0.0,
-    size: Annotated[
-        str | None, typer.Option(help="Of a built-in outline, mm, e.g. 340,240 (width,depth).")
-    ] = None,
-    offset: Annotated[
-        list[str] | None, typer.Option(help="Work offset of the G-code, mm, e.g. 'G55=10,0,0'; repeatable.")
-    ] = None,
+    at: str | None = option("Origin of the part on the machine, mm. [default: the machine's home]"),
+    turn: float = option("Turn of the part about z, deg.", 0.0),
+    size: str | None = option("Of a built-in outline, mm, e.g. 340,240 (width,depth)."),
+    offset: list[str] | None = option("Work offset of the G-code, mm, e.g. 'G55=10,0,0'; repeatable."),
     effect: options.Effects = None,
-    true_machine: Annotated[
-        str | None, typer.Option("--true", help="Machine file that the program is also simulated on.")
-    ] = None,
-    step: Annotated[float, typer.Option(help="Distance of the points along the path, mm.")] = 2.0,
-    within: Annotated[float, typer.Option(help="Chord error of the compensated program, mm.")] = 0.001,
-    thickness: Annotated[
-        float | None, typer.Option(help="Width to trim, mm; default: the process's.")
-    ] = None,
-    tolerance: Annotated[float | None, typer.Option(help="Tolerance, mm; default: the process's.")] = None,
-    passes: Annotated[int, typer.Option(help="Passes along the same program.")] = 1,
-    band: Annotated[bool, typer.Option(help="Also under 80 and 120 % of the force.")] = False,
-    place: Annotated[
-        int | None,
-        typer.Option(
-            help="Try so many placements first and take the best, refined; instead of --at and --turn."
-        ),
-    ] = None,
-    stock: Annotated[
-        str | None,
-        typer.Option(
-            help="Box of stock, mm, axes of the part: lowest and highest corner, e.g. -90,-60,-5,90,60,0."
-        ),
-    ] = None,
-    reverse: Annotated[
-        bool, typer.Option(help="Run the path the other way, conventional for climb and the other way round.")
-    ] = False,
-    entry: Annotated[
-        str | None,
-        typer.Option(
-            help="Enter a closed outline elsewhere: so many mm along it, or 'best' (the least step)."
-        ),
-    ] = None,
-    feeds: Annotated[
-        bool,
-        typer.Option(
-            help="Choose the largest feed of each move that keeps the error within the tolerance before compensation."
-        ),
-    ] = False,
-    redundancy: Annotated[
-        int | None,
-        typer.Option(help="Arms: choose the turn about the tool from so many over a full turn, e.g. 72."),
-    ] = None,
+    true_machine: str | None = option("Machine file that the program is also simulated on.", None, "--true"),
+    step: float = option("Distance of the points along the path, mm.", 2.0),
+    within: float = option("Chord error of the compensated program, mm.", 0.001),
+    thickness: float | None = option("Width to trim, mm; default: the process's."),
+    tolerance: float | None = option("Tolerance, mm; default: the process's."),
+    passes: int = option("Passes along the same program.", 1),
+    band: bool = option("Also under 80 and 120 % of the force.", False),
+    place: int | None = option(
+        "Try so many placements first and take the best, refined; instead of --at and --turn."
+    ),
+    stock: str | None = option(
+        "Box of stock, mm, axes of the part: lowest and highest corner, e.g. -90,-60,-5,90,60,0."
+    ),
+    reverse: bool = option(
+        "Run the path the other way, conventional for climb and the other way round.", False
+    ),
+    entry: str | None = option(
+        "Enter a closed outline elsewhere: so many mm along it, or 'best' (the least step)."
+    ),
+    feeds: bool = option(
+        "Choose the largest feed of each move that keeps the error within the tolerance before compensation.",
+        False,
+    ),
+    redundancy: int | None = option(
+        "Arms: choose the turn about the tool from so many over a full turn, e.g. 72."
+    ),
     threads: options.Threads = None,
     scheduler: options.Scheduler = None,
     as_json: options.Json = False,

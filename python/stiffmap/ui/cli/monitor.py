@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
-
-import typer
+from typing import Any
 
 from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.json_text import parse_json
@@ -16,18 +14,17 @@ from stiffmap.model.description import AppliedEffect
 from stiffmap.solve.machine import load_machine
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import finish
+from stiffmap.ui.cli.options import argument, option
 from stiffmap.ui.cli.output import show
 
 
 def command(
     machine: options.Declared,
-    before: Annotated[str, typer.Argument(help="Experiment folder: the machine as it was, or one specimen.")],
-    after: Annotated[str, typer.Argument(help="Experiment folder: the machine now, or another specimen.")],
+    before: str = argument("Experiment folder: the machine as it was, or one specimen."),
+    after: str = argument("Experiment folder: the machine now, or another specimen."),
     effect: options.Effects = None,
-    diagnosis: Annotated[
-        Path | None, typer.Option(help="diagnosis.json of the last diagnosis: its effects are followed.")
-    ] = None,
-    budget: Annotated[bool, typer.Option(help="Print the uncertainty budget of every number now.")] = False,
+    diagnosis: Path | None = option("diagnosis.json of the last diagnosis: its effects are followed."),
+    budget: bool = option("Print the uncertainty budget of every number now.", False),
     as_json: options.Json = False,
 ) -> None:
     """What changed since the last diagnosis; or whether two specimens of a type share their numbers.

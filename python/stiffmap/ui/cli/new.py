@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
-import typer
 from rich.text import Text
 
 from stiffmap.common.errors import StiffmapError
@@ -14,7 +14,8 @@ from stiffmap.common.outputs import new_file, write_text
 from stiffmap.model.files.shipped import starter_text
 from stiffmap.solve.starters import CLASSES, class_of, machine_text
 from stiffmap.ui.cli import options
-from stiffmap.ui.cli.output import print_json, show
+from stiffmap.ui.cli.options import argument, flag, option
+from stiffmap.ui.cli.output import show
 
 DIMENSIONS = {
     "radius": "mm, of the circle on which the legs stand on the base",
@@ -33,34 +34,29 @@ DIMENSIONS = {
 
 
 def _dimension(key: str) -> Any:
-    return typer.Option(f"--{key}", help=f"{DIMENSIONS[key]}.", rich_help_panel="Dimensions (with --from)")
+    return option(f"{DIMENSIONS[key]}.", rich_help_panel="Dimensions (with --from)")
 
 
 Length = float | None
 
 
 def command(
-    file: Annotated[
-        Path | None, typer.Argument(help="File to write; its stem becomes the machine's name.")
-    ] = None,
-    kind: Annotated[
-        str | None,
-        typer.Option(
-            "--from", metavar="CLASS", help="Start from a machine of this class; --list names them."
-        ),
-    ] = None,
-    listed: Annotated[bool, typer.Option("--list", help="List the classes and their dimensions.")] = False,
-    radius: Annotated[Length, _dimension("radius")] = None,
-    platform: Annotated[Length, _dimension("platform")] = None,
-    arm: Annotated[Length, _dimension("arm")] = None,
-    forearm: Annotated[Length, _dimension("forearm")] = None,
-    rod: Annotated[Length, _dimension("rod")] = None,
-    height: Annotated[Length, _dimension("height")] = None,
-    stroke: Annotated[Length, _dimension("stroke")] = None,
-    reach: Annotated[Length, _dimension("reach")] = None,
-    tube: Annotated[Length, _dimension("tube")] = None,
-    wall: Annotated[Length, _dimension("wall")] = None,
-    drive: Annotated[Length, _dimension("drive")] = None,
+    file: Path | None = argument("File to write; its stem becomes the machine's name.", None),
+    kind: str | None = option(
+        "Start from a machine of this class; --list names them.", None, "--from", metavar="CLASS"
+    ),
+    listed: bool = flag("List the classes and their dimensions.", "--list"),
+    radius: Length = _dimension("radius"),
+    platform: Length = _dimension("platform"),
+    arm: Length = _dimension("arm"),
+    forearm: Length = _dimension("forearm"),
+    rod: Length = _dimension("rod"),
+    height: Length = _dimension("height"),
+    stroke: Length = _dimension("stroke"),
+    reach: Length = _dimension("reach"),
+    tube: Length = _dimension("tube"),
+    wall: Length = _dimension("wall"),
+    drive: Length = _dimension("drive"),
     overwrite: options.Overwrite = False,
     as_json: options.Json = False,
 ) -> None:
@@ -81,7 +77,8 @@ def command(
     dimensions = {"radius": radius, "platform": platform, "arm": arm, "forearm": forearm, "rod": rod, "height": height,
                   "stroke": stroke, "reach": reach, "tube": tube, "wall": wall, "drive": drive}  # fmt: skip
     if listed:
-        _list(as_json)
+        classes = {n: {"title": c.title, "dimensions": dict(c.defaults)} for n, c in CLASSES.items()}
+        show(as_json, classes, _class_lines())
         return
     if file is None:
         raise StiffmapError("new: expected a file to write, such as my_machine.yaml (or --list)")
@@ -103,10 +100,7 @@ def command(
     show(as_json, data, [told])
 
 
-def _list(as_json: bool) -> None:
-    if as_json:
-        print_json({n: {"title": c.title, "dimensions": dict(c.defaults)} for n, c in CLASSES.items()})
-        return
+def _class_lines() -> Iterator[str]:
     for name, c in CLASSES.items():
-        print(f"{name:<13}{c.title}\n{'':13}" + " ".join(f"--{k} {v:g}" for k, v in c.defaults.items()))
-    print("lengths in mm; --drive in N/µm where drives slide, in kN·m/rad where they turn")
+        yield f"{name:<13}{c.title}\n{'':13}" + " ".join(f"--{k} {v:g}" for k, v in c.defaults.items())
+    yield "lengths in mm; --drive in N/µm where drives slide, in kN·m/rad where they turn"

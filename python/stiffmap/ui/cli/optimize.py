@@ -6,9 +6,8 @@ import time
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
-import typer
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
@@ -18,6 +17,7 @@ from stiffmap.common.outputs import make_folder
 from stiffmap.common.outputs.option import written
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import finish
+from stiffmap.ui.cli.options import argument, option
 from stiffmap.ui.cli.output import show, table, write_files
 from stiffmap.ui.report.design import Chosen, Report, measured
 from stiffmap.workspace.design import ParetoSet, load_design, optimize
@@ -25,10 +25,10 @@ from stiffmap.workspace.performance.registry import get_measure
 
 
 def command(
-    design: Annotated[str, typer.Argument(help="Design file, or a shipped one by name: redesign.")],
-    output: Annotated[Path, written(help="Folder for results; resumed from there.")] = Path("design"),
-    generations: Annotated[int | None, typer.Option(help="Generations; default: the file's.")] = None,
-    processes: Annotated[int | None, typer.Option(help="Processes; default: all cores.")] = None,
+    design: str = argument("Design file, or a shipped one by name: redesign."),
+    output: Path = written("Folder for results; resumed from there.", Path("design")),
+    generations: int | None = option("Generations; default: the file's."),
+    processes: int | None = option("Processes; default: all cores."),
     scheduler: options.Scheduler = None,
     as_json: options.Json = False,
 ) -> None:

@@ -3,11 +3,27 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from stiffmap.common.outputs.option import written
+
+
+def option(help: str, default: Any = None, *names: str, **more: Any) -> Any:
+    """An option of one command, required where its default is ``...``; `names` and `more` as of ``typer.Option``."""
+    return typer.Option(default, *names, help=help, **more)
+
+
+def flag(help: str, name: str) -> Any:
+    """An option without a value, which is not set by default."""
+    return option(help, False, name)
+
+
+def argument(help: str, default: Any = ...) -> Any:
+    """An argument of one command, required where it has no default."""
+    return typer.Argument(default, help=help)
+
 
 Machine = Annotated[str, typer.Argument(help="Shipped name (stiffmap machines) or machine file.")]
 Declared = Annotated[str, typer.Argument(help="Declared machine: shipped name or machine file.")]
@@ -59,7 +75,7 @@ Overwrite = Annotated[bool, typer.Option("--overwrite", help="Overwrite what is 
 Threads = Annotated[int | None, typer.Option(help="Threads; default: all cores.")]
 Tolerance = Annotated[float, typer.Option(help="Tolerated deflection, mm.")]
 Plane = Annotated[str, typer.Option(help="Plane in which the force turns: xy, xz or yz.")]
-Folder = Annotated[Path | None, written(help="Folder for files and pictures.")]
+Folder = Annotated[Path | None, written("Folder for files and pictures.", ...)]
 Rotation = Annotated[
     str | None,
     typer.Option(

@@ -28,35 +28,25 @@ MEANINGS = {
 }
 
 
-def print_json(data: Any) -> None:
-    """JSON on standard output: one document, keys in the order given, no NaN."""
-    print(json_text(data), flush=True)  # a program that reads a pipe waits for it
+def show(as_json: bool, data: Any, told: Iterable[Any], files: Iterable[str | Path] | None = None) -> None:
+    """A result as one document of JSON, with the files written, or as lines and tables for the terminal.
 
-
-def say(*told: Any) -> None:
-    """Lines and tables on the terminal: text as it is, without markup and never broken; None: nothing."""
+    Text is shown as it is, without markup and never broken; None: nothing.
+    """
+    if as_json:
+        text = json_text(data if files is None else {**data, "files": files})
+        print(text, flush=True)  # a program that reads a pipe waits for it
+        return
     console = Console(highlight=False, emoji=False)
-    for each in told:
+    for each in (*told, f"wrote {', '.join(map(str, files))}" if files else None):
         if each is not None:
             console.print(
                 each, soft_wrap=isinstance(each, (str, Text, Tree)), markup=not isinstance(each, str)
             )
 
 
-def show(
-    as_json: bool, data: Mapping[str, Any], told: Iterable[Any], files: Iterable[str | Path] | None = None
-) -> None:
-    """A result as JSON, with the files written, or as lines and tables for the terminal."""
-    if as_json:
-        print_json(data if files is None else {**data, "files": files})
-        return
-    say(*told)
-    if files:
-        say(f"wrote {', '.join(map(str, files))}")
-
-
 def write_files(folder: Path | None, contents: Iterable[tuple[str, Any]]) -> list[Path]:
-    """Write named datasets (.nc), data (.json), machines (.yaml), bytes and figures, each of them made when its turn comes; no folder: nothing."""
+    """Write named datasets (.nc), data (.json), machines (.yaml), texts, bytes and figures, each of them made when its turn comes; no folder: nothing."""
     if folder is None:
         return []
     return [_written(make_folder(folder) / name, content) for name, content in contents]
@@ -65,6 +55,8 @@ def write_files(folder: Path | None, contents: Iterable[tuple[str, Any]]) -> lis
 def _written(path: Path, content: Any) -> Path:
     if path.suffix == ".json":
         return write_text(path, json_text(content))
+    if isinstance(content, str):
+        return write_text(path, content)
     if isinstance(content, bytes):
         with writing(path) as fresh:
             fresh.write_bytes(content)

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated
+from typing import Any
 
-import typer
-
-from stiffmap.common.outputs import make_folder, write_text
+from stiffmap.common.outputs import make_folder
 from stiffmap.common.outputs.option import written
 from stiffmap.ui.cli import options
-from stiffmap.ui.cli.output import show
+from stiffmap.ui.cli.options import option
+from stiffmap.ui.cli.output import show, write_files
 from stiffmap.ui.paper import Results, Statement, all_statements, compute
 from stiffmap.ui.paper.table import as_csv, as_markdown, as_rich, count, count_text
 
@@ -18,9 +18,9 @@ NO_CURVES = "The paper prints no numbers of the curves in Figures 5 to 7; the nu
 
 
 def command(
-    output: Annotated[Path | None, written(help="Folder for figures and tables.")] = None,
-    points: Annotated[int, typer.Option(help="Positions along x and y of the error maps.")] = 101,
-    figures: Annotated[bool, typer.Option(help="Draw Figures 5 to 7 (with -o).")] = True,
+    output: Path | None = written("Folder for figures and tables."),
+    points: int = option("Positions along x and y of the error maps.", 101),
+    figures: bool = option("Draw Figures 5 to 7 (with -o).", True),
     threads: options.Threads = None,
     as_json: options.Json = False,
 ) -> None:
@@ -42,16 +42,15 @@ def command(
     target = make_folder(output) if output else None
     results = compute(points, threads=threads, progress=False if as_json else None)
     statements = all_statements(results)
-    files = write(results, statements, target, figures) if target else []
+    files = write_files(target, _files(results, statements, figures))
     told = [as_rich(statements), count_text(statements), NO_CURVES]
     show(as_json, {"statements": statements, "count": count(statements)}, told, files)
 
 
-def write(results: Results, statements: list[Statement], target: Path, figures: bool) -> list[Path]:
+def _files(results: Results, statements: list[Statement], figures: bool) -> Iterator[tuple[str, Any]]:
     """Figures and tables."""
-    from stiffmap.ui.paper.figures import save_all
+    from stiffmap.ui.paper.figures import all_figures
 
-    out = save_all(results, target) if figures else []
-    for name, text in (("statements.csv", as_csv(statements)), ("statements.md", as_markdown(statements))):
-        out.append(write_text(target / name, text))
-    return out
+    yield from all_figures(results).items() if figures else ()
+    yield "statements.csv", as_csv(statements)
+    yield "statements.md", as_markdown(statements)

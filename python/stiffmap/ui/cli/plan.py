@@ -5,10 +5,9 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
-import typer
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import with_uncertainty
@@ -23,49 +22,33 @@ from stiffmap.identification.planning.estimate import fitted
 from stiffmap.solve.machine import Machine, load_machine
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import MM, in_si, numbers
+from stiffmap.ui.cli.options import argument, flag, option
 from stiffmap.ui.cli.output import show
 
 
 def command(
-    machine: Annotated[str, typer.Argument(help="Machine: shipped name or machine file.")],
-    identify: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--identify", help="Effect whose numbers are to be identified, at the value given; repeatable."
-        ),
-    ] = None,
-    taps: Annotated[
-        int | None, typer.Option(help="In place of --identify: so many poses for tap tests, best first.")
-    ] = None,
-    output: Annotated[Path | None, written(help="CSV file of the rows chosen.")] = None,
-    rival: Annotated[
-        list[str] | None, typer.Option("--rival", help="Explanation to separate from; repeatable.")
-    ] = None,
-    for_map: Annotated[
-        bool, typer.Option("--map", help="Make the map at the workpiece certain instead of the numbers.")
-    ] = False,
-    at: Annotated[
-        list[str] | None,
-        typer.Option(help="Point of the workpiece, mm, as 100,0,50; repeatable (with --map)."),
-    ] = None,
-    rows: Annotated[int, typer.Option(help="Rows to measure.")] = 12,
+    machine: str = argument("Machine: shipped name or machine file."),
+    identify: list[str] | None = option(
+        "Effect whose numbers are to be identified, at the value given; repeatable.", None, "--identify"
+    ),
+    taps: int | None = option("In place of --identify: so many poses for tap tests, best first."),
+    output: Path | None = written("CSV file of the rows chosen."),
+    rival: list[str] | None = option("Explanation to separate from; repeatable.", None, "--rival"),
+    for_map: bool = flag("Make the map at the workpiece certain instead of the numbers.", "--map"),
+    at: list[str] | None = option("Point of the workpiece, mm, as 100,0,50; repeatable (with --map)."),
+    rows: int = option("Rows to measure.", 12),
     quantity: options.Quantity = "deflection",
-    poses: Annotated[int, typer.Option(help="Candidate poses, at random in the workspace.")] = 60,
-    force: Annotated[float, typer.Option(help="Size of the forces, N.")] = 400.0,
-    read: Annotated[str, typer.Option(help="Axes read, of dx,dy,dz,rx,ry,rz.")] = "dx,dy,dz",
-    noise: Annotated[float | None, typer.Option(help="One standard deviation of a reading, mm.")] = None,
+    poses: int = option("Candidate poses, at random in the workspace.", 60),
+    force: float = option("Size of the forces, N.", 400.0),
+    read: str = option("Axes read, of dx,dy,dz,rx,ry,rz.", "dx,dy,dz"),
+    noise: float | None = option("One standard deviation of a reading, mm."),
     frame: options.Frame = "known",
     tool: options.Target = "known",
-    until: Annotated[
-        float | None,
-        typer.Option(
-            help="On a twin: go on in batches of --rows until every u is this share of a typical size."
-        ),
-    ] = None,
-    twin: Annotated[
-        list[str] | None, typer.Option("--twin", help="What the twin really has; default: --identify.")
-    ] = None,
-    seed: Annotated[int, typer.Option(help="Seed of candidates and of the twin's noise.")] = 0,
+    until: float | None = option(
+        "On a twin: go on in batches of --rows until every u is this share of a typical size."
+    ),
+    twin: list[str] | None = option("What the twin really has; default: --identify.", None, "--twin"),
+    seed: int = option("Seed of candidates and of the twin's noise.", 0),
     as_json: options.Json = False,
 ) -> None:
     """Which poses, loads and readings are most informative, before the instrument is booked.

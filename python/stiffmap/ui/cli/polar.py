@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
-import typer
 import xarray as xr
 from rich.table import Table
 
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import MM, finish, force_given, gravity, machine_with, position
+from stiffmap.ui.cli.options import option
 from stiffmap.ui.cli.output import failed, failed_in_words, show, table, write_files
 
 
@@ -20,7 +20,7 @@ def command(
     at: options.Places = None,
     force: options.Force = "300",
     plane: options.Plane = "xy",
-    directions: Annotated[int, typer.Option(help="Number of directions.")] = 72,
+    directions: int = option("Number of directions.", 72),
     tolerance: options.Tolerance = 0.25,
     effect: options.Effects = None,
     gravity_: options.Gravity = None,

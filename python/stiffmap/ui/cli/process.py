@@ -3,33 +3,23 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
-
-import typer
 
 from stiffmap.common.outputs.option import written
 from stiffmap.ui.cli import options
+from stiffmap.ui.cli.options import argument, option
 from stiffmap.ui.cli.output import show
 
 
 def command(
-    table: Annotated[
-        Path,
-        typer.Argument(
-            help="CSV file or workbook: feed_per_tooth_mm, Fx_N, Fy_N, Fz_N, teeth, axial_mm; side, radial_mm, diameter_mm, "
-            "helix_deg, spindle_rpm; time_s. Also feed (mm/min), Fx (kN) …"
-        ),
-    ],
-    base: Annotated[
-        str | None,
-        typer.Option(
-            "--process", help="Process file or shipped name: tool, cut and speed that no column has."
-        ),
-    ] = None,
-    sheet: Annotated[
-        str | None, typer.Option(help="Sheet of a workbook; the first where none is named.")
-    ] = None,
-    output: Annotated[Path | None, written(help="Process file, for mill, lobes, map and so on.")] = None,
+    table: Path = argument(
+        "CSV file or workbook: feed_per_tooth_mm, Fx_N, Fy_N, Fz_N, teeth, axial_mm; side, radial_mm, diameter_mm, "
+        "helix_deg, spindle_rpm; time_s. Also feed (mm/min), Fx (kN) …"
+    ),
+    base: str | None = option(
+        "Process file or shipped name: tool, cut and speed that no column has.", None, "--process"
+    ),
+    sheet: str | None = option("Sheet of a workbook; the first where none is named."),
+    output: Path | None = written("Process file, for mill, lobes, map and so on."),
     as_json: options.Json = False,
 ) -> None:
     """Coefficients of the cutting force from a dynamometer's table.

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
 
 import numpy as np
-import typer
 from scipy.spatial.transform import Rotation
 
 from stiffmap.common.json_text import json_text
@@ -17,13 +15,14 @@ from stiffmap.identification.validity import beyond
 from stiffmap.solve.machine import load_machine
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import finish
+from stiffmap.ui.cli.options import option
 from stiffmap.ui.cli.output import show
 
 
 def command(
     machine: options.Declared,
     data: options.Experiment,
-    rows: Annotated[int, typer.Option(help="Number of worst rows to print.")] = 5,
+    rows: int = option("Number of worst rows to print.", 5),
     effect: options.Effects = None,
     output: options.Folder = None,
     threads: options.Threads = None,

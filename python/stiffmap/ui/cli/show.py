@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
-import typer
 from rich.text import Text
 from rich.tree import Tree
 
@@ -22,6 +21,7 @@ from stiffmap.solve.mobility import Mobility, mobility
 from stiffmap.solve.status import Status
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import machine_at, numbers
+from stiffmap.ui.cli.options import option
 from stiffmap.ui.cli.output import show
 
 
@@ -29,21 +29,14 @@ def command(
     machine: options.Machine,
     at: options.At = None,
     turned: options.Rotation = None,
-    output: Annotated[Path | None, written(help="Picture to write. [default: MACHINE.png]")] = None,
+    output: Path | None = written("Picture to write. [default: MACHINE.png]"),
     effect: options.Effects = None,
-    load: Annotated[
-        str | None,
-        typer.Option(help="Force on the tool in N, e.g. 300,0,0: draw the machine deformed by it."),
-    ] = None,
-    page: Annotated[
-        Path | None,
-        written("--page", help="With --load: also write a page (HTML) in which the machine turns."),
-    ] = None,
-    view: Annotated[
-        str | None,
-        typer.Option(help="Elevation and azimuth of the view, deg. [default: 22,35; flat: from above]"),
-    ] = None,
-    picture: Annotated[bool, typer.Option(help="Draw the machine.")] = True,
+    load: str | None = option("Force on the tool in N, e.g. 300,0,0: draw the machine deformed by it."),
+    page: Path | None = written(
+        "With --load: also write a page (HTML) in which the machine turns.", None, "--page"
+    ),
+    view: str | None = option("Elevation and azimuth of the view, deg. [default: 22,35; flat: from above]"),
+    picture: bool = option("Draw the machine.", True),
     as_json: options.Json = False,
 ) -> None:
     """Draw a machine in 3-D at a pose and print what it is made of.

@@ -6,10 +6,9 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import Any
 
 import numpy as np
-import typer
 
 from stiffmap.common.broadcasting import Floats, random_numbers
 from stiffmap.common.errors import StiffmapError
@@ -21,6 +20,7 @@ from stiffmap.experiment.virtual import plans as make
 from stiffmap.solve.machine import Machine, load_machine
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import in_si, numbers
+from stiffmap.ui.cli.options import argument, option
 from stiffmap.ui.cli.output import show
 
 GRID = re.compile(r"^grid:(\d+)x(\d+)x(\d+)$")
@@ -32,56 +32,40 @@ WORDS = {
 
 
 def command(
-    machine: Annotated[str, typer.Argument(help="Machine: shipped name or machine file.")],
-    output: Annotated[Path, written(help="Folder of the virtual experiment.")],
-    effect: Annotated[
-        list[str] | None,
-        typer.Option(help="What the machine has beyond the declared one; repeatable."),
-    ] = None,
-    plan: Annotated[
-        str,
-        typer.Option(
-            help="random (evenly over the workspace), grid:NXxNYxNZ, a CSV file of rows (x,y,z in mm; "
-            "fx … in N and any other column of an experiment), or an experiment folder to repeat."
-        ),
-    ] = "random",
+    machine: str = argument("Machine: shipped name or machine file."),
+    output: Path = written("Folder of the virtual experiment.", ...),
+    effect: list[str] | None = option("What the machine has beyond the declared one; repeatable."),
+    plan: str = option(
+        "random (evenly over the workspace), grid:NXxNYxNZ, a CSV file of rows (x,y,z in mm; "
+        "fx … in N and any other column of an experiment), or an experiment folder to repeat.",
+        "random",
+    ),
     quantity: options.Quantity = "deflection",
-    poses: Annotated[int, typer.Option(help="Poses of a random plan.")] = 30,
-    loads: Annotated[
-        str, typer.Option(help="Loads per pose: axes, full (with sums of pairs and zero), or N at random.")
-    ] = "9",
-    forces: Annotated[str, typer.Option(help="Sizes of the forces, N.")] = "100,250,400",
-    repeats: Annotated[int, typer.Option(help="Readings of each condition.")] = 2,
-    read: Annotated[str, typer.Option(help="Axes read, of dx,dy,dz,rx,ry,rz, or none.")] = "dx,dy,dz",
-    joint: Annotated[
-        list[str] | None,
-        typer.Option(help="Encoder read: NAME or NAME:motor, as x.actuator:motor; repeatable."),
-    ] = None,
-    distances: Annotated[
-        bool, typer.Option(help="Read distances from each pose to the next instead of positions.")
-    ] = False,
-    command: Annotated[
-        bool, typer.Option(help="Write commanded actuator coordinates instead of poses.")
-    ] = False,
-    noise: Annotated[
-        float | None, typer.Option(help="One standard deviation, mm; default 0.003, positions 0.008.")
-    ] = None,
-    angle_noise: Annotated[float, typer.Option(help="The same of an angle, mrad.")] = 0.01,
-    zero_noise: Annotated[float, typer.Option(help="Of the zero that a pose's readings share, mm.")] = 0.0,
-    branches: Annotated[bool, typer.Option(help="Read every load loading and unloading.")] = False,
-    shuffle: Annotated[bool, typer.Option(help="Visit the poses in random order.")] = False,
-    temperature: Annotated[str | None, typer.Option(help="First and last temperature, °C, as 20,26.")] = None,
-    setups: Annotated[int, typer.Option(help="Set-ups that the poses are dealt to.")] = 1,
+    poses: int = option("Poses of a random plan.", 30),
+    loads: str = option("Loads per pose: axes, full (with sums of pairs and zero), or N at random.", "9"),
+    forces: str = option("Sizes of the forces, N.", "100,250,400"),
+    repeats: int = option("Readings of each condition.", 2),
+    read: str = option("Axes read, of dx,dy,dz,rx,ry,rz, or none.", "dx,dy,dz"),
+    joint: list[str] | None = option("Encoder read: NAME or NAME:motor, as x.actuator:motor; repeatable."),
+    distances: bool = option("Read distances from each pose to the next instead of positions.", False),
+    command: bool = option("Write commanded actuator coordinates instead of poses.", False),
+    noise: float | None = option("One standard deviation, mm; default 0.003, positions 0.008."),
+    angle_noise: float = option("The same of an angle, mrad.", 0.01),
+    zero_noise: float = option("Of the zero that a pose's readings share, mm.", 0.0),
+    branches: bool = option("Read every load loading and unloading.", False),
+    shuffle: bool = option("Visit the poses in random order.", False),
+    temperature: str | None = option("First and last temperature, °C, as 20,26."),
+    setups: int = option("Set-ups that the poses are dealt to.", 1),
     frame: options.Frame = "known",
     tool: options.Target = "known",
-    unloaded: Annotated[str, typer.Option(help="Unloaded state: centre, approach, unknown.")] = "centre",
-    approach: Annotated[bool, typer.Option(help="Reach each pose along ±x, ±y or ±z.")] = False,
-    instrument_on: Annotated[str, typer.Option(help="floor, base, or a point of the machine.")] = "floor",
-    target_on: Annotated[str, typer.Option(help="tool or platform.")] = "tool",
-    force_against: Annotated[str, typer.Option(help="floor, base, or a point of the machine.")] = "floor",
-    gravity: Annotated[str | None, typer.Option(help="m/s², base axes, as 0,0,-9.81.")] = None,
-    outliers: Annotated[float, typer.Option(help="Share of rows that are wild, 0 to 1.")] = 0.0,
-    seed: Annotated[int, typer.Option(help="Seed of poses, loads and noise.")] = 0,
+    unloaded: str = option("Unloaded state: centre, approach, unknown.", "centre"),
+    approach: bool = option("Reach each pose along ±x, ±y or ±z.", False),
+    instrument_on: str = option("floor, base, or a point of the machine.", "floor"),
+    target_on: str = option("tool or platform.", "tool"),
+    force_against: str = option("floor, base, or a point of the machine.", "floor"),
+    gravity: str | None = option("m/s², base axes, as 0,0,-9.81."),
+    outliers: float = option("Share of rows that are wild, 0 to 1.", 0.0),
+    seed: int = option("Seed of poses, loads and noise.", 0),
     as_json: options.Json = False,
 ) -> None:
     """Write a virtual experiment, to try a plan before the instrument is booked.
@@ -101,20 +85,23 @@ def command(
       [cyan]stiffmap simulate orthoglide-revised --plan experiments/servo --effect 'dead_zone actuator y half_width=5um' -o twin[/cyan]
     """
     chosen = load_machine(machine)
-    size = in_si(noise)
-    layout = _layout(
-        chosen,
-        plan,
-        quantity,
-        poses,
-        loads,
-        _sizes(forces),
-        repeats,
-        _axes(read),
-        size,
-        1e-3 * angle_noise,
-        seed,
-    )
+    strengths, axes, size = _sizes(forces), _axes(read), in_si(noise)
+    if quantity not in make.MICRO:
+        raise StiffmapError(f"--quantity: expected deflection or position, got {quantity!r}")
+    if size is not None and size <= 0:
+        raise StiffmapError(f"--noise: expected a standard deviation above zero, got {noise:g} mm")
+    for name, value in (("poses", poses), ("repeats", repeats)):
+        if value < 1:
+            raise StiffmapError(f"--{name}: expected at least 1, got {value}")
+    how: dict[str, Any] = {"axes": axes, "noise": size, "angle_noise": 1e-3 * angle_noise}
+    if (path := Path(plan)).suffix == ".csv":
+        layout = load_plan(path, chosen, quantity, **how)
+    elif path.exists():
+        layout = _repeated(load_experiment(path), size)
+    else:
+        where = _poses(chosen, plan, poses, seed)
+        own = _loads(loads, strengths, len(where), seed)
+        layout = make.plan_of_poses(chosen, quantity, where, own, repeats=repeats, **how)
     layout = _channels(layout, chosen, joint or [], distances, size)
     layout = make.with_branches(layout) if branches else layout
     layout = make.with_approach(layout, seed) if approach else layout
@@ -156,39 +143,6 @@ def _axes(text: str) -> tuple[str, ...]:
     if wrong or not wanted:
         raise StiffmapError(f"--read: expected axes of {', '.join(AXES)}, got '{text}'")
     return wanted
-
-
-def _layout(
-    machine: Machine,
-    plan: str,
-    quantity: str,
-    poses: int,
-    loads: str,
-    forces: Sequence[float],
-    repeats: int,
-    read: Sequence[str],
-    noise: float | None,
-    angle_noise: float,
-    seed: int,
-) -> Experiment:
-    """The plan that ``--plan`` and the other options describe."""
-    if quantity not in make.MICRO:
-        raise StiffmapError(f"--quantity: expected deflection or position, got {quantity!r}")
-    if noise is not None and noise <= 0:
-        raise StiffmapError(f"--noise: expected a standard deviation above zero, got {1e3 * noise:g} mm")
-    for name, value in (("poses", poses), ("repeats", repeats)):
-        if value < 1:
-            raise StiffmapError(f"--{name}: expected at least 1, got {value}")
-    path = Path(plan)
-    if path.suffix == ".csv":
-        return load_plan(path, machine, quantity, axes=read, noise=noise, angle_noise=angle_noise)
-    if path.exists():
-        return _repeated(load_experiment(path), noise)
-    where = _poses(machine, plan, poses, seed)
-    own = _loads(loads, forces, len(where), seed)
-    return make.plan_of_poses(
-        machine, quantity, where, own, repeats=repeats, axes=read, noise=noise, angle_noise=angle_noise
-    )
 
 
 def _repeated(plan: Experiment, noise: float | None) -> Experiment:

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
-import typer
 from rich.table import Table
 
 from stiffmap.common.broadcasting import Floats
@@ -24,6 +23,7 @@ from stiffmap.solve.unreachable import why_unreachable
 from stiffmap.solve.worst_force import worst_force
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import MM, finish, force_given, machine_at, numbers, position_words
+from stiffmap.ui.cli.options import option
 from stiffmap.ui.cli.output import MEANINGS, show
 from stiffmap.ui.cli.output import table as table_of
 
@@ -35,15 +35,12 @@ SHOWN = 20  # rows of a file that are printed
 
 def command(
     machine: options.Machine,
-    at: Annotated[
-        str | None,
-        typer.Option(help="Commanded TCP in mm, e.g. 0,0,300, or a CSV file of poses. [default: home]"),
-    ] = None,
-    output: Annotated[Path | None, written(help="With a file of poses: CSV of the answers.")] = None,
+    at: str | None = option("Commanded TCP in mm, e.g. 0,0,300, or a CSV file of poses. [default: home]"),
+    output: Path | None = written("With a file of poses: CSV of the answers."),
     force: options.Force = "0,0,0",
-    moment: Annotated[str, typer.Option(help="Moment about the point in N mm, base axes.")] = "0,0,0",
+    moment: str = option("Moment about the point in N mm, base axes.", "0,0,0"),
     turned: options.Rotation = None,
-    point: Annotated[str, typer.Option(help="Named point where the wrench acts.")] = "tcp",
+    point: str = option("Named point where the wrench acts.", "tcp"),
     effect: options.Effects = None,
     gravity_: options.Gravity = None,
     method: options.Method = "fast",

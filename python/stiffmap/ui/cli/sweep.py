@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
-import typer
 import xarray as xr
 from rich.table import Table
 
@@ -14,31 +13,22 @@ from stiffmap.solve.machine import Machine
 from stiffmap.solve.status import Status
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import MM, finish, machine_at, numbers
+from stiffmap.ui.cli.options import option
 from stiffmap.ui.cli.output import show, table, write_files
 
 
 def command(
     machine: options.Machine,
     at: options.At = None,
-    direction: Annotated[str, typer.Option(help="Direction of the force, any length.")] = "1,0,0",
-    to: Annotated[float, typer.Option(help="Largest force, N.")] = 1000.0,
-    from_: Annotated[
-        float, typer.Option("--from", help="Smallest force, N; negative: against the direction.")
-    ] = 0.0,
-    points: Annotated[int, typer.Option(help="Number of forces, or of steps to the limit.")] = 21,
-    control: Annotated[
-        str, typer.Option(help="With --limit: force, displacement (past limit points) or arc.")
-    ] = "force",
-    limit: Annotated[
-        float | None,
-        typer.Option(help="Follow one path of equilibria to this force (N) or displacement (mm)."),
-    ] = None,
-    cross: Annotated[
-        int,
-        typer.Option(
-            help="With --limit: follow the branch that crosses at this bifurcation, 1, 2 …; -1: to the other side."
-        ),
-    ] = 0,
+    direction: str = option("Direction of the force, any length.", "1,0,0"),
+    to: float = option("Largest force, N.", 1000.0),
+    from_: float = option("Smallest force, N; negative: against the direction.", 0.0, "--from"),
+    points: int = option("Number of forces, or of steps to the limit.", 21),
+    control: str = option("With --limit: force, displacement (past limit points) or arc.", "force"),
+    limit: float | None = option("Follow one path of equilibria to this force (N) or displacement (mm)."),
+    cross: int = option(
+        "With --limit: follow the branch that crosses at this bifurcation, 1, 2 …; -1: to the other side.", 0
+    ),
     tolerance: options.Tolerance = 0.25,
     effect: options.Effects = None,
     gravity_: options.Gravity = None,

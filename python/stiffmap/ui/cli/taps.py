@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
-import typer
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment import load_experiment
@@ -15,22 +14,18 @@ from stiffmap.identification.taps import TapDiagnosis, TapTest, explain_taps, lo
 from stiffmap.identification.taps.causes import corrected
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import finish, machine_with, words
+from stiffmap.ui.cli.options import argument, option
 from stiffmap.ui.cli.output import show, write_files
 
 
 def command(
     machine: options.Machine,
-    table: Annotated[
-        Path,
-        typer.Argument(
-            help="CSV: x_mm, y_mm, z_mm, frequency_Hz; u_Hz, damping_percent, dir_x, dir_y, dir_z; or response, along, hammer."
-        ),
-    ],
-    statics: Annotated[
-        Path | None, typer.Option(help="Experiment folder of the same machine, explained together.")
-    ] = None,
-    only: Annotated[str | None, typer.Option(help="Kinds of effects to try, separated by commas.")] = None,
-    mass_u: Annotated[float, typer.Option(help="Standard uncertainty of masses that declare none, %.")] = 5.0,
+    table: Path = argument(
+        "CSV: x_mm, y_mm, z_mm, frequency_Hz; u_Hz, damping_percent, dir_x, dir_y, dir_z; or response, along, hammer."
+    ),
+    statics: Path | None = option("Experiment folder of the same machine, explained together."),
+    only: str | None = option("Kinds of effects to try, separated by commas."),
+    mass_u: float = option("Standard uncertainty of masses that declare none, %.", 5.0),
     effect: options.Effects = None,
     output: options.Folder = None,
     as_json: options.Json = False,

@@ -5,15 +5,14 @@ from __future__ import annotations
 import math
 import webbrowser
 from pathlib import Path
-from typing import Annotated, Any
-
-import typer
+from typing import Any
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import number_in
 from stiffmap.common.outputs.option import written
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import MM, in_si, machine_with, numbers
+from stiffmap.ui.cli.options import option
 from stiffmap.ui.cli.output import show
 
 LOCAL = "127.0.0.1"
@@ -25,61 +24,34 @@ def command(
     machine: options.Machine,
     at: options.At = None,
     rotation: options.Rotation = None,
-    force: Annotated[str, typer.Option(help="Force on the tool in N.")] = "0,0,-300",
-    moment: Annotated[str, typer.Option(help="Moment on the tool in N·m.")] = "0,0,0",
+    force: str = option("Force on the tool in N.", "0,0,-300"),
+    moment: str = option("Moment on the tool in N·m.", "0,0,0"),
     gravity: options.Gravity = None,
     effect: options.Effects = None,
-    plane: Annotated[
-        str | None,
-        typer.Option(help="Axis across which the plane lies (x, y, z), or the normal of a free one."),
-    ] = None,
-    quantity: Annotated[
-        str,
-        typer.Option(
-            help="What the colours show: deflection, worst, stiffness, margin, status, frequency, dynamic."
-        ),
-    ] = "deflection",
-    tolerance: Annotated[float, typer.Option(help="Tolerated deflection, mm.")] = 0.25,
-    frequency: Annotated[float, typer.Option(help="Of the dynamic stiffness, Hz.")] = 0.0,
-    magnify: Annotated[
-        float | None, typer.Option(help="Magnification of the deflected machine. [default: a round one]")
-    ] = None,
-    changes: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            help="A number of the machine, ADDRESS=VALUE in SI, e.g. x.foot/beam.EIx=4000; repeatable.",
-        ),
-    ] = None,
-    start: Annotated[
-        str | None,
-        typer.Option(help="All coordinates (m, rad) that name an assembly mode, as the view writes them."),
-    ] = None,
-    link: Annotated[
-        str | None, typer.Option(help="State of a link that the view gave; goes before the options.")
-    ] = None,
-    experiment: Annotated[
-        Path | None, typer.Option(help="Folder of an experiment: its rows and residuals.")
-    ] = None,
-    diagnosis: Annotated[
-        Path | None,
-        typer.Option(help="Folder of a diagnosis: what it named is lit on its element."),
-    ] = None,
-    path: Annotated[
-        str | None, typer.Option(help="Toolpath (G-code, CL, CSV, or an outline): wanted, cut, compensated.")
-    ] = None,
-    meshes: Annotated[
-        Path | None, typer.Option(help="URDF that the machine was imported from, whose meshes are drawn.")
-    ] = None,
-    html: Annotated[Path | None, written("--html", help="Write the scene as one page and end.")] = None,
-    picture: Annotated[
-        Path | None, written("--picture", help="Write a picture (PNG, SVG, PDF) and end.")
-    ] = None,
-    port: Annotated[int | None, typer.Option(help="Port. [default: a free one from 8080 on]")] = None,
-    host: Annotated[
-        str, typer.Option(help="Address to listen on; beyond this computer a token is asked for.")
-    ] = LOCAL,
-    browser: Annotated[bool, typer.Option(help="Open the browser.")] = True,
+    plane: str | None = option("Axis across which the plane lies (x, y, z), or the normal of a free one."),
+    quantity: str = option(
+        "What the colours show: deflection, worst, stiffness, margin, status, frequency, dynamic.",
+        "deflection",
+    ),
+    tolerance: options.Tolerance = 0.25,
+    frequency: float = option("Of the dynamic stiffness, Hz.", 0.0),
+    magnify: float | None = option("Magnification of the deflected machine. [default: a round one]"),
+    changes: list[str] | None = option(
+        "A number of the machine, ADDRESS=VALUE in SI, e.g. x.foot/beam.EIx=4000; repeatable.", None, "--set"
+    ),
+    start: str | None = option(
+        "All coordinates (m, rad) that name an assembly mode, as the view writes them."
+    ),
+    link: str | None = option("State of a link that the view gave; goes before the options."),
+    experiment: Path | None = option("Folder of an experiment: its rows and residuals."),
+    diagnosis: Path | None = option("Folder of a diagnosis: what it named is lit on its element."),
+    path: str | None = option("Toolpath (G-code, CL, CSV, or an outline): wanted, cut, compensated."),
+    meshes: Path | None = option("URDF that the machine was imported from, whose meshes are drawn."),
+    html: Path | None = written("Write the scene as one page and end.", None, "--html"),
+    picture: Path | None = written("Write a picture (PNG, SVG, PDF) and end.", None, "--picture"),
+    port: int | None = option("Port. [default: a free one from 8080 on]"),
+    host: str = option("Address to listen on; beyond this computer a token is asked for.", LOCAL),
+    browser: bool = option("Open the browser.", True),
     as_json: options.Json = False,
 ) -> None:
     """Look at a machine and its map live in a browser: drag the tool, turn the force, change a number.
@@ -109,13 +81,18 @@ def command(
     model = _model(machine, effect, link, meshes, at=at, rotation=rotation, force=force, moment=moment, gravity=gravity,
                    plane=plane, quantity=quantity, tolerance=tolerance, frequency=frequency, magnify=magnify,
                    changes=changes, start=start)  # fmt: skip
-    from stiffmap.ui.view.open import data_of
+    from stiffmap.ui.view.open import View, data_of
 
     data = data_of(model.declared, experiment, diagnosis, path)
+    name = model.declared.name
     if html is not None or picture is not None:
-        _write(model, data, html, picture, as_json)
+        show(as_json, {"machine": name}, [], _written(model, data, html, picture))
         return
-    _serve(model, data, host, port, browser, as_json)
+    opened = View(model, host, port, data)
+    show(as_json, {"machine": name, "url": opened.url}, [f"{name}: {opened.url}", "Ctrl-C ends it"])
+    if browser:
+        webbrowser.open(opened.url)
+    opened.wait()
 
 
 def _model(
@@ -146,11 +123,11 @@ def _state(g: dict[str, Any]) -> dict[str, Any]:
         "frequency": g["frequency"],
         "magnification": g["magnify"],
     }
-    for field, option, count, unit in (
+    for field, name, count, unit in (
         ("position", "at", 3, MM), ("rotation", "rotation", 3, DEGREE), ("gravity", "gravity", 3, 1.0), ("start", "start", None, 1.0),
     ):  # fmt: skip
-        if g[option] is not None:
-            out[field] = tuple(in_si(g[option], option, count, unit))
+        if g[name] is not None:
+            out[field] = tuple(in_si(g[name], name, count, unit))
     if g["plane"] in ("x", "y", "z"):
         out["plane"] = g["plane"]
     elif g["plane"] is not None:
@@ -170,21 +147,9 @@ def _change(text: str) -> tuple[str, float]:
     raise StiffmapError(f"--set: expected ADDRESS=VALUE, such as x.foot/beam.EIx=4000; got '{text}'")
 
 
-def _write(model: Any, data: Any, html: Path | None, picture: Path | None, as_json: bool) -> None:
+def _written(model: Any, data: Any, html: Path | None, picture: Path | None) -> list[Path]:
     from stiffmap.ui.plot import save
     from stiffmap.ui.view.outputs import view_figure, write_page
 
     files = [] if html is None else [write_page(model.moment, html, data)]
-    files += [] if picture is None else [save(view_figure(model.moment), picture)]
-    show(as_json, {"machine": model.declared.name}, [], files)
-
-
-def _serve(model: Any, data: Any, host: str, port: int | None, browser: bool, as_json: bool) -> None:
-    from stiffmap.ui.view.open import View
-
-    opened = View(model, host, port, data)
-    name = model.declared.name
-    show(as_json, {"machine": name, "url": opened.url}, [f"{name}: {opened.url}", "Ctrl-C ends it"])
-    if browser:
-        webbrowser.open(opened.url)
-    opened.wait()
+    return files if picture is None else [*files, save(view_figure(model.moment), picture)]

@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
 import numpy as np
-import typer
 
 from stiffmap.solve.status import Flag, Status
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import MM, finish, machine_at, numbers
+from stiffmap.ui.cli.options import option
 from stiffmap.ui.cli.output import show
 
 
 def command(
     machine: options.Machine,
     at: options.At = None,
-    by: Annotated[str, typer.Option(help="Imposed translation of the point in mm, base axes.")] = "0,0,0",
-    turn: Annotated[str, typer.Option(help="Imposed rotation vector in deg, base axes.")] = "0,0,0",
+    by: str = option("Imposed translation of the point in mm, base axes.", "0,0,0"),
+    turn: str = option("Imposed rotation vector in deg, base axes.", "0,0,0"),
     turned: options.Rotation = None,
-    point: Annotated[str, typer.Option(help="Named point that is held.")] = "tcp",
+    point: str = option("Named point that is held.", "tcp"),
     effect: options.Effects = None,
     gravity_: options.Gravity = None,
     as_json: options.Json = False,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 from matplotlib.figure import Figure
@@ -10,7 +9,7 @@ from matplotlib.figure import Figure
 from stiffmap.ui.paper.results import FORCE, TOLERANCE, Results
 from stiffmap.ui.plot.error_maps import map_figure
 from stiffmap.ui.plot.forces import draw_ellipse, draw_polar, position_text, sweep_figure
-from stiffmap.ui.plot.style import MM, headline, panel, paper, save
+from stiffmap.ui.plot.style import MM, headline, panel, paper
 
 
 def figure_5(results: Results) -> Figure:
@@ -40,19 +39,19 @@ def figure_7(results: Results, variable: str = "worst_deflection_xy", case: str 
     return map_figure(results.maps, variable, case=case, tolerance=TOLERANCE)
 
 
-def save_all(results: Results, folder: Path) -> list[Path]:
-    """Write every figure as PNG; Figure 7 in four readings, since the paper does not state its force."""
+def all_figures(results: Results) -> dict[str, Figure]:
+    """Every figure by the name of its file; Figure 7 in four readings, since the paper does not state its force."""
     worst = float(results.maps.worst_deflection_xy.max()) * MM
     figures = {
-        "figure5": figure_5(results),
-        "figure6": figure_6(results),
-        "figure7-worst": figure_7(results),
-        "figure7-best": figure_7(results, "best_deflection_xy"),
-        "figure7-Fx": figure_7(results, "deflection_xy", "Fx"),
-        "figure7-Fy": figure_7(results, "deflection_xy", "Fy"),
+        "figure5.png": figure_5(results),
+        "figure6.png": figure_6(results),
+        "figure7-worst.png": figure_7(results),
+        "figure7-best.png": figure_7(results, "best_deflection_xy"),
+        "figure7-Fx.png": figure_7(results, "deflection_xy", "Fx"),
+        "figure7-Fy.png": figure_7(results, "deflection_xy", "Fy"),
     }
     headline(
-        figures["figure7-worst"],
+        figures["figure7-worst.png"],
         f"Figure 7. {FORCE:g} N in the worst direction of the plane, up to {worst:.2f} mm",
     )
-    return [save(figure, folder / f"{name}.png") for name, figure in figures.items()]
+    return figures
