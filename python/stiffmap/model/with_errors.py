@@ -65,7 +65,6 @@ def _sequence(
 ) -> Elements:
     out: list[Element] = []
     for e in elements:
-        name = f"{path}.{e.name}"
         if isinstance(e, Block):
             branches = tuple(
                 replace(b, elements=_sequence(b.elements, f"{path}.{b.name}", of, end=False))
@@ -73,10 +72,7 @@ def _sequence(
             )
             out.append(replace(e, branches=branches))
             continue
-        change = of.get(name)
-        if change is None:
-            out.append(e)
-            continue
+        change = of.get(f"{path}.{e.name}", {})
         if isinstance(e, Joint) and any(k in change for k in FRAME):
             frame = _pose(change)
             turned = about(home_position(e), frame.r)

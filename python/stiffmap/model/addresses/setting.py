@@ -1,17 +1,29 @@
-"""Other numbers in a machine: of its design, so that its controller knows them."""
+"""Other numbers in a machine: of its design, so that its controller knows them, or as it is built."""
 
 from __future__ import annotations
 
 import difflib
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import partial
 
 from stiffmap.common.broadcasting import real_number
 from stiffmap.common.errors import StiffmapError
-from stiffmap.model.addresses.fields import Field, field_of, fields
+from stiffmap.model.addresses.fields import Field, field_of, fields, vector_fields
 from stiffmap.model.addresses.places import bar_offset, full_names, machine_fields, number_at, split
-from stiffmap.model.description import Block, MachineDescription, Spring, tree
+from stiffmap.model.description import (
+    Block,
+    Body,
+    Element,
+    Joint,
+    MachineDescription,
+    Offset,
+    Point,
+    Pose,
+    Spring,
+    tree,
+)
 
 LENGTH = "length"
 MOST_NAMED = 6
@@ -122,3 +134,54 @@ def every_address(description: MachineDescription) -> list[str]:
         if isinstance(element, Spring) and bar_offset(description, full) is not None:
             out.append(f"{full}/{LENGTH}")
     return out
+
+
+COUNTED = {
+    Spring: ("compliance.", "stiffness."),
+    Body: ("mass", "com."),
+    Point: ("at.",),
+    Offset: ("translation.", "actual.translation."),
+}
+"""Numbers that a machine as built can have otherwise, by the beginning of their names; those of joints: all but these."""
+NOT_OF_JOINTS = ("home", "rest", "range.", "limits.", "compliance", "anchor.", "at.")
+OUTSIDE = ("stiffness", "length")
+
+
+def moved(description: MachineDescription, key: str, delta: float) -> MachineDescription | None:
+    """The machine with the number ``full.name/field`` moved by `delta` (SI).
+
+    A length of an offset moves the machine as built; the controller keeps the nominal one. None: this
+    machine has no such number, or none that is an error of a machine as built (sections of a beam, angles).
+    """
+    found = _as_built(description, key)
+    return None if found is None else found.put(found.value + delta)
+
+
+def number(description: MachineDescription, key: str) -> float | None:
+    """The number (SI) under ``full.name/field``; None as in `moved`."""
+    found = _as_built(description, key)
+    return None if found is None else found.value
+
+
+def _as_built(description: MachineDescription, key: str) -> Field | None:
+    name, _, field = key.partition("/")
+    if field in OUTSIDE and name in [s.name for s in description.external_springs]:
+        return dict(machine_fields(description))[key]
+    return number_at(description, name, partial(_built_field, field=field))
+
+
+def _built_field(element: Element, field: str) -> Field | None:
+    """A number that the machine as built may have otherwise."""
+    if isinstance(element, Joint):
+        entry = field.startswith("compliance_slope") or not field.startswith(NOT_OF_JOINTS)
+        if not entry or field.startswith("stiffness."):
+            return None
+    elif not field.startswith(COUNTED.get(type(element), ())):
+        return None
+    if isinstance(element, Offset) and field.startswith("translation."):
+        if element.actual is not None:
+            return None  # an error that the file states goes before
+        t, r = element.nominal.translation, element.nominal.rotation
+        built = vector_fields(t, "translation.", "m", lambda v: replace(element, actual=Pose(v, r)))
+        return dict(built).get(field)
+    return field_of(element, field)

@@ -33,10 +33,7 @@ def in_words(by_source: Mapping[str, float]) -> str:
     """``83 % of it rests on assumed numbers, 17 % on computed ones``; empty where no number is marked or nothing moves."""
     if set(by_source) <= {UNMARKED}:
         return ""
-    shares = zip(by_source, percents(list(by_source.values())), strict=True)
-    parts = [f"{share} % of it rests on numbers that are {s}" for s, share in shares if share]
-    if not parts:
-        return ""
-    return ", ".join(
-        [parts[0], *(p.replace(" of it rests on numbers that are ", " on ") + " ones" for p in parts[1:])]
-    )
+    shares = zip(percents(list(by_source.values())), by_source, strict=True)
+    shown = [f"{share} % of it rests on numbers that are {s}" for share, s in shares if share]
+    more = (p.replace(" of it rests on numbers that are ", " on ") + " ones" for p in shown[1:])
+    return ", ".join([*shown[:1], *more])

@@ -10,12 +10,6 @@ from numpy.typing import ArrayLike
 from stiffmap.common.units import Dimension
 
 Matrix6 = tuple[tuple[float, ...], ...]
-COMPLIANCE = (
-    Dimension(length=1, force=-1),
-    Dimension(force=-1, angle=1),
-    Dimension(length=-1, force=-1, angle=1),
-)
-"""By the number of rotations among the two directions of an entry."""
 
 
 def as_rows(matrix: ArrayLike) -> Matrix6:
@@ -25,8 +19,8 @@ def as_rows(matrix: ArrayLike) -> Matrix6:
 
 def entry_dimension(word: str, i: int, j: int) -> Dimension:
     """Unit of the entry (i, j), counted from 0, of a spring's ``compliance`` or ``stiffness``."""
-    compliance = COMPLIANCE[(i > 2) + (j > 2)]
-    return compliance if word == "compliance" else Dimension(*(-power for power in compliance))
+    turns, sign = (i > 2) + (j > 2), 1 if word == "compliance" else -1
+    return Dimension(length=sign * (1 - turns), force=-sign, angle=sign * min(turns, 1))
 
 
 @dataclass(frozen=True)

@@ -49,17 +49,14 @@ def add_effect(
 
 def apply_records(description: MachineDescription, records: Sequence[AppliedEffect]) -> MachineDescription:
     """The machine with the effects of these records added one after the other."""
-    if description.effects or description.declared is not None:
-        for r in records:
-            given = {**dict(r.parameters), **dict(r.options)}
-            description = add_effect(
-                description, r.kind, element=r.element or None, legs=r.legs or None, **given
-            )
-        return description
+    at_once = not description.effects and description.declared is None
     checked: list[AppliedEffect] = []
-    for r in records:  # one build of them all
-        given = {**dict(r.parameters), **dict(r.options)}
-        checked.append(_checked(description, checked, r.kind, r.element or None, r.legs or None, given))
+    for r in records:
+        place, given = (r.element or None, r.legs or None), {**dict(r.parameters), **dict(r.options)}
+        if at_once:  # one build of them all
+            checked.append(_checked(description, checked, r.kind, *place, given))
+        else:
+            description = add_effect(description, r.kind, element=place[0], legs=place[1], **given)
     return _build(description, tuple(checked)) if checked else description
 
 

@@ -44,7 +44,7 @@ def _units(
 ) -> dict[str, tuple[str, ...]]:
     """The units that each parameter may have; at a known place one only."""
     if machine is None:
-        return {p.name: effect.units_of(p.name) for p in effect.parameters}
+        return {p.name: (p.unit, p.angular) if p.angular else (p.unit,) for p in effect.parameters}
     declared = machine.declared or machine
     at = place_of(effect, declared, element or None, legs or None)
     return {p.name: (p.unit,) for p in effect.parameters_at(declared, *at)}

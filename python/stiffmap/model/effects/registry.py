@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from difflib import get_close_matches
 from functools import cache
 from os import PathLike
@@ -18,16 +17,13 @@ from stiffmap.model.effects.types import EffectType
 def _known() -> dict[str, EffectType]:
     from stiffmap.model.effects.library import EFFECTS
 
-    return {effect.kind: effect for effect in sorted(EFFECTS, key=_order)}
-
-
-def _order(effect: EffectType) -> tuple[bool, int, str]:
-    return (effect.measurement, effect.precedence, effect.kind)
+    return {effect.kind: effect for effect in EFFECTS}
 
 
 def kinds() -> tuple[str, ...]:
     """Names of all kinds, those of the machine first, those of the measurement last."""
-    return tuple(_known())
+    ordered = sorted(_known().values(), key=lambda e: (e.measurement, e.precedence, e.kind))
+    return tuple(effect.kind for effect in ordered)
 
 
 def get(kind: str) -> EffectType:
@@ -50,14 +46,13 @@ def register(effect: EffectType) -> EffectType:
     if effect.kind in {e.kind for e in EFFECTS}:
         raise StiffmapError(f"effect {effect.kind!r}: the library has a kind of that name")
     _check(effect)
-    known = [e for e in _known().values() if e.kind != effect.kind]
-    _replace([*known, effect])
+    _known()[effect.kind] = effect
     return effect
 
 
 def unregister(kind: str) -> None:
     """Forget a kind that was registered."""
-    _replace(e for e in _known().values() if e.kind != kind)
+    _known().pop(kind, None)
 
 
 def load_effects(path: str | PathLike[str]) -> tuple[EffectType, ...]:
@@ -76,13 +71,6 @@ def defined(module: object) -> tuple[EffectType, ...]:
     """The kinds that a module defines as ``EFFECT`` or ``EFFECTS``."""
     one = getattr(module, "EFFECT", None)
     return tuple(getattr(module, "EFFECTS", ())) or ((one,) if isinstance(one, EffectType) else ())
-
-
-def _replace(effects: Iterable[EffectType]) -> None:
-    ordered = {e.kind: e for e in sorted(effects, key=_order)}
-    known = _known()
-    known.clear()
-    known.update(ordered)
 
 
 def _check(effect: EffectType) -> None:

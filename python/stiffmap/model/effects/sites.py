@@ -129,10 +129,13 @@ def places(description: MachineDescription, sites: Sites) -> list[Place]:
             having.setdefault(name, []).append(leg.name)
     out: list[Place] = []
     for name, legs in having.items():
-        out += [(name, (leg,)) for leg in legs]
-        out += [(name, tuple(legs))] if len(legs) > 1 else []
+        out += _alone_and_together(name, legs)
     trunk = names((*description.base, *description.platform), sites)
     return out + [(name, ()) for name in trunk if name not in having]
+
+
+def _alone_and_together(name: str, legs: list[str]) -> list[Place]:
+    return [(name, (leg,)) for leg in legs] + ([(name, tuple(legs))] if len(legs) > 1 else [])
 
 
 def at_sites(sites: Sites) -> Callable[[MachineDescription], list[Place]]:
@@ -158,7 +161,6 @@ def per_leg(element: str) -> Callable[[MachineDescription], list[Place]]:
     """A place that every leg has, such as its mount on the base."""
 
     def find(description: MachineDescription) -> list[Place]:
-        legs = tuple(leg.name for leg in description.legs)
-        return [(element, (leg,)) for leg in legs] + ([(element, legs)] if len(legs) > 1 else [])
+        return _alone_and_together(element, [leg.name for leg in description.legs])
 
     return find

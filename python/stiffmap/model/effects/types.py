@@ -139,8 +139,3 @@ class EffectType:
             return self.at(description, element, legs)
         turns = any(p.angular for p in self.parameters) and is_revolute(description, element)
         return tuple(p.turning for p in self.parameters) if turns else self.parameters
-
-    def units_of(self, name: str) -> tuple[str, ...]:
-        """The unit of a parameter, and the one that it has on a joint that turns."""
-        p = self.parameter(name)
-        return (p.unit, p.angular) if p.angular else (p.unit,)

@@ -36,7 +36,6 @@ from stiffmap.model.files.schema.elements import (
     BlockModel,
     BodyModel,
     CableModel,
-    CommandErrorModel,
     ElementModel,
     JointModel,
     OffsetModel,
@@ -98,9 +97,7 @@ def build_element(
 
 
 def _offset(model: OffsetModel, context: Context) -> Offset:
-    actual = None
-    if model.actual is not None:
-        actual = build_pose(model.actual, context.at("actual"), "actual.")
+    actual = None if model.actual is None else build_pose(model.actual, context.at("actual"), "actual.")
     return Offset(model.offset, build_pose(model, context), actual)
 
 
@@ -174,14 +171,13 @@ def _cable(model: CableModel, context: Context) -> Cable:
 def _command_errors(
     model: ActuatorModel | CableModel, angular: bool, context: Context
 ) -> tuple[CommandError, ...]:
-    return tuple(_command_error(e, angular, context) for e in model.command_errors or [])
-
-
-def _command_error(model: CommandErrorModel, angular: bool, context: Context) -> CommandError:
-    error = CommandError(**build_numbers(model, CommandError, angular, context, "command_errors."))
-    if any(b <= a for (a, _), (b, _) in pairwise(error.knots)):
+    errors = tuple(
+        CommandError(**build_numbers(e, CommandError, angular, context, "command_errors."))
+        for e in model.command_errors or []
+    )
+    if any(b <= a for error in errors for (a, _), (b, _) in pairwise(error.knots)):
         context.at("command_errors").at("knots").fail("knots need rising coordinates")
-    return error
+    return errors
 
 
 def _body(model: BodyModel, context: Context, place: int, models: Sequence[ElementModel]) -> Body:

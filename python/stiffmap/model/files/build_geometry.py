@@ -10,7 +10,7 @@ from stiffmap.common.units import ANGLE, LENGTH, NONE, Dimension
 from stiffmap.model.description.pose import IDENTITY, Pose, Rows, Vector, rows
 from stiffmap.model.files.context import Context
 from stiffmap.model.files.schema.base import Number
-from stiffmap.model.files.schema.geometry import NAMED, Frame, Turn
+from stiffmap.model.files.schema.geometry import NAMED, Frame
 
 ROTATION_TOLERANCE = 1e-6
 EXACT = 1e-14  # such rows stay as written: saved files must load back equal
@@ -43,7 +43,8 @@ def build_rotation(frame: Frame, context: Context) -> Rows:
         return _rows(matrix)
     matrix = np.eye(3)
     for i, turn in enumerate(frame.turns or []):
-        matrix = matrix @ _turn(turn, context.at("turns", i))
+        angle = context.at("turns", i).si(turn.by, ANGLE)
+        matrix = matrix @ rotation_about(np.array(turn.about), angle)
     return _rows(matrix)
 
 
@@ -65,7 +66,3 @@ def _checked_rows(given: list[list[Number]], context: Context) -> Rows:
         u, _, v = np.linalg.svd(matrix)  # the nearest rotation
         matrix = u @ v
     return _rows(matrix) if np.any(matrix != np.eye(3)) else IDENTITY
-
-
-def _turn(turn: Turn, context: Context) -> NDArray[np.float64]:
-    return rotation_about(np.array(turn.about), context.si(turn.by, ANGLE))

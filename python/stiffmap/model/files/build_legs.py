@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from stiffmap.common.errors import FileError
 from stiffmap.model.description import Joint, Leg, Offset, Pose
 from stiffmap.model.description.tree import ENDS, Elements, edit_path, walk
 from stiffmap.model.files.build_elements import HOME, build_elements
@@ -61,7 +60,9 @@ def with_home(elements: Elements, path: str, home: Home, context: Context) -> El
     """The sequence with other home coordinates of the joint ``path`` (branches, then joint)."""
     edited = edit_path(elements, path, lambda e: _joint(e, home, context) if isinstance(e, Joint) else None)
     if edited is None:
-        raise _unknown(elements, path, context)
+        known = [name.partition(".")[2] for name, e in walk(elements, "") if isinstance(e, Joint)]
+        there = ", ".join(known) or "none"
+        context.fail(f"no joint '{path}'{suggestion(path, known)}; there are: {there}")
     return edited
 
 
@@ -70,9 +71,3 @@ def _joint(joint: Joint, home: Home, context: Context) -> Joint:
     if len(numbers) != len(joint.axes):
         context.fail(f"joint '{joint.name}' has {len(joint.axes)} coordinates; found {len(numbers)}")
     return replace(joint, home=build_number(HOME, numbers, joint.kind != "prismatic", context))
-
-
-def _unknown(elements: Elements, path: str, context: Context) -> FileError:
-    known = [name.partition(".")[2] for name, e in walk(elements, "") if isinstance(e, Joint)]
-    there = ", ".join(known) or "none"
-    return context.error(f"no joint '{path}'{suggestion(path, known)}; there are: {there}")

@@ -13,7 +13,7 @@ from stiffmap.model.description import BeamNumbers, Law, Spring
 from stiffmap.model.description.numbers import DIRECTIONS
 from stiffmap.model.description.strokes import Matrix6, as_rows, entry_dimension
 from stiffmap.model.files.build_numbers import build_numbers
-from stiffmap.model.files.context import Context, LinkUse, StrokeUse
+from stiffmap.model.files.context import Context, LinkUse
 from stiffmap.model.files.schema.base import FileModel, Number
 from stiffmap.model.files.schema.elements import SpringModel
 from stiffmap.model.files.schema.springs import Beam, LawModel, Material, Matrix
@@ -37,7 +37,7 @@ def build_spring(model: SpringModel, context: Context) -> Spring:
             )
     stiffness, compliance = (matrix, None) if word == "stiffness" else (None, matrix)
     if model.stroke is not None:
-        context.gathered.strokes.append(StrokeUse(context.full, model, context.at("stroke")))
+        context.gathered.strokes.append((model, context.at("stroke")))
     return Spring(model.spring, compliance, stiffness, laws, beam=beam, **numbers)
 
 

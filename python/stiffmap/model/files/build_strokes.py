@@ -9,16 +9,17 @@ from stiffmap.common.units import ANGLE, LENGTH, Dimension
 from stiffmap.model.description import BeamStroke, Element, Joint, MachineDescription, Spring, TableStroke
 from stiffmap.model.description.tree import all_elements, edit
 from stiffmap.model.files.build_springs import build_matrix
-from stiffmap.model.files.context import Context, Gathered, StrokeUse
+from stiffmap.model.files.context import Context, Gathered
 from stiffmap.model.files.schema.base import Number, suggestion
+from stiffmap.model.files.schema.elements import SpringModel
 
 
 def with_strokes(description: MachineDescription, gathered: Gathered) -> MachineDescription:
     """The machine with the strokes that its file gives; problems are kept in ``gathered``."""
-    for use in gathered.strokes:
-        stroke = use.context.attempt(_stroke, description, use)
+    for spring, context in gathered.strokes:
+        stroke = context.attempt(_stroke, description, spring, context)
         if stroke is not None:
-            description = edit(description, use.full, partial(_with_stroke, stroke)) or description
+            description = edit(description, context.full, partial(_with_stroke, stroke)) or description
     return description
 
 
@@ -26,13 +27,15 @@ def _with_stroke(stroke: BeamStroke | TableStroke, element: Element) -> Element 
     return replace(element, stroke=stroke) if isinstance(element, Spring) else None
 
 
-def _stroke(description: MachineDescription, use: StrokeUse) -> BeamStroke | TableStroke:
-    model, context = use.model.stroke, use.context
+def _stroke(
+    description: MachineDescription, spring: SpringModel, context: Context
+) -> BeamStroke | TableStroke:
+    model = spring.stroke
     assert model is not None
-    joint = stroke_joint(description, use.full, model.joint, context)
+    joint = stroke_joint(description, model.joint, context)
     coordinate = LENGTH if joint.kind == "prismatic" else ANGLE
     if model.table is None:
-        return _beam(use, joint, coordinate)
+        return _beam(spring, context, joint, coordinate)
     at = tuple(context.at("table", i, "at").si(row.at, coordinate) for i, row in enumerate(model.table))
     for i in range(1, len(at)):
         if at[i] <= at[i - 1]:
@@ -52,8 +55,8 @@ def _stroke(description: MachineDescription, use: StrokeUse) -> BeamStroke | Tab
     return TableStroke(model.joint, at, rows)
 
 
-def _beam(use: StrokeUse, joint: Joint, coordinate: Dimension) -> BeamStroke:
-    model, beam, context = use.model.stroke, use.model.beam, use.context
+def _beam(spring: SpringModel, context: Context, joint: Joint, coordinate: Dimension) -> BeamStroke:
+    model, beam = spring.stroke, spring.beam
     assert model is not None
     length, along = model.length or (beam and beam.length), model.along or (beam and beam.along)
     assert length and along  # the schema asks for them
@@ -75,16 +78,16 @@ def _beam(use: StrokeUse, joint: Joint, coordinate: Dimension) -> BeamStroke:
     return out
 
 
-def stroke_joint(description: MachineDescription, full: str, name: str, context: Context) -> Joint:
-    """The joint that a spring of this full name varies with; raises `FileError`."""
+def stroke_joint(description: MachineDescription, name: str, context: Context) -> Joint:
+    """The joint that the spring at this place varies with; raises `FileError`."""
     joints = {n: e for n, e in all_elements(description) if isinstance(e, Joint) and len(e.axes) == 1}
-    scope = full
+    scope = context.full
     while scope:
         scope = scope.rpartition(".")[0]
         found = joints.get(f"{scope}.{name}" if scope else name)
         if found is not None:
             return found
-    own = full.partition(".")[0]
+    own = context.full.partition(".")[0]
     near = [n.partition(".")[2] if n.partition(".")[0] == own else n for n in joints]
     there = ", ".join(near) or "none"
     raise context.at("joint").error(

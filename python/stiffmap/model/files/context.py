@@ -29,15 +29,6 @@ class LinkUse:
 
 
 @dataclass
-class StrokeUse:
-    """A spring with a stroke, by its full name: built when all joints are known."""
-
-    full: str
-    model: SpringModel
-    context: Context
-
-
-@dataclass
 class Gathered:
     """What belongs to the whole machine, in the order of the file, keyed ``full.name/field``."""
 
@@ -45,7 +36,8 @@ class Gathered:
     notes: dict[str, str] = field(default_factory=dict)
     sources: dict[str, str] = field(default_factory=dict)
     links: dict[str, LinkUse] = field(default_factory=dict)
-    strokes: list[StrokeUse] = field(default_factory=list)
+    strokes: list[tuple[SpringModel, Context]] = field(default_factory=list)
+    """Springs with a stroke, which are built when all joints are known."""
     problems: list[FileError] = field(default_factory=list)
 
 

@@ -14,7 +14,7 @@ from stiffmap.model.link.correlation import Correlation
 from stiffmap.model.link.noise import Noise
 from stiffmap.model.link.regression import Regression
 from stiffmap.model.link.rigidfit import RigidFit
-from stiffmap.model.link.transport import stiffness_covariance, transport_compliance
+from stiffmap.model.link.transport import transport_compliance
 
 
 class Evidence(NamedTuple):
@@ -68,8 +68,10 @@ class Estimate:
 
     @property
     def stiffness_covariance(self) -> Floats:
-        """(36, 36) covariance of the stiffness entries, first order."""
-        return stiffness_covariance(self.compliance, self.covariance)
+        """(36, 36) covariance of the stiffness entries, first order: ``dK = -K dC K``, link (12)."""
+        K = np.linalg.inv(self.compliance)
+        gain = np.kron(K, K.T)
+        return np.asarray(gain @ self.covariance @ gain.T)
 
     @property
     def tests(self) -> int:

@@ -15,6 +15,7 @@ from stiffmap.common.units import FORCES, MOMENTS, STRESSES, size_of
 from stiffmap.common.yaml_text import read
 from stiffmap.model.link.arrays import Floats
 from stiffmap.model.link.gmshmesh import UNITS
+from stiffmap.model.link.readers import table_lines
 from stiffmap.model.link.shapes import Bar, Foot, ForkBar, HollowBar
 from stiffmap.model.link.solve import Material
 
@@ -106,10 +107,7 @@ def read_cases(path: str | Path) -> Floats:
     Raises:
         StiffmapError: no such file, a column or unit missing, cells that are not numbers.
     """
-    try:
-        lines = [s for s in Path(path).read_text(encoding="utf-8").splitlines() if s.strip() and s[0] != "#"]
-    except OSError:
-        raise StiffmapError(f"{path}: no such file") from None
+    lines = table_lines(path)
     columns = {}
     for place, cell in enumerate(lines[0].split(",") if lines else []):
         found = re.fullmatch(r"\s*([fm][xyz])\s*\[\s*([A-Za-z*]+)\s*\]\s*", cell, re.IGNORECASE)

@@ -26,7 +26,7 @@ def read_csv_field(path: str | Path) -> tuple[Floats, Floats]:
     Raises:
         StiffmapError: no such file, a column or its unit missing, cells that are not numbers.
     """
-    lines = [line for line in _lines(path) if line.strip() and not line.lstrip().startswith("#")]
+    lines = table_lines(path)
     if len(lines) < 2:
         raise StiffmapError(f"{path}: expected a header and rows, got {len(lines)} lines")
     names, factor = _header(path, lines[0])
@@ -157,6 +157,11 @@ def read_field(
     if absent:
         raise StiffmapError(f"{nodes}: no coordinates for node {absent[0]} ({len(absent)} missing)")
     return UNITS[unit] * np.array([place[int(i)] for i in numbers]), UNITS[unit] * fields
+
+
+def table_lines(path: str | Path) -> list[str]:
+    """Lines of a table in text, without empty ones and comments."""
+    return [line for line in _lines(path) if line.strip() and not line.lstrip().startswith("#")]
 
 
 def _lines(path: str | Path) -> list[str]:

@@ -57,16 +57,16 @@ def solve_skfem(mesh: SolidMesh, material: Material, setup: Setup, wrenches: Flo
         StiffmapError: unknown face, the part is not held, or the residual is too large.
     """
     K = stiffness_matrix(mesh, material)
+    f = nodal_loads(mesh, setup.loaded, setup.reference, wrenches).reshape(-1, len(wrenches))
     if setup.support == "soft":
-        return _solve_soft(mesh, K, setup, wrenches)
+        return _solve_soft(mesh, K, setup, f)
     if setup.support == "bed":
-        return _solve_bed(mesh, K, material, setup, wrenches)
+        return _solve_bed(mesh, K, material, setup, f)
     held = _dofs(mesh.face_nodes(setup.fixed))
     if setup.head == "rigid":
         T = _rigid_head(mesh, setup, np.setdiff1d(np.arange(K.shape[0]), held))
         q = _factorised(T.T @ K @ T)(np.vstack([np.zeros((T.shape[1] - 6, len(wrenches))), wrenches.T]))
         return _field(T @ q, mesh)
-    f = nodal_loads(mesh, setup.loaded, setup.reference, wrenches).reshape(-1, len(wrenches))
     return _field(_held(K, held, f), mesh)
 
 
@@ -92,10 +92,9 @@ def stiffness_matrix(mesh: SolidMesh, material: Material) -> Any:
     return theirs.tocsr()[order][:, order].tocsc()
 
 
-def _solve_soft(mesh: SolidMesh, K: Any, setup: Setup, wrenches: Floats) -> Floats:
+def _solve_soft(mesh: SolidMesh, K: Any, setup: Setup, f: Floats) -> Floats:
     """Reaction linear over the fixed face; its mean motion is then taken out of the field."""
     centre = mesh.nodes[mesh.face_nodes(setup.fixed)].mean(axis=0)
-    f = nodal_loads(mesh, setup.loaded, setup.reference, wrenches).reshape(-1, len(wrenches))
     modes = design_matrix(mesh.nodes, centre).reshape(-1, 6)
     reaction = -(modes.T @ f).T
     f = f + nodal_loads(mesh, setup.fixed, centre, reaction).reshape(f.shape)
@@ -103,12 +102,11 @@ def _solve_soft(mesh: SolidMesh, K: Any, setup: Setup, wrenches: Floats) -> Floa
     return _less_mean_motion(mesh, setup.fixed, centre, _field(u, mesh))
 
 
-def _solve_bed(mesh: SolidMesh, K: Any, material: Material, setup: Setup, wrenches: Floats) -> Floats:
+def _solve_bed(mesh: SolidMesh, K: Any, material: Material, setup: Setup, f: Floats) -> Floats:
     """Springs of E/sqrt(area) under the fixed face, about those of a neighbour of the same material."""
     face = mesh.face(setup.fixed)
     area, centre = face_area_centre(mesh.nodes, face)
     bed = kron(face_mass(mesh.nodes, face), sparse_eye(3)) * (material.young / np.sqrt(area))
-    f = nodal_loads(mesh, setup.loaded, setup.reference, wrenches).reshape(-1, len(wrenches))
     return _less_mean_motion(mesh, setup.fixed, centre, _field(_factorised(K + bed)(f), mesh))
 
 

@@ -17,9 +17,7 @@ def twist_transport(shift: Floats, rotation: Floats | None = None) -> Floats:
     T[:3, 3:] = -skew(np.asarray(shift, dtype=float))
     if rotation is None:
         return T
-    R = np.zeros((6, 6))
-    R[:3, :3] = R[3:, 3:] = np.asarray(rotation, dtype=float).T
-    return R @ T
+    return np.kron(np.eye(2), np.asarray(rotation, dtype=float).T) @ T
 
 
 def transport_compliance(
@@ -32,10 +30,3 @@ def transport_compliance(
     T = twist_transport(shift, rotation)
     TT = np.kron(T, T)
     return T @ compliance @ T.T, TT @ covariance @ TT.T
-
-
-def stiffness_covariance(compliance: Floats, covariance: Floats) -> Floats:
-    """Covariance (36, 36), row-major, of ``K = C^-1`` to first order: ``dK = -K dC K``, link (12)."""
-    K = np.linalg.inv(compliance)
-    gain = np.kron(K, K.T)
-    return np.asarray(gain @ covariance @ gain.T)

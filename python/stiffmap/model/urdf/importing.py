@@ -83,14 +83,8 @@ def _check_file(description: MachineDescription, file: str) -> None:
 
 def _check_names(model: UrdfModel, side: Sidecar, file: str) -> None:
     joints = {j.name: j for j in model.above.values()}
-    given = {
-        "name_mot": side.name_mot,
-        "joint_name": side.joint_name,
-        "home": side.home,
-        "actuators": side.actuators,
-    }
-    for key, names in given.items():
-        for name in names:
+    for key in ("name_mot", "joint_name", "home", "actuators"):
+        for name in getattr(side, key):
             if name not in joints:
                 near = suggestion(name, list(joints))
                 raise FileError(f"no joint '{name}' in {model.file}{near}", file=file, key=key)
@@ -104,7 +98,7 @@ def _check_names(model: UrdfModel, side: Sidecar, file: str) -> None:
 
 def _tip(model: UrdfModel, side: Sidecar, tip: str | None, file: str) -> tuple[str, str]:
     """The tool: as named, the platform of the loops, or the one that is found; and what it was chosen from."""
-    found, choice = "", ""
+    choice = ""
     if tip or side.tip:
         found = model.link(tip or side.tip or "", "tip", model.file if tip else file)
     elif side.closed_loop:

@@ -188,7 +188,8 @@ class Editor:
         try:
             return build_element(_MODEL.validate_python(raw), here)
         except ValidationError as error:
-            here.fail(str(error.errors()[0]["msg"]))
+            first = error.errors()[0]
+            here.fail(str(first.get("ctx", {}).get("error", first["msg"])))
 
     def _workspace(self, values: dict[str, float]) -> tuple[Vector, Vector] | None:
         if not self.space:

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffmap.model.description import Block, Branch, Element, Joint, MachineDescription, Offset
+from stiffmap.model.description import Block, Branch, Element, Joint, Offset
 from stiffmap.model.description.tree import Elements
-from stiffmap.model.effects.edit import change_sites
-from stiffmap.model.effects.sites import blocks
+from stiffmap.model.effects.edit import Sites
+from stiffmap.model.effects.sites import blocks, each
 from stiffmap.model.effects.types import Placed
 
 
@@ -52,13 +53,14 @@ def _offset(b: Branch, end: str) -> NDArray[np.float64]:
     return e.nominal.p
 
 
-def change_branches(
-    description: MachineDescription, placed: Placed, change: Callable[[Block, Branch, float], Branch]
-) -> MachineDescription:
-    """``change`` on both branches, with the share -1/2 for the first and +1/2 for the second."""
+def on_branches(
+    change: Callable[[Block, Branch, float, Placed], Branch], sites: Sites = spread_blocks
+) -> dict[str, Any]:
+    """``places`` and ``apply`` of an effect that changes both branches, with the share -1/2 for the first and +1/2 for
+    the second."""
 
-    def block(e: Block) -> Elements:
+    def block(e: Block, placed: Placed) -> Elements:
         pairs = zip(e.branches, (-0.5, 0.5), strict=True)
-        return (replace(e, branches=tuple(change(e, b, share) for b, share in pairs)),)
+        return (replace(e, branches=tuple(change(e, b, share, placed) for b, share in pairs)),)
 
-    return change_sites(description, placed.legs, placed.element, spread_blocks, block)
+    return each(sites, block)

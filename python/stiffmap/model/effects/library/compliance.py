@@ -11,8 +11,7 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.model.description import Element, Joint, Law, MachineDescription, Spring
 from stiffmap.model.description.strokes import as_rows
 from stiffmap.model.description.tree import Elements
-from stiffmap.model.effects.edit import change_sites
-from stiffmap.model.effects.sites import at_sites, elastic_joints, found, springs
+from stiffmap.model.effects.sites import each, elastic_joints, found, springs
 from stiffmap.model.effects.types import EffectType, Parameter, Placed
 
 SCALE = Parameter("scale", "1", 1e-3, 1e3, 1.0, 0.1, "factor on the nominal compliance")
@@ -40,19 +39,14 @@ def _has(e: Element, i: int) -> bool:
     return isinstance(e, Spring) and e.compliance is not None and e.compliance[i - 1][i - 1] > 0.0
 
 
-def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
+def softened(e: Any, placed: Placed) -> Elements:
     """Scales the law, the matrix or one entry of it."""
-    entry = placed.element.partition(".")[2]
-
-    def change(e: Any) -> Elements:
-        if isinstance(e, Joint):
-            return (_joint(e, placed),)
-        if "value" in placed.values:
-            raise StiffmapError("value is for elements with one direction; use scale for a 6x6 spring")
-        scale = placed.values["scale"]
-        return (_entry(e, int(entry[1]) - 1, scale) if entry else _whole(e, scale),)
-
-    return change_sites(description, placed.legs, placed.element, sites, change)
+    if isinstance(e, Joint):
+        return (_joint(e, placed),)
+    if "value" in placed.values:
+        raise StiffmapError("value is for elements with one direction; use scale for a 6x6 spring")
+    entry, scale = placed.element.partition(".")[2], placed.values["scale"]
+    return (_entry(e, int(entry[1]) - 1, scale) if entry else _whole(e, scale),)
 
 
 def _joint(e: Joint, placed: Placed) -> Joint:
@@ -128,8 +122,7 @@ EFFECT = EffectType(
         "whole matrix, or one diagonal entry of it (element `foot.k11`), its couplings staying as they are."
     ),
     parameters=(SCALE, VALUE),
-    places=at_sites(sites),
-    apply=apply,
+    **each(sites, softened),
     frame="local axes of the spring or joint",
     one_of=("scale", "value"),
     at=at,

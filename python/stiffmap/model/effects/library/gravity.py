@@ -30,9 +30,7 @@ def apply(description: MachineDescription, placed: Placed) -> MachineDescription
     if placed.element == "machine":
         if "scale" not in placed.values:
             raise StiffmapError("give scale for the machine; mass is for a single body")
-        x, y, z = DOWN
-        s = placed.values["scale"]
-        return replace(description, gravity=(x * s, y * s, z * s))
+        return replace(description, gravity=(0.0, 0.0, -STANDARD * placed.values["scale"]))
     if "mass" not in placed.values:
         raise StiffmapError("give mass (kg) for a body; scale is for the machine")
     place, mass = (placed.legs, placed.element, bodies), placed.values["mass"]

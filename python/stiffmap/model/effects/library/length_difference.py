@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from stiffmap.model.description import Block, Branch, MachineDescription, Spring
+from stiffmap.model.description import Block, Branch, Spring
 from stiffmap.model.description.numbers import with_entry
 from stiffmap.model.description.tree import Elements
-from stiffmap.model.effects.library.bars import change_branches, spread_blocks
+from stiffmap.model.effects.library.bars import on_branches, spread_blocks
 from stiffmap.model.effects.library.length import longer
-from stiffmap.model.effects.sites import at_sites, links
+from stiffmap.model.effects.sites import links
 from stiffmap.model.effects.types import EffectType, Parameter, Placed
 
 
@@ -24,17 +24,13 @@ def _rod(b: Branch) -> int | None:
     return found[0] if len(found) == 1 and len(springs) == 1 else None
 
 
-def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
+def lengthened(block: Block, b: Branch, share: float, placed: Placed) -> Branch:
     """The first rod shorter by half of the difference, the second longer."""
-
-    def change(block: Block, b: Branch, share: float) -> Branch:
-        i = _rod(b)
-        assert i is not None  # the place has been checked
-        rod = longer(b.elements[i], share * placed.values["difference"])
-        changed: Branch = with_entry(b, "elements", i, rod)
-        return changed
-
-    return change_branches(description, placed, change)
+    i = _rod(b)
+    assert i is not None  # the place has been checked
+    rod = longer(b.elements[i], share * placed.values["difference"])
+    changed: Branch = with_entry(b, "elements", i, rod)
+    return changed
 
 
 EFFECT = EffectType(
@@ -46,8 +42,7 @@ EFFECT = EffectType(
         "half; their mean is as declared (its error is `length`)."
     ),
     parameters=(Parameter("difference", "m", -0.1, 0.1, 0.0, 1e-4, "second rod minus first rod"),),
-    places=at_sites(rod_blocks),
-    apply=apply,
+    **on_branches(lengthened, rod_blocks),
     pivot="near end of each rod",
     frame="direction of the rods",
     moves="all behind each rod; the block's end turns with the two rods",

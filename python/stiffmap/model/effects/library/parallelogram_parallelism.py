@@ -4,20 +4,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from stiffmap.model.description import Branch, Joint, MachineDescription, Pose
+from stiffmap.model.description import Block, Branch, Joint, Pose
 from stiffmap.model.effects.edit import built, splice
-from stiffmap.model.effects.library.bars import change_branches, spread_blocks
+from stiffmap.model.effects.library.bars import on_branches
 from stiffmap.model.effects.library.geometry import ANGLES, rotation_of, rotations
-from stiffmap.model.effects.sites import at_sites
 from stiffmap.model.effects.types import EffectType, Option, Placed
 
 
-def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
+def turned(block: Block, b: Branch, share: float, placed: Placed) -> Branch:
     """Half of the angle on each pin; only the pins' directions change."""
-    return change_branches(description, placed, lambda block, b, share: _turned(b, placed, share))
-
-
-def _turned(b: Branch, placed: Placed, share: float) -> Branch:
     pins = [i for i, e in enumerate(b.elements) if isinstance(e, Joint) and not e.actuated]
     i = pins[0] if placed.options["end"] == "proximal" else pins[-1]
     e = b.elements[i]
@@ -36,8 +31,7 @@ EFFECT = EffectType(
         "of the angles, the first one's by minus half. The directions of the axes alone change."
     ),
     parameters=rotations("angle of the second pin against the first"),
-    places=at_sites(spread_blocks),
-    apply=apply,
+    **on_branches(turned),
     pivot="centre of each pin",
     frame="local axes before the pin",
     moves="nothing: the bars stay where they are at home",

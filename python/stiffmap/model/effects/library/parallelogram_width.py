@@ -4,28 +4,23 @@ from __future__ import annotations
 
 import numpy as np
 
-from stiffmap.model.description import Block, Branch, MachineDescription, Offset
+from stiffmap.model.description import Block, Branch, Offset
 from stiffmap.model.description.numbers import with_entry
 from stiffmap.model.effects.edit import shifted
-from stiffmap.model.effects.library.bars import change_branches, end_index, spread_blocks, width
-from stiffmap.model.effects.sites import at_sites
+from stiffmap.model.effects.library.bars import end_index, on_branches, width
 from stiffmap.model.effects.types import EffectType, Option, Parameter, Placed
 
 
-def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
+def widened(block: Block, b: Branch, share: float, placed: Placed) -> Branch:
     """Half of the error on each pin, along the line between them."""
     end = placed.options["end"]
-
-    def change(block: Block, b: Branch, share: float) -> Branch:
-        for one in ("proximal", "distal") if end == "both" else (end,):
-            apart, i = width(block, one), end_index(b, one)
-            size = share * placed.values["error"] * (1.0 if one == "proximal" else -1.0)
-            pin = b.elements[i]
-            assert isinstance(pin, Offset)
-            b = with_entry(b, "elements", i, shifted(pin, size * apart / np.linalg.norm(apart)))
-        return b
-
-    return change_branches(description, placed, change)
+    for one in ("proximal", "distal") if end == "both" else (end,):
+        apart, i = width(block, one), end_index(b, one)
+        size = share * placed.values["error"] * (1.0 if one == "proximal" else -1.0)
+        pin = b.elements[i]
+        assert isinstance(pin, Offset)
+        b = with_entry(b, "elements", i, shifted(pin, size * apart / np.linalg.norm(apart)))
+    return b
 
 
 EFFECT = EffectType(
@@ -37,8 +32,7 @@ EFFECT = EffectType(
         "apart than declared, half of it on each side; with `both` the bars stay parallel."
     ),
     parameters=(Parameter("error", "m", -0.1, 0.1, 0.0, 1e-4, "added to the declared width"),),
-    places=at_sites(spread_blocks),
-    apply=apply,
+    **on_branches(widened),
     pivot="middle between the pins",
     frame="line through the two pins",
     moves="each pin with its bar",

@@ -54,11 +54,7 @@ class FileModel(BaseModel):
         data = cls.as_mapping(data)
         known = _keys_of(cls)
         if not isinstance(data, dict):
-            raise PydanticCustomError(
-                "mapping_expected",
-                "expected a mapping with keys among {known}; found {found}",
-                {"known": ", ".join(known), "found": describe(data)},
-            )
+            raise ValueError(f"expected a mapping with keys among {', '.join(known)}; found {describe(data)}")
         unknown = [key for key in data if key not in known]
         if not unknown:
             return handler(data)
@@ -81,12 +77,8 @@ def _keys_of(model: type[FileModel]) -> list[str]:
 
 
 def _unknown_key(key: str, known: list[str], data: Any) -> InitErrorDetails:
-    error = PydanticCustomError(
-        "unknown_key",
-        "unknown key '{key}'{near}; known keys: {known}",
-        {"key": key, "near": suggestion(key, known), "known": ", ".join(known)},
-    )
-    return InitErrorDetails(type=error, loc=(), input=data)
+    text = f"unknown key '{key}'{suggestion(key, known)}; known keys: {', '.join(known)}"
+    return InitErrorDetails(type="value_error", loc=(), input=data, ctx={"error": ValueError(text)})
 
 
 def _once_more(error: Any) -> InitErrorDetails:
@@ -140,9 +132,7 @@ class Number(FileModel):
         if isinstance(data, dict):
             return data
         if isinstance(data, bool) or not isinstance(data, (int, float)):
-            raise PydanticCustomError(
-                "number_expected", "expected a number; found {found}", {"found": describe(data)}
-            )
+            raise ValueError(f"expected a number; found {describe(data)}")
         return {"value": float(data)}
 
     @classmethod

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, Tag, create_model, model_validator
-from pydantic_core import PydanticCustomError
 
 from stiffmap.model.description import Body, Cable, CommandError, Drive, Joint, Point, Spring
 from stiffmap.model.description.numbers import DIRECTIONS, DeclaredNumber, numbers_of
@@ -73,24 +72,19 @@ class JointModel(_numbers(Joint, passive=True)):  # type: ignore[misc]
         needed = AXES_OF[self.kind]
         given = [self.axis] if self.axis is not None else self.axes
         if (self.axis is not None and self.axes is not None) or given is None or len(given) != needed:
-            raise PydanticCustomError(
-                "axes",
-                "a {kind} joint needs {what}",
-                {"kind": self.kind, "what": "one axis" if needed == 1 else f"axes: a list of {needed}"},
-            )
+            what = "one axis" if needed == 1 else f"axes: a list of {needed}"
+            raise ValueError(f"a {self.kind} joint needs {what}")
         for key in ("home", "rest", "stiffness", "compliance"):
             value = getattr(self, key)
             whole = key in ("stiffness", "compliance")  # one number then holds for every axis
             if isinstance(value, list) and len(value) != needed:
                 what = "one number" if needed == 1 else f"{needed} numbers"
-                raise PydanticCustomError("per_axis", "{key} needs {what}", {"key": key, "what": what})
+                raise ValueError(f"{key} needs {what}")
             if isinstance(value, Number) and needed != 1 and not whole:
-                raise PydanticCustomError(
-                    "per_axis", "{key} needs a list of {n} numbers", {"key": key, "n": needed}
-                )
+                raise ValueError(f"{key} needs a list of {needed} numbers")
         one_of(self, ("stiffness", "compliance", "law"))
         if self.rest is not None and self.stiffness is None and self.compliance is None and self.law is None:
-            raise PydanticCustomError("rest", "rest needs a stiffness, a compliance or a law")
+            raise ValueError("rest needs a stiffness, a compliance or a law")
         return self
 
 
@@ -134,7 +128,7 @@ class CableModel(_numbers(Cable, Drive)):  # type: ignore[misc]
     @model_validator(mode="after")
     def _yields(self) -> CableModel:
         if getattr(self, "elasticity", None) is None and getattr(self, "stiffness", None) is None:
-            raise PydanticCustomError("cable", "a cable needs an elasticity (EA) or a stiffness")
+            raise ValueError("a cable needs an elasticity (EA) or a stiffness")
         return self
 
 
@@ -159,14 +153,11 @@ class SpringModel(_numbers(Spring)):  # type: ignore[misc]
         refused = also if table else [k for k in ("stiffness", "laws") if self.stroke and k in also]
         if refused:
             what = "a table" if table else "length and joint"
-            message = "a stroke by {what} does not go with {keys}"
-            raise PydanticCustomError("stroke", message, {"what": what, "keys": ", ".join(refused)})
+            raise ValueError(f"a stroke by {what} does not go with {', '.join(refused)}")
         if self.stroke is not None and not table and self.beam is None:
             missing = [k for k in ("length", "along") if getattr(self.stroke, k) is None]
             if missing:
-                raise PydanticCustomError(
-                    "stroke", "without a beam, a stroke needs {keys}", {"keys": " and ".join(missing)}
-                )
+                raise ValueError(f"without a beam, a stroke needs {' and '.join(missing)}")
         return self
 
 
@@ -181,7 +172,7 @@ class BodyModel(_numbers(Body)):  # type: ignore[misc]
     @model_validator(mode="after")
     def _mass(self) -> BodyModel:
         if getattr(self, "mass", None) is None and self.of is None:
-            raise PydanticCustomError("mass", "a body needs a mass, or of: the spring whose beam it is")
+            raise ValueError("a body needs a mass, or of: the spring whose beam it is")
         return self
 
 
@@ -202,15 +193,8 @@ def one_of(model: FileModel, keys: tuple[str, ...], *, required: bool = False) -
     """Refuse two of ``keys`` together, and none of them where one is required."""
     given = [k for k in keys if getattr(model, k) is not None]
     if len(given) > 1 or (required and not given):
-        raise PydanticCustomError(
-            "one_of",
-            "give {how} of {keys}; found {found}",
-            {
-                "how": "exactly one" if required else "at most one",
-                "keys": ", ".join(keys),
-                "found": ", ".join(given) or "none",
-            },
-        )
+        how = "exactly one" if required else "at most one"
+        raise ValueError(f"give {how} of {', '.join(keys)}; found {', '.join(given) or 'none'}")
 
 
 def sort_of(data: Any) -> str | None:

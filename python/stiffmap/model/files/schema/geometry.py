@@ -6,7 +6,6 @@ import re
 from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
-from pydantic_core import PydanticCustomError
 
 from stiffmap.model.files.schema.base import FileModel, Number, Pair, Vector3, describe
 
@@ -30,15 +29,11 @@ def read_axis(value: Any) -> tuple[float, float, float]:
         a, b, c = NAMED[value]
         return (a, b, c)
     if not isinstance(value, (list, tuple)) or len(value) != 3 or not all(map(_is_number, value)):
-        raise PydanticCustomError(
-            "axis",
-            "expected an axis: x, y, z, -x, -y, -z or three numbers; found {found}",
-            {"found": describe(value)},
-        )
+        raise ValueError(f"expected an axis: x, y, z, -x, -y, -z or three numbers; found {describe(value)}")
     length = sum(float(v) ** 2 for v in value) ** 0.5
     if not 0.0 < length < float("inf"):
         what = "a zero-length axis has no direction" if length == 0.0 else "the axis is not finite"
-        raise PydanticCustomError("axis_length", "{what}: {value}", {"what": what, "value": str(value)})
+        raise ValueError(f"{what}: {value}")
     # a unit vector stays as written: saved files must load back equal
     scale = 1.0 if abs(length - 1.0) < 1e-14 else length
     x, y, z = (float(v) / scale for v in value)
@@ -51,10 +46,8 @@ def _read_permutation(value: Any) -> list[str]:
     if not isinstance(names, list) or "".join(map(str, names)) != text or len(names) != 3:
         names = None
     if names is None or sorted(str(n)[-1] for n in names) != ["x", "y", "z"]:
-        raise PydanticCustomError(
-            "axes",
-            "expected the base axes that are local x, y, z, such as yzx or z-yx; found {found}",
-            {"found": describe(value)},
+        raise ValueError(
+            f"expected the base axes that are local x, y, z, such as yzx or z-yx; found {describe(value)}"
         )
     return [str(n) for n in names]
 
@@ -95,7 +88,7 @@ class Frame(FileModel):
     def _one_rotation(self) -> Frame:
         given = [k for k in ("rotation", "axes", "turns") if getattr(self, k) is not None]
         if len(given) > 1:
-            raise PydanticCustomError("rotation", "give only one of {keys}", {"keys": ", ".join(given)})
+            raise ValueError(f"give only one of {', '.join(given)}")
         return self
 
 

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, Tag, model_validator
-from pydantic_core import PydanticCustomError
 
+from stiffmap.model.description import TASK
 from stiffmap.model.files.schema.base import FileModel, Name, Noted, Number, Numbers, Source, Vector3
 from stiffmap.model.files.schema.elements import BodyModel, CableModel, ElementModel, OffsetModel, PointModel
 from stiffmap.model.files.schema.geometry import Box, Frame, HomeModel
 from stiffmap.model.files.schema.springs import Material
 
-Component = Literal["x", "y", "z", "rx", "ry", "rz"]
+Components = Annotated[list[Literal[TASK]], Field(min_length=1)]  # type: ignore[valid-type]
 
 
 class UnitsModel(FileModel):
@@ -45,9 +45,9 @@ class LegModel(Noted):
     @model_validator(mode="after")
     def _one_chain(self) -> LegModel:
         if (self.template is None) == (self.elements is None):
-            raise PydanticCustomError("leg", "give exactly one of template and elements")
+            raise ValueError("give exactly one of template and elements")
         if self.parameters is not None:
-            raise PydanticCustomError("with", "with: this leg's template has no parameters")
+            raise ValueError("with: this leg's template has no parameters")
         return self
 
 
@@ -95,27 +95,21 @@ class MachineFile(FileModel):
     units: UnitsModel
     gravity: Annotated[Vector3, Field(description="m/s², base axes; left out: none.")] | None = None
     home: HomeModel | None = None
-    task: Annotated[
-        list[Component],
-        Field(
-            min_length=1,
-            description="Pose components that are commanded; left out: all. Translations along base axes, "
-            "rotations about the axes of the commanded TCP frame.",
-        ),
-    ] = Field(default_factory=lambda: list(get_args(Component)))
+    task: Components = Field(
+        default_factory=lambda: list(TASK),
+        description="Pose components that are commanded; left out: all. Translations along base axes, "
+        "rotations about the axes of the commanded TCP frame.",
+    )
     workspace: Box | None = None
     materials: dict[Name, Material] = Field(default_factory=dict)
     templates: dict[Name, AnyTemplate] = Field(default_factory=dict)
     base: list[ElementModel] = Field(default_factory=list)
     legs: dict[Name, LegModel] = Field(default_factory=dict)
-    freedoms: Annotated[
-        list[Component],
-        Field(
-            min_length=1,
-            description="Components in which the platform of a machine without legs can move; left out: all. "
-            "Guides hold the others.",
-        ),
-    ] = Field(default_factory=lambda: list(get_args(Component)))
+    freedoms: Components = Field(
+        default_factory=lambda: list(TASK),
+        description="Components in which the platform of a machine without legs can move; left out: all. "
+        "Guides hold the others.",
+    )
     platform: list[ElementModel] = Field(default_factory=list)
     modal_damping: Annotated[
         Number | list[Number] | None,
@@ -140,18 +134,11 @@ class MachineFile(FileModel):
         if self.legs:
             return self
         if not any(isinstance(e, CableModel) for e in self.platform):
-            raise PydanticCustomError("legs", "expected legs, or cables in the platform; found neither")
+            raise ValueError("expected legs, or cables in the platform; found neither")
         rigid = (OffsetModel, BodyModel, PointModel, CableModel)
         for sequence, kinds in (("base", rigid[1:3]), ("platform", rigid)):
             for e in getattr(self, sequence):
                 if not isinstance(e, kinds):
-                    raise PydanticCustomError(
-                        "legs",
-                        "without legs, {sequence} has {kinds} only; found {found}",
-                        {
-                            "sequence": sequence,
-                            "kinds": ", ".join(k.__name__.removesuffix("Model").lower() for k in kinds),
-                            "found": type(e).__name__.removesuffix("Model").lower(),
-                        },
-                    )
+                    *known, found = (k.__name__.removesuffix("Model").lower() for k in (*kinds, type(e)))
+                    raise ValueError(f"without legs, {sequence} has {', '.join(known)} only; found {found}")
         return self

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
-from pydantic_core import PydanticCustomError
 
 from stiffmap.model import beams
 from stiffmap.model.files.schema.base import FileModel, Name, Number, Pair, describe
@@ -36,10 +35,8 @@ class Matrix(FileModel):
         if isinstance(data, dict) and not set(data) <= {"rows", "diagonal", "entries"}:
             return {"entries": _upper(data)}
         if not isinstance(data, dict):
-            raise PydanticCustomError(
-                "matrix",
-                "expected six diagonal terms, six rows of six, or entries such as k11, k26; found {found}",
-                {"found": describe(data)},
+            raise ValueError(
+                f"expected six diagonal terms, six rows of six, or entries such as k11, k26; found {describe(data)}"
             )
         return data
 
@@ -52,21 +49,13 @@ def _upper(entries: dict[Any, Any]) -> dict[str, Any]:
         if name not in ENTRIES and name[:1] + name[:0:-1] in ENTRIES:
             name = name[0] + name[:0:-1]
         if name not in ENTRIES:
-            raise PydanticCustomError(
-                "unknown_key",
-                "unknown key '{key}'; entries are k11 ... k66, translations first",
-                {"key": key},
-            )
+            raise ValueError(f"unknown key '{key}'; entries are k11 ... k66, translations first")
         if name in out:
-            raise PydanticCustomError("twice", "entry {name} is given twice", {"name": name})
+            raise ValueError(f"entry {name} is given twice")
         out[name] = value
     missing = [k for k in DIAGONAL if k not in out]
     if missing:
-        raise PydanticCustomError(
-            "missing_entries",
-            "missing diagonal entries {keys} (write 0 if meant)",
-            {"keys": ", ".join(missing)},
-        )
+        raise ValueError(f"missing diagonal entries {', '.join(missing)} (write 0 if meant)")
     return out
 
 
@@ -82,7 +71,7 @@ class Material(FileModel):
     @model_validator(mode="after")
     def _one_shear(self) -> Material:
         if (self.G is None) == (self.nu is None):
-            raise PydanticCustomError("shear", "give exactly one of G and nu")
+            raise ValueError("give exactly one of G and nu")
         return self
 
 
@@ -146,16 +135,10 @@ class Beam(FileModel):
         by_section = len(sections) == 1 and self.material is not None and not given
         by_products = not sections and self.material is None and set(given) == set(needed)
         if not (by_section or by_products):
-            raise PydanticCustomError(
-                "beam",
-                "a beam along {along} needs one section (round, tube, rectangle or hollow) with a material, "
-                "or exactly {products}; found {found}",
-                {
-                    "along": self.along,
-                    "products": ", ".join(needed),
-                    "found": ", ".join(sections + given + (["material"] if self.material else []))
-                    or "neither",
-                },
+            found = ", ".join(sections + given + (["material"] if self.material else [])) or "neither"
+            raise ValueError(
+                f"a beam along {self.along} needs one section (round, tube, rectangle or hollow) with a "
+                f"material, or exactly {', '.join(needed)}; found {found}"
             )
         return self
 
@@ -171,7 +154,7 @@ class LawModel(FileModel):
     @model_validator(mode="after")
     def _one_law(self) -> LawModel:
         if self.cubic is not None and self.knots is not None:
-            raise PydanticCustomError("law", "cubic and knots do not combine")
+            raise ValueError("cubic and knots do not combine")
         return self
 
 
@@ -197,7 +180,5 @@ class Stroke(FileModel):
     def _one_form(self) -> Stroke:
         also = [k for k in ("at", "length", "along", "rate") if getattr(self, k) is not None]
         if self.table is not None and also:
-            raise PydanticCustomError(
-                "stroke", "a table takes no {keys} in addition", {"keys": ", ".join(also)}
-            )
+            raise ValueError(f"a table takes no {', '.join(also)} in addition")
         return self
