@@ -65,6 +65,7 @@ def load_link(path: str | Path) -> LinkFile:
         raise StiffmapError(f"{path}: units: expected {UNITS}, got {data.get('units')}")
     C = _array(path, data, "compliance", (6, 6))
     _check_spring(path, C)
+    C = C / 2 + C.T / 2  # digits that a file rounds
     if "covariance" in data:
         V = _array(path, data, "covariance", (36, 36))
     elif "standard_error" in data:

@@ -217,6 +217,15 @@ def test_link_file_with_standard_errors_only(tmp_path):
     assert link.standard_error == pytest.approx(0.01 * np.abs(bar_compliance()))
 
 
+def test_digits_that_a_file_rounds_make_no_asymmetry(tmp_path):
+    C = bar_compliance()
+    C[1, 5] *= 1 + 1e-8
+    C[2, 4] *= 1 - 1e-8
+    link = load_link(write(tmp_path, "l.yaml", link_text(compliance=C.tolist())))
+    assert np.array_equal(link.compliance, link.compliance.T)
+    np.testing.assert_allclose(link.compliance, bar_compliance(), rtol=1e-8)
+
+
 SKEWED = bar_compliance()
 SKEWED[1, 5] *= 1.01
 LARGE = np.full((6, 6), 1e59)
