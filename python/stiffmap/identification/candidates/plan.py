@@ -11,8 +11,7 @@ from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.prediction.fingerprint import fingerprint
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.identification.candidates.candidates import Candidate, candidates
-from stiffmap.identification.candidates.sensitivity import Variant, variants
-from stiffmap.identification.candidates.slopes import Slopes
+from stiffmap.identification.candidates.sensitivity import Slopes, Variant, variants
 from stiffmap.identification.clock import Clock
 from stiffmap.model.effects import get, kinds
 
