@@ -14,7 +14,6 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.common.one_thread import on_one_thread
 from stiffmap.experiment.calls import as_experiment
 from stiffmap.experiment.comparison.limitations import refuse
-from stiffmap.experiment.comparison.summary import Summary
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.noise.outliers import swapped
 from stiffmap.experiment.prediction.predict import Predictor
@@ -28,7 +27,6 @@ from stiffmap.identification.inference.corrected import Corrected, corrected
 from stiffmap.identification.inference.inference import Inferred, infer
 from stiffmap.identification.inference.machines import (
     CALIBRATED,
-    HeldOut,
     stands_out,
     vouched,
     written,
@@ -117,10 +115,13 @@ def _answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, star
     at_name = {r.name: r for r in rows}
     beyond = tuple(at_name[b.unknown.name] for b in verdict.beyond)
     each = shares(columns, best.fit)
+    held = made.held_out
+    unseen = (held.before, held.after) if held else (before, after)
+    beyond_noise = [s.ratio**2 - best.fit.noise**2 for s in unseen]
     if beyond:
         word = f"beyond tolerance: {', '.join(r.name for r in beyond)}"
-    elif (verdict.rest or verdict.time) and _mostly_left(made.held_out, before, after, best.fit.noise):
-        word = "unattributed"
+    elif (verdict.rest or verdict.time) and beyond_noise[1] > 0.5 * beyond_noise[0]:
+        word = "unattributed"  # more is left than taken away
     elif exact:
         word = "as declared"
     else:
@@ -152,12 +153,6 @@ def _answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, star
         residual=np.where(listed[:, None], np.nan, made.left[1]),
         seconds=time.perf_counter() - start,
     )
-
-
-def _mostly_left(held: HeldOut | None, before: Summary, after: Summary, noise: float) -> bool:
-    """Whether of the squares beyond noise more is left than taken away, of readings that no fit saw where there are any."""
-    one, other = (held.before, held.after) if held else (before, after)
-    return other.ratio**2 - noise**2 > 0.5 * (one.ratio**2 - noise**2)
 
 
 def table_of(columns: Columns, fit: Fit, best: Corrected | None) -> tuple[tuple[Row, ...], int]:
