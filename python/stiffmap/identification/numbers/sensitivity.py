@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cache, partial
 
 import numpy as np
 
@@ -68,49 +69,37 @@ def with_moves(
     return edited(description, own, travel) if own or travel else description
 
 
-class Slopes:
-    """Changes of the readings per standard uncertainty at some values (p,).
+def slopes_at(predictor: Predictor, unknowns: Sequence[Unknown], values: Floats) -> Ahead[int]:
+    """Changes (n, c) of the readings per standard uncertainty of each unknown, by its number, at some values (p,).
 
     Those of a set-up and of the instrument, and what one step does not lead to, are for whole predictions.
     """
+    description = predictor.machine.description
+    pairs = [(u, float(v)) for u, v in zip(unknowns, values, strict=True) if v != 0.0]
+    here = moves_of(pairs)
+    scale = here.pop((INSTRUMENT, SCALE), 0.0)
+    terms = (scaled(description, scale),) if scale else ()
+    apart = any(u.setup and not u.of_instrument for u, _ in pairs)  # a machine for each set-up
+    plain = [k for k, u in enumerate(unknowns) if not u.setup and not u.of_instrument]
 
-    def __init__(self, predictor: Predictor, unknowns: Sequence[Unknown], values: Floats) -> None:
-        self._predictor, self._unknowns = predictor, unknowns
-        pairs = [(u, float(v)) for u, v in zip(unknowns, values, strict=True) if v != 0.0]
-        self._here = moves_of(pairs)
-        self._scale = self._here.pop((INSTRUMENT, SCALE), 0.0)
-        apart = any(u.setup and not u.of_instrument for u, _ in pairs)  # a machine for each set-up
-        plain = [k for k, u in enumerate(unknowns) if not u.setup and not u.of_instrument]
-        self._ahead = Ahead([] if apart else plain, AT_ONCE, self._tell)
+    @cache
+    def base() -> Predictor:
+        off = any(at != INSTRUMENT for at, _ in here)
+        return predictor.beside(machine=built(predictor, here)) if off else predictor
 
-    def of(self, k: int) -> Floats | None:
-        """(n, c) of unknown k; None where whole predictions are needed."""
-        return self._ahead.of(k)
+    def moved(u: Unknown, by: float) -> MachineDescription:
+        more = {place: here.get(place, 0.0) + weight * u.u * by for place, weight in u.moves}
+        return with_moves(description, {**here, **more})
 
-    def _tell(self, some: Sequence[int]) -> list[Floats | None]:
-        terms = (scaled(self._predictor.machine.description, self._scale),) if self._scale else ()
-        near = {k: n for k in some if (n := self._near(self._unknowns[k]))}
-        told = dict(zip(near, self._base.changes_of_machines(list(near.values()), terms), strict=True))
+    def tell(some: Sequence[int]) -> list[Floats | None]:
+        near = {}
+        for k in some:
+            with suppress(StiffmapError):  # what cannot be built: its own prediction will say why
+                near[k] = Near(moved(unknowns[k], SMALL), partial(moved, unknowns[k], 0.0))
+        told = dict(zip(near, base().changes_of_machines(list(near.values()), terms), strict=True))
         return [None if (change := told.get(k)) is None else change / SMALL for k in some]
 
-    @cached_property
-    def _base(self) -> Predictor:
-        """Of the machine with these values."""
-        base = self._predictor
-        if any(at != INSTRUMENT for at, _ in self._here):
-            base = base.beside(machine=built(base, self._here))
-        return base
-
-    def _near(self, u: Unknown) -> Near | None:
-        """The machine with an unknown moved; None where it cannot be built: its own prediction will say why."""
-        try:
-            return Near(self._moved(u, SMALL), partial(self._moved, u, 0.0))
-        except StiffmapError:
-            return None
-
-    def _moved(self, u: Unknown, by: float) -> MachineDescription:
-        more = {place: self._here.get(place, 0.0) + weight * u.u * by for place, weight in u.moves}
-        return with_moves(self._predictor.machine.description, {**self._here, **more})
+    return Ahead([] if apart else plain, AT_ONCE, tell)
 
 
 def predicted(
@@ -209,7 +198,7 @@ def _columns(
     predictor: Predictor, unknowns: Sequence[Unknown], values: Floats, base: Floats
 ) -> Iterator[tuple[int, Floats | None, str]]:
     """Each unknown with (n, c) its slopes at `values`, where the machine shows `base`, or why there are none."""
-    slopes, solved = Slopes(predictor, unknowns, values), np.isfinite(base)
+    slopes, solved = slopes_at(predictor, unknowns, values), np.isfinite(base)
     for k, u in enumerate(unknowns):
         try:
             column = slopes.of(k)

@@ -14,8 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stiffmap.experiment.experiment import Experiment, Floats
-from stiffmap.identification.numbers.certificate import INSTRUMENT, SCALE, frame_names
-from stiffmap.identification.numbers.tolerances import Tolerances
+from stiffmap.identification.numbers.certificate import INSTRUMENT, SCALE, Tolerances, frame_names
 from stiffmap.model.description import Block, Body, Element, Joint, MachineDescription, Offset, Spring
 from stiffmap.model.with_errors import END, FRAME
 
@@ -69,11 +68,6 @@ class Declared:
     """What the file says, by full name and field, SI."""
 
     given: dict[str, float]
-
-    @staticmethod
-    def of(description: MachineDescription) -> Declared:
-        """Of a machine without its effects."""
-        return Declared({k: u for k, u in description.uncertainty if u > 0.0})
 
     def single(self, name: str, fields: Sequence[str], default: float, size: float = 1.0) -> float:
         """Of one number, that of the first of some fields of `name` that has one, over the number's size."""
@@ -130,7 +124,7 @@ def unknowns(
     """
     t = tolerances or Tolerances()
     bare = description.declared or description
-    given = Declared.of(bare)
+    given = Declared({k: u for k, u in bare.uncertainty if u > 0.0})
     loaded = bool(experiment.wrench.any() or experiment.gravity or bare.gravity)
     weighs = bool(experiment.gravity or bare.gravity)
     out: list[Unknown] = []
