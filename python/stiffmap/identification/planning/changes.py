@@ -118,16 +118,9 @@ def monitor(
     return Comparison(a, b, changes, float(chi2.sf(together, max(len(known), 1))))
 
 
-# The difference of fitted numbers between two experiments, judged against what their model leaves.
-#
-# That is no noise: it is smooth over the workspace, shared by the readings of a pose, and the same in both experiments where they
-# stand at the same poses. Both are fitted at once, each with numbers of its own, under the covariance of all gaps that a diagnosis
-# knows, as large as the readings make likeliest (docs/diagnosis.md).
-
-
 def difference(machine: Machine, a: Estimate, b: Estimate) -> tuple[Floats, Floats]:
-    """(k,) second minus first value, SI, and (k, k) its covariance; infinite variances of numbers that either does not
-    determine."""
+    """(k,) second minus first value, SI, and (k, k) its covariance; infinite variances of numbers that either does not determine. Both
+    are fitted at once, each with numbers of its own, under the covariance of all gaps that a diagnosis knows."""
     k = len(a.values)
     known = np.flatnonzero(np.isfinite(a.sigma) & np.isfinite(b.sigma))
     shift, covariance = b.values - a.values, np.diag(np.full(k, np.inf))
