@@ -22,7 +22,8 @@ import numpy as np
 import stiffmap as sm
 from stiffmap.experiment import simulate
 from stiffmap.experiment.calls import placed
-from stiffmap.identification.planning import design, estimate, follow
+from stiffmap.identification.planning import estimate, follow
+from stiffmap.identification.planning import plan as design
 
 MORE = (12, 16, 24, 32, 48)
 POSES = 40
@@ -128,7 +129,7 @@ def of_map(machine: sm.Machine) -> str:
     if not terms:
         return "–"
     low, high = machine.workspace
-    d = design(machine, terms, aim="map", rows=6, poses=POSES, at=np.array([(low + high) / 2]))
+    d = design(machine, terms, aim="map", rows=6, poses=POSES, position=np.array([(low + high) / 2]))
     return f"{1e6 * d.value:.3g}, {1e6 * d.random_value:.3g}"
 
 

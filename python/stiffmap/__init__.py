@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     from stiffmap.identification.calibration import Calibration
     from stiffmap.identification.calibration.calibrate import calibrate
     from stiffmap.identification.diagnosis import Diagnosis, diagnose
-    from stiffmap.identification.planning.calls import monitor, plan
+    from stiffmap.identification.planning.changes import monitor
+    from stiffmap.identification.planning.design import plan
     from stiffmap.machining.chatter import floquet_multiplier, limiting_depth, stability_lobes, vibration_map
     from stiffmap.machining.compensation import Commands, compensate
     from stiffmap.machining.milling import mill
@@ -77,7 +78,8 @@ _HOME = {
         "stiffmap.experiment.spreadsheet.from_table": "experiment_from_table",
         "stiffmap.identification.calibration": "Calibration calibrate",
         "stiffmap.identification.diagnosis": "Diagnosis diagnose",
-        "stiffmap.identification.planning.calls": "monitor plan",
+        "stiffmap.identification.planning.design": "plan",
+        "stiffmap.identification.planning.changes": "monitor",
         "stiffmap.machining.chatter": "floquet_multiplier limiting_depth stability_lobes vibration_map",
         "stiffmap.machining.compensation": "Commands compensate",
         "stiffmap.machining.milling": "mill",

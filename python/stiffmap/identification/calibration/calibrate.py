@@ -7,40 +7,40 @@ from collections.abc import Sequence
 from os import PathLike
 
 import numpy as np
+from numpy.typing import NDArray
 
 from stiffmap.common.broadcasting import whole_number
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.one_thread import on_one_thread
 from stiffmap.experiment.calls import as_experiment
 from stiffmap.experiment.comparison.limitations import refuse
-from stiffmap.experiment.comparison.summary import Summary, summary
-from stiffmap.experiment.experiment import Experiment
+from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.noise.outliers import swapped
-from stiffmap.experiment.noise.over_time import over_time
-from stiffmap.experiment.noise.whitening import Problem
 from stiffmap.experiment.prediction.predict import Predictor
-from stiffmap.identification.calibration.result import Calibration
-from stiffmap.identification.calibration.table import table_of, too_wide
+from stiffmap.identification.calibration.result import Calibration, Row
 from stiffmap.identification.candidates.plan import Plan
 from stiffmap.identification.clock import Clock, Progress
+from stiffmap.identification.inference.amplitudes import OFF, Fit, evaluated
+from stiffmap.identification.inference.columns import Columns
 from stiffmap.identification.inference.constants import ODDS
 from stiffmap.identification.inference.corrected import Corrected, corrected
 from stiffmap.identification.inference.inference import Inferred, infer
 from stiffmap.identification.inference.machines import (
     CALIBRATED,
-    HeldOut,
-    left_by,
     stands_out,
     vouched,
     written,
 )
 from stiffmap.identification.inference.names import EXACT
 from stiffmap.identification.inference.readings import readings
-from stiffmap.identification.inference.shares import shares
+from stiffmap.identification.inference.shares import of_numbers, shares
 from stiffmap.identification.inference.verdict import judged
 from stiffmap.identification.numbers import GROUPS, Tolerances
 from stiffmap.identification.validity import covered
 from stiffmap.solve.machine import Machine, as_machine
+
+SEEN = 1.0
+"""Singular value, per standard uncertainty, beyond which the readings determine a direction more than its prior does."""
 
 
 @on_one_thread
@@ -108,20 +108,20 @@ def _answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, star
     clock.say("readings that no fit saw")
     made = written(models, base, given, listed, seed, lambda: clock.over)
     at = models.get(CALIBRATED)
-    whole = [left_by(e, sigma, p, ~listed) for p in (base, made.prediction)]
-    left = [np.where(listed[:, None], np.nan, v) for v in whole]
-    before, after = (summary(v, sigma, e.channels) for v in left)
-    pairs = swapped(e, whole[1], sigma, listed)
+    before, after = made.sizes
+    pairs = swapped(e, made.left[1], sigma, listed)
     rows, rank = table_of(columns, found.search.calibrated or fit, at)
     verdict, wide = judged(columns, found.search), too_wide(fit)
     at_name = {r.name: r for r in rows}
     beyond = tuple(at_name[b.unknown.name] for b in verdict.beyond)
     each = shares(columns, best.fit)
-    problem = Problem.of(e, sigma, made.prediction, ~listed)
+    held = made.held_out
+    unseen = (held.before, held.after) if held else (before, after)
+    beyond_noise = [s.ratio**2 - best.fit.noise**2 for s in unseen]
     if beyond:
         word = f"beyond tolerance: {', '.join(r.name for r in beyond)}"
-    elif (verdict.rest or verdict.time) and _mostly_left(made.held_out, before, after, best.fit.noise):
-        word = "unattributed"
+    elif (verdict.rest or verdict.time) and beyond_noise[1] > 0.5 * beyond_noise[0]:
+        word = "unattributed"  # more is left than taken away
     elif exact:
         word = "as declared"
     else:
@@ -146,16 +146,70 @@ def _answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, star
         swapped=tuple((e.ids[i], e.ids[j]) for i, j in pairs),
         failed=given.sensitivity.failed,
         stopped=clock.stopped,
-        machine=vouched(predictor, made, f"Numbers calibrated by experiment {e.name}.", columns, ~listed),
+        machine=vouched(predictor, made, f"Numbers calibrated by experiment {e.name}.", columns),
         validity=covered(predictor.machine, e, ~listed),
-        over_time=over_time(problem, problem.residual(made.prediction)),
+        over_time=made.over_time,
         experiment=e,
-        residual=left[1],
+        residual=np.where(listed[:, None], np.nan, made.left[1]),
         seconds=time.perf_counter() - start,
     )
 
 
-def _mostly_left(held: HeldOut | None, before: Summary, after: Summary, noise: float) -> bool:
-    """Whether of the squares beyond noise more is left than taken away, of readings that no fit saw where there are any."""
-    one, other = (held.before, held.after) if held else (before, after)
-    return other.ratio**2 - noise**2 > 0.5 * (one.ratio**2 - noise**2)
+def table_of(columns: Columns, fit: Fit, best: Corrected | None) -> tuple[tuple[Row, ...], int]:
+    """Rows of all numbers that the readings show, with their values at the optimum, and how many directions the readings
+    determine."""
+    at = {}
+    if best is not None:
+        at = {u.name: float(v) for u, v in zip(best.given.sensitivity.unknowns, best.numbers, strict=True)}
+    numbers = [p.name for p in fit.parts if p.kind == "number"]
+    white = fit.without(numbers).white(columns.numbers)
+    gram = white.T @ white
+    minimal = set(independent(gram))
+    prior = np.ones(len(columns.unknowns))
+    for (
+        group,
+        index,
+    ) in columns.groups.items():  # one that is off by little here has no better tolerances for it
+        prior[index] = max(1.0, fit.spread(group))
+    spread = np.sqrt(np.diag(np.linalg.inv(np.diag(prior**-2) + gram)))
+    out = []
+    for k, (u, (value, _, _)) in enumerate(zip(columns.unknowns, of_numbers(columns, fit), strict=True)):
+        value, sd = at.get(u.name, value), float(spread[k])
+        informed = 1.0 - (sd / prior[k]) ** 2
+        pull = float(value / np.sqrt(informed)) if informed > 1e-9 else 0.0
+        more = bool(informed > 0.5), float(prior[k] / sd), k in minimal
+        out.append(Row(u.name, u.group, u.leg, u.unit, value * u.u, u.u, sd * u.u, pull, *more))
+    return tuple(out), int((np.linalg.eigvalsh(gram) > SEEN**2).sum())
+
+
+def independent(gram: Floats) -> NDArray[np.intp]:
+    """A minimal set of unknowns that spans what the readings determine.
+
+    Pivoted elimination of AᵀA: the unknown that is most observable comes first and is projected out of the others, until what
+    remains of each is below `SEEN`.
+    """
+    left = np.array(gram, dtype=float)
+    kept: list[int] = []
+    for _ in range(len(left)):
+        size = np.diag(left).copy()
+        size[kept] = -np.inf
+        best = int(np.argmax(size))
+        if not size[best] > SEEN**2:
+            break
+        kept.append(best)
+        left = left - np.outer(left[best], left[best]) / left[best, best]
+    return np.array(sorted(kept), dtype=np.intp)
+
+
+def too_wide(fit: Fit) -> dict[str, float]:
+    """Groups whose numbers are off by so many times their standard uncertainties (rms), where these are too small without doubt."""
+    out = {}
+    for k, p in enumerate(fit.parts):
+        t = float(fit.t[1 + k])
+        if p.kind != "number" or t <= max(0.0, OFF):
+            continue
+        other = fit.t.copy()
+        other[1 + k] = 0.0
+        if fit.score - evaluated(fit.columns, fit.parts, other, fit.weights).score > np.log(ODDS):
+            out[p.name] = float(np.exp(0.5 * t))
+    return out

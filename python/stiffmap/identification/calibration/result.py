@@ -15,7 +15,6 @@ from stiffmap.experiment.comparison.summary import Summary
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.noise.outliers import set_aside
 from stiffmap.experiment.noise.over_time import OverTime
-from stiffmap.identification.calibration.table import Row
 from stiffmap.identification.inference.machines import HeldOut
 from stiffmap.identification.inference.shares import largest
 from stiffmap.identification.inference.travel import Profile
@@ -30,6 +29,30 @@ MOST = 6
 DISPLAY_UNITS = {"m": (1e3, "mm"), "rad": (1e3, "mrad"), "1": (1e6, "ppm")}
 FACTOR = 0.5
 """Logarithm of a factor from which it is written as one: ×1.65."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One unknown: declared standard uncertainty, posterior, and whether the readings determine it."""
+
+    name: str
+    group: str
+    leg: str
+    unit: str
+    """``m``, ``rad``, ``1`` or ``ln`` (logarithm of a factor)."""
+    value: float
+    """Posterior mean of its error."""
+    u: float
+    sigma: float
+    """Posterior standard deviation."""
+    pull: float
+    """Value over the standard deviation that it should have if `u` is right."""
+    identifiable: bool
+    """Whether the readings say more of it than its prior does."""
+    observability: float
+    """How many times the readings sharpen its prior."""
+    minimal: bool
+    """Whether it belongs to the minimal set that spans all that the readings determine."""
 
 
 @short_repr

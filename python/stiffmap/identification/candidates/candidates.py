@@ -113,17 +113,9 @@ def _plausible(p: Parameter) -> Parameter:
     return replace(p, lower=max(lower, p.lower), upper=min(upper, p.upper))
 
 
-def check_kinds(names: Iterable[str]) -> frozenset[str]:
-    """Kinds of effects by their names; StiffmapError for one that does not exist."""
-    return frozenset(effects.get(n).kind for n in names)
-
-
 def clash(candidate: Candidate, others: Iterable[Candidate]) -> bool:
     """Whether the candidate and one of the others exclude each other at a place that they share."""
-    return any(_excludes(candidate, other) for other in others)
-
-
-def _excludes(one: Candidate, other: Candidate) -> bool:
-    legs = set(one.legs) & set(other.legs) or not one.legs or not other.legs
-    named = other.kind in effects.get(one.kind).excludes or one.kind in effects.get(other.kind).excludes
-    return bool(one.element == other.element and legs and named)
+    legs, excluded = set(candidate.legs), effects.get(candidate.kind).excludes
+    shared = (o for o in others if o.element == candidate.element)
+    shared = (o for o in shared if not legs or not o.legs or legs & set(o.legs))
+    return any(o.kind in excluded or candidate.kind in effects.get(o.kind).excludes for o in shared)

@@ -11,8 +11,7 @@ from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.prediction.fingerprint import fingerprint
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.identification.candidates.candidates import Candidate, candidates
-from stiffmap.identification.candidates.sensitivity import Variant, variants
-from stiffmap.identification.candidates.slopes import Slopes
+from stiffmap.identification.candidates.sensitivity import Slopes, Variant, variants
 from stiffmap.identification.clock import Clock
 from stiffmap.model.effects import get, kinds
 
@@ -37,15 +36,9 @@ def plan_of(predictor: Predictor, clock: Clock | None = None) -> Plan:
     clock = clock or Clock()
     registered = [(k, id(get(k))) for k in kinds()]  # users may register more
     key = digest(fingerprint(predictor), predictor.experiment.read, registered)
-    plan = _PLANS.get(key)
-    if plan is None:
-        plan, whole = _compute(predictor, clock)
-        return _PLANS.put(key, plan) if whole else plan
-    return plan
-
-
-def _compute(predictor: Predictor, clock: Clock) -> tuple[Plan, bool]:
-    """The plan, and whether all candidates are in it."""
+    kept = _PLANS.get(key)
+    if kept is not None:
+        return kept
     base = predictor()
     good: list[Variant] = []
     failed: list[tuple[Candidate, str]] = []
@@ -70,4 +63,5 @@ def _compute(predictor: Predictor, clock: Clock) -> tuple[Plan, bool]:
         good += usable
         if not usable:
             failed.append((candidate, "the machine has no equilibrium with it at some poses"))
-    return Plan(base, tuple(good), tuple(failed)), whole
+    plan = Plan(base, tuple(good), tuple(failed))
+    return _PLANS.put(key, plan) if whole else plan

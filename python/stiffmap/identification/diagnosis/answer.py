@@ -10,12 +10,9 @@ from scipy.stats import chi2
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.comparison.limitations import limitations
-from stiffmap.experiment.comparison.summary import Summary, summary
-from stiffmap.experiment.experiment import Experiment, Floats, Mask
+from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.noise.checks import checks
 from stiffmap.experiment.noise.nuisance import nuisance_columns
-from stiffmap.experiment.noise.over_time import over_time
-from stiffmap.experiment.noise.whitening import Problem
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.identification.candidates.candidates import Candidate
 from stiffmap.identification.clock import Clock
@@ -33,7 +30,6 @@ from stiffmap.identification.inference.machines import (
     CALIBRATED,
     CORRECTED,
     Written,
-    left_by,
     stands_out,
     vouched,
     written,
@@ -61,13 +57,12 @@ def answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, cross
     listed = stands_out(columns, fit, found.suspects, models.values())
     clock.say("readings that no fit saw")
     made = written(models, base, given, listed, seed, lambda: clock.over or not cross_validate)
+    held, late = made.held_out, made.over_time
     best = models.get(CORRECTED)
     each, gap = shares(columns, fit), gap_of(columns, fit)
     effects = _effects(predictor, v, best, each, fit)
     others = _alternatives(predictor, found, v, best, clock) if effects else []
-    before, after = (left_by(e, sigma, p, ~listed) for p in (base, made.prediction))
-    held = made.held_out
-    noise = _noise(found, before, after, best, listed)
+    noise = _noise(found, made, best)
     rest = _rest(columns, fit, v, each, gap)
     return Diagnosis(
         verdict=_word(v, effects, rest, clock.stopped and noise.lack_of_fit_before < RARE),
@@ -77,8 +72,8 @@ def answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, cross
             separation(predictor, found.noise.floor, best.effects if best else (), other.effects, seed)
             for _, other in others
         ],
-        before=held.before if held else _sum(before, sigma, e, listed),
-        after=held.after if held else _sum(after, sigma, e, listed),
+        before=held.before if held else made.sizes[0],
+        after=held.after if held else made.sizes[1],
         held_out=held,
         noise=noise,
         detectable=detectable(columns, fit),
@@ -92,14 +87,14 @@ def answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, cross
             *notes,
             *(_or_number(n) for n in v.named if n.numbers),
             *limitations(e, found.noise, predictor.machine),
-            *_over_time(Problem.of(e, sigma, made.prediction, ~listed), made.prediction),
+            *([] if late is None else [str(late)]),
         ],
         shares=each,
-        machine=vouched(predictor, made, _said(made, effects, e), columns, ~listed),
+        machine=vouched(predictor, made, _said(made, effects, e), columns),
         declared=predictor.machine,
         experiment=e,
-        residual_before=before,
-        residual_after=after,
+        residual_before=made.left[0],
+        residual_after=made.left[1],
         set_aside=listed,
         gap=gap,
         calibration=_numbers(found, v, best, given),
@@ -204,44 +199,29 @@ def _alternatives(
 
 def _word(v: Verdict, effects: Sequence[Effect], rest: Sequence[Rest], cut_short: bool) -> str:
     """`cut_short`: whether the search could not come to an end though the readings are no noise."""
-    named = bool(effects or v.beyond)
     if v.word == "ambiguous" and effects:
         return "ambiguous"
-    if named:
+    if effects or v.beyond:
         return "effects+unattributed" if rest else "effects"
     return "unattributed" if rest or v.word == "unattributed" or cut_short else "none"
 
 
-def _sum(residual: Floats, sigma: Floats, e: Experiment, listed: Mask) -> Summary:
-    return summary(np.where(listed[:, None], np.nan, residual), sigma, e.channels)
-
-
-def _noise(
-    found: Inferred, before: Floats, after: Floats, best: Corrected | None, listed: Mask
-) -> NoiseReport:
+def _noise(found: Inferred, made: Written, best: Corrected | None) -> NoiseReport:
     n, e = found.noise, found.columns.experiment
-    scale = found.search.best.fit.noise
-
-    def per_axis(values: Floats) -> dict[str, float]:
-        return {c.name: float(v) for c, v, read in zip(e.channels, values, e.axis_read, strict=True) if read}
+    frames = nuisance_columns(e, found.plan.base).shape[-1]
+    values = 0 if best is None else sum(len(t.values) for t in best.terms)
 
     def lack(left: Floats, values: int) -> float:
-        z = (np.where(listed[:, None], np.nan, left) / n.sigma).ravel()
+        z = (left / n.sigma)[~made.listed]
         z = z[np.isfinite(z)]
         return float(chi2.sf(float(z @ z), max(1, len(z) - frames - values)))
 
-    frames = nuisance_columns(e, found.plan.base).shape[-1]
-    values = 0 if best is None else sum(len(t.values) for t in best.terms)
-    return NoiseReport(
-        per_axis(n.floor),
-        per_axis(n.repeats),
-        per_axis(n.declared),
-        per_axis(n.consistency),
-        lack(before, 0),
-        lack(after, values),
-        n.rms,
-        scale,
+    floor, repeats, declared, consistency = (
+        {c.name: float(v) for c, v, read in zip(e.channels, each, e.axis_read, strict=True) if read}
+        for each in (n.floor, n.repeats, n.declared, n.consistency)
     )
+    lacks, scale = (lack(made.left[0], 0), lack(made.left[1], values)), found.search.best.fit.noise
+    return NoiseReport(floor, repeats, declared, consistency, *lacks, n.rms, scale)
 
 
 def _rest(columns: Columns, fit: Fit, v: Verdict, each: dict[str, float], gap: Floats) -> list[Rest]:
@@ -283,28 +263,18 @@ def _or_number(n: Named) -> str:
     return f"instead of {n.chosen.place.candidate} these declared numbers may be out of tolerance: {names}"
 
 
-def _over_time(problem: Problem, prediction: Floats) -> list[str]:
-    """What is left over time, in words; nothing where no times were recorded."""
-    found = over_time(problem, problem.residual(prediction))
-    return [] if found is None else [str(found)]
-
-
 def _numbers(found: Inferred, v: Verdict, best: Corrected | None, given: Readings) -> Numbers | None:
     if best is None or not len(best.numbers):
         return None
-    said = of_numbers(found.columns, found.search.best.fit)
-    at = {u.name: k for k, u in enumerate(given.sensitivity.unknowns)}
-    table, beyond = [], []
+    said = zip(found.columns.unknowns, of_numbers(found.columns, found.search.best.fit), strict=True)
+    at = dict(zip((u.name for u in given.sensitivity.unknowns), best.numbers.tolist(), strict=True))
+    table = [
+        Number(u.name, u.group, u.leg, u.unit, at[u.name] * u.u, u.u, sd * u.u, share)
+        for u, (_, sd, share) in said
+        if u.name in at
+    ]
     off = {b.unknown.name for b in v.beyond}
-    for u, (value, sd, share) in zip(found.columns.unknowns, said, strict=True):
-        if u.name not in at:
-            continue
-        value = float(best.numbers[at[u.name]])
-        row = Number(u.name, u.group, u.leg, u.unit, value * u.u, u.u, sd * u.u, share)
-        table.append(row)
-        if u.name in off:
-            beyond.append(row)
-    beyond.sort(key=lambda n: -n.share)
+    beyond = sorted((n for n in table if n.name in off), key=lambda n: -n.share)
     names = ", ".join(n.name for n in beyond)
     word = f"beyond tolerance: {names}" if beyond else "adjusted within tolerance"
     return Numbers(word, tuple(beyond), tuple(table))

@@ -14,7 +14,6 @@ from stiffmap.experiment.calls import as_experiment
 from stiffmap.experiment.comparison.limitations import refuse
 from stiffmap.experiment.experiment import Experiment
 from stiffmap.experiment.prediction.predict import Predictor
-from stiffmap.identification.candidates.candidates import check_kinds
 from stiffmap.identification.candidates.plan import plan_of
 from stiffmap.identification.clock import Clock, Progress
 from stiffmap.identification.diagnosis.answer import answer
@@ -25,6 +24,7 @@ from stiffmap.identification.diagnosis.slips.find import find_slip
 from stiffmap.identification.diagnosis.slips.slip import Slip
 from stiffmap.identification.inference.inference import infer
 from stiffmap.identification.numbers import GROUPS, Tolerances
+from stiffmap.model.effects import get
 from stiffmap.solve.machine import Machine, as_machine
 
 SLIPS = 2
@@ -78,7 +78,9 @@ def diagnose(
     whole_number(seed, "seed", 0)
     declared, data = as_machine(machine), as_experiment(experiment)
     clock = Clock.of(time_limit, progress)
-    check_kinds(n for n in exclude if n not in GROUPS)
+    for name in exclude:
+        if name not in GROUPS:
+            get(name)
     with clock.on_interrupt():
         predictor = Predictor(declared, data, threads=threads)
         refuse(predictor.experiment, predictor())

@@ -206,7 +206,8 @@ def drawn(pose: Integers, seed: int, most: int) -> Integers:
 def _averages(e: Experiment, rows: Integers, channel: Integers, noise: Floats, raw: Floats) -> Floats:
     """(N, k) orthonormal columns that average repeats of one condition; the identity where a reading stands out from its
     repeats, or where loads are held over hours: creep is in the repeats."""
-    _, number = np.unique(np.stack([e.conditions[rows], channel, _level(noise)]), axis=1, return_inverse=True)
+    level = np.unique(noise, return_inverse=True)[1].reshape(-1)  # readings of unlike noise are not averaged
+    _, number = np.unique(np.stack([e.conditions[rows], channel, level]), axis=1, return_inverse=True)
     number = number.reshape(-1)
     average = np.zeros((len(rows), int(number.max()) + 1))
     average[np.arange(len(rows)), number] = 1.0 / np.sqrt(np.bincount(number))[number]
@@ -217,11 +218,6 @@ def _averages(e: Experiment, rows: Integers, channel: Integers, noise: Floats, r
     if e.hours is not None or np.any(own > STANDS_OUT * max(typical, 1.0)):
         return np.eye(len(rows))
     return average
-
-
-def _level(noise: Floats) -> Integers:
-    """Readings of unlike noise are not averaged."""
-    return np.unique(noise, return_inverse=True)[1].reshape(-1)
 
 
 def zeros(e: Experiment, points: Points) -> Floats:

@@ -27,8 +27,7 @@ from stiffmap.identification.inference.optimum import covariance
 from stiffmap.identification.inference.places import possible
 from stiffmap.identification.inference.readings import Readings
 from stiffmap.identification.inference.travel import Profile, profiles
-from stiffmap.identification.numbers.sensitivity import bends, sensitivity_at
-from stiffmap.identification.numbers.slopes import moves_of, with_moves
+from stiffmap.identification.numbers.sensitivity import bends, moves_of, sensitivity_at, with_moves
 from stiffmap.model.description import AppliedEffect
 from stiffmap.solve.machine import Machine
 

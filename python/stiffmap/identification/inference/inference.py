@@ -18,8 +18,7 @@ from stiffmap.identification.clock import Clock
 from stiffmap.identification.inference.chosen import Chosen
 from stiffmap.identification.inference.columns import Columns, columns
 from stiffmap.identification.inference.names import Search, searched
-from stiffmap.identification.numbers.certificate import certified
-from stiffmap.identification.numbers.tolerances import Tolerances
+from stiffmap.identification.numbers.certificate import Tolerances, certified
 from stiffmap.identification.numbers.unknowns import Unknown, unknowns
 from stiffmap.model.description import AppliedEffect
 from stiffmap.solve.machine import Machine

@@ -10,9 +10,10 @@ from scipy.linalg import cholesky, solve_triangular
 
 from stiffmap.experiment.channels import metres
 from stiffmap.experiment.comparison.summary import Summary, summary
-from stiffmap.experiment.experiment import Experiment, Floats, Integers, Mask
+from stiffmap.experiment.experiment import Floats, Integers, Mask
 from stiffmap.experiment.noise.held_out import folds, left_unseen
 from stiffmap.experiment.noise.outliers import GROSS
+from stiffmap.experiment.noise.over_time import OverTime, over_time
 from stiffmap.experiment.noise.whitening import Problem, nuisance_part
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.identification.inference.amplitudes import Fit
@@ -45,17 +46,26 @@ class HeldOut:
 
 @dataclass(frozen=True, eq=False)
 class Written:
-    """The machine of the three that predicts best."""
+    """The machine of the three that predicts best, and what it leaves of the readings."""
 
     which: str
     """``declared``, ``calibrated`` or ``corrected``."""
     machine: Machine
-    prediction: Floats
-    """(n, c) m, rad."""
     held_out: HeldOut | None
     """None where there are not two groups of readings, or time is over."""
-    promise: tuple[float, float] | None = None
-    """By how much a reading of another pose will differ, m or rad, and its standard uncertainty."""
+    promise: tuple[float, float] | None
+    """By how much a reading of another pose will differ, m or rad, and its standard uncertainty; None of the declared machine."""
+    listed: Mask
+    """(n,) rows that stand alone: no measure of a prediction."""
+    prediction: Floats
+    """(n, c) m, rad."""
+    left: tuple[Floats, Floats]
+    """(n, c) m, rad: readings less the predictions of the declared machine and of this one, less the frames, tools and zeros that
+    fit all other rows best where that machine stands."""
+    sizes: tuple[Summary, Summary]
+    """The same in numbers, rows that stand alone left out."""
+    over_time: OverTime | None
+    """What this machine leaves over time; None where no times were recorded."""
 
 
 def written(
@@ -66,22 +76,38 @@ def written(
     seed: int,
     over: Callable[[], bool],
 ) -> Written:
-    """The last of some machines, unless another of them or the declared one is clearly better, each fold of readings predicted from
-    all others.
+    """The last of some machines, by name, unless another of them or the declared one is clearly better; `declared` (n, c) is what that
+    one shows, `listed` (n,) rows that stand alone."""
+    e, sigma = given.predictor.experiment, given.sigma
+    which, held = _chosen(models, declared, given, listed, seed, over)
+    machine, prediction, promise = given.predictor.machine, declared, None
+    if which != DECLARED:
+        best = models[which]
+        machine, prediction, promise = machine_of(best), best.prediction, promised(best)
+        if held is not None and held.by == "poses":
+            promise = borne_out(promise, held.after.size[0], len(np.unique(e.groups)))
+    problems = [Problem.of(e, sigma, p, ~listed) for p in (declared, prediction)]
+    before, after = (e.reading - p.base - nuisance_part(p, e.reading - p.base) for p in problems)
+    first, last = (summary(np.where(listed[:, None], np.nan, r), sigma, e.channels) for r in (before, after))
+    late = over_time(problems[1], problems[1].residual(prediction))
+    return Written(which, machine, held, promise, listed, prediction, (before, after), (first, last), late)
 
-    models
-        By name.
-    declared
-        (n, c) prediction of the declared machine.
-    listed
-        (n,) rows that stand alone: no measure of a prediction.
-    """
+
+def _chosen(
+    models: dict[str, Corrected],
+    declared: Floats,
+    given: Readings,
+    listed: Mask,
+    seed: int,
+    over: Callable[[], bool],
+) -> tuple[str, HeldOut | None]:
+    """Which machine is handed over, each fold of readings predicted from all others."""
     e, sigma = given.predictor.experiment, given.sigma
     label, by = folds(e, seed)
     number = int(label.max()) + 1
     last = list(models)[-1] if models else DECLARED
     if number < 2 or over():
-        return _made(last, models, given, declared, None)
+        return last, None
     left = {name: np.full_like(e.reading, np.nan) for name in (DECLARED, *models)}
     for k in range(number):
         test = label == k
@@ -93,8 +119,7 @@ def written(
             left[name][own] = left_unseen(e, sigma, shown, seen, own)[own]
     best = _best(left, last, sigma, e.groups)
     before, after = (summary(left[name], sigma, e.channels) for name in (DECLARED, best))
-    held = HeldOut(before, after, number, by)
-    return _made(best, models, given, declared, held)
+    return best, HeldOut(before, after, number, by)
 
 
 def own_zeros(found: Corrected, own: Mask) -> Floats:
@@ -127,22 +152,6 @@ def _best(left: dict[str, Floats], wanted: str, sigma: Floats, pose: Integers) -
     if not np.isfinite(worse).all():
         return best
     return best if worse.mean() > worse.std() / np.sqrt(len(worse)) else wanted
-
-
-def _made(
-    which: str,
-    models: dict[str, Corrected],
-    given: Readings,
-    declared: Floats,
-    held: HeldOut | None,
-) -> Written:
-    if which == DECLARED:
-        return Written(which, given.predictor.machine, declared, held)
-    found = models[which]
-    said = promised(found)
-    if held is not None and held.by == "poses":
-        said = borne_out(said, held.after.size[0], len(np.unique(given.predictor.experiment.groups)))
-    return Written(which, machine_of(found), found.prediction, held, said)
 
 
 def borne_out(promise: tuple[float, float], left: float, poses: int) -> tuple[float, float]:
@@ -192,15 +201,15 @@ def promised(found: Corrected) -> tuple[float, float]:
     return size, size / float(np.sqrt(2.0 * number))
 
 
-def vouched(predictor: Predictor, made: Written, said: str, columns: Columns, keep: Mask) -> Machine:
-    """The machine that is handed over; its file says what it has from which experiment (`said`), what the readings in `keep` (n,)
-    covered, and by how much its prediction of others is off."""
+def vouched(predictor: Predictor, made: Written, said: str, columns: Columns) -> Machine:
+    """The machine that is handed over; its file says what it has from which experiment (`said`), what the readings that do not stand
+    alone covered, and by how much its prediction of others is off."""
     if made.which == DECLARED:
         return predictor.machine
     e, d = predictor.experiment, made.machine.description
     source = f"{d.source} {said}".strip()
     declared = None if d.declared is None else replace(d.declared, source=source)
-    valid = covered(predictor.machine, e, keep)
+    valid = covered(predictor.machine, e, ~made.listed)
     error, u = made.promise or (np.nan, np.nan)
     if np.isfinite(error):
         unit = "m" if metres(e.channels)[columns.channel].any() else "rad"
@@ -218,10 +227,3 @@ def stands_out(columns: Columns, fit: Fit, suspects: Mask, models: Iterable[Corr
         seen[rows] = True
         out[rows[w < SET_ASIDE]] = True
     return out
-
-
-def left_by(e: Experiment, sigma: Floats, prediction: Floats, keep: Mask) -> Floats:
-    """(n, c) reading minus prediction, less the frames, tools and zeros that fit the rows in `keep` (n,) best where that machine
-    stands."""
-    raw = e.reading - prediction
-    return np.asarray(raw - nuisance_part(Problem.of(e, sigma, prediction, keep), raw))

@@ -7,7 +7,7 @@ their uncertainties, in "groups" each group by its own. All are searched alike a
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 
 import numpy as np
@@ -88,7 +88,7 @@ def searched(
     if columns.unknowns and not over():
         worlds |= {"together": parts.together, "groups": parts.numbers}
     optima: dict[tuple[tuple[int, int], ...], Floats] = {}
-    searches = [_World(columns, parts, name, own, predict, over, optima) for name, own in worlds.items()]
+    searches = [_World(columns, parts.gaps, name, own, predict, over, optima) for name, own in worlds.items()]
     found = {w.name: w.search() for w in searches}
     best = max(found.values(), key=lambda s: s.best.score)
     others = [w for w in searches if w.name != best.best.world]
@@ -123,24 +123,19 @@ def _without(c: Chosen, best: Search, others: Sequence[_World], found: Mapping[s
     return max(allowed, key=lambda m: m.score, default=None)
 
 
+@dataclass(eq=False)
 class _World:
     """The search in one world."""
 
-    def __init__(
-        self,
-        columns: Columns,
-        parts: Parts,
-        name: str,
-        numbers: tuple[Part, ...],
-        predict: Predict | None,
-        over: Callable[[], bool],
-        optima: dict[tuple[tuple[int, int], ...], Floats],
-    ) -> None:
-        self.columns, self.name, self.numbers, self.predict = columns, name, numbers, predict
-        self.over, self.optima = over, optima
-        self.known: dict[frozenset[tuple[int, int]], Model] = {}
-        self.anchors: dict[int, tuple[Model, list[Fit]]] = {}
-        self.gaps = parts.gaps
+    columns: Columns
+    gaps: tuple[Part, ...]
+    name: str
+    numbers: tuple[Part, ...]
+    predict: Predict | None
+    over: Callable[[], bool]
+    optima: dict[tuple[tuple[int, int], ...], Floats]
+    known: dict[frozenset[tuple[int, int]], Model] = field(default_factory=dict)
+    anchors: dict[int, tuple[Model, list[Fit]]] = field(default_factory=dict)
 
     def search(self) -> Search:
         """Forward steps with elimination and exchange after each."""
@@ -250,7 +245,7 @@ class _World:
         now, shown = fit, None
         for _ in range(CORRECTIONS + 1):
             at = tuple(c.by_posterior(now) for c in chosen)
-            line = self._line(at)
+            line = np.sum([c.rotated(self.columns) @ c.values for c in at], axis=0)
             if shown is not None and _near(line, shown):
                 return now, chosen
             missed = self.predict(at) - line
@@ -286,9 +281,6 @@ class _World:
         if gain <= PROGRESS or not all(c.is_possible for c in at):
             return model
         return replace(model, chosen=at, fit=fit, score=model.score + gain)
-
-    def _line(self, chosen: Sequence[Chosen]) -> Floats:
-        return np.asarray(np.sum([c.rotated(self.columns) @ c.values for c in chosen], axis=0))
 
     def _less(self, missed: Floats, fit: Fit) -> Fit:
         """The fit on a residual less something."""

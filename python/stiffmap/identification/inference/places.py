@@ -89,7 +89,9 @@ def places(
 def shape_of(v: Variant, white: Floats) -> Shape | None:
     """A variant by its columns (m, q) in noise: those that a plausible size makes visible; None without any."""
     length = np.linalg.norm(white, axis=0)
-    most = np.minimum([_reach(v, k) for k in range(white.shape[1])], 1.0 / NULL)
+    linear = v.candidate.linear
+    limits = [reach(p) for p in linear] if len(linear) == len(v.sign) else []  # largest plausible values
+    most = np.minimum([*limits, *[np.inf] * (white.shape[1] - len(limits))], 1.0 / NULL)
     seen = length * most > VISIBLE
     if not seen.any():
         return None
@@ -99,14 +101,6 @@ def shape_of(v: Variant, white: Floats) -> Shape | None:
     if kept.shape[1] == 1 and seen.sum() == 1 and v.sign[seen][0]:
         sign = int(np.sign(v.sign[seen][0]) * np.sign(float(kept[:, 0] @ white[:, seen][:, 0])))
     return Shape(v, np.asfortranarray(kept), sign)
-
-
-def _reach(v: Variant, k: int) -> float:
-    """Largest plausible value of a column's parameter, in its scale."""
-    linear = v.candidate.linear
-    if k >= len(linear) or len(linear) != len(v.sign):
-        return np.inf
-    return reach(linear[k])
 
 
 def reach(p: Parameter) -> float:

@@ -54,9 +54,6 @@ def of_numbers(columns: Columns, fit: Fit) -> list[tuple[float, float, float]]:
 def gap_of(columns: Columns, fit: Fit) -> Floats:
     """(n, c) m, rad: what nobody can name, at the readings that were compared; NaN elsewhere."""
     out = np.full(columns.experiment.reading.shape, np.nan)
-    whole = np.zeros(len(columns))
-    for p, _ in fit.on:
-        if p.kind in GAPS:
-            whole = whole + fit.mean(p)
+    whole = sum((fit.mean(p) for p, _ in fit.on if p.kind in GAPS), np.zeros(len(columns)))
     out[columns.rows, columns.channel] = columns.sigma * (columns.free @ whole)
     return out

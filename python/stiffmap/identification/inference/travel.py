@@ -122,13 +122,10 @@ def knots_of(joint: Joint, p: Profile) -> Knots:
         return knots
     out = list(knots)
     for _ in range(TURNS):
-        if out[0][0] <= ends[0]:
-            break
-        out = [(u - turn, e) for u, e in out[: len(knots)]] + out
-    for _ in range(TURNS):
-        if out[-1][0] >= ends[1]:
-            break
-        out = out + [(u + turn, e) for u, e in out[-len(knots) :]]
+        if out[0][0] > ends[0]:
+            out = [(u - turn, e) for u, e in out[: len(knots)]] + out
+        if out[-1][0] < ends[1]:
+            out = out + [(u + turn, e) for u, e in out[-len(knots) :]]
     return tuple(out)
 
 

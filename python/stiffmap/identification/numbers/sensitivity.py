@@ -2,24 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.kept import Kept
 from stiffmap.experiment.experiment import Experiment, Floats, Mask
+from stiffmap.experiment.prediction.ahead import Ahead
 from stiffmap.experiment.prediction.fingerprint import fingerprint
+from stiffmap.experiment.prediction.nearby import Near
 from stiffmap.experiment.prediction.predict import Predictor, Terms
 from stiffmap.identification.numbers.certificate import INSTRUMENT, SCALE, frame_columns, scaled
-from stiffmap.identification.numbers.slopes import Moves, Slopes, built, moves_of
 from stiffmap.identification.numbers.unknowns import Unknown
-from stiffmap.model.description import AppliedEffect
+from stiffmap.model.description import AppliedEffect, MachineDescription
+from stiffmap.model.with_errors import Knots, edited
+from stiffmap.solve.machine import Machine
 
-STEP = 0.1
-"""Of a standard uncertainty, for differences."""
+STEP, SMALL = 0.1, 2e-4
+"""Of a standard uncertainty, for differences of whole predictions and for slopes."""
+AT_ONCE = 64
+"""Unknowns whose slopes are computed together."""
+Moves = Mapping[tuple[str, str], float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +45,61 @@ class Sensitivity:
 BENT = 0.05
 """Share of a fit's whole change that a straight line misses, beyond which columns are taken anew at the fit."""
 _KEPT: Kept[tuple[str, tuple[Unknown, ...]], Sensitivity] = Kept(4)
+
+
+def moves_of(pairs: Iterable[tuple[Unknown, float]]) -> dict[tuple[str, str], float]:
+    """By how much each number is off, of unknowns at values in standard uncertainties."""
+    moves: dict[tuple[str, str], float] = {}
+    for unknown, value in pairs:
+        for place, weight in unknown.moves:
+            moves[place] = moves.get(place, 0.0) + weight * unknown.u * value
+    return moves
+
+
+def built(predictor: Predictor, moves: Moves) -> Machine:
+    """The machine with its own numbers off; the instrument's are left out."""
+    return Machine(with_moves(predictor.machine.description, moves), like=predictor.machine)
+
+
+def with_moves(
+    description: MachineDescription, moves: Moves, travel: Mapping[str, Knots] | None = None
+) -> MachineDescription:
+    """The description with its own numbers off, and with axis positioning errors of its drives; the instrument's are left out."""
+    own = {(at, what): by for (at, what), by in moves.items() if at != INSTRUMENT}
+    return edited(description, own, travel) if own or travel else description
+
+
+def slopes_at(predictor: Predictor, unknowns: Sequence[Unknown], values: Floats) -> Ahead[int]:
+    """Changes (n, c) of the readings per standard uncertainty of each unknown, by its number, at some values (p,).
+
+    Those of a set-up and of the instrument, and what one step does not lead to, are for whole predictions.
+    """
+    description = predictor.machine.description
+    pairs = [(u, float(v)) for u, v in zip(unknowns, values, strict=True) if v != 0.0]
+    here = moves_of(pairs)
+    scale = here.pop((INSTRUMENT, SCALE), 0.0)
+    terms = (scaled(description, scale),) if scale else ()
+    apart = any(u.setup and not u.of_instrument for u, _ in pairs)  # a machine for each set-up
+    plain = [k for k, u in enumerate(unknowns) if not u.setup and not u.of_instrument]
+
+    @cache
+    def base() -> Predictor:
+        off = any(at != INSTRUMENT for at, _ in here)
+        return predictor.beside(machine=built(predictor, here)) if off else predictor
+
+    def moved(u: Unknown, by: float) -> MachineDescription:
+        more = {place: here.get(place, 0.0) + weight * u.u * by for place, weight in u.moves}
+        return with_moves(description, {**here, **more})
+
+    def tell(some: Sequence[int]) -> list[Floats | None]:
+        near = {}
+        for k in some:
+            with suppress(StiffmapError):  # what cannot be built: its own prediction will say why
+                near[k] = Near(moved(unknowns[k], SMALL), partial(moved, unknowns[k], 0.0))
+        told = dict(zip(near, base().changes_of_machines(list(near.values()), terms), strict=True))
+        return [None if (change := told.get(k)) is None else change / SMALL for k in some]
+
+    return Ahead([] if apart else plain, AT_ONCE, tell)
 
 
 def predicted(
@@ -136,7 +198,7 @@ def _columns(
     predictor: Predictor, unknowns: Sequence[Unknown], values: Floats, base: Floats
 ) -> Iterator[tuple[int, Floats | None, str]]:
     """Each unknown with (n, c) its slopes at `values`, where the machine shows `base`, or why there are none."""
-    slopes, solved = Slopes(predictor, unknowns, values), np.isfinite(base)
+    slopes, solved = slopes_at(predictor, unknowns, values), np.isfinite(base)
     for k, u in enumerate(unknowns):
         try:
             column = slopes.of(k)

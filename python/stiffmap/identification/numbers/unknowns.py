@@ -8,15 +8,13 @@ values of its Jacobian (`statistics`), not to rules by hand: the same for serial
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from stiffmap.experiment.experiment import Experiment, Floats
-from stiffmap.identification.numbers.certificate import INSTRUMENT, SCALE, frame_names
-from stiffmap.identification.numbers.declared import Declared, Run
-from stiffmap.identification.numbers.tolerances import Tolerances
+from stiffmap.identification.numbers.certificate import INSTRUMENT, SCALE, Tolerances, frame_names
 from stiffmap.model.description import Block, Body, Element, Joint, MachineDescription, Offset, Spring
 from stiffmap.model.with_errors import END, FRAME
 
@@ -38,6 +36,8 @@ GROUPS = (
 GEOMETRY = GROUPS[:9]
 ALONG = 0.999
 """Cosine beyond which an axis is that of a joint's own motion."""
+Run = Sequence[tuple[str, Offset]]
+"""Offsets that follow each other, with their full names."""
 
 
 @dataclass(frozen=True)
@@ -63,6 +63,58 @@ class Unknown:
         return self.group == INSTRUMENT
 
 
+@dataclass(frozen=True)
+class Declared:
+    """What the file says, by full name and field, SI."""
+
+    given: dict[str, float]
+
+    def single(self, name: str, fields: Sequence[str], default: float, size: float = 1.0) -> float:
+        """Of one number, that of the first of some fields of `name` that has one, over the number's size."""
+        found = [u for f in fields if (u := self.given.get(f"{name}/{f}"))]
+        return found[0] / size if found else default
+
+    def spring(self, name: str, spring: Spring, default: float) -> float:
+        """Relative, of a 6x6 spring as a whole: the widest of the entries that have an uncertainty."""
+        word, matrix = (
+            ("compliance", spring.compliance) if spring.compliance else ("stiffness", spring.stiffness)
+        )
+        found = [
+            u / abs(matrix[i][j])
+            for i in range(6)
+            for j in range(i, 6)
+            if matrix is not None
+            and (u := self.given.get(f"{name}/{word}.k{i + 1}{j + 1}")) is not None
+            and matrix[i][j] != 0.0
+        ]
+        return max(found, default=default)
+
+    def length(self, names: Sequence[str], offset: Offset) -> float | None:
+        """Of an offset along itself, mean of those of `names` (independent of each other); None: not given."""
+        way = offset.nominal.p / np.linalg.norm(offset.nominal.p)
+        each = []
+        for name in names:
+            u = np.array([self.given.get(f"{name}/translation.{c}", 0.0) for c in "xyz"])
+            each.append(float(np.linalg.norm(way * u)))
+        return float(np.sqrt(np.mean(np.square(each)))) if all(v > 0.0 for v in each) else None
+
+    def position(self, run: Run, default: float) -> Floats:
+        """(3,) of the place of the frame behind a run of offsets, along its own axes.
+
+        Components with an uncertainty add in squares; directions that none of them covers have the default.
+        """
+        turn = np.eye(3)
+        variance, covered = np.zeros(3), np.zeros(3)
+        for name, offset in reversed(run):
+            turn = offset.nominal.r @ turn
+            for c in range(3):
+                u = self.given.get(f"{name}/translation.{'xyz'[c]}")
+                if u is not None:
+                    variance += (turn[c] * u) ** 2
+                    covered += turn[c] ** 2
+        return np.asarray(np.sqrt(variance + default**2 * np.clip(1.0 - covered, 0.0, 1.0)))
+
+
 def unknowns(
     description: MachineDescription, experiment: Experiment, tolerances: Tolerances | None = None
 ) -> list[Unknown]:
@@ -72,7 +124,7 @@ def unknowns(
     """
     t = tolerances or Tolerances()
     bare = description.declared or description
-    given = Declared.of(bare)
+    given = Declared({k: u for k, u in bare.uncertainty if u > 0.0})
     loaded = bool(experiment.wrench.any() or experiment.gravity or bare.gravity)
     weighs = bool(experiment.gravity or bare.gravity)
     out: list[Unknown] = []
@@ -129,7 +181,7 @@ def _of_part(e: Element, name: str, leg: str, t: Tolerances, given: Declared) ->
         u = given.spring(name, e, t.compliance)
         yield _relative(name, leg, "link compliance", "compliance", u)
     elif isinstance(e, Body) and e.mass > 0.0:
-        yield _relative(name, leg, "masses", "mass", given.mass(name, e.mass, t.mass))
+        yield _relative(name, leg, "masses", "mass", given.single(name, ["mass"], t.mass, e.mass))
 
 
 def joint_name(element: str) -> str:
@@ -158,13 +210,31 @@ def _of_joint(
     yield from _frame(name, leg, tuple(kept), place, t.direction, "axis positions", turned)
     if e.actuated:
         unit, u = ("m", t.zero) if slides else ("rad", t.turning_zero)
-        yield Unknown(f"zero of {name}", "zeros", unit, given.zero(name, u), (((name, "zero"), 1.0),), leg)
         yield Unknown(
-            f"gain of {name}", "gains", "1", given.gain(name, t.gain), (((name, "gain"), 1.0),), leg
+            f"zero of {name}",
+            "zeros",
+            unit,
+            given.single(name, ["home", "command_errors.offset"], u),
+            (((name, "zero"), 1.0),),
+            leg,
+        )
+        yield Unknown(
+            f"gain of {name}",
+            "gains",
+            "1",
+            given.single(name, ["command_errors.slope"], t.gain),
+            (((name, "gain"), 1.0),),
+            leg,
         )
     if e.law is not None and not e.law.cubic and not e.law.knots:
         group = "drive compliance" if e.actuated else "link compliance"
-        yield _relative(name, leg, group, "compliance", given.law(name, e, t.compliance))
+        yield _relative(
+            name,
+            leg,
+            group,
+            "compliance",
+            given.single(name, ["stiffness", "law.stiffness"], t.compliance, e.law.stiffness),
+        )
 
 
 def _frame(

@@ -104,7 +104,15 @@ def budgets(
     predictor = Predictor(machine, experiment)
     scale = np.array([p.scale for _, p in fitted(machine.description, found.terms)])
     inverse = np.linalg.pinv(found.jacobian * scale) * scale[:, None]
-    shifts = [(name, u, inverse @ move) for name, u, move in _moves(machine, predictor, found, others)]
+    shifts = []
+    for term, given in others:
+        parameters = [p for _, p in fitted(machine.description, (term,)) if p.name in given]
+        unknown = set(given) - {p.name for p in parameters}
+        if unknown:
+            raise StiffmapError(f"budget: {term.kind} has no number '{sorted(unknown)[0]}' at this place")
+        moved = slopes(predictor, (*found.terms, term), [(len(found.terms), p) for p in parameters])
+        for p, move in zip(parameters, found.problem.white(moved).T, strict=True):
+            shifts.append((f"{term.kind} of {term.element}: {p.name}", float(given[p.name]), inverse @ move))
     form = float(np.sqrt(max(0.0, found.misfit**2 - 1.0)))
     freedom = float(max(found.freedom, 1))
     out = []
@@ -115,29 +123,6 @@ def budgets(
             lines.append(Line("misfit beyond noise", "model form", form * sigma, freedom))
         lines += [Line(source, "B", abs(u * float(s[k])), float("inf")) for source, u, s in shifts]
         out.append(Budget(name, unit, float(value), tuple(lines)))
-    return out
-
-
-def _moves(
-    machine: Machine,
-    predictor: Predictor,
-    found: Estimate,
-    others: Sequence[tuple[AppliedEffect, Mapping[str, float]]],
-) -> list[tuple[str, float, Floats]]:
-    """Name, standard uncertainty and whitened change of the readings per unit, of numbers that were not fitted."""
-    out = []
-    for term, given in others:
-        parameters = [p for p in fitted(machine.description, (term,)) if p[1].name in given]
-        unknown = set(given) - {p.name for _, p in parameters}
-        if unknown:
-            raise StiffmapError(f"budget: {term.kind} has no number '{sorted(unknown)[0]}' at this place")
-        moved = [(len(found.terms), p) for _, p in parameters]
-        columns = found.problem.white(slopes(predictor, (*found.terms, term), moved))
-        names = [p.name for _, p in parameters]
-        out += [
-            (f"{term.kind} of {term.element}: {n}", float(given[n]), c)
-            for n, c in zip(names, columns.T, strict=True)
-        ]
     return out
 
 

@@ -12,13 +12,23 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from os import PathLike
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from stiffmap.common.broadcasting import Floats, one_of, random_numbers, whole_number
+from stiffmap.common.broadcasting import (
+    Floats,
+    one_of,
+    random_numbers,
+    trailing,
+    whole_number,
+    wrench_array,
+)
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.short import short_repr
+from stiffmap.experiment.calls import Effects, as_experiment, effects_of
 from stiffmap.experiment.experiment import PER_ROW, Experiment
 from stiffmap.experiment.virtual.plans import load_set, plan_of_poses, random_poses
 from stiffmap.identification.planning.estimate import Estimate, estimate, fitted
@@ -30,8 +40,9 @@ from stiffmap.identification.planning.information import (
     of_map,
 )
 from stiffmap.model.description import AppliedEffect
+from stiffmap.model.files.load import Source
 from stiffmap.solve.kinematics import inverse_kinematics
-from stiffmap.solve.machine import Machine
+from stiffmap.solve.machine import Machine, as_machine
 from stiffmap.solve.status import Flag
 
 AIMS = ("identify", "separate", "map")
@@ -70,64 +81,79 @@ class Design:
         }
 
 
-def design(
-    machine: Machine,
-    terms: Sequence[AppliedEffect],
+def plan(
+    machine: Machine | Source,
+    identify: Effects,
     *,
-    rows: int,
-    aim: str = "identify",
-    rival: Sequence[AppliedEffect] = (),
+    rows: int = 12,
+    rival: Effects = (),
+    aim: str | None = None,
     quantity: str = "deflection",
     poses: int = 60,
     force: float = 400.0,
-    candidates: Experiment | None = None,
-    at: Floats | None = None,
-    load: Floats | None = None,
+    candidates: Experiment | str | PathLike[str] | None = None,
+    position: ArrayLike | None = None,
+    wrench: ArrayLike | None = None,
     frame: str = "known",
     tool: str = "known",
     axes: Sequence[str] = ("dx", "dy", "dz"),
     noise: float | None = None,
     seed: int = 0,
-    done: Experiment | None = None,
+    done: Experiment | str | PathLike[str] | None = None,
 ) -> Design:
-    """The `rows` candidate rows that are most informative on the numbers in `terms`.
+    """Which poses, loads and readings are most informative, before the instrument is booked.
 
     Parameters
     ----------
-    terms, rival
-        Effects with the values at which they are to be identified; the rival's numbers are fitted away.
+    identify
+        Effects whose numbers are wanted, at the values given: ``"compliance actuator x scale=1"``, or records.
+    rows
+        Number of rows to measure.
+    rival
+        Another explanation, to be distinguished from `identify`; its numbers are fitted away.
     aim
-        ``identify``, ``separate`` (needs `rival`) or ``map`` (at the poses `at` (m, 3) under the wrench `load`
-        (6,); None: the workspace's corners, under `force` along x).
+        ``identify`` (D-optimal), ``separate`` (needs `rival`), ``map`` (the map at the workpiece); None: ``separate`` where there
+        is a rival, else ``identify``.
+    position, wrench
+        With the aim ``map``: poses of the workpiece (m, 3) m and the wrench (6,) N, N·m there; None: corners of the
+        workspace, `force` along x.
     candidates
-        Rows to choose from, each at most once; None: `poses` random poses of the workspace, for deflections
-        under ± `force` along x, y, z. Rows out of reach or beyond a drive's range are left out.
+        Rows to choose from, each at most once: an experiment, its folder or file; None: `poses` random poses of the workspace, for
+        deflections under ± `force` (N) along x, y, z. Rows out of reach or beyond a drive's range are left out.
     frame, tool
         What the instrument leaves unknown, as in an experiment file.
     noise
         One standard deviation of a reading, m; None: 3 µm for deflections, 8 µm for positions.
     done
-        Rows that have been measured already: their information counts.
+        Rows that have been measured already, given as `candidates`: their information counts.
 
-    Raises
-    ------
-    StiffmapError
-        For bad input.
+    Returns a `Design`: its `experiment` holds the rows, `sigma` (k,) the expected standard uncertainties (SI).
+    Raises StiffmapError for bad input.
     """
+    machine = as_machine(machine)
+    terms, others = tuple(effects_of(machine, identify)), tuple(effects_of(machine, rival))
+    if not terms:
+        raise StiffmapError("identify: expected at least one effect, got none")
+    aim = ("separate" if others else "identify") if aim is None else aim
+    pool = None if candidates is None else as_experiment(candidates)
+    measured = None if done is None else as_experiment(done)
+    at = None if position is None else trailing(position, (3,), "position", "positions (m)").reshape(-1, 3)
+    load = None if wrench is None else wrench_array(wrench)
     one_of(aim, AIMS, "aim")
-    if aim == "separate" and not rival:
+    if aim == "separate" and not others:
         raise StiffmapError("rival: separating two explanations needs the other one")
     whole_number(rows, "rows", 1)
     one_of(frame, UNKNOWN, "frame")
     one_of(tool, UNKNOWN, "tool")
-    if candidates is None:
+    if pool is None:
         where, loads = random_poses(machine, poses, seed), load_set("axes", [force])
-        candidates = plan_of_poses(machine, quantity, where, loads, axes=axes, noise=noise)
-    pool = replace(in_limits(machine, candidates), frame=frame, tool=tool)
-    old = 0 if done is None else len(done)
-    both = pool if done is None else _numbered(joined(replace(done, frame=frame, tool=tool), pool))
-    each = Information(machine, both, tuple(terms), tuple(rival) if aim == "separate" else ())
-    weight = map_weight(machine, tuple(terms), at, load, force) if aim == "map" else None
+        pool = plan_of_poses(machine, quantity, where, loads, axes=axes, noise=noise)
+    both, old = replace(in_limits(machine, pool), frame=frame, tool=tool), 0
+    if measured is not None:
+        old = len(measured)
+        both = _numbered(joined(replace(measured, frame=frame, tool=tool), both))
+    each = Information(machine, both, terms, others if aim == "separate" else ())
+    weight = map_weight(machine, terms, at, load, force) if aim == "map" else None
 
     def value(m: Floats) -> Floats:
         return information_of(m, each.wanted) if weight is None else of_map(m, weight)
@@ -186,8 +212,8 @@ def follow(
     data: Experiment | None = None
     now = tuple(terms)
     while data is None or len(data) < most:
-        plan = design(machine, now, rows=batch, done=data, seed=seed + len(found), **options)  # type: ignore[arg-type]
-        new = measure(plan.experiment)
+        chosen = plan(machine, now, rows=batch, done=data, seed=seed + len(found), **options)  # type: ignore[arg-type]
+        new = measure(chosen.experiment)
         data = new if data is None else _numbered(joined(data, new))
         result = estimate(machine, data, now)
         found.append((len(data), result))
@@ -201,15 +227,15 @@ def follow(
 OFF_LIMITS = Flag.DRIVE_RANGE | Flag.JOINT_LIMIT
 
 
-def in_limits(machine: Machine, plan: Experiment) -> Experiment:
+def in_limits(machine: Machine, rows: Experiment) -> Experiment:
     """Rows whose pose is within reach and limits."""
-    if plan.command is not None:
-        return plan
-    at = inverse_kinematics(machine, plan.position, plan.rotation)
+    if rows.command is not None:
+        return rows
+    at = inverse_kinematics(machine, rows.position, rows.rotation)
     good = np.isfinite(at.position).all(axis=1) & ((at.flags & OFF_LIMITS) == 0)
     if not good.any():
         raise StiffmapError(f"{machine.name}: no candidate pose is within the drives' range")
-    return plan.rows(np.asarray(good))
+    return rows.rows(np.asarray(good))
 
 
 def joined(a: Experiment, b: Experiment) -> Experiment:

@@ -14,7 +14,7 @@ from stiffmap.experiment.noise.level import noise_of
 from stiffmap.experiment.noise.whitening import Problem
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.identification.candidates.candidates import words
-from stiffmap.identification.candidates.slopes import step_of
+from stiffmap.identification.candidates.sensitivity import step_of
 from stiffmap.identification.inference.optimum import covariance, optimum
 from stiffmap.model import effects
 from stiffmap.model.description import AppliedEffect, MachineDescription

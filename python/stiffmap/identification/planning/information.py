@@ -1,7 +1,4 @@
-"""What every candidate row adds: information matrices of wanted numbers and of all that is unknown next to them.
-
-Rows are taken one after the other, then exchanged while that gains (V. V. Fedorov, Theory of Optimal Experiments, 1972).
-"""
+"""What every candidate row adds: information matrices of wanted numbers and of all that is unknown next to them."""
 
 from __future__ import annotations
 

@@ -53,10 +53,11 @@ class Explained:
     chi2: float
     """Of all readings by their noise, and of the uncertain numbers by their uncertainty."""
     statics: float | None = None
-    """First parameter by static readings alone, and by frequencies alone, each with its u; None: not both were there."""
-    u_statics: float | None = None
+    """Parameter by static readings alone; None: not both were there."""
     taps: float | None = None
-    u_taps: float | None = None
+    """The same by frequencies alone."""
+    disagreement: float | None = None
+    """Standard deviations between the two."""
     machine: Machine | None = field(default=None, repr=False)
     off: Floats | None = field(default=None, repr=False)
     """Uncertain numbers of the fit, in standard uncertainties."""
@@ -65,13 +66,6 @@ class Explained:
     def candidate(self) -> str:
         """Kind, element and legs in words."""
         return str(self.place)
-
-    @property
-    def disagreement(self) -> float | None:
-        """Standard deviations between statics and frequencies."""
-        if self.statics is None or self.taps is None or self.u_statics is None or self.u_taps is None:
-            return None
-        return abs(self.statics - self.taps) / float(np.hypot(self.u_statics, self.u_taps))
 
 
 @dataclass(frozen=True)
@@ -252,10 +246,7 @@ def _both(problem: Problem, best: Explained) -> Explained:
     if one is None or two is None:
         return best
     name = best.place.parameters[0].name
+    a, b = one.parameters[name], two.parameters[name]
     return replace(
-        best,
-        statics=one.parameters[name],
-        u_statics=one.u[name],
-        taps=two.parameters[name],
-        u_taps=two.u[name],
+        best, statics=a, taps=b, disagreement=abs(a - b) / float(np.hypot(one.u[name], two.u[name]))
     )

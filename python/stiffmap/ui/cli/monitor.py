@@ -9,7 +9,7 @@ from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.json_text import parse_json
 from stiffmap.experiment import load_experiment
 from stiffmap.identification.planning.budget import budgets
-from stiffmap.identification.planning.calls import monitor
+from stiffmap.identification.planning.changes import monitor
 from stiffmap.model.description import AppliedEffect
 from stiffmap.solve.machine import load_machine
 from stiffmap.ui.cli import options

@@ -16,8 +16,7 @@ from stiffmap.common.outputs.option import written
 from stiffmap.experiment import simulate
 from stiffmap.experiment.calls import effects_of
 from stiffmap.experiment.files.save import plan_columns
-from stiffmap.identification.planning import Design, Estimate, follow
-from stiffmap.identification.planning.calls import plan as design
+from stiffmap.identification.planning import Design, Estimate, follow, plan
 from stiffmap.identification.planning.estimate import fitted
 from stiffmap.solve.machine import Machine, load_machine
 from stiffmap.ui.cli import options
@@ -87,7 +86,7 @@ def command(
         _sequential(m, identify or (), twin, until, rows, how, as_json)
         return
     workpiece = np.array([MM * numbers(t, "at", 3) for t in at]) if at else None
-    found = design(m, identify or (), rows=rows, aim=aim, rival=rival or (), position=workpiece, **how)
+    found = plan(m, identify or (), rows=rows, aim=aim, rival=rival or (), position=workpiece, **how)
     if output is not None:
         columns = plan_columns(found.experiment)
         write_rows(output, list(columns), zip(*columns.values(), strict=True))

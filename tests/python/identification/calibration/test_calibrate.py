@@ -15,7 +15,7 @@ from stiffmap.experiment import Experiment, Predictor, random_plan, save_experim
 from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.noise.whitening import Problem
 from stiffmap.identification.calibration import calibrate
-from stiffmap.identification.calibration.table import independent
+from stiffmap.identification.calibration.calibrate import independent
 from stiffmap.identification.inference.corrected import corrected
 from stiffmap.identification.inference.covariance import Covariance
 from stiffmap.identification.inference.readings import Readings

@@ -14,7 +14,7 @@ from stiffmap.experiment.channels import Channel
 from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.prediction.nearby import Near, Nearby
 from stiffmap.identification.candidates.candidates import Candidate, candidates
-from stiffmap.identification.candidates.slopes import Slopes, step_of
+from stiffmap.identification.candidates.sensitivity import Slopes, step_of
 from stiffmap.model.description import Block, Branch, Point, Spring
 from stiffmap.model.effects import Parameter
 

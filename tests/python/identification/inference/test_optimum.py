@@ -10,7 +10,7 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment import Predictor
 from stiffmap.experiment.calls import placed
 from stiffmap.identification.inference.optimum import covariance, differences, optimum
-from stiffmap.identification.planning import design
+from stiffmap.identification.planning import plan as design
 from stiffmap.identification.planning.estimate import fitted, slopes, values_of, with_values
 
 WIDE = (np.full(3, -np.inf), np.full(3, np.inf))

@@ -11,8 +11,9 @@ import pytest
 import stiffmap as sm
 from stiffmap.experiment import Predictor, simulate
 from stiffmap.experiment.calls import placed
-from stiffmap.identification.planning import design, estimate, follow
-from stiffmap.identification.planning.monitor import compare
+from stiffmap.identification.planning import estimate, follow
+from stiffmap.identification.planning import plan as design
+from stiffmap.identification.planning.changes import monitor as compare
 from stiffmap.machining.compensation import compensate
 from stiffmap.ui.cli.app import main
 
@@ -87,7 +88,7 @@ def test_rivals_are_told_apart_better_than_at_random(orthoglide: sm.Machine) -> 
 
 def test_the_map_is_made_certain(orthoglide: sm.Machine) -> None:
     terms = [placed(orthoglide, f"compliance actuator {leg} scale=1") for leg in "xyz"]
-    plan = design(orthoglide, terms, rows=5, poses=12, aim="map", at=np.array([[0.1, 0.1, 0.0]]))
+    plan = design(orthoglide, terms, rows=5, poses=12, aim="map", position=np.array([[0.1, 0.1, 0.0]]))
     assert plan.value < plan.random_value
 
 

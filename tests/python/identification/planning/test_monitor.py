@@ -12,8 +12,8 @@ import stiffmap as sm
 from stiffmap.experiment import random_plan, save_experiment, simulate
 from stiffmap.experiment.calls import placed
 from stiffmap.identification.planning.budget import Budget, Line, budgets, iso_230_2, iso_9283
+from stiffmap.identification.planning.changes import monitor as compare
 from stiffmap.identification.planning.estimate import estimate
-from stiffmap.identification.planning.monitor import compare
 from stiffmap.ui.cli.app import main
 
 

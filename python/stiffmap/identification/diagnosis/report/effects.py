@@ -46,15 +46,13 @@ def _effect(
     evidence: dict[str, float],
 ) -> Effect:
     c = term.candidate
-    scale = np.array([p.scale for p in c.parameters])
-    low, high = term.bounds
+    scale = np.array([[p.scale] for p in c.parameters])
+    low, high = (side[:, None] for side in term.bounds)
     ends = np.stack([term.values - WIDE * sd, term.values + WIDE * sd], axis=1)
-    inside = np.clip(ends, low[:, None], high[:, None])
-    limits, values = inside * scale[:, None], term.values * scale
-    parameters = {
-        p.name: (float(v), float(a), float(b), p.unit)
-        for p, v, (a, b) in zip(c.parameters, values, limits, strict=True)
-    }
+    inside = np.clip(ends, low, high)
+    rows = np.column_stack([term.values, inside]) * scale
+    named = zip(c.parameters, rows.tolist(), strict=True)
+    parameters = {p.name: (v, a, b, p.unit) for p, (v, a, b) in named}
     cut = [
         f"{p.name} {side}"
         for p, e, i in zip(c.parameters, ends, inside, strict=True)
@@ -65,7 +63,7 @@ def _effect(
         c.kind,
         c.element,
         c.legs,
-        parameters | _derived(description, c, np.column_stack([values, limits])),
+        parameters | _derived(description, c, rows),
         [as_place(a) for a in aliases],
         evidence,
         definition(c),
@@ -125,7 +123,5 @@ def _sizes(columns: Columns, fit: Fit, place: Place, needed: float) -> dict[str,
             return dict.fromkeys((p.name for p in linear), None)
         with np.errstate(divide="ignore"):
             each.append(needed / np.linalg.norm(white, axis=0))
-    out: dict[str, float | None] = {}
-    for p, size in zip(linear, np.median(each, axis=0), strict=True):
-        out[p.name] = float(size) * p.scale if float(size) < reach(p) else None
-    return out
+    sizes = zip(linear, np.median(each, axis=0).tolist(), strict=True)
+    return {p.name: size * p.scale if size < reach(p) else None for p, size in sizes}

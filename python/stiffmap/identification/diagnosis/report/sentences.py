@@ -64,12 +64,8 @@ def sentence(e: Effect) -> str:
 
 def _compared(e: Effect, more: str, less: str) -> str:
     scale = e.parameters["scale"][0]
-    how = (
-        f"{scale:.2f} times as {more} as in your file"
-        if scale >= 1
-        else f"{1 / scale:.2f} times as {less} as in your file"
-    )
-    head = f"{_upper(place(e))} is {how}"
+    how = f"{scale:.2f} times as {more}" if scale >= 1 else f"{1 / scale:.2f} times as {less}"
+    head = f"{_upper(place(e))} is {how} as in your file"
     if "value" not in e.parameters:
         return f"{head}: scale {measured(*e.parameters['scale'])}"
     value, low, high, unit = e.parameters["value"]
@@ -137,12 +133,9 @@ def _of_machine(d: Any, verdict: str) -> str:
         return f"The diagnosis was stopped before it found anything ({size})."
     if verdict == "none":
         return f"The machine agrees with its file within what these readings can show ({size})."
-    if verdict == "unattributed" and d.stopped:
-        return f"The machine differs from its file ({size}), and nothing that was tried explains how."
     if verdict == "unattributed":
-        return (
-            f"The machine differs from its file ({size}), and no single cause known to stiffmap explains how."
-        )
+        nothing = "nothing that was tried" if d.stopped else "no single cause known to stiffmap"
+        return f"The machine differs from its file ({size}), and {nothing} explains how."
     if verdict == "ambiguous":
         return f"The readings are explained by more than one cause. First of them: {named}."
     rest = " Part of the difference remains unexplained." if "unattributed" in verdict else ""

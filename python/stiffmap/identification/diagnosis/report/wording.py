@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from stiffmap.common.number_text import percent, with_uncertainty, within
@@ -31,7 +29,7 @@ def five_lines(d: Findings) -> list[str]:
     """Verdict, effects, before and after, noise, and what could not be seen; then the calibration, if any."""
     return [
         f"verdict: {d.verdict} - {VERDICTS[d.verdict]}",
-        *(f"readings: {s.check}: {s.seen}{_undone(s)}{_also(s)}" for s in d.slips),
+        *(f"readings: {_slip(s)}" for s in d.slips),
         "effects: " + ("; ".join(effect_text(e) for e in d.effects) or "none") + _others(d),
         *(f"number: {number_text(n)}" for n in (d.calibration.beyond if d.calibration else ())[:LISTED]),
         f"held-out readings: rms {_thousandth(*d.before.size)} before, {_thousandth(*d.after.size)} after "
@@ -42,13 +40,10 @@ def five_lines(d: Findings) -> list[str]:
     ]
 
 
-def _undone(s: Slip) -> str:
-    evidence = f"; {'; '.join(s.evidence)}" if s.evidence else ""
-    return f"{evidence}; what follows is of readings with it undone" if s.undone else evidence
-
-
-def _also(s: Slip) -> str:
-    return "".join(f"; or {a}: these readings cannot determine which" for a in s.also)
+def _slip(s: Slip) -> str:
+    undone = ["what follows is of readings with it undone"] if s.undone else []
+    also = [f"or {a}: these readings cannot determine which" for a in s.also]
+    return "; ".join([f"{s.check}: {s.seen}", *s.evidence, *undone, *also])
 
 
 def noise_size(d: Findings) -> float:
@@ -77,7 +72,9 @@ def _more(d: Findings) -> list[str]:
         out.append(f"declared numbers: {d.calibration.verdict}")
     out += [f"not named: {why}" for why in d.refused]
     if d.stopped:
-        out.append("stopped early: this is the best so far" + _not_tried(d.not_tried))
+        more = f" and {len(d.not_tried) - LISTED} more" if len(d.not_tried) > LISTED else ""
+        what = f"; not tried: {'; '.join(d.not_tried[:LISTED])}{more}" if d.not_tried else ""
+        out.append(f"stopped early: this is the best so far{what}")
     return out
 
 
@@ -97,11 +94,6 @@ def number_text(n: Number) -> str:
     return f"{n.name}: {off} {'' if label == '1' else label} off ({many:.2g} standard uncertainties)".replace(
         "  ", " "
     )
-
-
-def _not_tried(what: Sequence[str]) -> str:
-    more = f" and {len(what) - LISTED} more" if len(what) > LISTED else ""
-    return f"; not tried: {'; '.join(what[:LISTED])}{more}" if what else ""
 
 
 def digits(factor: float, value: float, low: float, high: float) -> list[str]:
@@ -129,11 +121,7 @@ def separation_text(s: Separation) -> str:
     """Where, load, axis, how many."""
     where = ", ".join(f"{1e3 * v:.0f}" for v in s.position)
     load = ", ".join(f"{v:.0f}" for v in s.force)
-    many = (
-        f"{s.readings} reading{'s' if s.readings != 1 else ''}"
-        if s.readings
-        else "no sensible number of readings"
-    )
+    many = f"{s.readings or 'no sensible number of'} reading{'s' if s.readings != 1 else ''}"
     gap = f"{1e3 * s.difference:.4f} mm"
     return f"read {s.axis} at ({where}) mm under force ({load}) N: they differ by {gap}, {many}"
 

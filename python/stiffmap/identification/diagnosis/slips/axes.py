@@ -137,10 +137,7 @@ def shifts(e: Experiment, base: Floats) -> Iterator[Hypothesis]:
     n, where = len(e), _coordinates(e)
     for step in steps(e):
         there = np.roll(base + where, step, axis=0)
-        keep = np.ones(n, bool)
-        keep[:step] = False if step > 0 else keep[:step]
-        if step < 0:
-            keep[step:] = False
+        keep = np.arange(n) >= step if step > 0 else np.arange(n) < n + step
         way = "below" if step > 0 else "above"
         many = "one row" if abs(step) == 1 else f"{abs(step)} rows"
         yield Hypothesis("shift", f"each reading stands {many} {way} its pose and load",

@@ -78,15 +78,14 @@ class Screen:
 
     def gain(self, residual: Floats) -> float:
         """What the best part takes from chi-square of a residual (N,), its strengths within their bounds."""
-        along = [s.directions.T @ residual for s in self.shapes]
-        gains = np.array(
-            [
-                a @ a if not s.sign or s.sign * a[0] > 0.0 else 0.0
-                for s, a in zip(self.shapes, along, strict=True)
-            ]
-        )
+        along = [(s.sign, s.directions.T @ residual) for s in self.shapes]
+        gains = np.array([a @ a if not sign or sign * a[0] > 0.0 else 0.0 for sign, a in along])
         best = (k for k in np.argsort(-gains) if self._is_possible(self.shapes[k].variant, residual))
         return float(gains[k]) if (k := next(best, None)) is not None else 0.0
+
+    def left(self, residual: Floats) -> float:
+        """Chi-square that the best part leaves of a residual (N,)."""
+        return float(residual @ residual) - self.gain(residual)
 
     def _is_possible(self, v: Variant, residual: Floats) -> bool:
         """Whether the strengths that explain most are within the bounds of their parameters."""
@@ -97,38 +96,22 @@ class Screen:
         return all(p.lower <= x <= p.upper for p, x in v.candidate.strengths(np.asarray(strengths)))
 
 
-@dataclass(frozen=True, eq=False)
 class Readings:
-    """The first rows of an experiment, and what each single part of the machine would change in them."""
+    """The first rows of an experiment, at most `ROWS`, and what each single part of the machine would change in them.
 
-    predictor: Predictor
-    plan: Plan
-    base: Floats
-    """(n, c) prediction of the declared machine."""
-    sigma: Floats
-    """(n, c) noise of readings that do not stand alone."""
-    least: Floats
-    """(n, c) the least noise of rows that may be shifted."""
+    base (n, c) is the prediction of the declared machine, sigma (n, c) the noise of readings that do not stand alone, least (n, c)
+    that of rows that may be shifted, all in m or rad; problem: the readings in noise sigma.
+    """
 
-    @staticmethod
-    def of(predictor: Predictor, plan: Plan) -> Readings:
-        """Of at most `ROWS` rows."""
+    def __init__(self, predictor: Predictor, plan: Plan) -> None:
         e = predictor.experiment
         noise, _ = without_suspects(e, plan.base)
         if len(e) > ROWS:
             part = e.rows(np.arange(ROWS))
             predictor = Predictor(predictor.machine, part, threads=predictor.threads)
-        return Readings(predictor, plan, plan.base[:ROWS], noise.sigma[:ROWS], quiet(e, noise)[:ROWS])
-
-    @property
-    def experiment(self) -> Experiment:
-        """Its rows that are judged."""
-        return self.predictor.experiment
-
-    @cached_property
-    def problem(self) -> Problem:
-        """In the noise of readings that do not stand alone."""
-        return Problem.of(self.experiment, self.sigma, self.base)
+        self.predictor, self.plan, self.experiment = predictor, plan, predictor.experiment
+        self.base, self.sigma, self.least = plan.base[:ROWS], noise.sigma[:ROWS], quiet(e, noise)[:ROWS]
+        self.problem = Problem.of(self.experiment, self.sigma, self.base)
 
     @cached_property
     def screen(self) -> Screen:
@@ -143,7 +126,7 @@ def find_slip(predictor: Predictor, plan: Plan) -> Found | None:
     plain = whole.frame != "unknown" and whole.tool != "unknown" and whole.seen is None and not whole.absolute
     if not plain or not np.isfinite(plan.base[whole.read]).any():
         return None
-    s = Readings.of(predictor, plan)
+    s = Readings(predictor, plan)
     e, sigma = s.experiment, s.least
     problem = Problem.of(e, sigma, s.base)
     misfit = problem.residual(s.base)
@@ -153,41 +136,26 @@ def find_slip(predictor: Predictor, plan: Plan) -> Found | None:
     judged = [j for j in _judged(s, problem) if j.beside < LEFT]
     if not judged:
         return None
-    slack = max(SAME * min(j.beside for j in judged), 3.0 * (2.0 * problem.freedom) ** 0.5 / of)
     best = min(j.beside for j in judged)
-    near = sorted(
-        (j for j in judged if j.beside <= best + slack), key=lambda j: (j.hypothesis.changes, j.left)
-    )
-    first = near[0]
+    slack = max(SAME * best, 3.0 * (2.0 * problem.freedom) ** 0.5 / of)
+    alike = (j for j in judged if j.beside <= best + slack)
+    first, *others = sorted(alike, key=lambda j: (j.hypothesis.changes, j.left))
     h = first.hypothesis
     # shifted rows look like noise where they are repeats: of that the noise of the readings holds too much
     noise = float(np.nanmedian((sigma / s.sigma) ** 2))
-    if (h.physical or h.kind != "factor") and first.beside > BETTER * best_part(
-        s, noise * problem.freedom
-    ) - slack:
+    possible = h.physical or h.kind != "factor"
+    if possible and first.beside > BETTER * best_part(s, noise * problem.freedom) - slack:
         return None
-    same = dict.fromkeys(
-        j.hypothesis.check
-        for j in near[1:]
-        if j.hypothesis.changes <= h.changes and j.hypothesis.check != h.check
-    )
+    also = (j.hypothesis.check for j in others if j.hypothesis.changes <= h.changes)
+    same = tuple(dict.fromkeys(check for check in also if check != h.check))[:3]
     after = h.undo(whole) if h.undo else whole
-    slip = Slip(
-        h.kind,
-        h.seen,
-        h.check,
-        tuple(same)[:3],
-        first.left,
-        h.undo is not None,
-        _evidence(whole, after),
-        h.factor,
-    )
-    return Found(slip, after)
+    undone, evidence = h.undo is not None, _evidence(whole, after)
+    return Found(Slip(h.kind, h.seen, h.check, same, first.left, undone, evidence, h.factor), after)
 
 
 def _judged(s: Readings, problem: Problem) -> Iterator[Judged]:
     """Mistakes that take away enough to be one, jointly with a fault that the machine may have as well."""
-    for h in _all(s, problem):
+    for h in _hypotheses(s, problem):
         left = _left(h, problem)
         if left < MOST:
             yield Judged(h, left, min(left, _beside(s, h)))
@@ -207,8 +175,7 @@ def _beside(s: Readings, h: Hypothesis) -> float:
     misfit = problem.residual(s.base)
     residual = problem.white(np.nan_to_num(gap))
     scale = 1.0 if h.factor is None else abs(h.factor)
-    left = scale**2 * (float(residual @ residual) - s.screen.gain(residual))
-    return _excess(left, float(misfit @ misfit), problem.freedom)
+    return _excess(scale**2 * s.screen.left(residual), float(misfit @ misfit), problem.freedom)
 
 
 def _excess(left: float, of: float, freedom: float) -> float:
@@ -228,20 +195,16 @@ def quiet(e: Experiment, noise: Noise) -> Floats:
     return np.asarray(noise.sigma * np.where(noise.floor > 0, least / noise.floor, 1.0))
 
 
-def _all(s: Readings, problem: Problem) -> Iterator[Hypothesis]:
+def _hypotheses(s: Readings, problem: Problem) -> Iterator[Hypothesis]:
+    """All mistakes that are tried; of positions only where rows have poses of their own."""
     e = s.experiment
-    if e.quantity == "deflection" or _orthogonal(e):
+    if e.quantity == "deflection" or (e.command is None and int(e.groups.max()) > 0):
         yield from gauges(e, s.base)
         yield from shifts(e, s.base)
     if e.quantity == "deflection":
         yield from factors(e, problem, s.base, partial(left_beside, s))
         if e.wrench[:, :3].any():
             yield from loads(s.predictor)
-
-
-def _orthogonal(e: Experiment) -> bool:
-    """Whether rows have poses of their own."""
-    return e.command is None and int(e.groups.max()) > 0
 
 
 def _left(h: Hypothesis, problem: Problem) -> float:
@@ -258,22 +221,23 @@ def _left(h: Hypothesis, problem: Problem) -> float:
 def best_part(s: Readings, freedom: float) -> float:
     """Share of the misfit beyond noise that the best single part of the machine leaves."""
     residual = s.problem.residual(s.base)
-    of = float(residual @ residual)
-    return _excess(of - s.screen.gain(residual), of, freedom)
+    return _excess(s.screen.left(residual), float(residual @ residual), freedom)
 
 
 def left_beside(s: Readings, factor: float, axes: tuple[int, ...]) -> float:
     """Chi-square that the best single part of the machine leaves where some channels read `factor` times too much."""
     prediction = s.base.copy()
     prediction[:, axes] *= factor
-    residual = s.problem.residual(prediction)
-    return float(residual @ residual) - s.screen.gain(residual)
+    return s.screen.left(s.problem.residual(prediction))
 
 
 def _evidence(before: Experiment, after: Experiment) -> tuple[str, ...]:
-    """Reciprocity and linearity, which need no model, before and after."""
+    """Reciprocity and linearity, which need no model, before and after: rms over the noise."""
     out = []
-    first, second = _checks(before), _checks(after)
+    first, second = (
+        {c.name: c.rms for c in checks(e, e.reading, noise_of(e).sigma, np.ones(len(e), bool))}
+        for e in (before, after)
+    )
     for name in ("reciprocity", "linearity"):
         one, other = first.get(name, np.nan), second.get(name, np.nan)
         if not np.isfinite(one):
@@ -285,8 +249,3 @@ def _evidence(before: Experiment, after: Experiment) -> tuple[str, ...]:
             )
         out.append(text)
     return tuple(out)
-
-
-def _checks(e: Experiment) -> dict[str, float]:
-    """Rms of each check over the noise."""
-    return {c.name: c.rms for c in checks(e, e.reading, noise_of(e).sigma, np.ones(len(e), bool))}

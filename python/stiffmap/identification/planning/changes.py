@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
+from os import PathLike
 
 import numpy as np
 from scipy.linalg import block_diag, cholesky, solve_triangular
 from scipy.stats import chi2
 
 from stiffmap.common.broadcasting import Floats
+from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import with_uncertainty, within
 from stiffmap.common.short import short_repr
+from stiffmap.experiment.calls import Effects, as_experiment, effects_of
 from stiffmap.experiment.experiment import Experiment
 from stiffmap.experiment.noise.whitening import basis, readings_of
 from stiffmap.identification.inference.amplitudes import Fit, fitted
@@ -21,8 +23,8 @@ from stiffmap.identification.inference.kernels import Points, gaps
 from stiffmap.identification.inference.parts import Part
 from stiffmap.identification.planning.design import joined
 from stiffmap.identification.planning.estimate import Estimate, estimate
-from stiffmap.model.description import AppliedEffect
-from stiffmap.solve.machine import Machine
+from stiffmap.model.files.load import Source
+from stiffmap.solve.machine import Machine, as_machine
 
 MOST = 750
 """Readings of each experiment. Effort only: an (N, N) matrix is factorised."""
@@ -80,17 +82,29 @@ class Comparison:
         return "\n".join([f"{word} (p = {self.p:.2g})", *map(str, self.changes)])
 
 
-def compare(
-    machine: Machine, first: Experiment, second: Experiment, terms: Sequence[AppliedEffect]
+def monitor(
+    machine: Machine | Source,
+    before: Experiment | str | PathLike[str],
+    after: Experiment | str | PathLike[str],
+    effects: Effects,
 ) -> Comparison:
-    """Numbers of `terms` in two experiments: before and after, or one specimen and another.
+    """What changed between two experiments, or whether two machines of a type share their numbers.
 
-    Each is fitted on its own; differences are judged against what the model leaves of both: smooth gaps that they share and errors
-    of each pose, as large as the readings make likeliest, since neither is a change. Of more than some 1500 readings whole poses
-    are drawn.
-    Raises StiffmapError as `estimate` does.
+    before, after
+        Experiments, their folders or files.
+    effects
+        What is followed: its numbers are fitted to each experiment on its own.
+
+    Differences are judged against what the model leaves of both: smooth gaps that they share and errors of each pose, as large as
+    the readings make likeliest, since neither is a change. Of more than some 1500 readings whole poses are drawn.
+    Returns a `Comparison`: `changes` in SI with uncertainty and p-value each, `common` where one set of numbers serves both.
+    Raises StiffmapError for bad input.
     """
-    a, b = (estimate(machine, _some(e), terms) for e in (first, second))
+    machine = as_machine(machine)
+    terms = effects_of(machine, effects)
+    if not terms:
+        raise StiffmapError("effects: expected at least one effect to follow, got none")
+    a, b = (estimate(machine, _some(as_experiment(e)), terms) for e in (before, after))
     step, covariance = difference(machine, a, b)
     u = np.sqrt(np.diag(covariance))
     single = chi2.sf((step / u) ** 2, 1)
@@ -104,16 +118,9 @@ def compare(
     return Comparison(a, b, changes, float(chi2.sf(together, max(len(known), 1))))
 
 
-# The difference of fitted numbers between two experiments, judged against what their model leaves.
-#
-# That is no noise: it is smooth over the workspace, shared by the readings of a pose, and the same in both experiments where they
-# stand at the same poses. Both are fitted at once, each with numbers of its own, under the covariance of all gaps that a diagnosis
-# knows, as large as the readings make likeliest (docs/diagnosis.md).
-
-
 def difference(machine: Machine, a: Estimate, b: Estimate) -> tuple[Floats, Floats]:
-    """(k,) second minus first value, SI, and (k, k) its covariance; infinite variances of numbers that either does not
-    determine."""
+    """(k,) second minus first value, SI, and (k, k) its covariance; infinite variances of numbers that either does not determine. Both
+    are fitted at once, each with numbers of its own, under the covariance of all gaps that a diagnosis knows."""
     k = len(a.values)
     known = np.flatnonzero(np.isfinite(a.sigma) & np.isfinite(b.sigma))
     shift, covariance = b.values - a.values, np.diag(np.full(k, np.inf))
