@@ -252,9 +252,8 @@ def spectral(a: Floats) -> tuple[Floats, Floats]:
     """Largest singular value, and its dyad."""
     wide = a.shape[2] > a.shape[1]
     a = np.swapaxes(a, 1, 2) if wide else a
-    v = np.linalg.eigh(np.swapaxes(a, 1, 2) @ a)[1][
-        :, :, -1
-    ]  # quicker than svd, exact enough for the largest
+    # quicker than svd, exact enough for the largest
+    v = np.linalg.eigh(np.swapaxes(a, 1, 2) @ a)[1][:, :, -1]
     image = (a @ v[:, :, None])[:, :, 0]
     size = np.linalg.norm(image, axis=1)
     u = image / np.maximum(size, 1e-300)[:, None]
