@@ -14,6 +14,7 @@ from stiffmap.common.tasks import workers
 from stiffmap.machining.chatter.cut import GivenProcess, cut_axes, milling_process
 from stiffmap.machining.chatter.zero_order import FEED, TOOL, frequencies_of, least_depth
 from stiffmap.machining.process import Process
+from stiffmap.solve.labels import batch_dims
 from stiffmap.solve.machine import Machine, as_machine
 from stiffmap.solve.options import keywords_of
 from stiffmap.workspace.vibration.modes import TipModes, tip_modes
@@ -82,7 +83,7 @@ def vibration_map(
             rows = blocks[i]
             stiffness[rows], at[rows], way[rows], depth[rows] = some
     shape = p.shape[:-1]
-    dims = ("pose",) if len(shape) == 1 else tuple(f"pose_{i}" for i in range(len(shape)))
+    dims = batch_dims(len(shape))
     lowest = np.where(np.isfinite(found.rest[:, 0, 0]), found.frequency[:, 0], np.nan)
     values = {
         "lowest_frequency": (lowest, "Hz"),

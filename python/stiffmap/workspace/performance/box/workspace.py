@@ -129,7 +129,8 @@ def workspace_volume(
     kept = drawn.position[drawn.inside]
     box = np.stack([kept.min(axis=0), kept.max(axis=0)]) if len(kept) else np.full((2, 3), np.nan)
     with judge_on(bounds, scheduler) as judge:
-        proven = _proven(judge, bounds.unproven, drawn, low, high, axes, cells, prove)
+        provable = prove > 0 and not bounds.unproven and len(axes) == 3
+        proven = _proven(judge, drawn, low, (high - low) / cells, cells, prove) if provable else float("nan")
     return Workspace(
         volume=cell * float(pairs.mean(axis=1).sum()),
         error=cell * float(np.sqrt((pairs[:, 0] != pairs[:, 1]).sum() / 4)),
@@ -193,20 +194,8 @@ def _limiting(drawn: Judged) -> tuple[tuple[str, float], ...]:
     return tuple(sorted(found, key=lambda f: -f[1]))
 
 
-def _proven(
-    judge: Judge,
-    unproven: str,
-    drawn: Judged,
-    low: Floats,
-    high: Floats,
-    axes: list[int],
-    cells: int,
-    work: int,
-) -> float:
+def _proven(judge: Judge, drawn: Judged, low: Floats, step: Floats, cells: int, work: int) -> float:
     """Volume of the cells (halved where that decides) every pose of which was proven to keep the limits."""
-    if work <= 0 or unproven or len(axes) != 3:
-        return float("nan")
-    step = (high - low) / cells
     number = np.flatnonzero(drawn.inside.reshape(-1, 2).all(axis=1))
     corner = np.stack(np.unravel_index(number, (cells,) * 3), axis=1)
     a = low + corner * step
