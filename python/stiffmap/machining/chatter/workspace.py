@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from os import PathLike
 from typing import Any
 
@@ -15,6 +14,7 @@ from stiffmap.common.tasks import workers
 from stiffmap.machining.chatter.cut import GivenProcess, cut_axes, milling_process
 from stiffmap.machining.chatter.zero_order import FEED, TOOL, frequencies_of, least_depth
 from stiffmap.machining.process import Process
+from stiffmap.solve.labels import batch_dims
 from stiffmap.solve.machine import Machine, as_machine
 from stiffmap.solve.options import keywords_of
 from stiffmap.workspace.vibration.modes import TipModes, tip_modes
@@ -79,11 +79,11 @@ def vibration_map(
     blocks = [rows[np.isfinite(found.rest[rows, 0, 0])] for rows in blocks]
     blocks = [rows for rows in blocks if rows.size]
     with workers(_block, (f, axes, cut), scheduler=scheduler) as hands:
-        for i, some in hands.as_done(_only(found, rows) for rows in blocks):
+        for i, some in hands.as_done(found.only(rows) for rows in blocks):
             rows = blocks[i]
             stiffness[rows], at[rows], way[rows], depth[rows] = some
     shape = p.shape[:-1]
-    dims = ("pose",) if len(shape) == 1 else tuple(f"pose_{i}" for i in range(len(shape)))
+    dims = batch_dims(len(shape))
     lowest = np.where(np.isfinite(found.rest[:, 0, 0]), found.frequency[:, 0], np.nan)
     values = {
         "lowest_frequency": (lowest, "Hz"),
@@ -117,7 +117,7 @@ def _block(
     way = _real(np.linalg.eigh(at_peak.conj().transpose(0, 2, 1) @ at_peak)[1][:, :, -1])
     depth: Floats | float = np.nan
     if cut is not None:
-        depth = np.array([_limit(_only(some, here[i : i + 1]), axes, cut) for i in here])
+        depth = np.array([_limit(some.only(here[i : i + 1]), axes, cut) for i in here])
     return 1 / np.sqrt(largest[here, peak]), f[peak], way, depth
 
 
@@ -134,11 +134,6 @@ def _around(found: TipModes) -> Floats:
     if not each.size:
         return np.array([1.0, 10.0, 100.0])
     return np.geomspace(LOW * each.min(), HIGH * each.max(), POINTS)
-
-
-def _only(m: TipModes, rows: np.ndarray) -> TipModes:
-    arrays = ("square", "tip", "viscous", "loss", "rest", "unsymmetric", "status", "flags")
-    return replace(m, shape=(len(rows),), **{n: getattr(m, n)[rows] for n in arrays})
 
 
 def _real(v: np.ndarray) -> Floats:

@@ -101,44 +101,33 @@ def optimize(
     problem = design if isinstance(design, Design) else load_design(design)
     place = None if folder is None else Path(folder)
     with nullcontext() if place is None else only_job(make_folder(place)):
-        return _searched(problem, place, generations, processes, progress, scheduler)
-
-
-def _searched(
-    problem: Design,
-    place: Path | None,
-    generations: int | None,
-    processes: int | None,
-    progress: Progress | None,
-    scheduler: Any,
-) -> ParetoSet:
-    kept = Evaluations(problem, None if place is None else place / "evaluations.jsonl")
-    count = problem.model.search.generations
-    if generations is not None:
-        count = whole_number(generations, "generations", 1)
-    algorithm = _algorithm(problem, count)
-    history: list[tuple[int, int, float]] = []
-    seen: list[Floats] = []
-    measure: Any = None
-    with workers(judge, problem, scheduler=scheduler, processes=thread_count(processes)) as judges:
-        while algorithm.has_next():
-            asked = algorithm.ask()
-            x = np.ascontiguousarray(asked.get("X"), dtype=float)
-            todo = kept.missing(x)
-            kept.add(x[todo], judges.in_order(list(x[todo])))
-            judged = [kept.get(row) for row in x]
-            asked.set("F", np.array([j.objectives for j in judged]))
-            if problem.constraints:
-                asked.set("G", np.array([j.violations for j in judged]))
-            algorithm.tell(infills=asked)
-            seen.extend(x)
-            measure = measure or _hypervolume([kept.get(r) for r in seen])
-            good = [kept.get(r) for r in seen if feasible(kept.get(r))]
-            volume = float(measure(np.array([j.objectives for j in good]))) if good and measure else 0.0
-            history.append((len(history) + 1, len(seen), volume))
-            if progress is not None:
-                progress(len(history), len(seen), volume, len(good))
-    return _front(problem, np.unique(np.array(seen), axis=0), kept, history, len(seen))
+        kept = Evaluations(problem, None if place is None else place / "evaluations.jsonl")
+        count = problem.model.search.generations
+        if generations is not None:
+            count = whole_number(generations, "generations", 1)
+        algorithm = _algorithm(problem, count)
+        history: list[tuple[int, int, float]] = []
+        seen: list[Floats] = []
+        measure: Any = None
+        with workers(judge, problem, scheduler=scheduler, processes=thread_count(processes)) as judges:
+            while algorithm.has_next():
+                asked = algorithm.ask()
+                x = np.ascontiguousarray(asked.get("X"), dtype=float)
+                todo = kept.missing(x)
+                kept.add(x[todo], judges.in_order(list(x[todo])))
+                judged = [kept.get(row) for row in x]
+                asked.set("F", np.array([j.objectives for j in judged]))
+                if problem.constraints:
+                    asked.set("G", np.array([j.violations for j in judged]))
+                algorithm.tell(infills=asked)
+                seen.extend(x)
+                measure = measure or _hypervolume([kept.get(r) for r in seen])
+                good = [kept.get(r) for r in seen if feasible(kept.get(r))]
+                volume = float(measure(np.array([j.objectives for j in good]))) if good and measure else 0.0
+                history.append((len(history) + 1, len(seen), volume))
+                if progress is not None:
+                    progress(len(history), len(seen), volume, len(good))
+        return _front(problem, np.unique(np.array(seen), axis=0), kept, history, len(seen))
 
 
 def feasible(judged: Judged) -> bool:

@@ -66,23 +66,15 @@ class Evaluations:
 
     def add(self, x: Floats, judged: list[Judged]) -> None:
         """Keep, and write at once."""
+        lines: list[dict[str, Any]] = []
         for row, one in zip(x, judged, strict=True):
             self.known[row.tobytes()] = one
-        if self.path is None or not judged:
+            f, g = one.objectives.tolist(), one.violations.tolist()
+            lines.append({"x": row.tolist(), "f": f, "g": g, "values": one.values, "reason": one.reason})
+        if self.path is None or not lines:
             return
-        lines: list[dict[str, Any]] = (
-            [] if self.path.exists() and self.path.stat().st_size else [{"design": self.mark}]
-        )
-        for row, one in zip(x, judged, strict=True):
-            lines.append(
-                {
-                    "x": row.tolist(),
-                    "f": one.objectives.tolist(),
-                    "g": one.violations.tolist(),
-                    "values": one.values,
-                    "reason": one.reason,
-                }
-            )
+        if not (self.path.exists() and self.path.stat().st_size):
+            lines.insert(0, {"design": self.mark})
         add_lines(self.path, [json.dumps(line) for line in lines])
 
     def get(self, x: Floats) -> Judged:

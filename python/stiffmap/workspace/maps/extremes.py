@@ -182,7 +182,7 @@ def peak_angle(value: Floats, slope: Floats) -> Floats:
     count = value.shape[1]
     coefficients = dot(np.concatenate([value, slope], axis=1)[:, None, :], _fit(count)[None])
     c = np.where(np.isfinite(coefficients).all(axis=1, keepdims=True), coefficients, 0.0)
-    scan, degree = even_angles(SCAN), _degree(count)
+    scan, degree = even_angles(SCAN), min(count - 1, MAX_DEGREE)
     at = dot(c[:, None, :], _basis(scan, degree))
     # Of two peaks the higher one may lie between points of the scan, and the other on one: each is refined.
     pose, point = np.nonzero((at >= np.roll(at, 1, axis=1)) & (at >= np.roll(at, -1, axis=1)))
@@ -192,10 +192,6 @@ def peak_angle(value: Floats, slope: Floats) -> Floats:
     angle = np.empty(at.shape)
     angle[pose, point] = peak
     return np.take_along_axis(angle, np.argmax(height, axis=1)[:, None], axis=1)[:, 0]
-
-
-def _degree(count: int) -> int:
-    return min(count - 1, MAX_DEGREE)
 
 
 def _refined(c: Floats, angle: Floats, degree: int) -> Floats:
@@ -221,6 +217,6 @@ def _basis(angle: Floats, degree: int, order: int = 0) -> Floats:
 @lru_cache
 def _fit(count: int) -> NDArray[np.float64]:
     """Least-squares coefficients from values and slopes: (2 degree + 1, 2 count)."""
-    angle, degree = even_angles(count), _degree(count)
+    angle, degree = even_angles(count), min(count - 1, MAX_DEGREE)
     rows = np.concatenate([_basis(angle, degree), _basis(angle, degree, 1)])
     return np.asarray(np.linalg.pinv(rows))

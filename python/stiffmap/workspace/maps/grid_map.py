@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import ArrayLike
 
 from stiffmap.common.errors import FileError
 from stiffmap.common.outputs import needs_space, only_job
+from stiffmap.model.files.load import Source
 from stiffmap.solve.compiled import Status
-from stiffmap.solve.machine import Machine, hint_metres, takes_machine
+from stiffmap.solve.machine import Machine, as_machine, hint_metres
+from stiffmap.solve.options import keywords_of
 from stiffmap.workspace.maps.files import is_zarr, partial_folder, read_dataset, write_dataset
-from stiffmap.workspace.maps.inputs import POINTS
 from stiffmap.workspace.maps.plan import MapPlan, map_plan
 from stiffmap.workspace.maps.progress import track
 from stiffmap.workspace.maps.store import Store, folder_store, memory_store
@@ -25,34 +24,16 @@ from stiffmap.workspace.maps.tiles import Work, work_of
 from stiffmap.workspace.maps.zarr_map import open_zarr_map
 
 
-@takes_machine
+@keywords_of(map_plan)
 def error_map(
-    machine: Machine,
+    machine: Machine | Source,
     *,
-    x: ArrayLike | None = None,
-    y: ArrayLike | None = None,
-    z: ArrayLike | None = None,
-    points: int = POINTS,
-    wrench: ArrayLike | Mapping[str, ArrayLike] | None = None,
-    cases: Sequence[str] | None = None,
-    plane: str | None = "xy",
-    force: float | None = None,
-    directions: int = 4,
-    tolerance: float = 0.25e-3,
-    compliance: bool = False,
-    uncertainty: bool = False,
-    point: str = "tcp",
-    rotation: ArrayLike | None = None,
-    gravity: ArrayLike | None = None,
-    load_type: str = "dead",
-    method: str = "fast",
-    load_steps: int | str = "auto",
-    threads: int | None = None,
     chunk: int | None = None,
     progress: bool | None = None,
     out: str | PathLike[str] | None = None,
     resume: bool = False,
     scheduler: Any = None,
+    **call: Any,
 ) -> xr.Dataset:
     """How far the machine is pushed off its commanded position, over a grid of positions.
 
@@ -115,11 +96,8 @@ def error_map(
     FileError
         Where `out` cannot be written.
     """
-    plan = map_plan(
-        machine, x=x, y=y, z=z, points=points, wrench=wrench, cases=cases, plane=plane, force=force, directions=directions,
-        tolerance=tolerance, compliance=compliance, uncertainty=uncertainty, point=point, rotation=rotation,
-        gravity=gravity, load_type=load_type, method=method, load_steps=load_steps, threads=threads,
-    )  # fmt: skip
+    machine = as_machine(machine)
+    plan = map_plan(machine, **call)
     work = work_of(chunk, scheduler)
     if out is None:
         store = memory_store(plan)

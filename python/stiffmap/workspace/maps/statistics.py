@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from os import PathLike
 from typing import Any
 
@@ -131,7 +131,7 @@ class _Deflection:
         # A bin's upper edge may lie beyond the largest value.
         each = np.array([[h.percentiles(percentiles) for h in row] for row in self.histograms])
         each = np.fmin(each, self.most[..., None])
-        total = [Histogram.joined([row[c] for row in self.histograms]) for c in range(self.cases)]
+        total = [Histogram(*(row[c].count for row in self.histograms)) for c in range(self.cases)]
         both = np.fmin([h.percentiles(percentiles) for h in total], np.fmax.reduce(self.most)[:, None])
         of = f"of {name}"
         table = {
@@ -171,22 +171,14 @@ _SHIFT = 52 - BITS
 class Histogram:
     """Counts over bins that share a floating-point number's sign, exponent and leading bits."""
 
-    def __init__(self) -> None:
-        self.count: Counter[int] = Counter()
+    def __init__(self, *counts: Counter[int]) -> None:
+        self.count = sum(counts, Counter[int]())
 
     def add(self, values: Floats) -> None:
         """Count the values (n,), not negative; NaN are left out."""
         kept = np.ascontiguousarray(values[~np.isnan(values)], dtype=np.float64) + 0.0
         bins, counts = np.unique(kept.view(np.int64) >> _SHIFT, return_counts=True)
         self.count.update(dict(zip(bins.tolist(), counts.tolist(), strict=True)))
-
-    @classmethod
-    def joined(cls, parts: Iterable[Histogram]) -> Histogram:
-        """The counts of all."""
-        out = cls()
-        for part in parts:
-            out.count.update(part.count)
-        return out
 
     def percentiles(self, percent: Floats) -> Floats:
         """Upper edges of the bins that hold the values of rank ceil(p n / 100); NaN where nothing was counted."""

@@ -44,7 +44,7 @@ def map_table(ds: xr.Dataset) -> tuple[list[str], Iterator[list[Any]]]:
     for stem in ANGLES:
         columns |= {f"{n}, deg": np.degrees(v.values) for n, v in _like(full, stem) if v.ndim == 3}
     columns |= {f"{n}, N": v.values for n, v in _like(full, "force_limit")}
-    return list(columns), _rows(columns)
+    return list(columns), map(list, zip(*(_cells(n, np.ravel(v)) for n, v in columns.items()), strict=True))
 
 
 def _like(ds: xr.Dataset, stem: str) -> list[tuple[str, Any]]:
@@ -53,16 +53,11 @@ def _like(ds: xr.Dataset, stem: str) -> list[tuple[str, Any]]:
     return [(n, ds[n]) for n in names if not n.endswith("_std")]
 
 
-def _rows(columns: dict[str, Any]) -> Iterator[list[Any]]:
-    flat = {n: np.asarray(v).reshape(-1) for n, v in columns.items()}
-    for i in range(next(iter(flat.values())).size):
-        yield [_cell(n, v[i]) for n, v in flat.items()]
-
-
-def _cell(name: str, value: Any) -> Any:
+def _cells(name: str, values: Any) -> Iterator[Any]:
+    """Of one column (n,)."""
     if name.startswith("status"):
-        return Status(int(value)).name.lower()
-    return float(value) if np.isfinite(value) else None
+        return (Status(int(v)).name.lower() for v in values)
+    return (float(v) if np.isfinite(v) else None for v in values)
 
 
 def write_map_table(ds: xr.Dataset, path: str | PathLike[str]) -> Path:

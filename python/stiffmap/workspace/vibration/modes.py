@@ -3,7 +3,7 @@ damping, declared or assumed (V2)."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -140,6 +140,11 @@ class TipModes:
         with np.errstate(divide="ignore"):
             return np.asarray(1 / (2 * np.pi * np.sqrt(self.square)))
 
+    def only(self, rows: NDArray[np.intp]) -> TipModes:
+        """The modes at some of the poses."""
+        arrays = ("square", "tip", "viscous", "loss", "rest", "unsymmetric", "status", "flags")
+        return replace(self, shape=(len(rows),), **{n: getattr(self, n)[rows] for n in arrays})
+
     @property
     def proportional(self) -> bool:
         """Whether no damping couples two modes: the modes are then real."""
@@ -183,7 +188,13 @@ def tip_modes(
         gravity=compiled.gravity(gravity), closed=compiled.close_poses(poses, turns, cores)[0], point=point,
         count=_count(machine, declared, modes), threads=cores,
     )  # fmt: skip
-    _symmetric(machine, out["unsymmetric"], symmetrise)
+    worst = float(np.nanmax(out["unsymmetric"], initial=0.0))
+    if worst > SYMMETRIC and not symmetrise:
+        raise StiffmapError(
+            f"{machine.name}: a dead moment makes the tangent unsymmetric (by {worst:.2g} of its size), and a "
+            "frequency response by modes needs a symmetric one; give symmetrise=True to take its symmetric part, "
+            "or leave the moment out"
+        )
     static = machine.solve(poses, loads, rotation=turns, point=point, gravity=gravity, threads=threads)
     _statically(out, np.where(static.ok[:, None, None], static.compliance, np.nan))
     most = int(np.isfinite(out["square"]).sum(axis=1).max(initial=0))
@@ -205,16 +216,6 @@ def _count(machine: Machine, damping: Damping, modes: int | None) -> int:
         return min(size, whole_number(modes, "modes", 1))
     damped = int(np.count_nonzero((damping.viscous > 0) | (damping.loss > 0)))
     return max(1, min(size, 6 * len(machine.compiled.bodies) + damped))
-
-
-def _symmetric(machine: Machine, unsymmetric: Floats, symmetrise: bool) -> None:
-    worst = float(np.nanmax(unsymmetric, initial=0.0))
-    if worst > SYMMETRIC and not symmetrise:
-        raise StiffmapError(
-            f"{machine.name}: a dead moment makes the tangent unsymmetric (by {worst:.2g} of its size), and a "
-            "frequency response by modes needs a symmetric one; give symmetrise=True to take its symmetric part, "
-            "or leave the moment out"
-        )
 
 
 def _statically(out: dict[str, Any], compliance: Floats) -> None:

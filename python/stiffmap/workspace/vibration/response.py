@@ -11,8 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from stiffmap.common.broadcasting import Floats, real_array, thread_count
 from stiffmap.common.errors import StiffmapError
+from stiffmap.model.files.load import Source
 from stiffmap.solve.labels import WRENCH, batch_dims
-from stiffmap.solve.machine import Machine, takes_machine
+from stiffmap.solve.machine import Machine, as_machine
+from stiffmap.solve.options import keywords_of
 from stiffmap.workspace.vibration.modes import SYMMETRIC, TipModes, tip_modes
 
 Complex = NDArray[np.complex128]
@@ -109,21 +111,15 @@ KINDS = {"receptance": 0, "mobility": 1, "accelerance": 2}
 MOTION = ("x", "y", "z", "rx", "ry", "rz")
 
 
-@takes_machine
+@keywords_of(tip_modes)
 def frequency_response(
-    machine: Machine,
+    machine: Machine | Source,
     position: ArrayLike,
     frequencies: ArrayLike,
     wrench: ArrayLike | None = None,
     *,
-    rotation: ArrayLike | None = None,
-    gravity: ArrayLike | None = None,
-    point: str = "tcp",
-    damping: ArrayLike | None = None,
-    modes: int | None = None,
     kind: str = "receptance",
-    symmetrise: bool = False,
-    threads: int | None = None,
+    **call: Any,
 ) -> xr.DataArray:
     """Response of the machine to a force that oscillates at a point, its drives held.
 
@@ -163,20 +159,18 @@ def frequency_response(
     Raises StiffmapError for bad input (a machine without masses, frequencies that do not rise), never for a pose.
     Source: docs/theory.md, V1 to V3.
     """
+    machine = as_machine(machine)
     f = frequency_axis(frequencies)
     if kind not in KINDS:
         raise StiffmapError(f"kind: expected one of {', '.join(KINDS)}, got {kind!r}")
-    found = tip_modes(
-        machine, position, wrench, rotation=rotation, gravity=gravity, point=point, damping=damping, modes=modes,
-        symmetrise=symmetrise, threads=threads,
-    )  # fmt: skip
-    values = receptance(found, f, threads)
+    found = tip_modes(machine, position, wrench, **call)
+    values = receptance(found, f, call.get("threads"))
     if KINDS[kind]:
         values *= ((2j * np.pi * f) ** KINDS[kind])[:, None, None]
     batch = found.shape
     poses = batch_dims(len(batch))
     attrs: dict[str, object] = {
-        "machine": machine.name, "point": point, "kind": kind, "axes": "base axes, linear part first, SI",
+        "machine": machine.name, "point": call.get("point", "tcp"), "kind": kind, "axes": "base axes, linear part first, SI",
         "damping": found.damping.said,
         "modal": "real modes" if found.proportional else "complex modes: the damping couples them",
     }  # fmt: skip

@@ -14,11 +14,13 @@ from stiffmap.common.broadcasting import Floats, real_array, whole_number
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.rotations import as_rotations
 from stiffmap.common.short import short_repr
-from stiffmap.solve.machine import Machine, takes_machine
+from stiffmap.model.files.load import Source
+from stiffmap.solve.machine import Machine, as_machine
+from stiffmap.solve.options import keywords_of
 from stiffmap.workspace.maps.inputs import magnitude
 from stiffmap.workspace.performance.box.box_search import BoxSearch
 from stiffmap.workspace.performance.box.proof import judge_on
-from stiffmap.workspace.performance.limits.limits import Bounds
+from stiffmap.workspace.performance.limits.limits import Bounds, bounds_of
 from stiffmap.workspace.performance.poses import read_region
 
 WORK = 100_000
@@ -71,25 +73,18 @@ class LargestBox:
         return np.stack([local - self.edges / 2, local + self.edges / 2])
 
 
-@takes_machine
+@keywords_of(bounds_of)
 def largest_box(
-    machine: Machine,
+    machine: Machine | Source,
     proportions: ArrayLike = (1.0, 1.0, 1.0),
     *,
     transmission: tuple[float, float] | None = (0.5, 2.0),
-    norm: str = "sphere",
-    length: float | None = None,
-    ranges: bool = True,
-    joints: bool = True,
-    clearance: float | None = None,
-    deflection: tuple[float, str | None, float] | None = None,
-    rotation: ArrayLike | None = None,
     orientation: ArrayLike | str | None = None,
     region: ArrayLike | None = None,
     tolerance: float = 1e-4,
     max_evaluations: int = WORK,
-    threads: int | None = None,
     scheduler: Any = None,
+    **limits: Any,
 ) -> LargestBox:
     """Largest box of given proportions, anywhere in the workspace, all of it within the limits.
 
@@ -136,15 +131,13 @@ def largest_box(
     StiffmapError
         For bad input.
     """
+    machine = as_machine(machine)
     shape = real_array(proportions, "proportions")
     if shape.shape != (3,) or not (np.isfinite(shape).all() and (shape > 0).all()):
         raise StiffmapError(f"proportions: expected 3 positive numbers, got {proportions!r}")
     magnitude(tolerance, "tolerance", "m")
     whole_number(max_evaluations, "max_evaluations", 1)
-    given = None if rotation is None else as_rotations(real_array(rotation, "rotation"))
-    bounds = Bounds(
-        machine, given, transmission, norm, length, ranges, joints, clearance, deflection, threads
-    )
+    bounds = bounds_of(machine, transmission=transmission, **limits)
     space, shape = _region(machine, region, shape / shape[0])
     if isinstance(orientation, str):
         if orientation != "search":

@@ -11,13 +11,14 @@ from scipy.spatial import cKDTree
 
 from stiffmap.common.broadcasting import Floats, random_numbers, real_array, real_number, whole_number
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.rotations import as_rotations
 from stiffmap.common.short import short_repr
-from stiffmap.solve.machine import Machine, takes_machine
+from stiffmap.model.files.load import Source
+from stiffmap.solve.machine import Machine, as_machine
+from stiffmap.solve.options import keywords_of
 from stiffmap.workspace.performance.box.cells import halved
 from stiffmap.workspace.performance.box.inside import Inside, Judged
 from stiffmap.workspace.performance.box.proof import Judge, judge_on
-from stiffmap.workspace.performance.limits.limits import Bounds
+from stiffmap.workspace.performance.limits.limits import bounds_of
 from stiffmap.workspace.performance.poses import read_region
 
 CELLS = {3: 24, 2: 120, 1: 1000}
@@ -60,25 +61,17 @@ class Workspace:
         return self.ask(real_array(position, "position").reshape(-1, 3), self.drawn)
 
 
-@takes_machine
+@keywords_of(bounds_of)
 def workspace_volume(
-    machine: Machine,
+    machine: Machine | Source,
     *,
-    transmission: tuple[float, float] | None = None,
-    norm: str = "sphere",
-    length: float | None = None,
-    ranges: bool = True,
-    joints: bool = True,
     singularity: float | None = 1e-3,
-    clearance: float | None = None,
-    deflection: tuple[float, str | None, float] | None = None,
-    rotation: ArrayLike | None = None,
     region: ArrayLike | None = None,
     cells: int | None = None,
     prove: int = 0,
     seed: int = 0,
-    threads: int | None = None,
     scheduler: Any = None,
+    **limits: Any,
 ) -> Workspace:
     """Volume of all positions that the machine comes to in one orientation, with its sampling error.
 
@@ -108,15 +101,13 @@ def workspace_volume(
     StiffmapError
         For bad input.
     """
+    machine = as_machine(machine)
     if singularity is not None and not 0 <= real_number(singularity, "singularity") < 1:
         raise StiffmapError(f"singularity: expected a distance from 0 to 1, got {singularity!r}")
     if cells is not None:
         whole_number(cells, "cells", 2, what="a whole number, 2 or more along each edge")
     whole_number(prove, "prove", 0)
-    given = None if rotation is None else as_rotations(real_array(rotation, "rotation"))
-    bounds = Bounds(
-        machine, given, transmission, norm, length, ranges, joints, clearance, deflection, threads
-    )
+    bounds = bounds_of(machine, **limits)
     ask = Inside(bounds, singularity)
     rng = random_numbers(seed)
     axes = [i for i, name in enumerate("xyz") if name in machine.description.task]
@@ -126,22 +117,20 @@ def workspace_volume(
         )
     cells = cells or CELLS[len(axes)]
     low, high = _begun(machine, region, axes)
-    grown = 0 if region is not None else GROWN
+    more = 0
     if region is None:
-        low, high, grown = _extent(ask, low, high, axes, rng)
-    while True:
-        drawn, touched = _draw(ask, low, high, axes, cells, rng)
-        if not touched.any() or grown == 0:
-            break
-        grown -= 1
-        step = (high - low) / 4
-        low, high = low - step * touched[0], high + step * touched[1]
+        drawn, _, low, high, more = _grown(ask, low, high, axes, FIRST[len(axes)], rng, GROWN, 1 / 2)
+        if drawn.inside.any():
+            kept, step = drawn.position[drawn.inside], (high - low) / FIRST[len(axes)]
+            low, high = np.maximum(kept.min(axis=0) - step, low), np.minimum(kept.max(axis=0) + step, high)
+    drawn, touched, low, high, _ = _grown(ask, low, high, axes, cells, rng, more, 1 / 4)
     cell = float(np.prod((high - low)[axes] / cells))
     pairs = drawn.inside.reshape(-1, 2)
     kept = drawn.position[drawn.inside]
     box = np.stack([kept.min(axis=0), kept.max(axis=0)]) if len(kept) else np.full((2, 3), np.nan)
     with judge_on(bounds, scheduler) as judge:
-        proven = _proven(judge, bounds.unproven, drawn, low, high, axes, cells, prove)
+        provable = prove > 0 and not bounds.unproven and len(axes) == 3
+        proven = _proven(judge, drawn, low, (high - low) / cells, cells, prove) if provable else float("nan")
     return Workspace(
         volume=cell * float(pairs.mean(axis=1).sum()),
         error=cell * float(np.sqrt((pairs[:, 0] != pairs[:, 1]).sum() / 4)),
@@ -161,20 +150,17 @@ def _begun(machine: Machine, region: ArrayLike | None, axes: list[int]) -> tuple
     return centre - 3 * half * moves, centre + 3 * half * moves
 
 
-def _extent(
-    ask: Inside, low: Floats, high: Floats, axes: list[int], rng: np.random.Generator
-) -> tuple[Floats, Floats, int]:
-    """A region about all that is found, and how many times it may still grow."""
-    for left in range(GROWN, -1, -1):
-        drawn, touched = _draw(ask, low, high, axes, FIRST[len(axes)], rng)
-        if not drawn.inside.any() or not touched.any() or left == 0:
-            break
-        step = (high - low) / 2
+def _grown(
+    ask: Inside, low: Floats, high: Floats, axes: list[int], cells: int, rng: np.random.Generator, more: int, by: float
+) -> tuple[Judged, NDArray[np.bool_], Floats, Floats, int]:  # fmt: skip
+    """Poses as of `_draw`, where the region's border is reached in one larger by this share, and so on `more` times; the
+    region, and how many times are left."""
+    while True:
+        drawn, touched = _draw(ask, low, high, axes, cells, rng)
+        if not touched.any() or more == 0:
+            return drawn, touched, low, high, more
+        more, step = more - 1, by * (high - low)
         low, high = low - step * touched[0], high + step * touched[1]
-    if drawn.inside.any():
-        kept, step = drawn.position[drawn.inside], (high - low) / FIRST[len(axes)]
-        low, high = np.maximum(kept.min(axis=0) - step, low), np.minimum(kept.max(axis=0) + step, high)
-    return low, high, left
 
 
 def _draw(
@@ -208,20 +194,8 @@ def _limiting(drawn: Judged) -> tuple[tuple[str, float], ...]:
     return tuple(sorted(found, key=lambda f: -f[1]))
 
 
-def _proven(
-    judge: Judge,
-    unproven: str,
-    drawn: Judged,
-    low: Floats,
-    high: Floats,
-    axes: list[int],
-    cells: int,
-    work: int,
-) -> float:
+def _proven(judge: Judge, drawn: Judged, low: Floats, step: Floats, cells: int, work: int) -> float:
     """Volume of the cells (halved where that decides) every pose of which was proven to keep the limits."""
-    if work <= 0 or unproven or len(axes) != 3:
-        return float("nan")
-    step = (high - low) / cells
     number = np.flatnonzero(drawn.inside.reshape(-1, 2).all(axis=1))
     corner = np.stack(np.unravel_index(number, (cells,) * 3), axis=1)
     a = low + corner * step

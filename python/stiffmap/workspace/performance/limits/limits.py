@@ -7,11 +7,12 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
 from stiffmap.common.broadcasting import Floats, instance_of, real_array
 from stiffmap.common.errors import StiffmapError
+from stiffmap.common.rotations import as_rotations
 from stiffmap.model.description.machine import TASK
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.status import Status
@@ -19,7 +20,7 @@ from stiffmap.workspace.maps.inputs import magnitude
 from stiffmap.workspace.performance.limits.bars import Bars
 from stiffmap.workspace.performance.motion.closing import DriveKinematics, drive_kinematics, kernel_starts
 from stiffmap.workspace.performance.motion.scaling import characteristic_length, weighted
-from stiffmap.workspace.performance.motion.zonotopes import corners, inverse_rows
+from stiffmap.workspace.performance.motion.zonotopes import inverse_rows, worst_corner
 
 UNLIMITED = 1e299
 
@@ -210,6 +211,24 @@ class Bounds:
         return plain("deflection", value, most)
 
 
+def bounds_of(
+    machine: Machine,
+    *,
+    norm: str = "sphere",
+    length: float | None = None,
+    ranges: bool = True,
+    joints: bool = True,
+    clearance: float | None = None,
+    deflection: tuple[float, str | None, float] | None = None,
+    rotation: ArrayLike | None = None,
+    threads: int | None = None,
+    transmission: tuple[float, float] | None = None,
+) -> Bounds:
+    """By the arguments of `largest_box`; one rotation (3, 3), None: as at home. StiffmapError for bad input."""
+    given = None if rotation is None else as_rotations(real_array(rotation, "rotation"))
+    return Bounds(machine, given, transmission, norm, length, ranges, joints, clearance, deflection, threads)
+
+
 def plain(name: str, value: Floats, most: float) -> Limit:
     """A limit on a smooth number (n,) itself."""
     return Limit(name, value, most, value[:, None], np.ones((len(value), 1)))
@@ -233,9 +252,8 @@ def spectral(a: Floats) -> tuple[Floats, Floats]:
     """Largest singular value, and its dyad."""
     wide = a.shape[2] > a.shape[1]
     a = np.swapaxes(a, 1, 2) if wide else a
-    v = np.linalg.eigh(np.swapaxes(a, 1, 2) @ a)[1][
-        :, :, -1
-    ]  # quicker than svd, exact enough for the largest
+    # quicker than svd, exact enough for the largest
+    v = np.linalg.eigh(np.swapaxes(a, 1, 2) @ a)[1][:, :, -1]
     image = (a @ v[:, :, None])[:, :, 0]
     size = np.linalg.norm(image, axis=1)
     u = image / np.maximum(size, 1e-300)[:, None]
@@ -245,13 +263,10 @@ def spectral(a: Floats) -> tuple[Floats, Floats]:
 
 def vertices(a: Floats) -> tuple[Floats, Floats]:
     """Farthest corner of the image of the cube: the norm of J s for the worst s."""
-    signs, every = corners(a.shape[2]), np.arange(len(a))
-    images = a @ signs.T
-    norms = np.linalg.norm(images, axis=1)
-    worst = np.argmax(norms, axis=1)
-    value = norms[every, worst]
-    unit = images[every, :, worst] / value[:, None]
-    return value, unit[:, :, None] * signs[worst][:, None, :]
+    signs = worst_corner(a)[:, None, :]
+    image = (a * signs).sum(axis=2)
+    value = np.linalg.norm(image, axis=1)
+    return value, (image / value[:, None])[:, :, None] * signs
 
 
 def rows(a: Floats) -> tuple[Floats, Floats]:

@@ -28,26 +28,6 @@ from stiffmap.workspace.performance.motion.sharing import drive_weights, followe
 from stiffmap.workspace.performance.poses import loaded_poses
 
 
-@dataclass(frozen=True)
-class BodyMass:
-    """A body of the machine."""
-
-    name: str
-    mass: float
-    moves: bool
-    """False: it stands on the base in every pose."""
-
-
-def body_masses(machine: Machine) -> list[BodyMass]:
-    """All bodies, in the order of the file."""
-    compiled = machine.compiled
-    roles = compiled.names.roles
-    return [
-        BodyMass(name, mass, any(roles[c] != Role.SPRING for _, c in movers(compiled, node)))
-        for name, node, mass in compiled.bodies
-    ]
-
-
 def movers(compiled: CompiledMachine, node: int) -> Iterator[tuple[int, int]]:
     """Frame and number of each coordinate that moves a frame, from that frame to the base."""
     while node > 0:
@@ -59,12 +39,17 @@ def movers(compiled: CompiledMachine, node: int) -> Iterator[tuple[int, int]]:
 
 def total_mass(machine: Machine) -> float:
     """kg, all bodies that the machine file declares."""
-    return float(sum(b.mass for b in body_masses(machine)))
+    return float(sum(mass for *_, mass in machine.compiled.bodies))
 
 
 def moving_mass(machine: Machine) -> float:
     """kg, bodies that drives or passive joints move."""
-    return float(sum(b.mass for b in body_masses(machine) if b.moves))
+    compiled = machine.compiled
+    roles = compiled.names.roles
+    moving = (
+        m for _, n, m in compiled.bodies if any(roles[c] != Role.SPRING for _, c in movers(compiled, n))
+    )
+    return float(sum(moving))
 
 
 def inertias(machine: Machine) -> Floats:
@@ -76,13 +61,13 @@ def inertias(machine: Machine) -> Floats:
 
 def need_masses(machine: Machine, what: str) -> None:
     """StiffmapError that names the bodies without mass, or says that there are none."""
-    bodies = body_masses(machine)
+    bodies = machine.compiled.bodies
     if not bodies:
         raise StiffmapError(
             f"{machine.name}: {what} needs masses, and the machine file declares no body; "
             f"add 'body' elements to the legs {', '.join(machine.legs)} and the platform"
         )
-    empty = [b.name for b in bodies if b.mass <= 0]
+    empty = [name for name, _, mass in bodies if mass <= 0]
     if empty:
         raise StiffmapError(
             f"{machine.name}: {what} needs masses; these bodies have none: {', '.join(empty)}"

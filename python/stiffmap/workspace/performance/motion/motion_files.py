@@ -104,20 +104,15 @@ class Motion:
             return self.timed
         span = self.duration if duration is None else duration
         if span is not None:
-            return _with_force(timed(self.path, span), self)
-        if (speed := self.feed if feed is None else feed) is not None:
-            return _with_force(at_feed(self.path, speed), self)
-        run = fastest(machine, self.path, gravity=gravity, speed=self.speed, force=self.force)
-        return _with_force(run, self)
-
-
-def _with_force(run: Trajectory, motion: Motion) -> Trajectory:
-    """The run with the motion's force, of the place where it is."""
-    if motion.force.ndim == 1:
-        return run.with_force(motion.force)
-    assert motion.path is not None
-    way, own = way_along(run.position), way_along(motion.path.position)
-    return run.with_force(_between(way / way[-1], own / own[-1], motion.force))
+            run = timed(self.path, span)
+        elif (speed := self.feed if feed is None else feed) is not None:
+            run = at_feed(self.path, speed)
+        else:
+            run = fastest(machine, self.path, gravity=gravity, speed=self.speed, force=self.force)
+        if self.force.ndim == 1:
+            return run.with_force(self.force)
+        way, own = way_along(run.position), way_along(self.path.position)
+        return run.with_force(_between(way / way[-1], own / own[-1], self.force))
 
 
 def load_motion(file: str | PathLike[str]) -> Motion:

@@ -72,9 +72,8 @@ def farthest(found: Held) -> Floats:
             continue
         feel = np.linalg.norm(r[i], axis=1) > 1e-12
         _, size, axes = np.linalg.svd(r[i][feel])
-        inner = (
-            r[i][feel] @ axes[: int((size > 1e-9 * size[0]).sum())].T
-        )  # a guide holds the other directions
+        # a guide holds the other directions
+        inner = r[i][feel] @ axes[: int((size > 1e-9 * size[0]).sum())].T
         sides = [np.column_stack([s * inner, s * o[i][feel] - m[i][feel]]) for s in (1.0, -1.0)]
         corners = HalfspaceIntersection(np.vstack(sides), np.zeros(inner.shape[1])).intersections
         out[i] = np.linalg.norm(corners, axis=1).max()

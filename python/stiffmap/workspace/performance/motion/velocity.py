@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.short import short_repr
-from stiffmap.solve.machine import Machine, takes_machine
+from stiffmap.model.files.load import Source
+from stiffmap.solve.machine import Machine, as_machine, takes_machine
+from stiffmap.solve.options import keywords_of
 from stiffmap.solve.results import OverPoses
 from stiffmap.workspace.maps.inputs import plane_axes
 from stiffmap.workspace.performance.motion.closing import DriveKinematics, drive_kinematics
@@ -58,16 +61,43 @@ class VelocityTransmission(OverPoses):
     flags: NDArray[np.uint32]
 
 
-@takes_machine
-def velocity_transmission(
+def transmission_of(
     machine: Machine,
-    position: ArrayLike,
-    rotation: ArrayLike | None = None,
+    k: DriveKinematics,
     *,
     length: float | None = None,
     limits: ArrayLike | str = "unit",
     part: str = "all",
+) -> VelocityTransmission:
+    """`velocity_transmission` from kinematics that are at hand."""
+    speeds = drive_limits(machine, "speed", limits, "m/s or rad/s")
+    size = characteristic_length(machine, length)
+    j = weighted(machine, k.jacobian, size, part)
+    driven = j * speeds
+    s, low = of_motions(machine, k, singular_values(j))
+    high = s[..., 0]
+    if part == "translation" or (part == "all" and machine.compiled.redundancy):
+        rank = 3 if part == "translation" else _rank(s)
+        slowest = facets(driven, rank)[1].min(axis=-1, initial=np.inf)
+        slowest = np.where(np.isinf(slowest), 0.0, slowest)  # no facets: some motion has no drive
+    else:
+        slowest = rows_limit(inverse_rows(j), speeds)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return VelocityTransmission(
+            sphere_min=low, sphere_max=high, cube_min=slowest, cube_max=farthest_vertex(driven),
+            condition=high / low, dexterity=low / high, manipulability=np.nanprod(s, axis=-1) + 0 * high,
+            jacobian=k.jacobian, length=size, limits=speeds, status=k.status, flags=k.flags,
+        )  # fmt: skip
+
+
+@keywords_of(transmission_of)
+def velocity_transmission(
+    machine: Machine | Source,
+    position: ArrayLike,
+    rotation: ArrayLike | None = None,
+    *,
     threads: int | None = None,
+    **how: Any,
 ) -> VelocityTransmission:
     """How fast the tool moves per speed of the drives, at poses (..., 3) m.
 
@@ -89,37 +119,8 @@ def velocity_transmission(
     StiffmapError
         For bad input, never for a pose.
     """
-    k = drive_kinematics(machine, position, rotation, threads=threads)
-    return transmission_of(machine, k, length=length, limits=limits, part=part)
-
-
-def transmission_of(
-    machine: Machine,
-    k: DriveKinematics,
-    *,
-    length: float | None = None,
-    limits: ArrayLike | str = "unit",
-    part: str = "all",
-) -> VelocityTransmission:
-    """The same from kinematics that are at hand."""
-    speeds = drive_limits(machine, "speed", limits, "m/s or rad/s")
-    size = characteristic_length(machine, length)
-    j = weighted(machine, k.jacobian, size, part)
-    driven = j * speeds
-    s, low = of_motions(machine, k, singular_values(j))
-    high = s[..., 0]
-    if part == "translation" or (part == "all" and machine.compiled.redundancy):
-        rank = 3 if part == "translation" else _rank(s)
-        slowest = facets(driven, rank)[1].min(axis=-1, initial=np.inf)
-        slowest = np.where(np.isinf(slowest), 0.0, slowest)  # no facets: some motion has no drive
-    else:
-        slowest = rows_limit(inverse_rows(j), speeds)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return VelocityTransmission(
-            sphere_min=low, sphere_max=high, cube_min=slowest, cube_max=farthest_vertex(driven),
-            condition=high / low, dexterity=low / high, manipulability=np.nanprod(s, axis=-1) + 0 * high,
-            jacobian=k.jacobian, length=size, limits=speeds, status=k.status, flags=k.flags,
-        )  # fmt: skip
+    machine = as_machine(machine)
+    return transmission_of(machine, drive_kinematics(machine, position, rotation, threads=threads), **how)
 
 
 def of_motions(machine: Machine, k: DriveKinematics, values: Floats) -> tuple[Floats, Floats]:
