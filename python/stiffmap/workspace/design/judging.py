@@ -61,6 +61,8 @@ def values_of(design: Design, machine: Machine) -> dict[str, float]:
         high,
         task.force or 100.0,
         task.plane,
+        transmission=task.transmission,
+        proportions=task.proportions,
         nodes=nodes,
         coarse=nodes,
         quick=True,

@@ -114,6 +114,21 @@ class Requirements:
         """The bound on a measure, if there is one."""
         return dict(self.bounds).get(measure)
 
+    @property
+    def transmission(self) -> tuple[float, float]:
+        """Range of the transmission factors within which a pose counts; the paper's where the task names none."""
+        least, most = self.bound("transmission_min"), self.bound("transmission_max")
+        return (
+            least.at_least if least and least.at_least is not None else 0.5,
+            most.at_most if most and most.at_most is not None else 2.0,
+        )
+
+    @property
+    def proportions(self) -> tuple[float, float, float]:
+        """Edges of the task's box relative to the first; a cube where there is no box."""
+        x, y, z = self.box or (1.0, 1.0, 1.0)
+        return 1.0, y / x, z / x
+
 
 def bound_in(document: Document, file: str, given: BoundModel, *keys: str) -> Bound:
     """The bound of the measure that is the last of the keys under which it stands.

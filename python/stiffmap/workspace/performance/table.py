@@ -170,16 +170,10 @@ def measures(
     chosen = all_measures() if only is None else tuple(get_measure(n) for n in only)
     low, high, notes = _box(machine, box, task)
     size = force if force is not None else task.force if task.force is not None else 100.0
-    edges = np.array(task.box) if task.box else np.ones(3)
-    lowest, largest = task.bound("transmission_min"), task.bound("transmission_max")
     path = toolpath or task.toolpath
     case = Case(
         machine, low, high, size, plane or task.plane,
-        transmission=(
-            lowest.at_least if lowest and lowest.at_least is not None else 0.5,
-            largest.at_most if largest and largest.at_most is not None else 2.0,
-        ),
-        proportions=(1.0, float(edges[1] / edges[0]), float(edges[2] / edges[0])), nodes=nodes, coarse=coarse, gap=box_tolerance,
+        transmission=task.transmission, proportions=task.proportions, nodes=nodes, coarse=coarse, gap=box_tolerance,
         length=length, gravity=None if gravity is None else real_array(gravity, "gravity"),
         rotation=None if rotation is None else real_array(rotation, "rotation"), threads=threads,
         toolpath=path if path is None or isinstance(path, Motion) else load_motion(path),

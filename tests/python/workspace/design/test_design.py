@@ -150,6 +150,21 @@ def test_quick_machines_are_those_of_the_file(tmp_path, name):
         assert replace(whole, **bare) == replace(quick, **bare)
 
 
+def test_a_search_asks_for_the_transmission_of_its_task(tmp_path):
+    """The largest box about the centre: nearly a point where every factor has to be 1."""
+    edges = []
+    for most in ("1.02", "2.5"):
+        task = tmp_path / f"task-{most}.yaml"
+        box = "box: {x: 400 mm, y: 400 mm, z: 400 mm}"
+        task.write_text(f"name: task\n{box}\nrequirements:\n  transmission_max: {{at_most: {most}}}\n")
+        text = FILE.replace("objectives: [mass, frequency]", "objectives: [mass, largest_box]").replace(
+            "nodes: 2", "nodes: 9"
+        )
+        design = load_design(write(tmp_path, text + f"requirements: {task.name}\n"))
+        edges.append(judge(design, np.mean(design.bounds, axis=0)).values["largest_box"])
+    assert edges[0] < 0.3 * edges[1]
+
+
 def test_quick_judgement_is_that_of_the_full_measures():
     """At the same nodes: factors, speed and force alike; the deflection in its worst direction."""
     design = load_design("redesign")
