@@ -17,7 +17,7 @@ from stiffmap.ui.plot.style import BLACK, MM, ORANGE
 ARROW = 0.16
 """Of the machine's extent, length of the arrow of the force."""
 FORCE = "#C1121F"
-ZOOM = 1.03
+ZOOM = 0.94
 MARGIN = 0.06
 THINNEST = 0.3  # of the widest axis
 
