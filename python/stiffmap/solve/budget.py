@@ -162,6 +162,21 @@ def deflection_budget(
     )
 
 
+def budget_where_stable(
+    machine: Machine,
+    position: ArrayLike,
+    wrench: ArrayLike,
+    *,
+    rotation: ArrayLike | None = None,
+    gravity: ArrayLike | None = None,
+) -> DeflectionBudget | None:
+    """`deflection_budget`; None where no stable pose without load is there to compare with, as of a machine that has play."""
+    try:
+        return deflection_budget(machine, position, wrench, rotation=rotation, gravity=gravity)
+    except StiffmapError:
+        return None
+
+
 def _of_cables(
     machine: Machine, p: Floats, load: Floats, gravity: Floats, rotation: ArrayLike | None, point: str
 ) -> Floats:

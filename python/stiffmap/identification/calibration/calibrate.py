@@ -166,10 +166,8 @@ def table_of(columns: Columns, fit: Fit, best: Corrected | None) -> tuple[tuple[
     gram = white.T @ white
     minimal = set(independent(gram))
     prior = np.ones(len(columns.unknowns))
-    for (
-        group,
-        index,
-    ) in columns.groups.items():  # one that is off by little here has no better tolerances for it
+    for group, index in columns.groups.items():
+        # a group that is off by little here has no better tolerances for it
         prior[index] = max(1.0, fit.spread(group))
     spread = np.sqrt(np.diag(np.linalg.inv(np.diag(prior**-2) + gram)))
     out = []

@@ -15,10 +15,9 @@ from rich.table import Table
 from rich.text import Text
 
 from stiffmap.common.broadcasting import Floats
-from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import length_text, vector_text
 from stiffmap.model.description.sources import in_words as source_words
-from stiffmap.solve.budget import deflection_budget, in_shares
+from stiffmap.solve.budget import budget_where_stable, in_shares
 from stiffmap.solve.machine import Machine
 from stiffmap.ui.cli.inputs import MM
 from stiffmap.ui.cli.output import failed, failed_in_words, table
@@ -227,9 +226,8 @@ def worst_pose(machine: Machine, ds: Any, gravity: Any) -> dict[str, Any] | None
     if found is None:
         return None
     size, load, p, wrench = found
-    try:
-        budget = deflection_budget(machine, p, wrench, gravity=gravity)
-    except StiffmapError:
+    budget = budget_where_stable(machine, p, wrench, gravity=gravity)
+    if budget is None:
         return None
     return {
         "case": load,

@@ -154,6 +154,14 @@ def test_the_largest_deflection_names_the_spring_that_yields_most(leg, spring):
     assert f"% from {leg}.{spring}," in note and int(note.split("; ")[1].split(" %")[0]) > 50, note
 
 
+def test_a_machine_that_has_play_without_its_weight_keeps_its_largest_deflection():
+    machine = sm.load_machine("orthoglide-revised").with_effect(
+        "dead_zone", element="actuator", legs=["z"], half_width=2e-5
+    )
+    row = sm.measures(machine, only=["deflection"], nodes=3, coarse=2, gravity=[0, 0, -9.81])["deflection"]
+    assert 4e-4 < row.found.worst < 5e-4 and row.found.note.startswith("under 100 N along")
+
+
 def test_what_no_pose_keeps_is_named_with_its_bound():
     machine = sm.load_machine("hexapod")
     table = sm.measures(machine, only=["largest_box", "workspace"], nodes=3, coarse=2)

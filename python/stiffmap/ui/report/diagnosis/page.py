@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from stiffmap.common.errors import StiffmapError
 from stiffmap.common.fingerprints import digest
 from stiffmap.common.number_text import length_text, length_unit, vector_text
 from stiffmap.common.outputs import write_text
@@ -25,7 +24,7 @@ from stiffmap.identification.diagnosis.report.sentences import (
 from stiffmap.identification.diagnosis.report.wording import effect_text, five_lines, separation_text
 from stiffmap.model.description.tree import joints
 from stiffmap.model.effects import registry
-from stiffmap.solve.budget import deflection_budget
+from stiffmap.solve.budget import budget_where_stable
 
 SHOWN = 12
 """Detectable effects above the fold."""
@@ -140,9 +139,8 @@ def _budget(d: Findings) -> dict[str, Any] | None:
     if worst is None:
         return None
     p, force = worst
-    try:
-        found = deflection_budget(d.machine, p, force)
-    except StiffmapError:  # a machine in play has no stiffness to share out
+    found = budget_where_stable(d.machine, p, force)
+    if found is None:
         return None
     whole = float(np.linalg.norm(found.displacement[:3]))
     unit, factor, decimals = length_unit(whole)

@@ -6,7 +6,7 @@ import numpy as np
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.number_text import vector_text
-from stiffmap.solve.budget import deflection_budget, in_shares
+from stiffmap.solve.budget import budget_where_stable, in_shares
 from stiffmap.solve.status import Status
 from stiffmap.workspace.maps.inputs import plane_axes
 from stiffmap.workspace.performance.limits.deflection import TURNS, worst_deflection
@@ -28,11 +28,12 @@ def compute(case: Case) -> Found:
     )  # fmt: skip
     note = f"under {case.force:.4g} N"
     if np.isfinite(d.value):
+        note += f" along {vector_text(d.direction, 3)}"
         wrench = np.append(case.force * d.direction, np.zeros(3))
-        budget = deflection_budget(
+        budget = budget_where_stable(
             case.machine, d.position, wrench, rotation=case.rotation, gravity=case.gravity
         )
-        note += f" along {vector_text(d.direction, 3)}; {in_shares({n: s for n, _, s in budget.ranked()})}"
+        note += f"; {in_shares({n: s for n, _, s in budget.ranked()})}" if budget is not None else ""
     found = over_poses(d.positions, d.values, "low", note, direction=d.direction)
     return Found(**{**found.__dict__, "worst": d.value, "worst_at": d.position})
 
