@@ -154,6 +154,13 @@ def test_the_largest_deflection_names_the_spring_that_yields_most(leg, spring):
     assert f"% from {leg}.{spring}," in note and int(note.split("; ")[1].split(" %")[0]) > 50, note
 
 
+def test_shares_of_the_largest_deflection_are_those_under_its_force():
+    found = sm.measures("hexapod", only=["deflection"], nodes=3, coarse=2)["deflection"].found
+    wrench = [*(100.0 * found.extra["direction"]), 0.0, 0.0, 0.0]
+    name, _, share = sm.deflection_budget("hexapod", found.worst_at, wrench).ranked()[0]
+    assert f"; {100 * share:.0f} % from {name}, " in found.note
+
+
 def test_a_machine_that_has_play_without_its_weight_keeps_its_largest_deflection():
     machine = sm.load_machine("orthoglide-revised").with_effect(
         "dead_zone", element="actuator", legs=["z"], half_width=2e-5
