@@ -28,14 +28,15 @@ def target_positions(experiment: Experiment) -> Floats:
 def _levers(experiment: Experiment) -> Floats:
     """(n, 3) m, base axes: from the tool point to the target that was seen, where it has been found."""
     out = np.zeros((len(experiment), 3))
-    if experiment.rotation is None:  # the same in all rows: a shift
+    if experiment.rotation is None or not experiment.points:  # the same in all rows: a shift
         return out
     shifts = {name: shift for name, _, shift in experiment.registration}
     number, names = targets_of(experiment)
-    for i, point in enumerate(experiment.points):
-        target = f"target {names[number[i]]}"
-        if SEEN in point and target in shifts:
-            out[i] = experiment.rotation[i] @ shifts[target]
+    seen = np.array([SEEN in point for point in experiment.points])
+    for k, name in enumerate(names):
+        if (shift := shifts.get(f"target {name}")) is not None:
+            here = seen & (number == k)
+            out[here] = experiment.rotation[here] @ shift
     return out
 
 

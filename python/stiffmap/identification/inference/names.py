@@ -89,7 +89,10 @@ def searched(
         worlds |= {"together": parts.together, "groups": parts.numbers}
     optima: dict[tuple[tuple[int, int], ...], Floats] = {}
     searches = [_World(columns, parts.gaps, name, own, predict, over, optima) for name, own in worlds.items()]
-    found = {w.name: w.search() for w in searches}
+    searches.sort(key=lambda w: -w.null.score)
+    found: dict[str, Search] = {}
+    for w in searches:
+        found[w.name] = w.search(max((s.best for s in found.values()), key=lambda m: m.score, default=w.null))
     best = max(found.values(), key=lambda s: s.best.score)
     others = [w for w in searches if w.name != best.best.world]
     own = next(w for w in searches if w.name == best.best.world)
@@ -137,9 +140,18 @@ class _World:
     known: dict[frozenset[tuple[int, int]], Model] = field(default_factory=dict)
     anchors: dict[int, tuple[Model, list[Fit]]] = field(default_factory=dict)
 
-    def search(self) -> Search:
-        """Forward steps with elimination and exchange after each."""
-        null = model = self._fit((), None)
+    @property
+    def null(self) -> Model:
+        """No effect at all."""
+        return self._fit((), None)
+
+    def search(self, begin: Model) -> Search:
+        """Forward steps with elimination and exchange after each, from the effects of the best model of other worlds; it ends where
+        it would fall short of that even if each effect that may follow, and their exchanges, gained as much as the last one."""
+        model = null = self.null
+        if begin.chosen:
+            same = self._fit(begin.chosen, amplitudes(begin.fit), begin.fit.weights)
+            model = max(null, self._settled(same), key=lambda m: m.score)
         limit = float(np.log(ODDS) + np.log(max(1, len(self.columns.places))))
         while len(model.chosen) < MOST_EFFECTS and not self.over():
             trials = self._trials(model)
@@ -149,7 +161,10 @@ class _World:
             total = float(np.logaddexp.reduce(all_gains))
             if total <= limit:
                 break  # the odds of all places together
-            better = self._exchanged(self._by_pairs(self._exchanged(best)))
+            to_come = 1 + MOST_EFFECTS - len(best.chosen)
+            if begin.world != self.name and best.score + to_come * (best.score - model.score) < begin.score:
+                break
+            better = self._settled(best)
             if len(better.chosen) <= len(model.chosen) and better.score <= model.score + PROGRESS:
                 break
             model = better
@@ -305,6 +320,10 @@ class _World:
                 residual, begin, "2-point", (low, high), x_scale="jac", diff_step=1e-3, max_nfev=AT_MOST
             ).x
         return all_moved(chosen, self.optima[key])
+
+    def _settled(self, model: Model) -> Model:
+        """The model after exchanges, one by one and by pairs."""
+        return self._exchanged(self._by_pairs(self._exchanged(model)))
 
     def _exchanged(self, model: Model) -> Model:
         """Each effect in turn left out where that costs less than odds, or given up for a better one."""

@@ -24,6 +24,8 @@ DETERMINED = 0.5
 TOLERABLE = "declared numbers within their tolerances show the same"
 CLEARLY = 1.15
 """Noise over what is stated, or under it, from which it is said."""
+LEAST_SCALE = 0.01
+"""Of a compliance or a mass that a straight line would make negative."""
 KAPPA_SDS = 4.0
 """Prior standard deviations of ln κ beyond which the noise is no noise."""
 
@@ -243,9 +245,16 @@ def out_of_tolerance(columns: Columns, fit: Fit) -> Iterator[Beyond]:
     largest = float(norm.isf(RARE / (2.0 * max(1, determined))))
     doubt = float(norm.isf(1.0 / (2.0 * ODDS * max(1, len(found)))))
     for b in sorted(found, key=lambda b: -b.share):
-        far = abs(b.value) - doubt * b.sd > TOLERANCES and abs(b.value) > largest
+        value, sd = _of_logarithm(b) if b.unknown.unit == "ln" else (b.value, b.sd)
+        far = abs(value) - doubt * sd > TOLERANCES and abs(value) > largest
         if far and not unevenness(columns, fit, columns.free @ columns.numbers[:, number[id(b)]])[1]:
             yield b
+
+
+def _of_logarithm(b: Beyond) -> tuple[float, float]:
+    """Mean and standard deviation of a compliance's logarithm, in standard uncertainties: readings follow the compliance itself."""
+    scale = max(1.0 + b.unknown.u * b.value, LEAST_SCALE)
+    return float(np.log(scale)) / b.unknown.u, b.sd / scale
 
 
 def left(fit: Fit) -> tuple[str, str]:

@@ -18,7 +18,7 @@ from stiffmap.identification.inference.amplitudes import fitted
 from stiffmap.identification.inference.chosen import Chosen
 from stiffmap.identification.inference.constants import ODDS
 from stiffmap.identification.inference.inference import inferred, terms
-from stiffmap.identification.inference.names import Model, searched
+from stiffmap.identification.inference.names import Model, _World, searched
 from stiffmap.identification.inference.parts import Parts
 from stiffmap.identification.inference.places import Place, Shape
 from stiffmap.identification.inference.verdict import TOLERABLE, Beyond, effect_of, judged
@@ -231,3 +231,45 @@ def test_a_number_is_no_effect_that_contains_a_named_one():
     b = Beyond(unknown, 5.0, 0.1, 1.0)
     assert effect_of(c, b, [Chosen.at(narrow, 0)]) is None
     assert effect_of(c, b, []).place is wide
+
+
+def test_a_world_that_others_leave_far_behind_is_given_up_early(monkeypatch):
+    """Numbers are off in fifteen ways, of which effects on a machine that is exact can explain three."""
+    c = setting(1, (0.0, 0.0, 0.0))
+    rng = np.random.default_rng(5)
+    legs = [p.shapes[0].directions for p in c.places[:3]]
+    d = np.linalg.qr(np.hstack([*legs, rng.normal(size=(len(c), 12))]))[0]
+    unknowns = tuple(Unknown(f"number {k}", "link lengths", "m", 1e-4) for k in range(15))
+    residual = c.residual + d @ np.append([600.0, -500.0, 400.0], 30.0 * rng.normal(size=12))
+    whole = replace(
+        c, numbers=10.0 * d, unknowns=unknowns, residual=residual, experiment=one_place(len(c.rows))
+    )
+    made: list[tuple[str, int]] = []
+    inner = _World._made
+    monkeypatch.setattr(
+        _World,
+        "_made",
+        lambda w, chosen, *given: [made.append((w.name, len(chosen))), inner(w, chosen, *given)][1],
+    )
+    assert searched(whole).best.world != "exact"
+    assert max(k for name, k in made if name == "exact") == 1
+    made.clear()
+    searched(replace(whole, numbers=d[:, :0], unknowns=()))
+    assert max(k for _, k in made) > 1
+
+
+def test_a_search_in_another_world_begins_with_what_was_found(monkeypatch):
+    c = setting(1, (0.0, 40.0, 30.0))
+    d = 10.0 * np.linalg.qr(np.random.default_rng(5).normal(size=(len(c), 3)))[0]
+    unknowns = tuple(Unknown(f"number {k}", "link lengths", "m", 1e-4) for k in range(3))
+    c = replace(c, numbers=d, unknowns=unknowns, experiment=one_place(len(c.rows)))
+    begun: list[tuple[str, set[str]]] = []
+    inner = _World.search
+    monkeypatch.setattr(
+        _World,
+        "search",
+        lambda w, m: [begun.append((w.name, {x.place.candidate.element for x in m.chosen})), inner(w, m)][1],
+    )
+    s = searched(c)
+    assert {x.place.candidate.element for x in s.best.chosen} == {"leg 2", "leg 3"}
+    assert [b for _, b in begun] == [set(), {"leg 2", "leg 3"}, {"leg 2", "leg 3"}]

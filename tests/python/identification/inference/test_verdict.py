@@ -187,3 +187,16 @@ def test_one_of_many_weakly_determined_numbers_is_not_out_of_tolerance(many, bey
     t = np.array([0.0, 2 * np.log(50.0)])
     fit = amplitudes.evaluated(c, Parts(c).numbers, t, np.ones(READINGS))
     assert len(list(verdict.out_of_tolerance(c, fit))) == beyond
+
+
+@pytest.mark.parametrize(
+    ("unit", "value", "beyond"),
+    [("ln", 4.2, 0), ("ln", 6.0, 1), ("ln", -3.0, 1), ("m", 4.2, 1), ("m", -3.0, 0)],
+)
+def test_of_a_compliance_its_logarithm_is_within_tolerance(unit, value, beyond):
+    """u = 0.2, bound 3.29: readings 1.84 times as large are ln 1.84 / 0.2 = 3.05 off, those 0.4 times as large 4.6, 2.2 times 3.94."""
+    c = numbers((value,))
+    (one,) = c.unknowns
+    c = replace(c, numbers=20.0 * c.numbers, residual=20.0 * value * c.numbers[:, 0])
+    c = replace(c, unknowns=(replace(one, unit=unit, u=0.2),))
+    assert len(list(verdict.out_of_tolerance(c, amplitudes.fitted(c, Parts(c).numbers)))) == beyond
