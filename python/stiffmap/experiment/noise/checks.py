@@ -15,8 +15,8 @@ from itertools import combinations, pairwise
 import numpy as np
 from scipy.stats import chi2
 
-from stiffmap.experiment.experiment import Experiment, Floats, Integers
-from stiffmap.experiment.noise.level import Mask
+from stiffmap.experiment.experiment import Experiment, Floats, Integers, Mask
+from stiffmap.experiment.noise.level import sums
 
 Contrast = tuple[list[tuple[int, int]], list[float]]
 """(condition, channel) pairs and their weights."""
@@ -38,7 +38,8 @@ class Conditions:
     group: Integers
     """(k,) pose number."""
     state: Integers
-    """(k,) number of what else may differ between conditions of a pose."""
+    """(k,) number of the pose and of all that may differ between its conditions but the load: only alike ones are compared.
+    Temperature is not among it: the unloaded reading is as warm as the loaded one."""
     unloading: Mask
     work_conjugate: bool
     """Whether the force acts where the reading is taken, from and to the floor or base."""
@@ -48,19 +49,19 @@ class Conditions:
         """Weighted means of the kept rows of each condition."""
         good = np.isfinite(values) & np.isfinite(sigma) & keep[:, None]
         weight = np.where(good, 1.0 / np.where(good, sigma, 1.0) ** 2, 0.0)
-        total = _sums(e, weight)
-        sums = _sums(e, np.where(good, values, 0.0) * weight)
+        total = sums(weight, e.conditions)
+        mean = sums(np.where(good, values, 0.0) * weight, e.conditions)
         first = np.unique(e.conditions, return_index=True)[1]
         branch = np.array(e.branch or ("",) * len(e))[first]
         safe = np.where(total > 0, total, 1.0)
         return Conditions(
-            np.where(total > 0, sums / safe, np.nan),
+            np.where(total > 0, mean / safe, np.nan),
             np.where(total > 0, 1.0 / safe, np.nan),
             e.zeros**2,
             e.unloaded != "unknown",
             e.wrench[first],
             e.groups[first],
-            _states(e)[first],
+            e.states[first],
             branch == "unloading",
             _conjugate(e),
         )
@@ -88,21 +89,6 @@ class Conditions:
         shared = np.where(channel[:, None] == channel, self.zero[channel], 0.0)
         v = np.diag([self.variance[at] for at in cells]) + shared
         return np.asarray(matrix @ v @ matrix.T)
-
-
-def _sums(e: Experiment, values: Floats) -> Floats:
-    number = int(e.conditions.max()) + 1
-    return np.stack([np.bincount(e.conditions, v, number) for v in values.T], axis=1)
-
-
-def _states(e: Experiment) -> Integers:
-    """(n,) number of everything but pose and load: only alike conditions are compared. Temperature is not
-    among it: the unloaded reading is as warm as the loaded one."""
-    parts = [np.zeros(len(e))]
-    words = [e.branch, e.setup, e.points, e.load_points]
-    parts += [np.unique(w, return_inverse=True)[1].reshape(-1).astype(float) for w in words if w]
-    parts += list(e.approach.T) if e.approach is not None else []
-    return np.unique(np.column_stack(parts), axis=0, return_inverse=True)[1].reshape(-1)
 
 
 def _conjugate(e: Experiment) -> bool:
@@ -173,16 +159,13 @@ def _chi_square(value: Floats, covariance: Floats) -> tuple[float, int]:
 
 def alike(t: Conditions) -> Iterator[Integers]:
     """Conditions of each pose that differ by their load only; where there is but one nothing can be contrasted."""
-    return (here for here in _grouped(t.group, t.state) if here.size > 1)
+    return (here for here in _grouped(t.state) if here.size > 1)
 
 
-def _grouped(*keys: Integers) -> Iterator[Integers]:
-    """Rows of each combination of keys, rising."""
-    order = np.lexsort(keys[::-1])
-    ends = np.zeros(order.size, dtype=bool)
-    for key in keys:
-        ends[1:] |= np.diff(key[order]) != 0
-    return iter(np.split(order, np.flatnonzero(ends)) if order.size else ())
+def _grouped(key: Integers) -> list[Integers]:
+    """Rows of each value of the key, rising."""
+    order = np.argsort(key, kind="stable")
+    return np.split(order, np.flatnonzero(np.diff(key[order])) + 1)
 
 
 def _every(t: Conditions, rows: list[int], weights: list[float]) -> Iterator[Contrast]:

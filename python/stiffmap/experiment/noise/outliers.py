@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from stiffmap.experiment.experiment import Experiment, Floats
+from stiffmap.experiment.experiment import Experiment, Floats, Integers, Mask
 from stiffmap.experiment.noise.level import Noise, noise_of
 from stiffmap.experiment.noise.whitening import Problem, nuisance_part
 from stiffmap.experiment.setups import target_positions
 
-Mask = NDArray[np.bool_]
 MANY, LEAST_MANY = 0.1, 2
 """Share and number of rows beyond which those that stand alone before any effect is known are an effect."""
 NAMED = 12
@@ -61,7 +59,7 @@ def _contradicting(experiment: Experiment, residual: Floats, sigma: Floats) -> M
     return out
 
 
-def _worst(rows: NDArray[np.intp], z: Floats) -> NDArray[np.intp]:
+def _worst(rows: Integers, z: Floats) -> Integers:
     """Of conditions (g, m) rows of m repeats, whose readings are z (g, m, c), those rows that contradict the others."""
     read = np.isfinite(z)
     middle = _middle(z, read)

@@ -12,10 +12,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from stiffmap.experiment.experiment import Floats, Integers
+from stiffmap.experiment.experiment import Floats, Integers, Mask
 
 STEPS = 60
 DONE = 1e-12
@@ -32,7 +31,6 @@ HUBER = 3.0
 """Robust standard deviations beyond which a reading's weight falls."""
 PARALLEL = 1e-3
 """Second singular value of the relative turns, over the first: below it they have one axis only."""
-Mask = NDArray[np.bool_]
 
 
 @dataclass

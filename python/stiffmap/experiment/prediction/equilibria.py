@@ -8,8 +8,7 @@ from functools import partial
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from stiffmap.experiment.experiment import Experiment, Floats, Integers
-from stiffmap.experiment.noise.level import Mask
+from stiffmap.experiment.experiment import Experiment, Floats, Integers, Mask
 from stiffmap.experiment.poses.configuration import coordinates_of, in_reach, point_positions, positions_of
 from stiffmap.experiment.prediction.joints import joint_channels, joint_motions
 from stiffmap.experiment.prediction.metrology_loop import carrier, rigged, targets
