@@ -15,7 +15,7 @@ from itertools import combinations, pairwise
 import numpy as np
 from scipy.stats import chi2
 
-from stiffmap.experiment.experiment import Experiment, Floats, Integers, Mask
+from stiffmap.experiment.experiment import Experiment, Floats, Integers, Mask, numbered
 from stiffmap.experiment.noise.level import sums
 
 Contrast = tuple[list[tuple[int, int]], list[float]]
@@ -73,22 +73,18 @@ class Conditions:
             return False
         return self.zero_known or abs(sum(weights)) < 1e-12
 
-    def values_of(self, contrasts: list[Contrast]) -> Floats:
-        """(m,) contrasts."""
-        return np.array([sum(w * self.mean[at] for at, w in zip(*c, strict=True)) for c in contrasts])
-
-    def covariance_of(self, contrasts: list[Contrast]) -> Floats:
-        """(m, m) of contrasts of one pose."""
+    def of_contrasts(self, contrasts: list[Contrast]) -> tuple[Floats, Floats]:
+        """(m,) contrasts of one pose, and their covariance (m, m)."""
         cells = sorted({at for where, _ in contrasts for at in where})
         index = {at: i for i, at in enumerate(cells)}
         matrix = np.zeros((len(contrasts), len(cells)))
         for row, (where, weights) in enumerate(contrasts):
             for at, w in zip(where, weights, strict=True):
                 matrix[row, index[at]] += w
-        channel = np.array([a for _, a in cells])
+        condition, channel = np.array(cells).T
         shared = np.where(channel[:, None] == channel, self.zero[channel], 0.0)
-        v = np.diag([self.variance[at] for at in cells]) + shared
-        return np.asarray(matrix @ v @ matrix.T)
+        v = np.diag(self.variance[condition, channel]) + shared
+        return matrix @ self.mean[condition, channel], matrix @ v @ matrix.T
 
 
 def _conjugate(e: Experiment) -> bool:
@@ -140,7 +136,7 @@ def _test(
     for c in contrasts:
         of_pose.setdefault(int(table.group[c[0][0][0]]), []).append(c)
     for here in of_pose.values():
-        value, covariance = table.values_of(here), table.covariance_of(here)
+        value, covariance = table.of_contrasts(here)
         squares += (value**2 / np.diag(covariance)).tolist()
         drop, r = _chi_square(value, covariance)
         total, rank = total + drop, rank + r
@@ -185,12 +181,11 @@ def linearity(t: Conditions) -> Iterator[Contrast]:
 def _lines(t: Conditions, here: Integers) -> Iterator[list[int]]:
     size = np.linalg.norm(t.wrench[here], axis=1)
     loaded, size = here[size > 0], size[size > 0]
-    direction = np.round(t.wrench[loaded] / size[:, None], 6) + 0.0
-    same: dict[tuple[float, ...], list[int]] = {}
-    for k, d in enumerate(direction.tolist()):
-        same.setdefault(tuple(d), []).append(k)
-    for _, ks in sorted(same.items()):
-        yield [int(loaded[k]) for k in sorted(ks, key=lambda k: float(size[k]))]
+    order = np.argsort(size, kind="stable")
+    for line in (
+        _grouped(numbered([np.round(t.wrench[loaded] / size[:, None], 6)])[order]) if size.size else ()
+    ):
+        yield loaded[order[line]].tolist()
 
 
 def reversal(t: Conditions) -> Iterator[Contrast]:
@@ -202,11 +197,15 @@ def reversal(t: Conditions) -> Iterator[Contrast]:
 
 
 def _matching(t: Conditions, here: Integers, change: Callable[[Floats], Floats]) -> Iterator[tuple[int, int]]:
-    known = {tuple(np.round(t.wrench[i], 6) + 0.0): int(i) for i in here}
+    known = {_key(t.wrench[i]): int(i) for i in here}
     for i in here:
-        j = known.get(tuple(np.round(change(t.wrench[i]), 6) + 0.0))
+        j = known.get(_key(change(t.wrench[i])))
         if j is not None and np.any(t.wrench[i]):
             yield int(i), j
+
+
+def _key(wrench: Floats) -> tuple[float, ...]:
+    return tuple(np.round(wrench, 6) + 0.0)
 
 
 def superposition(t: Conditions) -> Iterator[Contrast]:
@@ -244,10 +243,9 @@ def hysteresis(t: Conditions) -> Iterator[Contrast]:
     if not t.unloading.any():
         return
     for pose in _grouped(t.group):
-        here = pose[~t.unloading[pose]]
-        known = {tuple(np.round(t.wrench[i], 6) + 0.0): int(i) for i in here}
+        known = {_key(t.wrench[i]): int(i) for i in pose[~t.unloading[pose]]}
         for j in pose[t.unloading[pose]]:
-            i = known.get(tuple(np.round(t.wrench[j], 6) + 0.0))
+            i = known.get(_key(t.wrench[j]))
             if i is not None:
                 yield from _every(t, [i, int(j)], [1.0, -1.0])
 

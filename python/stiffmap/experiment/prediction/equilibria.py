@@ -14,7 +14,7 @@ from stiffmap.experiment.experiment import Experiment, Floats, Integers, Mask
 from stiffmap.experiment.poses.configuration import coordinates_of, in_reach, point_positions, positions_of
 from stiffmap.experiment.prediction.joints import joint_channels, joint_motions
 from stiffmap.experiment.prediction.metrology_loop import carrier, rigged, targets
-from stiffmap.experiment.prediction.unloaded_state import lagging, lags, signs
+from stiffmap.experiment.prediction.unloaded_state import is_sided, lagging, signs
 from stiffmap.experiment.readings import Seen, kind_of
 from stiffmap.model.description.strain import rests_at_command
 from stiffmap.solve.closing import of_drives
@@ -129,8 +129,7 @@ class Solver:
     def rest(self) -> tuple[Floats, int]:
         """(n, c) without the wrenches: in the centre of every gap, or on the side of the approach."""
         bare = self.plan.without_load
-        sided = self.plan.quantity == "position" or self.plan.unloaded == "approach"
-        if sided and self.plan.approach is not None and lags(self.machine.description):
+        if is_sided(self.machine.description, self.plan):
             sides = signs(self.machine, bare)
             return _in_parts(bare, sides, lambda part, side: self._equilibria(self._lagging(side), part))
         return self._equilibria(self.machine, bare)

@@ -27,6 +27,12 @@ def lag(joint: Joint) -> float:
     return float(max((a for a, f in law.knots if f == 0.0), default=0.0) + law.friction / law.stiffness)
 
 
+def is_sided(description: MachineDescription, plan: Experiment) -> bool:
+    """Whether the state without load depends on the approach."""
+    sided = plan.quantity == "position" or plan.unloaded == "approach"
+    return sided and plan.approach is not None and lags(description)
+
+
 def lags(description: MachineDescription) -> bool:
     """Whether any drive stays behind."""
     elements = (e for leg in description.legs for e in leg.elements)
