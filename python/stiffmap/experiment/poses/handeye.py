@@ -70,7 +70,8 @@ class Sighting:
 
 def find_frames(s: Sighting) -> Frames:
     """Frames of instruments and targets of best fit."""
-    return min((_refined(s, f) for f in _starts(s)), key=lambda f: _cost(s, f))
+    refined = (_refined(s, f) for f in _starts(s))
+    return min(refined, key=lambda f: float(np.sum(np.abs(_linear(s, f)[0]))))
 
 
 def unmoved(s: Sighting) -> Frames:
@@ -188,11 +189,6 @@ def _near_the_tool(s: Sighting, f: Frames, residual: Floats, unknown: int) -> tu
     scale = _typical(residual) * max(float(s.placed.sum()) / ROWS, 1.0) ** 0.5 / ARM
     places = np.arange(unknown).reshape(-1, 6)[len(f.base_r) :, :3].ravel()
     return (scale * f.tool_p).ravel(), scale * np.eye(unknown)[places]
-
-
-def _cost(s: Sighting, f: Frames) -> float:
-    residual, _ = _linear(s, f)
-    return float(np.sum(np.abs(residual)))
 
 
 def _weights(residual: Floats) -> Floats:
