@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -10,15 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from stiffmap.common.broadcasting import Floats
 from stiffmap.common.short import short_repr
 from stiffmap.experiment.channels import AXES, AXIS_CHANNELS, Channel
 from stiffmap.experiment.notebook import experiment_html
-from stiffmap.experiment.ramps import directions
+from stiffmap.experiment.ramps import Integers, directions
 
 __all__ = ["AXES", "BRANCHES", "WRENCH", "Channel", "Experiment", "Floats", "Integers", "Loop"]
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 WRENCH = ("fx", "fy", "fz", "mx", "my", "mz")
 ASKED = tuple(f"{c}_cmd" for c in WRENCH)
@@ -193,7 +192,8 @@ class Experiment:
     @cached_property
     def groups(self) -> Integers:
         """(n,) number of the commanded pose (or pair of poses) of each row."""
-        return _numbers([self.command if self.command is not None else self.position, *self._turned])
+        place = self.position if self.command is None else self.command
+        return numbered([place, self.rotation, self.other, self.other_rotation])
 
     @cached_property
     def runs(self) -> Integers:
@@ -217,17 +217,17 @@ class Experiment:
         """The same rows without their wrenches."""
         return replace(self, wrench=np.zeros_like(self.wrench)) if self.wrench.any() else self
 
-    @property
-    def _turned(self) -> list[Any]:
-        return [self.rotation, self.other, self.other_rotation]
-
     @cached_property
     def conditions(self) -> Integers:
         """(n,) number of the condition (pose, load, how it was reached): repeats share it."""
-        words = [self.branch, self.setup, self.points, self.load_points]
-        labels = [np.unique(w, return_inverse=True)[1].reshape(-1) for w in words if w]
-        ways = self.load_direction
-        return _numbers([self.groups, self.wrench, self.temperature, self.approach, *labels, ways])
+        loads = self.wrench, self.temperature, self.load_direction
+        return numbered([self.states, *loads])
+
+    @cached_property
+    def states(self) -> Integers:
+        """(n,) number of the pose and how it was reached and read; load and temperature apart."""
+        words = self.branch, self.setup, self.points, self.load_points
+        return numbered([self.groups, self.approach, *words])
 
     @cached_property
     def load_direction(self) -> Integers | None:
@@ -254,8 +254,10 @@ def _pick(values: Any, index: Integers) -> Any:
     return tuple(values[i] for i in index) if isinstance(values, tuple) else values[index]
 
 
-def _numbers(parts: list[Any]) -> Integers:
-    """(n,) number of each different row of the parts (n, ...); None is left out."""
-    arrays = [np.asarray(p, dtype=float).reshape(len(p), -1) for p in parts if p is not None]
+def numbered(parts: Sequence[Any]) -> Integers:
+    """(n,) number of each different row of the parts, numbers (n, ...) or words (n,); None and no words are left out."""
+    given = [p for p in parts if p is not None and len(p)]
+    columns = [np.unique(p, return_inverse=True)[1] if isinstance(p, tuple) else p for p in given]
+    arrays = [np.asarray(c, dtype=float).reshape(len(c), -1) for c in columns]
     key = np.nan_to_num(np.round(np.hstack(arrays), 9), nan=np.inf) + 0.0
     return np.unique(key, axis=0, return_inverse=True)[1].reshape(-1)

@@ -25,7 +25,10 @@ def directions(wrench: Floats, order: Floats, run: Integers) -> Integers | None:
     run
         (n,) number of the set-up: each starts afresh.
     """
-    load = wrench[:, int(np.argmax(np.ptp(wrench, axis=0) / _sizes(wrench)))]
+    # forces and moments, each kind by its own largest range: what does not vary never counts
+    range_ = np.ptp(wrench, axis=0)
+    most = np.repeat([range_[:3].max(), range_[3:].max()], 3)
+    load = wrench[:, int(np.argmax(range_ / np.where(most > 0, most, np.inf)))]
     span = float(np.ptp(load))
     if not span > 0.0:
         return None
@@ -37,14 +40,6 @@ def directions(wrench: Floats, order: Floats, run: Integers) -> Integers | None:
         out[here], more = _followed(load[here], RETREAT * span)
         turns += more
     return out if turns * ROWS <= len(load) else None
-
-
-def _sizes(wrench: Floats) -> Floats:
-    """Forces and moments, each kind by its own largest range: what does not vary never counts."""
-    range_ = np.ptp(wrench, axis=0)
-    most = np.repeat([range_[:3].max(), range_[3:].max()], 3)
-    only = np.where(most > 0, most, np.inf)
-    return np.asarray(only)
 
 
 def _followed(load: Floats, retreat: float) -> tuple[Integers, int]:

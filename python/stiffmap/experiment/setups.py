@@ -20,6 +20,11 @@ def targets_of(e: Experiment) -> tuple[Integers, list[str]]:
     return _labelled(e, e.target or e.setup)
 
 
+def members(number: Integers) -> Floats:
+    """(k, n) 1 where a row has one of the numbers (n,), rising."""
+    return np.equal.outer(np.unique(number), number).astype(float)
+
+
 def target_positions(experiment: Experiment) -> Floats:
     """(n, 3) m, base axes: where the targets were commanded."""
     return np.asarray(experiment.position + _levers(experiment))

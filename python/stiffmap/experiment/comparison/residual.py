@@ -12,9 +12,9 @@ import numpy as np
 from stiffmap.common.outputs import number_cells, write_rows
 from stiffmap.common.short import short_repr
 from stiffmap.experiment.comparison.summary import Summary
-from stiffmap.experiment.experiment import Experiment, Floats
+from stiffmap.experiment.experiment import Experiment, Floats, Mask
 from stiffmap.experiment.noise.checks import Check
-from stiffmap.experiment.noise.level import Mask, Noise
+from stiffmap.experiment.noise.level import Noise
 from stiffmap.experiment.notebook import residual_html
 
 if TYPE_CHECKING:

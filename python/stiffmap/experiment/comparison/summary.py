@@ -8,6 +8,7 @@ import numpy as np
 
 from stiffmap.experiment.channels import AXIS_CHANNELS, Channel, metres
 from stiffmap.experiment.experiment import Floats
+from stiffmap.experiment.noise.level import rms
 
 
 @dataclass(frozen=True)
@@ -50,9 +51,3 @@ def summary(residual: Floats, sigma: Floats, channels: tuple[Channel, ...] = AXI
         ratio=rms(residual / sigma),
         rotation_rms=rms(angular) if np.isfinite(angular).any() else None,
     )
-
-
-def rms(values: Floats) -> float:
-    """Root mean square of what is finite; NaN of nothing."""
-    good = values[np.isfinite(values)]
-    return float(np.sqrt(np.mean(good**2))) if good.size else float("nan")

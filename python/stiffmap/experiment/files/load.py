@@ -128,7 +128,7 @@ def rows_of(model: ExperimentFile, table: Table) -> dict[str, Any]:
         "ids": read_columns.ids(table),
         "position": read_columns.position(table, bool(model.command)),
         "wrench": _wrench(model, table),
-        "asked": _asked(table),
+        "asked": table.block(ASKED, blank=True) if table.one_of(ASKED) else None,
         "rotation": rotation,
         "other_rotation": other_rotation,
         "command": read_columns.command(model, table),
@@ -231,8 +231,3 @@ def _wrench(model: ExperimentFile, table: Table) -> Floats:
             "missing column: a deflection needs a load (fx, fy, fz, mx, my, mz)", file=table.file
         )
     return table.block(WRENCH, blank=False, missing=0.0)
-
-
-def _asked(table: Table) -> Floats | None:
-    """(n, 6) N, N·m that were commanded, NaN where nothing was; each in the unit of the load that was measured."""
-    return table.block(ASKED, blank=True) if table.one_of(ASKED) else None

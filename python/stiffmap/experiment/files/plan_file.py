@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 
 from stiffmap.common.errors import FileError
-from stiffmap.experiment.channels import AXES, AXIS_CHANNELS
+from stiffmap.experiment.channels import AXES
 from stiffmap.experiment.experiment import Experiment
 from stiffmap.experiment.files.fields import EULER, PLAN, TURNED2
 from stiffmap.experiment.files.load import rows_of
 from stiffmap.experiment.files.schema import ExperimentFile, UnitsModel
 from stiffmap.experiment.files.table import read_table
 from stiffmap.experiment.files.units import Units
-from stiffmap.experiment.virtual.plans import MICRO
+from stiffmap.experiment.virtual.plans import unread
 from stiffmap.solve.machine import Machine
 
 KNOWN = tuple(c for c in PLAN if c not in (*EULER, *TURNED2))
@@ -40,8 +40,6 @@ def load_plan(
     table = Units(model, str(path)).of_header(read_table(path))
     table.refuse_unknown(KNOWN, "a plan knows")
     n = len(table)
-    size = np.where([c.unit == "m" for c in AXIS_CHANNELS], noise or MICRO[quantity], angle_noise)
-    sigma = np.tile(np.where([a in axes for a in AXES], size, np.nan), (n, 1))
     rows = {k: v for k, v in rows_of(model, table).items() if k not in READ_LATER}
     if rows["order"] is None:
         rows["order"] = np.arange(1, n + 1, dtype=float)
@@ -51,8 +49,7 @@ def load_plan(
         name=path.stem,
         machine=machine.name,
         quantity=quantity,
-        reading=np.where(np.isfinite(sigma), 0.0, np.nan),
-        sigma=sigma,
         rotation_against="home",
+        **unread(n, quantity, axes, noise, angle_noise),
         **rows,
     )

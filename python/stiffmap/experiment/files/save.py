@@ -46,10 +46,7 @@ def _head(e: Experiment, title: str) -> dict[str, Any]:
     told = dict(e.record)
     head |= {"notes": told.pop("notes")} if "notes" in told else {}
     head |= {"record": told} if told else {}
-    optional = {
-        "gravity": _gravity(e),
-        "reference_temperature": e.reference_temperature,
-    }
+    optional = {"gravity": _gravity(e), "reference_temperature": e.reference_temperature}
     head |= {k: v for k, v in optional.items() if v is not None}
     head |= {k: getattr(e, k) for k, plain in PLAIN.items() if getattr(e, k) != plain}
     if e.rotation is not None and e.rotation_against == "base" and e.command is None:
@@ -57,12 +54,13 @@ def _head(e: Experiment, title: str) -> dict[str, Any]:
     if (e.normal, e.surface) != ((0.0, 0.0, 1.0), "known"):
         head["surface"] = {"normal": list(e.normal), "shape": e.surface}
     if e.anchor is not None:
-        head["anchor"] = [float(f"{MM * v:.9g}") for v in e.anchor]
+        head["anchor"] = [_short(MM * v, 9) for v in e.anchor]
     if e.certificate:
-        mm = ("frame", "tool")
-        head["certificate"] = {k: float(f"{v * (MM if k in mm else 1.0):.6g}") for k, v in e.certificate}
+        head["certificate"] = {
+            k: _short(v * (MM if k in ("frame", "tool") else 1.0)) for k, v in e.certificate
+        }
     if e.loop != Loop():
-        head["metrology"] = {k: getattr(e.loop, k) for k in ("instrument_on", "target_on", "force_against")}
+        head["metrology"] = vars(e.loop).copy()
     return head
 
 
@@ -75,20 +73,21 @@ def _gravity(e: Experiment) -> Any:
 
 def _noise(e: Experiment) -> dict[str, Any]:
     """Declared noise; one that differs from row to row is a column instead."""
-    common = {
-        c.name: float(f"{e.sigma[e.read[:, i], i][0] * _scale(c):.6g}")
-        for i, c in enumerate(e.channels)
-        if not c.joint and e.axis_read[i] and _alike(e, i)
-    }
-    zero = {
-        a: float(f"{s * _scale(c):.6g}") for a, c, s in zip(AXES, e.channels, e.zero_sigma, strict=False) if s
-    }
+    each = {c.name: _declared(e, i) for i, c in enumerate(e.channels) if not c.joint}
+    common = {name: size for name, size in each.items() if size is not None}
+    zero = {c.name: _short(s * _scale(c)) for c, s in zip(e.channels, e.zero_sigma, strict=False) if s}
     return ({"noise": common} if common else {}) | ({"zero_noise": zero} if zero else {})
 
 
-def _alike(e: Experiment, i: int) -> bool:
+def _declared(e: Experiment, i: int) -> float | None:
+    """The standard deviation of a channel in the unit of the file, where all that was read has the same."""
     s = e.sigma[e.read[:, i], i]
-    return bool(np.isfinite(s).all() and np.ptp(s) == 0 and s[0] > 0)
+    alike = s.size and np.isfinite(s).all() and np.ptp(s) == 0 and s[0] > 0
+    return _short(s[0] * _scale(e.channels[i])) if alike else None
+
+
+def _short(value: float, digits: int = 6) -> float:
+    return float(f"{value:.{digits}g}")
 
 
 def _own_columns(e: Experiment) -> dict[str, Any]:
@@ -96,9 +95,9 @@ def _own_columns(e: Experiment) -> dict[str, Any]:
     joints: dict[str, Any] = {}
     for i, c in enumerate(e.channels):
         if c.joint:
+            noise = _declared(e, i)
             joints[c.name] = {"joint": c.joint, "unit": _unit(c), "side": c.side}
-            if _alike(e, i):
-                joints[c.name]["noise"] = float(f"{e.sigma[e.read[:, i], i][0] * _scale(c):.6g}")
+            joints[c.name] |= {} if noise is None else {"noise": noise}
     command = {c.name: {"actuator": c.joint, "unit": _unit(c)} for c in e.command_of}
     return ({"joints": joints} if joints else {}) | ({"command": command} if command else {})
 
@@ -119,7 +118,7 @@ def _columns(e: Experiment) -> dict[str, list[Any]]:
     for i, c in enumerate(e.channels):
         if e.axis_read[i] and c.name not in told:
             columns[c.name] = number_cells(e.reading[:, i] * _scale(c))
-            if not _alike(e, i) and np.isfinite(e.sigma[:, i]).any():
+            if _declared(e, i) is None and np.isfinite(e.sigma[:, i]).any():
                 columns[f"u_{c.name}"] = number_cells(e.sigma[:, i] * _scale(c))
     for name in COUNTED:
         if getattr(e, name) is not None:

@@ -15,8 +15,8 @@ from itertools import combinations, pairwise
 import numpy as np
 from scipy.stats import chi2
 
-from stiffmap.experiment.experiment import Experiment, Floats, Integers
-from stiffmap.experiment.noise.level import Mask
+from stiffmap.experiment.experiment import Experiment, Floats, Integers, Mask, numbered
+from stiffmap.experiment.noise.level import sums
 
 Contrast = tuple[list[tuple[int, int]], list[float]]
 """(condition, channel) pairs and their weights."""
@@ -38,7 +38,8 @@ class Conditions:
     group: Integers
     """(k,) pose number."""
     state: Integers
-    """(k,) number of what else may differ between conditions of a pose."""
+    """(k,) number of the pose and of all that may differ between its conditions but the load: only alike ones are compared.
+    Temperature is not among it: the unloaded reading is as warm as the loaded one."""
     unloading: Mask
     work_conjugate: bool
     """Whether the force acts where the reading is taken, from and to the floor or base."""
@@ -48,19 +49,19 @@ class Conditions:
         """Weighted means of the kept rows of each condition."""
         good = np.isfinite(values) & np.isfinite(sigma) & keep[:, None]
         weight = np.where(good, 1.0 / np.where(good, sigma, 1.0) ** 2, 0.0)
-        total = _sums(e, weight)
-        sums = _sums(e, np.where(good, values, 0.0) * weight)
+        total = sums(weight, e.conditions)
+        mean = sums(np.where(good, values, 0.0) * weight, e.conditions)
         first = np.unique(e.conditions, return_index=True)[1]
         branch = np.array(e.branch or ("",) * len(e))[first]
         safe = np.where(total > 0, total, 1.0)
         return Conditions(
-            np.where(total > 0, sums / safe, np.nan),
+            np.where(total > 0, mean / safe, np.nan),
             np.where(total > 0, 1.0 / safe, np.nan),
             e.zeros**2,
             e.unloaded != "unknown",
             e.wrench[first],
             e.groups[first],
-            _states(e)[first],
+            e.states[first],
             branch == "unloading",
             _conjugate(e),
         )
@@ -72,37 +73,18 @@ class Conditions:
             return False
         return self.zero_known or abs(sum(weights)) < 1e-12
 
-    def values_of(self, contrasts: list[Contrast]) -> Floats:
-        """(m,) contrasts."""
-        return np.array([sum(w * self.mean[at] for at, w in zip(*c, strict=True)) for c in contrasts])
-
-    def covariance_of(self, contrasts: list[Contrast]) -> Floats:
-        """(m, m) of contrasts of one pose."""
+    def of_contrasts(self, contrasts: list[Contrast]) -> tuple[Floats, Floats]:
+        """(m,) contrasts of one pose, and their covariance (m, m)."""
         cells = sorted({at for where, _ in contrasts for at in where})
         index = {at: i for i, at in enumerate(cells)}
         matrix = np.zeros((len(contrasts), len(cells)))
         for row, (where, weights) in enumerate(contrasts):
             for at, w in zip(where, weights, strict=True):
                 matrix[row, index[at]] += w
-        channel = np.array([a for _, a in cells])
+        condition, channel = np.array(cells).T
         shared = np.where(channel[:, None] == channel, self.zero[channel], 0.0)
-        v = np.diag([self.variance[at] for at in cells]) + shared
-        return np.asarray(matrix @ v @ matrix.T)
-
-
-def _sums(e: Experiment, values: Floats) -> Floats:
-    number = int(e.conditions.max()) + 1
-    return np.stack([np.bincount(e.conditions, v, number) for v in values.T], axis=1)
-
-
-def _states(e: Experiment) -> Integers:
-    """(n,) number of everything but pose and load: only alike conditions are compared. Temperature is not
-    among it: the unloaded reading is as warm as the loaded one."""
-    parts = [np.zeros(len(e))]
-    words = [e.branch, e.setup, e.points, e.load_points]
-    parts += [np.unique(w, return_inverse=True)[1].reshape(-1).astype(float) for w in words if w]
-    parts += list(e.approach.T) if e.approach is not None else []
-    return np.unique(np.column_stack(parts), axis=0, return_inverse=True)[1].reshape(-1)
+        v = np.diag(self.variance[condition, channel]) + shared
+        return matrix @ self.mean[condition, channel], matrix @ v @ matrix.T
 
 
 def _conjugate(e: Experiment) -> bool:
@@ -154,7 +136,7 @@ def _test(
     for c in contrasts:
         of_pose.setdefault(int(table.group[c[0][0][0]]), []).append(c)
     for here in of_pose.values():
-        value, covariance = table.values_of(here), table.covariance_of(here)
+        value, covariance = table.of_contrasts(here)
         squares += (value**2 / np.diag(covariance)).tolist()
         drop, r = _chi_square(value, covariance)
         total, rank = total + drop, rank + r
@@ -173,16 +155,13 @@ def _chi_square(value: Floats, covariance: Floats) -> tuple[float, int]:
 
 def alike(t: Conditions) -> Iterator[Integers]:
     """Conditions of each pose that differ by their load only; where there is but one nothing can be contrasted."""
-    return (here for here in _grouped(t.group, t.state) if here.size > 1)
+    return (here for here in _grouped(t.state) if here.size > 1)
 
 
-def _grouped(*keys: Integers) -> Iterator[Integers]:
-    """Rows of each combination of keys, rising."""
-    order = np.lexsort(keys[::-1])
-    ends = np.zeros(order.size, dtype=bool)
-    for key in keys:
-        ends[1:] |= np.diff(key[order]) != 0
-    return iter(np.split(order, np.flatnonzero(ends)) if order.size else ())
+def _grouped(key: Integers) -> list[Integers]:
+    """Rows of each value of the key, rising."""
+    order = np.argsort(key, kind="stable")
+    return np.split(order, np.flatnonzero(np.diff(key[order])) + 1)
 
 
 def _every(t: Conditions, rows: list[int], weights: list[float]) -> Iterator[Contrast]:
@@ -202,12 +181,11 @@ def linearity(t: Conditions) -> Iterator[Contrast]:
 def _lines(t: Conditions, here: Integers) -> Iterator[list[int]]:
     size = np.linalg.norm(t.wrench[here], axis=1)
     loaded, size = here[size > 0], size[size > 0]
-    direction = np.round(t.wrench[loaded] / size[:, None], 6) + 0.0
-    same: dict[tuple[float, ...], list[int]] = {}
-    for k, d in enumerate(direction.tolist()):
-        same.setdefault(tuple(d), []).append(k)
-    for _, ks in sorted(same.items()):
-        yield [int(loaded[k]) for k in sorted(ks, key=lambda k: float(size[k]))]
+    order = np.argsort(size, kind="stable")
+    for line in (
+        _grouped(numbered([np.round(t.wrench[loaded] / size[:, None], 6)])[order]) if size.size else ()
+    ):
+        yield loaded[order[line]].tolist()
 
 
 def reversal(t: Conditions) -> Iterator[Contrast]:
@@ -219,11 +197,15 @@ def reversal(t: Conditions) -> Iterator[Contrast]:
 
 
 def _matching(t: Conditions, here: Integers, change: Callable[[Floats], Floats]) -> Iterator[tuple[int, int]]:
-    known = {tuple(np.round(t.wrench[i], 6) + 0.0): int(i) for i in here}
+    known = {_key(t.wrench[i]): int(i) for i in here}
     for i in here:
-        j = known.get(tuple(np.round(change(t.wrench[i]), 6) + 0.0))
+        j = known.get(_key(change(t.wrench[i])))
         if j is not None and np.any(t.wrench[i]):
             yield int(i), j
+
+
+def _key(wrench: Floats) -> tuple[float, ...]:
+    return tuple(np.round(wrench, 6) + 0.0)
 
 
 def superposition(t: Conditions) -> Iterator[Contrast]:
@@ -261,10 +243,9 @@ def hysteresis(t: Conditions) -> Iterator[Contrast]:
     if not t.unloading.any():
         return
     for pose in _grouped(t.group):
-        here = pose[~t.unloading[pose]]
-        known = {tuple(np.round(t.wrench[i], 6) + 0.0): int(i) for i in here}
+        known = {_key(t.wrench[i]): int(i) for i in pose[~t.unloading[pose]]}
         for j in pose[t.unloading[pose]]:
-            i = known.get(tuple(np.round(t.wrench[j], 6) + 0.0))
+            i = known.get(_key(t.wrench[j]))
             if i is not None:
                 yield from _every(t, [i, int(j)], [1.0, -1.0])
 

@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.channels import Channel, metres
-from stiffmap.experiment.experiment import Experiment, Floats
+from stiffmap.experiment.experiment import Experiment, Floats, Integers, Mask, numbered
 
-Mask = NDArray[np.bool_]
 CONTRADICTION = 1e-4
 ENOUGH = 5
 """Degrees of freedom of repeats that show the noise without a declaration."""
@@ -28,7 +26,7 @@ class Noise:
     """Root mean square of the declared standard deviations."""
     repeats: Floats
     """From readings of the same condition."""
-    freedom: NDArray[np.intp]
+    freedom: Integers
     """Degrees of freedom of `repeats`."""
     consistency: Floats
     """p-value of repeats that differ at least this much from what is stated (two-sided chi-square)."""
@@ -40,9 +38,7 @@ class Noise:
     @property
     def rms(self) -> float:
         """Floor of the lengths together, m; NaN where none was read."""
-        lengths = self.floor[metres(self.channels)]
-        known = lengths[np.isfinite(lengths)]
-        return float(np.sqrt(np.mean(known**2))) if known.size else float("nan")
+        return rms(self.floor[metres(self.channels)])
 
     def contradictions(self) -> list[str]:
         """Axes whose repeats scatter more than the declaration allows, described in words."""
@@ -53,22 +49,25 @@ class Noise:
         ]
 
 
+def rms(values: Floats) -> float:
+    """Root mean square of what is finite; NaN of nothing."""
+    good = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(good**2))) if good.size else float("nan")
+
+
 def noise_of(experiment: Experiment, keep: Mask | None = None) -> Noise:
     """Noise floor from the rows in `keep`; raises StiffmapError where nothing determines the noise."""
-    rows = np.ones(len(experiment), bool) if keep is None else keep
-    squares, freedom = _within(experiment, rows)
+    squares, freedom, declared = _within(experiment, keep)
     with np.errstate(invalid="ignore", divide="ignore"):
         repeats = np.sqrt(squares / freedom)
-        declared = np.sqrt(_mean(experiment.sigma**2))
-        ratio = squares / declared**2
-        lower = chi2.cdf(ratio, np.maximum(freedom, 1))
+        lower = chi2.cdf(squares / declared**2, np.maximum(freedom, 1))
     p = np.where((freedom > 0) & (declared > 0), 2 * np.minimum(lower, 1 - lower), np.nan)
-    floor = np.fmax(declared, np.where(freedom >= ENOUGH, repeats, np.nan))
-    if lost := _lost(experiment, floor):
+    if lost := unknown(experiment, keep):
         raise StiffmapError(
             f"{experiment.name}: the noise of {', '.join(lost)} is zero or unknown; declare it (noise: in "
             f"experiment.yaml) or repeat readings at {ENOUGH} or more conditions"
         )
+    floor = np.fmax(declared, np.where(freedom >= ENOUGH, repeats, np.nan))
     factor = np.where(declared > 0, floor / np.where(declared > 0, declared, 1.0), np.nan)
     sigma = np.where(experiment.sigma > 0, experiment.sigma * factor, floor)
     return Noise(
@@ -76,18 +75,13 @@ def noise_of(experiment: Experiment, keep: Mask | None = None) -> Noise:
     )
 
 
-def unknown(experiment: Experiment) -> list[str]:
-    """Channels of which neither a declaration nor repeats say how sure they are: `noise_of` refuses them."""
-    squares, freedom = _within(experiment, np.ones(len(experiment), bool))
-    return _lost(
-        experiment, np.fmax(_mean(experiment.sigma**2), np.where(freedom >= ENOUGH, squares, np.nan))
-    )
-
-
-def _lost(experiment: Experiment, floor: Floats) -> list[str]:
-    """Channels that were read and have no positive floor (c,)."""
-    read = zip(experiment.channels, floor, experiment.axis_read, strict=True)
-    return [c.name for c, f, any_ in read if any_ and not f > 0]
+def unknown(experiment: Experiment, rows: Mask | None = None) -> list[str]:
+    """Channels of which neither a declaration nor repeats, among rows (n,), say how sure they are: `noise_of` refuses them."""
+    squares, freedom, declared = _within(experiment, rows)
+    known = (declared > 0) | ((freedom >= ENOUGH) & (squares > 0))
+    return [
+        c.name for c, lost in zip(experiment.channels, experiment.axis_read & ~known, strict=True) if lost
+    ]
 
 
 LOUD = 10.0
@@ -104,10 +98,8 @@ def contradictions(experiment: Experiment) -> list[str]:
         reading = e.reading.copy()
         reading[:, :3] = np.where(np.isfinite(e.seen), e.seen, reading[:, :3])
         e = replace(e, reading=reading)
-    words = [np.unique(w or [""] * len(e), return_inverse=True)[1] for w in (e.target, e.instrument, e.setup)]
-    alike = np.unique(np.column_stack([e.conditions, *words]), axis=0, return_inverse=True)[1].reshape(-1)
-    squares, freedom = _within(e, np.ones(len(e), bool), alike)
-    repeats, declared = np.sqrt(squares / np.maximum(freedom, 1)), np.sqrt(_mean(e.sigma**2))
+    squares, freedom, declared = _within(e, None, numbered([e.conditions, e.target, e.instrument, e.setup]))
+    repeats = np.sqrt(squares / np.maximum(freedom, 1))
     return [
         f"the declared noise of {c.name} is {1e3 * d:.3g} {unit}, and readings of the same command and load scatter by "
         f"{1e3 * s:.3g} {unit}, {s / d:.2g} times as much: are they of one target, one set-up and one load?"
@@ -141,21 +133,21 @@ def against_the_load(experiment: Experiment) -> str:
     )
 
 
-def _mean(values: Floats) -> Floats:
-    count = np.isfinite(values).sum(axis=0)
-    return np.asarray(np.where(count > 0, np.nansum(values, axis=0) / np.maximum(count, 1), np.nan))
+def sums(values: Floats | Mask, number: Integers) -> Floats:
+    """(k, c) sums of values (n, c) over the rows of each number (n,)."""
+    return np.stack([np.bincount(number, v) for v in values.T], axis=1)
 
 
 def _within(
-    experiment: Experiment, rows: Mask, alike: NDArray[np.intp] | None = None
-) -> tuple[Floats, NDArray[np.intp]]:
-    """Sum of squares within conditions, and its degrees of freedom, per axis."""
+    experiment: Experiment, rows: Mask | None, alike: Integers | None = None
+) -> tuple[Floats, Integers, Floats]:
+    """Sum of squares of rows within conditions, its degrees of freedom, and the declared standard deviation, per axis."""
     condition = experiment.conditions if alike is None else alike
-    number = int(condition.max()) + 1
-    read = experiment.read & rows[:, None]
+    read = experiment.read if rows is None else experiment.read & rows[:, None]
     values = np.where(read, experiment.reading, 0.0)
-    count = np.stack([np.bincount(condition, read[:, a], number) for a in range(read.shape[1])], axis=1)
-    total = np.stack([np.bincount(condition, values[:, a], number) for a in range(read.shape[1])], axis=1)
-    mean = total / np.maximum(count, 1)
+    count = sums(read, condition)
+    mean = sums(values, condition) / np.maximum(count, 1)
     squares = np.where(read, (values - mean[condition]) ** 2, 0.0).sum(axis=0)
-    return squares, np.maximum(count - 1, 0).sum(axis=0).astype(np.intp)
+    stated = np.isfinite(experiment.sigma).sum(axis=0)
+    declared = np.sqrt(np.nansum(experiment.sigma**2, axis=0) / np.where(stated > 0, stated, np.nan))
+    return squares, np.maximum(count - 1, 0).sum(axis=0).astype(np.intp), declared

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.readings import ReadingKind, kind_of
-from stiffmap.experiment.setups import setups_of, target_positions, targets_of
+from stiffmap.experiment.setups import members, setups_of, target_positions, targets_of
 
 Kinds = Sequence[tuple[int, ReadingKind, Experiment]]
 """Channel, what it is, and the experiment where the machine stands."""
@@ -37,21 +37,15 @@ def nuisance_columns(experiment: Experiment, base: Floats) -> Floats:
 def _zeros(experiment: Experiment) -> Iterator[Floats]:
     """An unknown zero per pose and channel."""
     if experiment.quantity == "deflection" and experiment.unloaded == "unknown":
-        for group in np.unique(experiment.groups):
-            yield from _per_axis((experiment.groups == group).astype(float), experiment)
-
-
-def _setups(experiment: Experiment) -> Iterator[Floats]:
-    """(n,) 1 where a row belongs to the set-up of an instrument."""
-    label = setups_of(experiment)[0]
-    yield from ((label == s).astype(float) for s in np.unique(label))
+        for here in members(experiment.groups):
+            yield from _per_axis(here, experiment)
 
 
 def _frames(experiment: Experiment, base: Floats) -> Iterator[Floats]:
     """The instrument's frame, one per set-up; distances and joints do not know it."""
     if experiment.frame == "known":
         return
-    for here in _setups(experiment):
+    for here in members(setups_of(experiment)[0]):
         if experiment.quantity == "position":
             yield from _per_axis(here, experiment, 6)
         if experiment.frame == "unknown":
@@ -77,10 +71,9 @@ def _tools(experiment: Experiment, base: Floats, kinds: Kinds) -> Iterator[Float
     """Where targets sit on the tool: off by a vector that turns with the tool, and turned if that is unknown."""
     if experiment.tool == "known":
         return
-    label = targets_of(experiment)[0]
     turned = np.nan_to_num(base[:, 3:6])
     there = Rotation.from_rotvec(turned)
-    for here in ((label == t).astype(float) for t in np.unique(label)):
+    for here in members(targets_of(experiment)[0]):
         for k in range(3):
             arm = _tool_axis(experiment.rotation, len(experiment), k)
             held = there.apply(arm)

@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from stiffmap.experiment.experiment import Experiment, Floats
+from stiffmap.experiment.experiment import Experiment, Floats, Integers, Mask
 from stiffmap.experiment.noise.level import Noise, noise_of
 from stiffmap.experiment.noise.whitening import Problem, nuisance_part
 from stiffmap.experiment.setups import target_positions
 
-Mask = NDArray[np.bool_]
 MANY, LEAST_MANY = 0.1, 2
 """Share and number of rows beyond which those that stand alone before any effect is known are an effect."""
 NAMED = 12
@@ -61,26 +59,18 @@ def _contradicting(experiment: Experiment, residual: Floats, sigma: Floats) -> M
     return out
 
 
-def _worst(rows: NDArray[np.intp], z: Floats) -> NDArray[np.intp]:
+def _worst(rows: Integers, z: Floats) -> Integers:
     """Of conditions (g, m) rows of m repeats, whose readings are z (g, m, c), those rows that contradict the others."""
     read = np.isfinite(z)
-    middle = _middle(z, read)
+    some = read.any(axis=1, keepdims=True)
+    middle = np.nanmedian(np.where(some, np.where(read, z, np.nan), 0.0), axis=1)
     away = np.where(read, z - middle[:, None], 0.0)
     score = np.sum(away**2, axis=2)
-    freedom = np.maximum(read.sum(axis=(1, 2)) - read.any(axis=1).sum(axis=1), 1)
+    freedom = np.maximum(read.sum(axis=(1, 2)) - some.sum(axis=(1, 2)), 1)
     found = chi2.sf(score.sum(axis=1), freedom) <= 1e-5
     if rows.shape[1] == 2:  # two that disagree: the one farther from the model
         score = np.sum(np.where(read, z, 0.0) ** 2, axis=2)
     return np.asarray(rows[found, np.argmax(score[found], axis=1)])
-
-
-def _middle(z: Floats, read: Mask) -> Floats:
-    """(g, c) medians over the repeats of (g, m, c) that were read; 0 where none was."""
-    ranked = np.sort(np.where(read, z, np.inf), axis=1)
-    count = read.sum(axis=1, keepdims=True)
-    low, high = (np.take_along_axis(ranked, np.maximum(k, 0), axis=1) for k in ((count - 1) // 2, count // 2))
-    high = np.where(count % 2 == 0, high, low)
-    return np.asarray(np.where(count > 0, (low + high) / 2, 0.0)[:, 0])
 
 
 def swapped(experiment: Experiment, left: Floats, sigma: Floats, out: Mask) -> list[tuple[int, int]]:

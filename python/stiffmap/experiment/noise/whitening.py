@@ -11,14 +11,11 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.experiment.experiment import Experiment, Floats
+from stiffmap.experiment.experiment import Experiment, Floats, Integers, Mask
 from stiffmap.experiment.noise.nuisance import nuisance_columns
 from stiffmap.experiment.noise.robust import ROUNDS, fitted
-
-Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,11 +27,11 @@ class Problem:
     """(n, c) noise floor of each reading."""
     keep: Mask
     """(n,) rows in use."""
-    index: tuple[NDArray[np.intp], NDArray[np.intp]]
+    index: tuple[Integers, Integers]
     """Row and axis of each of the N readings."""
     nuisance: Floats
     """(N, q) orthonormal basis of the whitened nuisances."""
-    blocks: tuple[tuple[NDArray[np.intp], Floats], ...]
+    blocks: tuple[tuple[Integers, Floats], ...]
     """Readings that share a zero, and the inverse Cholesky factor of their covariance."""
     base: Floats
     """(n, c) prediction of the declared machine."""
@@ -49,8 +46,7 @@ class Problem:
         bare = Problem(experiment, sigma, rows, index, none, _blocks(experiment, sigma, index), base)
         columns = nuisance_columns(experiment, base)
         if columns.shape[-1]:
-            q = basis(np.column_stack([bare.white(columns[..., i]) for i in range(columns.shape[-1])]))
-            bare = replace(bare, nuisance=q)
+            bare = replace(bare, nuisance=basis(bare.white(columns)))
         return bare
 
     def __len__(self) -> int:
@@ -62,7 +58,7 @@ class Problem:
         return len(self) - int(self.nuisance.shape[1])
 
     @property
-    def groups(self) -> NDArray[np.intp]:
+    def groups(self) -> Integers:
         """(N,) pose number of each reading."""
         return self.experiment.groups[self.index[0]]
 
@@ -101,7 +97,7 @@ class Problem:
         return self.white(self.experiment.reading - self.check(prediction))
 
 
-def readings_of(experiment: Experiment, base: Floats) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def readings_of(experiment: Experiment, base: Floats) -> tuple[Integers, Integers]:
     """Row and axis of all R readings of an experiment that the declared machine's prediction (n, c) covers."""
     at, axis = np.nonzero(experiment.read & np.isfinite(base))
     return at.astype(np.intp), axis.astype(np.intp)
@@ -118,9 +114,8 @@ def best_fit(problem: Problem, columns: Floats, values: Floats, *, robust: bool 
     if not columns.shape[-1]:
         return np.zeros_like(values)
     bare = replace(problem, nuisance=np.zeros((len(problem), 0)))
-    white = np.column_stack([bare.white(columns[..., i]) for i in range(columns.shape[-1])])
     rounds = ROUNDS if robust else 1
-    return np.asarray(columns @ fitted(white, bare.white(np.nan_to_num(values)), rounds)[0])
+    return np.asarray(columns @ fitted(bare.white(columns), bare.white(np.nan_to_num(values)), rounds)[0])
 
 
 def basis(columns: Floats, tolerance: float = 1e-9) -> Floats:
@@ -133,8 +128,8 @@ def basis(columns: Floats, tolerance: float = 1e-9) -> Floats:
 
 
 def _blocks(
-    experiment: Experiment, sigma: Floats, index: tuple[NDArray[np.intp], NDArray[np.intp]]
-) -> tuple[tuple[NDArray[np.intp], Floats], ...]:
+    experiment: Experiment, sigma: Floats, index: tuple[Integers, Integers]
+) -> tuple[tuple[Integers, Floats], ...]:
     zero, width = experiment.zeros, len(experiment.channels)
     if experiment.quantity != "deflection" or not zero.any():
         return ()

@@ -6,7 +6,8 @@ What is found once holds for a plan and all machines of one nominal geometry.
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable
-from typing import Any, Generic, TypeVar
+from functools import wraps
+from typing import Any, TypeVar
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -27,26 +28,21 @@ STEP = 1e-6
 """m or rad of a drive to either side."""
 
 
-class Once(Generic[Array]):
-    """Arrays by plan, geometry and name, the last ones as long as the plan lives; not to be written to."""
+def _once(make: Callable[..., Array]) -> Callable[..., Array]:
+    """The same, found out once for a plan and all machines of one geometry; the last ones are kept as long as the plan lives."""
+    known: WeakKeyDictionary[Experiment, Kept[Hashable, Array]] = WeakKeyDictionary()
 
-    def __init__(self) -> None:
-        self._known: WeakKeyDictionary[Experiment, Kept[Hashable, Array]] = WeakKeyDictionary()
+    @wraps(make)
+    def found(machine: Machine, plan: Experiment, *names: str) -> Array:
+        def frozen() -> Array:
+            made = make(machine, plan, *names)
+            made.flags.writeable = False
+            return made
 
-    def get(self, plan: Experiment, machine: Machine, make: Callable[[], Array], name: str = "") -> Array:
-        """The array of these; `make` is called where it is not known."""
-        key = name, nominal_geometry(machine.description)
-        return self._known.setdefault(plan, Kept(KEPT)).made(key, lambda: _frozen(make()))
+        key = names, nominal_geometry(machine.description)
+        return known.setdefault(plan, Kept(KEPT)).made(key, frozen)
 
-
-def _frozen(made: Array) -> Array:
-    made.flags.writeable = False
-    return made
-
-
-_REACH: Once[Mask] = Once()
-_POINTS: Once[Floats] = Once()
-_SLOPES: Once[Floats] = Once()
+    return found
 
 
 def coordinates_of(machine: Machine, plan: Experiment) -> Floats:
@@ -73,15 +69,11 @@ def poses_once(plan: Experiment) -> tuple[Experiment, Integers]:
     return plan, np.arange(len(plan))
 
 
+@_once
 def in_reach(machine: Machine, plan: Experiment) -> Mask:
-    """(n,) rows whose commanded pose the rigid machine can take; found out once for all machines of one geometry;
-    not to be written to."""
+    """(n,) rows whose commanded pose the rigid machine can take; not to be written to."""
     if plan.joints is not None:
         return np.asarray(np.isfinite(plan.joints).all(axis=1))
-    return _REACH.get(plan, machine, lambda: _reached(machine, plan))
-
-
-def _reached(machine: Machine, plan: Experiment) -> Mask:
     plain = straight(machine.description)  # a gap without force has no stiffness, and would leave the kernels
     if plain is not machine.description:
         machine = Machine(plain, like=machine)
@@ -95,13 +87,8 @@ def _reached(machine: Machine, plan: Experiment) -> Mask:
 
 
 def point_positions(machine: Machine, name: str, plan: Experiment) -> Floats:
-    """(n, 3) m, base axes, of a point where each row is commanded; NaN where that is out of reach.
-
-    Found out once for all machines of one geometry, as long as the plan lives; not to be written to.
-    """
-    if name == "tcp":
-        return plan.position
-    return _POINTS.get(plan, machine, lambda: _point(machine, name, plan), name)
+    """(n, 3) m, base axes, of a point where each row is commanded; NaN where that is out of reach; not to be written to."""
+    return plan.position if name == "tcp" else _point(machine, plan, name)
 
 
 def positions_of(machine: Machine, plan: Experiment, read: tuple[str, ...]) -> Floats:
@@ -110,21 +97,19 @@ def positions_of(machine: Machine, plan: Experiment, read: tuple[str, ...]) -> F
     return np.stack([at[p][i] for i, p in enumerate(read)])
 
 
-def _point(machine: Machine, name: str, plan: Experiment) -> Floats:
+@_once
+def _point(machine: Machine, plan: Experiment, name: str) -> Floats:
     found = coordinates_of(machine, plan)
     at = machine.compiled.point_positions(name, np.ascontiguousarray(found))
     return np.where(np.asarray(np.isfinite(found).all(axis=1))[:, None], at, np.nan)
 
 
+@_once
 def drive_jacobian(machine: Machine, plan: Experiment) -> Floats:
     """(n, 6, actuators) twist of the TCP per unit of each drive of the rigid machine, in the plan's branch.
 
-    NaN in a column where the drive cannot move to both sides. Found out once for all machines of one geometry; not to be written to.
+    NaN in a column where the drive cannot move to both sides; not to be written to.
     """
-    return _SLOPES.get(plan, machine, lambda: _jacobian(machine, plan))
-
-
-def _jacobian(machine: Machine, plan: Experiment) -> Floats:
     plan, back = poses_once(plan)
     start = coordinates_of(machine, plan)
     drives = of_drives(machine.compiled, start)

@@ -12,10 +12,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from stiffmap.experiment.experiment import Floats, Integers
+from stiffmap.experiment.experiment import Floats, Integers, Mask
 
 STEPS = 60
 DONE = 1e-12
@@ -30,9 +29,10 @@ PAIRS = 400
 """Relative rotations that the closed form takes."""
 HUBER = 3.0
 """Robust standard deviations beyond which a reading's weight falls."""
+LATE = 1e-3
+"""Weight of a target's shift against an instrument's, where only one of them can be known."""
 PARALLEL = 1e-3
 """Second singular value of the relative turns, over the first: below it they have one axis only."""
-Mask = NDArray[np.bool_]
 
 
 @dataclass
@@ -70,7 +70,8 @@ class Sighting:
 
 def find_frames(s: Sighting) -> Frames:
     """Frames of instruments and targets of best fit."""
-    return min((_refined(s, f) for f in _starts(s)), key=lambda f: _cost(s, f))
+    refined = (_refined(s, f) for f in _starts(s))
+    return min(refined, key=lambda f: float(np.sum(np.abs(_linear(s, f)[0]))))
 
 
 def unmoved(s: Sighting) -> Frames:
@@ -97,17 +98,14 @@ def _starts(s: Sighting) -> list[Frames]:
     setups, targets = int(s.setup.max()) + 1, int(s.target.max()) + 1
     tool_r = np.tile(np.eye(3), (targets, 1, 1))
     if s.turned.any() and s.turn_unknown and s.tool_unknown:
-        for k in range(targets):
-            tool_r[k] = _tool_turn(s, k)
+        tool_r = np.stack([_tool_turn(s, k) for k in range(targets)])
     if s.turned.any():
         base_r = np.stack([_base_turn(s, tool_r, k) for k in range(setups)])
-        return [_shifts(s, base_r, tool_r)]
+        return [_shifted(s, Frames(base_r, np.zeros((setups, 3)), tool_r, np.zeros((targets, 3))))]
     # No orientation: a rigid fit for each of a few places of the target; the refinement does the rest.
-    arms = (
-        [np.zeros(3), *(sign * ARM * a for a in np.eye(3) for sign in (1, -1))]
-        if s.tool_unknown
-        else [np.zeros(3)]
-    )
+    arms = [np.zeros(3)]
+    if s.tool_unknown:
+        arms += [sign * ARM * a for a in np.eye(3) for sign in (1, -1)]
     return [_rigid(s, tool_r, np.tile(arm, (targets, 1)), setups) for arm in arms]
 
 
@@ -141,29 +139,13 @@ def _base_turn(s: Sighting, tool_r: Floats, setup: int) -> Floats:
     return np.asarray(Rotation.from_matrix(turns).mean().as_matrix())
 
 
-def _shifts(s: Sighting, base_r: Floats, tool_r: Floats) -> Frames:
-    """Shifts that fit best for given turns; a target's place that the plan leaves open stays at the tool."""
-    setups, targets = len(base_r), len(tool_r)
-    n, unknown = int(s.placed.sum()), 3 * setups + (3 * targets if s.tool_unknown else 0)
-    out = Frames(base_r, np.zeros((setups, 3)), tool_r, np.zeros((targets, 3)))
-    if not n:
-        return out
-    at = np.flatnonzero(s.placed)
-    a = np.zeros((n, 3, unknown))
-    for row, i in enumerate(at):
-        a[row, :, 3 * s.setup[i] : 3 * s.setup[i] + 3] = np.eye(3)
-        if s.tool_unknown:
-            k = 3 * (setups + s.target[i])
-            a[row, :, k : k + 3] = base_r[s.setup[i]] @ s.r[i]
-    b = s.q[at] - np.einsum("nij,nj->ni", base_r[s.setup[at]], s.p[at])
-    ridge = 1e-6 * np.eye(unknown)[3 * setups :]
-    found = np.linalg.lstsq(
-        np.vstack([a.reshape(-1, unknown), ridge]), np.append(b.ravel(), np.zeros(len(ridge)))
-    )[0]
-    out.base_p = found[: 3 * setups].reshape(-1, 3)
-    if s.tool_unknown:
-        out.tool_p = found[3 * setups :].reshape(-1, 3)
-    return out
+def _shifted(s: Sighting, f: Frames) -> Frames:
+    """The frames with shifts that fit best for their turns; a target's place that the plan leaves open stays at the tool."""
+    residual, columns = _linear(s, f)
+    weight = np.tile([1.0, 1.0, 1.0, 0.0, 0.0, 0.0], len(f.base_r) + len(f.tool_r))
+    weight[6 * len(f.base_r) :] *= LATE
+    _move(f, -weight * np.linalg.lstsq(columns * weight, residual, rcond=1e-9)[0])
+    return f
 
 
 def _rigid(s: Sighting, tool_r: Floats, tool_p: Floats, setups: int) -> Frames:
@@ -205,16 +187,8 @@ def _near_the_tool(s: Sighting, f: Frames, residual: Floats, unknown: int) -> tu
     if not (s.tool_unknown and s.placed.any()):
         return np.zeros(0), np.zeros((0, unknown))
     scale = _typical(residual) * max(float(s.placed.sum()) / ROWS, 1.0) ** 0.5 / ARM
-    slopes = np.zeros((len(f.tool_p), 3, unknown))
-    for k in range(len(f.tool_p)):
-        first = 6 * (len(f.base_r) + k)
-        slopes[k, :, first : first + 3] = scale * np.eye(3)
-    return (scale * f.tool_p).ravel(), slopes.reshape(-1, unknown)
-
-
-def _cost(s: Sighting, f: Frames) -> float:
-    residual, _ = _linear(s, f)
-    return float(np.sum(np.abs(residual)))
+    places = np.arange(unknown).reshape(-1, 6)[len(f.base_r) :, :3].ravel()
+    return (scale * f.tool_p).ravel(), scale * np.eye(unknown)[places]
 
 
 def _weights(residual: Floats) -> Floats:
@@ -232,39 +206,32 @@ def _linear(s: Sighting, f: Frames) -> tuple[Floats, Floats]:
     Positions are judged at the target, on the commanded orientation: errors of angle shall not move it by the lever.
     """
     _, turn = as_commanded(s, f)
-    shift = np.einsum("nji,nj->ni", f.base_r[s.setup], s.q - f.base_p[s.setup]) - s.p
-    shift = shift - np.einsum("nij,nj->ni", s.r, f.tool_p[s.target])
+    at = np.einsum("nji,nj->ni", f.base_r[s.setup], s.q - f.base_p[s.setup])
+    shift = at - s.p - np.einsum("nij,nj->ni", s.r, f.tool_p[s.target])
     setups, targets = len(f.base_r), len(f.tool_r)
     n, unknown = len(s.p), 6 * setups + 6 * targets
-    d = np.zeros((n, 6, unknown))
-    at = s.p + shift + np.einsum("nij,nj->ni", s.r, f.tool_p[s.target])
-    for axis in range(3):
-        e = np.eye(3)[axis]
-        y = 6 * s.setup
-        rows = np.arange(n)
+    d, rows = np.zeros((n, 6, unknown)), np.arange(n)
+    y, x = 6 * s.setup, 6 * (setups + s.target)
+    for axis, e in enumerate(np.eye(3)):
         d[rows, axis, y + axis] = -1.0
         d[rows, :3, y + 3 + axis] = -np.cross(e, at)
         d[rows, 3:, y + 3 + axis] = -e
         if not s.tool_unknown:
             continue
-        x = 6 * (setups + s.target)
         d[rows, :3, x + axis] = -s.r[:, :, axis]
         if s.turn_unknown:
             d[rows, 3:, x + 3 + axis] = -s.r[:, :, axis]
     size = max(float(np.linalg.norm(np.ptp(s.p, axis=0))), 1e-3)
     residual = np.hstack([shift, turn * size])
     d[:, 3:] *= size
-    good = np.hstack([np.repeat(s.placed[:, None], 3, axis=1), np.repeat(s.turned[:, None], 3, axis=1)])
+    good = np.repeat(np.column_stack([s.placed, s.turned]), 3, axis=1)
     return residual[good], d[good]
 
 
 def _move(f: Frames, step: Floats) -> None:
-    setups = len(f.base_r)
-    parts = step.reshape(-1, 6)
-    for k in range(setups):  # instrument: the base moves by a small motion in base axes
-        turn = Rotation.from_rotvec(parts[k, 3:]).as_matrix()
-        f.base_p[k] = f.base_p[k] + f.base_r[k] @ parts[k, :3]
-        f.base_r[k] = f.base_r[k] @ turn
-    for k in range(len(f.tool_r)):
-        f.tool_p[k] = f.tool_p[k] + parts[setups + k, :3]
-        f.tool_r[k] = Rotation.from_rotvec(parts[setups + k, 3:]).as_matrix() @ f.tool_r[k]
+    base, tool = np.split(step.reshape(-1, 6), [len(f.base_r)])
+    # instrument: the base moves by a small motion in base axes
+    f.base_p = f.base_p + np.einsum("kij,kj->ki", f.base_r, base[:, :3])
+    f.base_r = f.base_r @ Rotation.from_rotvec(base[:, 3:]).as_matrix()
+    f.tool_p = f.tool_p + tool[:, :3]
+    f.tool_r = Rotation.from_rotvec(tool[:, 3:]).as_matrix() @ f.tool_r

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from stiffmap.experiment.experiment import Experiment, Floats, Integers
-from stiffmap.experiment.noise.level import Mask
+from stiffmap.experiment.experiment import Experiment, Floats, Integers, Mask
 from stiffmap.experiment.poses.configuration import coordinates_of, in_reach, point_positions, positions_of
 from stiffmap.experiment.prediction.joints import joint_channels, joint_motions
 from stiffmap.experiment.prediction.metrology_loop import carrier, rigged, targets
-from stiffmap.experiment.prediction.unloaded_state import lagging, lags, signs
+from stiffmap.experiment.prediction.unloaded_state import is_sided, lagging, signs
 from stiffmap.experiment.readings import Seen, kind_of
 from stiffmap.model.description.strain import rests_at_command
 from stiffmap.solve.closing import of_drives
@@ -33,7 +34,7 @@ def motions(machine: Machine, plan: Experiment, threads: int | None = None) -> t
     Deflection: the loaded minus the unloaded state of the same commanded pose.
     """
     if plan.gravity_of is not None:
-        return _by_gravity(machine, plan, threads)
+        return _in_parts(plan, plan.gravity_of, partial(_under_gravity, machine, threads))
     if any(kind_of(c) for c in plan.extra):
         return _with_kinds(machine, plan, threads)
     solver = Solver(rigged(machine, plan.loop), plan, threads)
@@ -44,16 +45,24 @@ def motions(machine: Machine, plan: Experiment, threads: int | None = None) -> t
     return out - rest, count + more
 
 
-def _by_gravity(machine: Machine, plan: Experiment, threads: int | None) -> tuple[Floats, int]:
-    """Every row under its own gravity."""
-    assert plan.gravity_of is not None
+def _in_parts(
+    plan: Experiment, labels: Any, solve: Callable[[Experiment, Any], tuple[Floats, int]]
+) -> tuple[Floats, int]:
+    """(n, c) of what is solved apart for the rows of each label (n,) or (n, ...), and how many equilibria that took."""
+    each, number = np.unique(labels, axis=0, return_inverse=True)
     out, count = np.full((len(plan), len(plan.channels)), np.nan), 0
-    for g in np.unique(plan.gravity_of, axis=0):
-        here = np.flatnonzero((plan.gravity_of == g).all(axis=1))
-        part = replace(plan.rows(here), gravity=(float(g[0]), float(g[1]), float(g[2])), gravity_of=None)
-        out[here], more = motions(machine, part, threads)
+    for k, label in enumerate(each):
+        here = np.flatnonzero(number.reshape(-1) == k)
+        out[here], more = solve(plan.rows(here), label)
         count += more
     return out, count
+
+
+def _under_gravity(
+    machine: Machine, threads: int | None, plan: Experiment, gravity: Floats
+) -> tuple[Floats, int]:
+    x, y, z = gravity.tolist()
+    return motions(machine, replace(plan, gravity=(x, y, z), gravity_of=None), threads)
 
 
 def _with_kinds(machine: Machine, plan: Experiment, threads: int | None) -> tuple[Floats, int]:
@@ -120,32 +129,20 @@ class Solver:
     def rest(self) -> tuple[Floats, int]:
         """(n, c) without the wrenches: in the centre of every gap, or on the side of the approach."""
         bare = self.plan.without_load
-        sided = self.plan.quantity == "position" or self.plan.unloaded == "approach"
-        if sided and self.plan.approach is not None and lags(self.machine.description):
-            return self._sided(bare)
+        if is_sided(self.machine.description, self.plan):
+            sides = signs(self.machine, bare)
+            return _in_parts(bare, sides, lambda part, side: self._equilibria(self._lagging(side), part))
         return self._equilibria(self.machine, bare)
 
-    def _sided(self, bare: Experiment) -> tuple[Floats, int]:
-        sign = signs(self.machine, bare)
-        out, count = np.full((len(bare), len(bare.channels)), np.nan), 0
-        for s in np.unique(sign, axis=0):
-            here = np.flatnonzero((sign == s).all(axis=1))
-            out[here], more = self._equilibria(lagging(self.machine, s, bool(bare.gravity)), bare.rows(here))
-            count += more
-        return out, count
+    def _lagging(self, side: Floats) -> Machine:
+        return lagging(self.machine, side, bool(self.plan.gravity))
 
     def _equilibria(self, machine: Machine, plan: Experiment) -> tuple[Floats, int]:
         if not plan.wrench.any() and not moves_unloaded(machine, plan):
             return _at_command(machine, plan), 0
         if len(set(plan.load_points)) < 2:
             return self._unique(machine, plan, plan.load_points[0] if plan.load_points else plan.load_point)
-        labels = np.array(plan.load_points)
-        out, count = np.full((len(plan), len(plan.channels)), np.nan), 0
-        for point in np.unique(labels):
-            here = np.flatnonzero(labels == point)
-            out[here], more = self._unique(machine, plan.rows(here), str(point))
-            count += more
-        return out, count
+        return _in_parts(plan, plan.load_points, partial(self._unique, machine))
 
     def _unique(self, machine: Machine, plan: Experiment, load_point: str) -> tuple[Floats, int]:
         """Each different (pose, wrench) is solved once."""
@@ -155,7 +152,7 @@ class Solver:
         wanted = list(dict.fromkeys([*read, *([on] if on else [])]))
         against = carrier(machine, plan.loop.force_against)
         options = SolveOptions(
-            point=load_point,
+            point=str(load_point),
             wrenches=_reaction(machine, once, load_point, against) if against else {},
             read_points=wanted,
             gravity=once.gravity,

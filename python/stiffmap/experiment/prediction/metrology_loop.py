@@ -12,11 +12,6 @@ from stiffmap.solve.machine import Machine
 BASE, PLATFORM = "base.rig_on_base", "platform.rig_on_platform"
 
 
-def _holders() -> tuple[str, ...]:
-    """Beginnings of the names of elements that sit between the platform and the tool."""
-    return tuple(k for k in kinds() if get(k).behind_platform)
-
-
 def rigged(machine: Machine, loop: Loop) -> Machine:
     """The machine with a point behind the base's elements and one before the tool's holder, where the
     loop needs them."""
@@ -24,7 +19,7 @@ def rigged(machine: Machine, loop: Loop) -> Machine:
     if "base" in (loop.instrument_on, loop.force_against) and _yields(d.base):
         d = replace(d, base=(*d.base, Point(BASE.removeprefix("base."))))
     if loop.target_on == "platform" and _yields(d.platform):
-        holders = _holders()
+        holders = tuple(k for k in kinds() if get(k).behind_platform)  # with which their names begin
         at = next((i for i, e in enumerate(d.platform) if e.name.startswith(holders)), len(d.platform))
         d = replace(
             d, platform=(*d.platform[:at], Point(PLATFORM.removeprefix("platform.")), *d.platform[at:])

@@ -17,7 +17,7 @@ from stiffmap.experiment.poses.configuration import point_positions, positions_o
 from stiffmap.experiment.prediction.equilibria import moves_unloaded
 from stiffmap.experiment.prediction.joints import joint_channels
 from stiffmap.experiment.prediction.metrology_loop import carrier, rigged, targets
-from stiffmap.experiment.prediction.unloaded_state import lags
+from stiffmap.experiment.prediction.unloaded_state import is_sided
 from stiffmap.experiment.readings import kind_of
 from stiffmap.model.description import Body, MachineDescription, Offset, Point
 from stiffmap.model.description.alike import alike
@@ -161,7 +161,7 @@ def _steps_show(machine: Machine, plan: Experiment) -> bool:
     if points != {"tcp"} and not _rigid_platform(machine.description):
         return False
     of_platform = all(p == "tcp" or p.startswith("platform.") for p in points)
-    return of_platform and not _is_sided(machine.description, plan)
+    return of_platform and not is_sided(machine.description, plan)
 
 
 def _step_leads(machine: Machine, other: MachineDescription, plan: Experiment) -> bool:
@@ -170,7 +170,7 @@ def _step_leads(machine: Machine, other: MachineDescription, plan: Experiment) -
     heavy = _is_heavy(machine, plan)
     if heavy and machine.compiled.names.free_spins:  # a weight that is off turns them
         return False
-    if not alike(d, other, heavy=heavy) or _is_sided(other, plan):
+    if not alike(d, other, heavy=heavy) or is_sided(other, plan):
         return False
     return _points(machine, plan) == {"tcp"} or d.platform == other.platform
 
@@ -199,12 +199,6 @@ def _seen_at(machine: Machine, plan: Experiment, point: str, read: tuple[str, ..
     arms = np.broadcast_to(np.nan_to_num(arm), motion.shape[:-1] + (3,)).reshape(-1, 3)
     motion[..., :3] += (turn.apply(arms) - arms).reshape(motion.shape[:-1] + (3,))
     return np.asarray(motion[1:] - motion[:1])
-
-
-def _is_sided(description: MachineDescription, plan: Experiment) -> bool:
-    """Whether the state without load depends on the approach."""
-    sided = plan.quantity == "position" or plan.unloaded == "approach"
-    return sided and plan.approach is not None and lags(description)
 
 
 def _rigid_platform(description: MachineDescription) -> bool:

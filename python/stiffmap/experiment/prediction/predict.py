@@ -83,11 +83,7 @@ class Predictor:
         near = {i: n for i in left if (n := self._near(moved[i], unmoved[i] if unmoved else None))}
         if not near:
             return out
-        mechanical, load = _parts(base)
-        motion = self._motion_of(mechanical, load)
-        before = readings(self.experiment, motion, base)
-        told = Nearby(self.with_terms(base), self._plan_under(load), self.threads)
-        shown = self._shown(told, list(near.values()), motion, before, [moved[i] for i in near])
+        shown = self._shown(list(near.values()), base, [moved[i] for i in near])
         for i, seen in zip(near, shown, strict=True):
             if seen is not None:
                 seen.flags.writeable = False
@@ -107,15 +103,14 @@ class Predictor:
 
     def changes_of_machines(self, others: Sequence[Near], terms: Terms = ()) -> list[Floats | None]:
         """The same of other machines near this one, of which nothing is kept; `terms` of the measurement belong to all."""
-        motion = self._motion_of(*_parts(terms))
-        before = readings(self.experiment, motion, terms)
-        told = Nearby(self.machine, self._plan_under(_parts(terms)[1]), self.threads)
-        return self._shown(told, others, motion, before, [terms] * len(others))
+        return self._shown(others, terms, [terms] * len(others))
 
-    def _shown(
-        self, told: Nearby, others: Sequence[Near], motion: Floats, before: Floats, terms: Sequence[Terms]
-    ) -> list[Floats | None]:
-        """What readings show of the motions of others, beyond `before`."""
+    def _shown(self, others: Sequence[Near], base: Terms, terms: Sequence[Terms]) -> list[Floats | None]:
+        """What readings with their terms show of the motions of others, beyond those of `base`."""
+        mechanical, load = _parts(base)
+        motion = self._motion_of(mechanical, load)
+        before = readings(self.experiment, motion, base)
+        told = Nearby(self.with_terms(mechanical), self._plan_under(load), self.threads)
         out = [
             readings(self.experiment, motion + change, t) - before
             if change is not None and np.isfinite(change[np.isfinite(motion)]).all()
@@ -173,8 +168,7 @@ class Predictor:
         if not mechanical:
             return self.machine
         return self._machines.made(
-            mechanical,
-            lambda: Machine(self._described(mechanical), like=self.machine),
+            mechanical, lambda: Machine(self._described(mechanical), like=self.machine)
         )
 
     def _motion_of(self, mechanical: Terms, load: Terms) -> Floats:
@@ -194,8 +188,7 @@ class Predictor:
         if not any(_has_branch(t) for t in terms):
             return self._solve(plan, terms)
         out = np.full((len(plan), len(plan.channels)), np.nan)
-        branch = np.array(plan.branch or ("loading",) * len(plan))
-        branch = np.where(branch == "", "loading", branch)
+        branch = np.array([b or "loading" for b in plan.branch or ("",) * len(plan)])
         for name in np.unique(branch):
             here = np.flatnonzero(branch == name)
             out[here] = self._solve(plan.rows(here), tuple(_on_branch(t, str(name)) for t in terms))

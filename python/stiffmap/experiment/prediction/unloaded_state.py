@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +9,7 @@ import numpy as np
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.poses.configuration import drive_jacobian
 from stiffmap.model.description import CommandError, Element, Joint, Leg, MachineDescription
-from stiffmap.model.description.tree import edit_sequences
+from stiffmap.model.description.tree import edit_elements
 from stiffmap.solve.kinematics import inverse_kinematics
 from stiffmap.solve.machine import Machine
 
@@ -28,13 +27,16 @@ def lag(joint: Joint) -> float:
     return float(max((a for a, f in law.knots if f == 0.0), default=0.0) + law.friction / law.stiffness)
 
 
+def is_sided(description: MachineDescription, plan: Experiment) -> bool:
+    """Whether the state without load depends on the approach."""
+    sided = plan.quantity == "position" or plan.unloaded == "approach"
+    return sided and plan.approach is not None and lags(description)
+
+
 def lags(description: MachineDescription) -> bool:
     """Whether any drive stays behind."""
-    return any(lag(e) > 0 for leg in description.legs for e in _joints(leg.elements))
-
-
-def _joints(elements: tuple[Element, ...]) -> Iterator[Joint]:
-    yield from (e for e in elements if isinstance(e, Joint))
+    elements = (e for leg in description.legs for e in leg.elements)
+    return any(lag(e) > 0 for e in elements if isinstance(e, Joint))
 
 
 def signs(machine: Machine, experiment: Experiment) -> Floats:
@@ -66,25 +68,21 @@ def lagging(machine: Machine, sign: Floats, weighs: bool = False) -> Machine:
     """
     way = dict(zip(machine.actuators, sign.tolist(), strict=True))
     d = machine.description
-    legs = tuple(replace(leg, elements=_behind(leg, way, weighs)) for leg in d.legs)
-    return Machine(replace(d, legs=legs, effects=(), declared=None), like=machine)
 
-
-def _behind(leg: Leg, way: dict[str, float], weighs: bool) -> tuple[Element, ...]:
-    def edit(elements: tuple[Element, ...]) -> tuple[Element, ...]:
-        return tuple(
-            _drive(e, way.get(f"{leg.name}.{e.name}", 0.0), weighs)
-            if isinstance(e, Joint) and lag(e) > 0
-            else e
-            for e in elements
+    def behind(leg: Leg) -> Leg:
+        edited = edit_elements(
+            leg.elements, lambda e: _behind(e, way.get(f"{leg.name}.{e.name}", 0.0), weighs)
         )
+        return replace(leg, elements=edited)
 
-    return edit_sequences(leg.elements, edit)
+    return Machine(replace(d, legs=tuple(map(behind, d.legs)), effects=(), declared=None), like=machine)
 
 
-def _drive(joint: Joint, sign: float, weighs: bool) -> Joint:
+def _behind(joint: Element, sign: float, weighs: bool) -> Element:
+    """A drive that lags on one side; other elements as they are."""
+    if not isinstance(joint, Joint) or joint.law is None or not lag(joint) > 0:
+        return joint
     law = joint.law
-    assert law is not None
     behind = law.friction / law.stiffness if weighs else lag(joint)
     free = replace(law, friction=0.0) if weighs else replace(law, friction=0.0, knots=())
     errors = (*joint.command_errors, CommandError(offset=-sign * behind))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import repeat
 from pathlib import Path
 from typing import Any, NoReturn
@@ -16,6 +16,7 @@ from stiffmap.common.units import Unit, known, unit_of
 from stiffmap.common.yaml_text import text_of
 from stiffmap.experiment.experiment import WRENCH
 from stiffmap.experiment.files.fields import POSE, quantity_of
+from stiffmap.experiment.spreadsheet.answers import Meant
 from stiffmap.experiment.spreadsheet.guess import READINGS, Column, guess
 from stiffmap.experiment.spreadsheet.together import weight
 
@@ -42,38 +43,24 @@ class Imported:
     units: dict[str, str]
     factors: dict[str, float]
     """Of columns in units that experiment files do not have: how many of `units` one of the sheet's is."""
-    header: list[str]
     rows: Rows
-    repeats: int
     constants: dict[str, float]
-    head: dict[str, Any] = field(default_factory=dict)
-    """Further keys of experiment.yaml."""
-    said: tuple[str, ...] = ()
+    said: list[str]
     """What the reader must know, in words."""
 
 
-def understand(
-    sheet: Sheet,
-    chosen: Mapping[str, Sequence[str]],
-    units: Mapping[str, str],
-    constants: Mapping[str, float],
-    commands: Mapping[str, tuple[str, str]] | None = None,
-    head: Mapping[str, Any] | None = None,
-    loaded: bool = False,
-) -> Imported:
-    """Columns, units and rows of data.csv; raises StiffmapError that asks for what cannot be guessed.
+def understand(m: Meant, loaded: bool = False) -> Imported:
+    """Columns, units and rows of data.csv of a sheet, as it is meant; raises StiffmapError that asks for what cannot be guessed.
 
-    ``units`` (meaning -> unit) for columns without brackets; ``constants`` (meaning -> number) for what the
-    sheet has no column of, in mm and N. ``commands`` (column -> drive, unit) for columns of commanded joints, which stand for
-    poses; ``head`` holds further keys of experiment.yaml. ``loaded``: whether a load must be there.
+    ``loaded``: whether a load must be there.
     """
-    drives = dict(commands or {})
-    columns = guess(sheet.header, chosen)
+    sheet, drives = m.sheet, m.columns
+    columns = guess(sheet.header, m.chosen)
     used = [c for c in columns if c.meaning != "note"]
     for c in used:
-        if c.meaning not in WORDS and not sheet.is_numeric(c.index):
+        if c.meaning not in WORDS:
             sheet.numbers(c.index)  # raises, naming the line
-    known = {c.meaning for c in used} | set(constants)
+    known = {c.meaning for c in used} | set(m.constants)
     if drives:  # the pose follows from them
         columns = [replace(c, meaning="note") if c.meaning in POSE else c for c in columns]
         used = [c for c in columns if c.meaning != "note"]
@@ -81,9 +68,14 @@ def understand(
     _ask(sheet, known, bool(drives))
     beside = _beside(sheet, columns)
     plain = (*WORDS, *COUNTED, *drives)
-    found = {c.meaning: _unit(sheet, c, units, beside) for c in used if c.meaning not in plain}
+    found = {c.meaning: _unit(sheet, c, m.units, beside) for c in used if c.meaning not in plain}
     if loaded and not known & {*WRENCH, "ll"}:
-        _ask_load(sheet)
+        _ask_column(
+            sheet,
+            "missing column: a deflection needs a load; which column is it? Say --map fx='HEADER' (fy, fz, mx, my, mz; "
+            "--map fz='-HEADER' where it pulls against the axis), or --set fx=NUMBER (N) where it is the same in every row",
+            "load",
+        )
     said = []
     for c in used:
         if c.meaning in WRENCH[:3]:
@@ -92,12 +84,7 @@ def understand(
             said += [why] if why else []
     named = {m: u.name for m, u in found.items()}
     factors = {m: u.factor for m, u in found.items() if u.factor != 1.0}
-    rows = Rows(sheet, used, constants, factors)
-    told = {"command": {k: {"actuator": a, "unit": u} for k, (a, u) in drives.items()}} if drives else {}
-    further = told | dict(head or {})
-    return Imported(
-        columns, named, factors, rows.header, rows, rows.repeats, dict(constants), further, tuple(said)
-    )
+    return Imported(columns, named, factors, Rows(sheet, used, m.constants, factors), dict(m.constants), said)
 
 
 def _ask(sheet: Sheet, known_: set[str], joints: bool) -> None:
@@ -117,15 +104,6 @@ def _ask(sheet: Sheet, known_: set[str], joints: bool) -> None:
             "repeats, or length='HEADER'; where a ball stood in one socket, --set px=0 --set py=0 --set pz=0",
             "reading",
         )
-
-
-def _ask_load(sheet: Sheet) -> None:
-    _ask_column(
-        sheet,
-        "missing column: a deflection needs a load; which column is it? Say --map fx='HEADER' (fy, fz, mx, my, mz; "
-        "--map fz='-HEADER' where it pulls against the axis), or --set fx=NUMBER (N) where it is the same in every row",
-        "load",
-    )
 
 
 def _ask_column(sheet: Sheet, message: str, meaning: str) -> NoReturn:
@@ -211,8 +189,7 @@ class Rows:
         if self._name is None:
             return row
         name = str(row[self._name]) or "row"
-        free = name
-        count = 1
+        free, count = name, 1
         while free in taken:
             count += 1
             free = f"{name}.{count}"
@@ -245,33 +222,37 @@ class Rows:
 
 def write_folder(
     found: Imported,
-    sheet: Sheet,
+    m: Meant,
     folder: Path,
     machine: str,
     quantity: str,
-    noise: Mapping[str, float],
     title: str,
     record: Mapping[str, str] | None = None,
 ) -> None:
     """Write the folder; raises FileError where it cannot be written."""
+    sheet = m.sheet
     head: dict[str, Any] = {
         "title": title,
         "machine": machine,
         "quantity": quantity,
         "units": head_units(found),
     }
-    if noise:
+    if m.noise:
         factors = {n.replace("p", "d"): f for n, f in found.factors.items()}
         own = {absolute: n for n, absolute in ABSOLUTE.items()}
-        head["noise"] = {own.get(n, n): v * factors.get(own.get(n, n), 1.0) for n, v in noise.items()}
-    head |= found.head
+        head["noise"] = {own.get(n, n): v * factors.get(own.get(n, n), 1.0) for n, v in m.noise.items()}
+    if m.columns:
+        head["command"] = {k: {"actuator": a, "unit": u} for k, (a, u) in m.columns.items()}
+    head |= m.head
     told = {**dict(sheet.record), **(record or {})}
     if "notes" in told:
         head["notes"] = told.pop("notes")
     if told:
         head["record"] = told
     with only_job(make_folder(folder)):
-        head["rows"] = write_rows(folder / "data.csv", [ABSOLUTE.get(h, h) for h in found.header], found.rows)
+        head["rows"] = write_rows(
+            folder / "data.csv", [ABSOLUTE.get(h, h) for h in found.rows.header], found.rows
+        )
         notes = [c.index for c in found.columns if c.meaning == "note"]
         if notes:
             kept = ([row[i] for i in notes] for row in sheet.rows)

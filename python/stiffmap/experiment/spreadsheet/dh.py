@@ -68,7 +68,8 @@ def read_dh(sheet: Sheet, units: Mapping[str, str]) -> list[Row]:
             f"{sheet.file}: no column is {', '.join(lost)}: a table of Denavit and Hartenberg has theta, d, a and alpha, one "
             f"row a joint; found {', '.join(sheet.header)}"
         )
-    numbers = {n: _factor(sheet, at[n], n, units) * np.nan_to_num(sheet.numbers(at[n])) for n in NUMBERS}
+    units_of = {n: _factor(sheet, at[n], n, units) for n in NUMBERS}
+    numbers = {n: units_of[n] * np.nan_to_num(sheet.numbers(at[n])) for n in NUMBERS}
     count = len(sheet.lines)
     words = {n: list(sheet.columns[at[n]]) for n in ("name", "type") if n in at}
     slides = [w.strip().lower()[:1] in ("p", "t", "s", "l") for w in words.get("type", ["r"] * count)]
@@ -78,9 +79,7 @@ def read_dh(sheet: Sheet, units: Mapping[str, str]) -> list[Row]:
     ends = [(sheet.numbers(at["low"]), sheet.numbers(at["high"]))] if {"low", "high"} <= set(at) else []
     out = []
     for i in range(count):
-        scale = (
-            _factor(sheet, at["d"], "d", units) if slides[i] else _factor(sheet, at["theta"], "theta", units)
-        )
+        scale = units_of["d" if slides[i] else "theta"]
         range_ = (float(ends[0][0][i] * scale), float(ends[0][1][i] * scale)) if ends else None
         known = range_ is not None and all(map(math.isfinite, range_))
         theta, d, a, alpha = (float(numbers[n][i]) for n in NUMBERS)

@@ -87,11 +87,11 @@ def ask_all(m: Meant, ask: Ask | None, loaded: bool = False) -> Imported:
         signed = Meant.of_sheet(m.sheet, m)
         together(signed, False)
         m.sheet, m.chosen = signed.sheet, signed.chosen
-        return understand(m.sheet, m.chosen, m.units, m.constants, m.columns, m.head, loaded)
+        return understand(m, loaded)
 
     found = asked(m, ask, understood)
     read = dict.fromkeys(f"d{r[1]}" if r in SEEN else r for r in READINGS if r in found.units)
-    if ask is not None and found.repeats < 2:
+    if ask is not None and found.rows.repeats < 2:
         _noise(m, [r for r in read if r not in m.noise], ask)
     return found
 

@@ -147,7 +147,7 @@ def experiment_from_table(
     title = f"from {own.file.replace(str(file), file.name)}"
     kept = {"source": file.name, "sha256": file_digest(file), **(record or {})}
     with putting(output, "experiment.yaml") as fresh:
-        write_folder(found, own, fresh, declared, quantity, m.noise, title, kept)
+        write_folder(found, m, fresh, declared, quantity, title, kept)
         try:
             made = load_experiment(fresh)
         except FileError as error:  # nothing is left behind

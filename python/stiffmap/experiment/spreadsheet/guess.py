@@ -66,10 +66,12 @@ def guess(headers: Sequence[str], chosen: Mapping[str, Sequence[str]]) -> list[C
             meaning, repeat = _meaning(name)
             out.append(Column(index, name, unit, "note" if meaning in chosen else meaning, repeat))
     if "ll" not in chosen and any(c.meaning in READINGS and c.meaning != "ll" for c in out):
-        out = [
-            replace(c, meaning="note") if c.meaning == "ll" else c for c in out
-        ]  # a length of something else
-    return _one_each(out)
+        # a length of something else
+        out = [replace(c, meaning="note") if c.meaning == "ll" else c for c in out]
+    first = {(c.meaning, c.repeat): c.index for c in reversed(out)}  # a second one is a note
+    return [
+        c if first[c.meaning, c.repeat] == c.index else Column(c.index, c.name, c.unit, "note") for c in out
+    ]
 
 
 def find_column(wanted: str, headers: Sequence[str]) -> int:
@@ -105,15 +107,3 @@ def _meaning(name: str) -> tuple[str, int]:
             if meaning in READINGS and meaning != "ll" and re.fullmatch(pattern, match[1].strip()):
                 return meaning, int(match[2])
     return "note", 0
-
-
-def _one_each(columns: list[Column]) -> list[Column]:
-    """The second column of a meaning is a note, unless they are repeats."""
-    seen: set[tuple[str, int]] = set()
-    out = []
-    for c in columns:
-        key = (c.meaning, c.repeat)
-        again = c.meaning != "note" and key in seen
-        seen.add(key)
-        out.append(Column(c.index, c.name, c.unit, "note") if again else c)
-    return out

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -88,20 +89,32 @@ def plan_of_poses(
     n = len(position) * whole_number(repeats, "repeats", 1)
     given = None if noise is None else real_number(noise, "noise")
     turn = real_number(angle_noise, "angle_noise")
-    size = np.where([c.unit == "m" for c in AXIS_CHANNELS], given or MICRO[quantity], turn)
-    sigma = np.tile(np.where([a in axes for a in AXES], size, np.nan), (n, 1))
-    return Experiment(
+    plan = Experiment(
         name="plan",
         machine=as_machine(machine).name,
         quantity=quantity,
-        ids=tuple(str(i + 1) for i in range(n)),
+        ids=(),
         position=np.repeat(position, repeats, axis=0),
         wrench=np.repeat(wrench, repeats, axis=0),
-        reading=np.where(np.isfinite(sigma), 0.0, np.nan),
-        sigma=sigma,
         repeat=np.tile(np.arange(repeats) + 1, len(position)),
-        order=np.arange(1, n + 1, dtype=float),
+        **unread(n, quantity, axes, given, turn),
     )
+    return numbered_anew(plan)
+
+
+def unread(
+    rows: int, quantity: str, axes: Sequence[str], noise: float | None, angle_noise: float
+) -> dict[str, Any]:
+    """Readings (rows, 6) that are yet to be made of some axes, and their standard deviations, m and rad."""
+    size = np.where([c.unit == "m" for c in AXIS_CHANNELS], noise or MICRO[quantity], angle_noise)
+    sigma = np.tile(np.where([a in axes for a in AXES], size, np.nan), (rows, 1))
+    return {"reading": np.where(np.isfinite(sigma), 0.0, np.nan), "sigma": sigma}
+
+
+def numbered_anew(plan: Experiment) -> Experiment:
+    """The plan with the names and the order of its rows from 1 on."""
+    number = np.arange(1, len(plan.position) + 1)
+    return replace(plan, ids=tuple(map(str, number)), order=number.astype(float))
 
 
 def plan_of_joints(
@@ -172,22 +185,14 @@ def with_joints(plan: Experiment, channels: Sequence[Channel], sigma: Sequence[f
 def with_branches(plan: Experiment) -> Experiment:
     """Every row on both branches, loading first."""
     twice = plan.rows(np.repeat(np.arange(len(plan)), 2).astype(np.intp))
-    n = len(twice)
-    return replace(
-        twice,
-        ids=tuple(str(i + 1) for i in range(n)),
-        branch=("loading", "unloading") * len(plan),
-        order=np.arange(1, n + 1, dtype=float),
-    )
+    return numbered_anew(replace(twice, branch=("loading", "unloading") * len(plan)))
 
 
 def shuffled(plan: Experiment, seed: int) -> Experiment:
     """The plan with its poses visited in random order: what drifts is then no trend in space."""
     rank = random_numbers(seed).permutation(int(plan.groups.max()) + 1)
     index = np.argsort(rank[plan.groups], kind="stable")
-    moved = plan.rows(index.astype(np.intp))
-    ids = tuple(str(i + 1) for i in range(len(plan)))
-    return replace(moved, ids=ids, order=np.arange(1, len(plan) + 1, dtype=float))
+    return numbered_anew(plan.rows(index.astype(np.intp)))
 
 
 def with_temperature(plan: Experiment, first: float, last: float) -> Experiment:

@@ -30,7 +30,7 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.common.short import short_repr
 from stiffmap.experiment.calls import Effects, as_experiment, effects_of
 from stiffmap.experiment.experiment import PER_ROW, Experiment
-from stiffmap.experiment.virtual.plans import load_set, plan_of_poses, random_poses
+from stiffmap.experiment.virtual.plans import load_set, numbered_anew, plan_of_poses, random_poses
 from stiffmap.identification.planning.estimate import Estimate, estimate, fitted
 from stiffmap.identification.planning.information import (
     Information,
@@ -151,7 +151,7 @@ def plan(
     both, old = replace(in_limits(machine, pool), frame=frame, tool=tool), 0
     if measured is not None:
         old = len(measured)
-        both = _numbered(joined(replace(measured, frame=frame, tool=tool), both))
+        both = numbered_anew(joined(replace(measured, frame=frame, tool=tool), both))
     each = Information(machine, both, terms, others if aim == "separate" else ())
     weight = map_weight(machine, terms, at, load, force) if aim == "map" else None
 
@@ -171,7 +171,7 @@ def plan(
     scores = value(np.stack([start + each.matrices[p].sum(axis=0) for p in plans]))
     natural = scores if aim == "identify" else np.exp(scores / 2) if weight is None else np.sqrt(-scores)
     return Design(
-        _numbered(both.rows(np.sort(picked).astype(np.intp))),
+        numbered_anew(both.rows(np.sort(picked).astype(np.intp))),
         aim,
         each.names,
         each.units,
@@ -180,12 +180,6 @@ def plan(
         float(natural[0]),
         float(np.median(natural[1:])),
     )
-
-
-def _numbered(rows: Experiment) -> Experiment:
-    """With names and order from 1 on."""
-    number = np.arange(1, len(rows) + 1)
-    return replace(rows, ids=tuple(map(str, number)), order=number.astype(float))
 
 
 def follow(
@@ -214,7 +208,7 @@ def follow(
     while data is None or len(data) < most:
         chosen = plan(machine, now, rows=batch, done=data, seed=seed + len(found), **options)  # type: ignore[arg-type]
         new = measure(chosen.experiment)
-        data = new if data is None else _numbered(joined(data, new))
+        data = new if data is None else numbered_anew(joined(data, new))
         result = estimate(machine, data, now)
         found.append((len(data), result))
         now = result.terms

@@ -94,7 +94,7 @@ def command(
         ask=_prompt if dialogue else None, overwrite=overwrite,
     )  # fmt: skip
     found, names = made.understood, made.sheet.header
-    data = {"folder": output, "rows": len(made.experiment), "repeats": found.repeats,
+    data = {"folder": output, "rows": len(made.experiment), "repeats": found.rows.repeats,
             "columns": {names[c.index]: c.meaning for c in found.columns}, "units": found.units,
             "warnings": made.warnings}  # fmt: skip
     warnings = [Text(f"WARNING: {line}", "bold red") for line in made.warnings]
@@ -131,7 +131,7 @@ def _told(table: FromTable, words: Sequence[str]) -> Iterator[Any]:
     if (
         commands or made.seen is not None or made.absolute
     ):  # what was seen is no deviation before the frame is known
-        head: Sequence[str] = found.header
+        head: Sequence[str] = found.rows.header
         rows: Any = (
             [f"{c:.7g}" if isinstance(c, float) else str(c) for c in row]
             for row in islice(iter(found.rows), 3)
@@ -142,7 +142,7 @@ def _told(table: FromTable, words: Sequence[str]) -> Iterator[Any]:
         head, rows = experiment_rows(made)
     yield table_of("the first rows, as understood", head, rows, padding=(0, 1, 0, 0))
     poses = int(made.groups.max()) + 1
-    read = [p if (p := c.replace("d", "p", 1)) in found.header else c for c in made.axes]
+    read = [p if (p := c.replace("d", "p", 1)) in found.rows.header else c for c in made.axes]
     yield f"{table.folder}: {len(made)} rows of {made.quantity} at {poses} poses; reads {', '.join(read)}"
     declared = np.all(~made.read | (made.sigma > 0), axis=0)
     each = zip(made.channels, declared, made.axis_read, strict=True)

@@ -17,6 +17,7 @@ import numpy as np
 import stiffmap as sm
 from stiffmap.common.tables.sheet import read_sheet
 from stiffmap.experiment import load_experiment
+from stiffmap.experiment.spreadsheet.answers import Answers, Meant
 from stiffmap.experiment.spreadsheet.convert import understand, write_folder
 from stiffmap.machining.toolpath import load_path, outline_text, sampled
 from stiffmap.model.link.linkfile import load_link
@@ -99,8 +100,9 @@ def _sheet(text: str, folder: Path) -> None:
     path = folder / "readings.csv"
     path.write_text(text, encoding="utf-8", errors="surrogatepass")
     sheet = read_sheet(path)
-    found = understand(sheet, {}, {"x": "mm", "y": "mm", "z": "mm", "dx": "mm"}, {"fx": 300.0})
-    write_folder(found, sheet, folder / "out", "orthoglide-revised", "deflection", {"dx": 0.01}, "")
+    said = Answers({}, {"x": "mm", "y": "mm", "z": "mm", "dx": "mm"}, {"fx": 300.0}, {"dx": 0.01})
+    meant = Meant.of_sheet(sheet, said)
+    write_folder(understand(meant), meant, folder / "out", "orthoglide-revised", "deflection", "")
     load_experiment(folder / "out")
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.readings.types import ReadingKind, Seen
-from stiffmap.experiment.setups import setups_of
+from stiffmap.experiment.setups import members, setups_of
 
 
 def change(here: Seen, there: Seen | None) -> Floats:
@@ -26,12 +26,8 @@ def nuisance(e: Experiment) -> Iterator[Floats]:
     if e.surface == "known":
         return
     across = np.linalg.svd(np.array([e.normal]))[2][1:]
-    label = setups_of(e)[0]
-    for here in ((label == s).astype(float) for s in np.unique(label)):
-        shapes = [np.ones(len(e))]
-        if e.surface == "unknown":
-            shapes += [e.position @ a for a in across]
-        yield from (here * shape for shape in shapes)
+    shapes = [np.ones(len(e)), *(e.position @ a for a in across if e.surface == "unknown")]
+    yield from (here * shape for here in members(setups_of(e)[0]) for shape in shapes)
 
 
 READING = ReadingKind(

@@ -11,7 +11,7 @@ from scipy.optimize import least_squares
 from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.experiment import Experiment, Floats, Integers
 from stiffmap.experiment.readings.types import ReadingKind, Seen
-from stiffmap.experiment.setups import setups_of, target_positions, targets_of
+from stiffmap.experiment.setups import members, setups_of, target_positions, targets_of
 
 FEWEST = 6
 """Lengths of a set-up, for three coordinates of its anchor and a zero."""
@@ -34,9 +34,8 @@ def commanded(e: Experiment) -> Floats:
 
 def nuisance(e: Experiment) -> Iterator[Floats]:
     """Zero of the length and, where it is unknown, place of the anchor, one of each per set-up."""
-    label, way = setups_of(e)[0], _way(e)
-    shapes = [np.ones(len(e)), *(way.T if e.anchor is None else ())]
-    yield from ((label == s) * shape for s in np.unique(label) for shape in shapes)
+    shapes = [np.ones(len(e)), *(_way(e).T if e.anchor is None else ())]
+    yield from (here * shape for here in members(setups_of(e)[0]) for shape in shapes)
 
 
 def tool_offset(e: Experiment, arm: Floats, k: int) -> Floats:

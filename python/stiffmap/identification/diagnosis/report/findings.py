@@ -8,9 +8,8 @@ from typing import Any
 from stiffmap.common.json_text import json_text
 from stiffmap.common.plain import plain
 from stiffmap.experiment.comparison.summary import Summary
-from stiffmap.experiment.experiment import Experiment, Floats
+from stiffmap.experiment.experiment import Experiment, Floats, Mask
 from stiffmap.experiment.noise.checks import Check
-from stiffmap.experiment.noise.level import Mask
 from stiffmap.identification.candidates.candidates import words
 from stiffmap.identification.diagnosis.report.separation import Separation
 from stiffmap.identification.diagnosis.slips.slip import Slip
