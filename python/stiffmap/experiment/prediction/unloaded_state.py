@@ -9,7 +9,7 @@ import numpy as np
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.poses.configuration import drive_jacobian
 from stiffmap.model.description import CommandError, Element, Joint, Leg, MachineDescription
-from stiffmap.model.description.tree import edit_elements
+from stiffmap.model.description.tree import edit_elements, joints
 from stiffmap.solve.kinematics import inverse_kinematics
 from stiffmap.solve.machine import Machine
 
@@ -35,8 +35,7 @@ def is_sided(description: MachineDescription, plan: Experiment) -> bool:
 
 def lags(description: MachineDescription) -> bool:
     """Whether any drive stays behind."""
-    elements = (e for leg in description.legs for e in leg.elements)
-    return any(lag(e) > 0 for e in elements if isinstance(e, Joint))
+    return any(lag(joint) > 0 for joint in joints(description).values())
 
 
 def signs(machine: Machine, experiment: Experiment) -> Floats:
