@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy.optimize import minimize
 from scipy.stats import qmc
 
@@ -87,31 +86,28 @@ def placements(
     process: Process,
     *,
     count: int = 1000,
-    turns: tuple[float, float] = (-np.pi, np.pi),
-    box: ArrayLike | None = None,
     points: int = 500,
-    seed: int = 0,
     threads: int | None = None,
     scheduler: Any = None,
 ) -> Placements:
     """Search for the placement with the smallest largest error across the wall, before compensation.
 
-    count: placements tried (a Sobol sequence over box and turns); turns: (2,) rad; box (2, 3) m for the part, None: the
-    workspace of the machine file; points: number of points of the path in the search. scheduler: address of a dask
-    scheduler, or a `distributed.Client`, whose workers try the placements, with the same answer. Raises StiffmapError where no placement holds the path.
+    count: placements tried (a Sobol sequence over the machine's workspace and a full turn); points: number of points of the path in
+    the search. scheduler: address of a dask scheduler, or a `distributed.Client`, whose workers try the placements, with the same
+    answer. Raises StiffmapError where no placement holds the path.
     """
     if count < 1 or points < 2:
         raise StiffmapError(f"count and points: expected 1 or more and 2 or more, got {count} and {points}")
-    low, high = np.asarray(machine.workspace if box is None else box, dtype=float)
+    low, high = machine.workspace
     # along what the machine does not command the part has one place
-    steered = [axis in machine.description.task for axis in "xyz"]
+    steered = np.isin(["x", "y", "z"], machine.description.task)
     low, high = (np.where(steered, end, machine.description.home.p) for end in (low, high))
     search = Search(machine, path, process, points, threads)
     middle = (low + high) / 2
     naive = Placement(middle - search.middle, 0.0)
     power = int(np.ceil(np.log2(max(count, 2))))
-    unit = qmc.Sobol(4, seed=seed).random_base2(power)[:count]
-    turn = turns[0] + unit[:, 3] * (turns[1] - turns[0])
+    unit = qmc.Sobol(4, seed=0).random_base2(power)[:count]
+    turn = 2 * np.pi * unit[:, 3] - np.pi
     at = search.inside(unit[:, :3], turn, low, high)
     largest = _tried(search, at, turn, scheduler)
     if not np.isfinite(largest).any():
@@ -121,7 +117,7 @@ def placements(
             f"{', '.join(f'{v:.0f}' for v in 1e3 * search.size)} mm, the box {', '.join(f'{v:.0f}' for v in 1e3 * (high - low))} mm"
         )
     order = np.argsort(largest)[:REFINED]
-    with workers(_refined, (search, low, high, turns), scheduler=scheduler) as hands:
+    with workers(_refined, (search, low, high), scheduler=scheduler) as hands:
         tried = hands.in_order((at[i], float(turn[i])) for i in order if np.isfinite(largest[i]))
     tried.append((search.exact(naive), naive))
     error, best = min(tried, key=lambda t: t[0])
@@ -152,12 +148,10 @@ def _largest(search: Search, some: tuple[Floats, Floats]) -> Floats:
     return search.largest(*some)
 
 
-def _refined(
-    shared: tuple[Search, Floats, Floats, tuple[float, float]], begin: tuple[Floats, float]
-) -> tuple[float, Placement]:
+def _refined(shared: tuple[Search, Floats, Floats], begin: tuple[Floats, float]) -> tuple[float, Placement]:
     """One descent, as a task."""
-    search, low, high, turns = shared
-    return search.refined(*begin, low, high, turns)
+    search, low, high = shared
+    return search.refined(*begin, low, high)
 
 
 class Search:
@@ -230,9 +224,7 @@ class Search:
         job = self.at_place(place)
         return np.where(followed(job, job.position, self.threads), wall_errors(job, self.threads), np.inf)
 
-    def refined(
-        self, at: Floats, turn: float, low: Floats, high: Floats, turns: tuple[float, float]
-    ) -> tuple[float, Placement]:
+    def refined(self, at: Floats, turn: float, low: Floats, high: Floats) -> tuple[float, Placement]:
         """Error and placement after a descent along the gradient of a high mean of the errors, within the box."""
         scale = np.array([*np.maximum(high - low, 1e-3), 1.0])
 
@@ -245,14 +237,12 @@ class Search:
 
         a, b = self._extent(np.array([turn]))
         first, last = np.minimum(low - a[0], at), np.maximum(high - b[0], at)
-        bounds = [
-            (f / s, g / s) for f, g, s in zip([*first, turns[0]], [*last, turns[1]], scale, strict=True)
-        ]
+        bounds = np.array([[*first, -np.pi], [*last, np.pi]]) / scale
         found = minimize(
             cost,
             np.array([*at, turn]) / scale,
             method="L-BFGS-B",
-            bounds=bounds,
+            bounds=bounds.T,
             options={"maxiter": 12, "eps": 1e-4},
         )
         places = [Placement(at, turn), Placement(found.x[:3] * scale[:3], float(found.x[3]))]
