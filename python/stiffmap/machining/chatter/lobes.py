@@ -14,11 +14,18 @@ from numpy.typing import ArrayLike
 from stiffmap.common.broadcasting import Floats, real_array, whole_number
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.tasks import workers
-from stiffmap.machining.chatter.coupling import coupling_depth
 from stiffmap.machining.chatter.cut import GivenProcess, cut_axes, milling_process
 from stiffmap.machining.chatter.floquet import multiplier_map
 from stiffmap.machining.chatter.modes import ToolModes, mode_rows, modes_of_machine
-from stiffmap.machining.chatter.zero_order import FEED, TOOL, at_periods, frequencies_of, least_depth, limits
+from stiffmap.machining.chatter.zero_order import (
+    FEED,
+    TOOL,
+    at_periods,
+    coupling_depth,
+    frequencies_of,
+    least_depth,
+    limits,
+)
 from stiffmap.machining.process import Process
 from stiffmap.solve.machine import Machine, as_machine
 from stiffmap.solve.options import keywords_of
@@ -114,17 +121,10 @@ def stability_lobes(
     frequency = frequencies_of(modes.frequency)
     depth0, angle = limits(modes.receptance(frequency), p)
     least = least_depth(frequency, modes.receptance, p)
-    s = (
-        _axis(speeds, "speeds", "rad/s")
-        if speeds is not None
-        else p.spindle * np.linspace(0.25, 1.5, diagram[0])
-    )
+    s = _axis(p.spindle * np.linspace(0.25, 1.5, diagram[0]) if speeds is None else speeds, "speeds", "rad/s")
     top = HIGHEST * least if np.isfinite(least) else p.cut.axial
-    d = (
-        _axis(depths, "depths", "m")
-        if depths is not None
-        else np.linspace(0, max(top, 1e-9), diagram[1] + 1)[1:]
-    )
+    usual = np.linspace(0, max(top, 1e-9), diagram[1] + 1)[1:]
+    d = _axis(usual if depths is None else depths, "depths", "m")
     zero = at_periods(frequency, depth0, angle, 2 * pi / (p.tool.teeth * s))
     own = np.array([p.spindle])
     ds = xr.Dataset(
@@ -202,10 +202,15 @@ def _modes(
 
 
 def _axis(given: ArrayLike, name: str, unit: str) -> Floats:
-    out = np.atleast_1d(real_array(given, name, f"rising numbers above zero ({unit})"))
-    rises = out.ndim == 1 and out.size and np.isfinite(out).all() and out[0] > 0 and (np.diff(out) > 0).all()
-    if not rises:
-        raise StiffmapError(f"{name}: expected rising numbers above zero ({unit})")
+    what = f"rising numbers above zero ({unit})"
+    out = np.atleast_1d(real_array(given, name, what))
+    if (
+        out.ndim != 1
+        or not out.size
+        or not np.isfinite(out).all()
+        or not (np.diff(out, prepend=0.0) > 0).all()
+    ):
+        raise StiffmapError(f"{name}: expected {what}")
     return out
 
 
