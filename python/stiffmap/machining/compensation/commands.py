@@ -211,7 +211,8 @@ def _plan(
         must_take(machine, p, r)
         at = inverse_kinematics(machine, p, r)
     names, n = machine.compiled.names, len(at.position)
-    plan = Experiment(
+    way = None if approach is None else trailing(approach, (3,), "approach", "directions")
+    return Experiment(
         name="commands",
         machine=machine.name,
         quantity="position",
@@ -224,12 +225,9 @@ def _plan(
         joints=at.coordinates[:, list(names.joints.values())],
         joint_names=tuple(names.joints),
         load_point=point,
+        approach=None if way is None else np.broadcast_to(way, (n, 3)).copy(),
         gravity=None if gravity is None else tuple(float(v) for v in np.asarray(gravity)),  # type: ignore[arg-type]
     )
-    if approach is None:
-        return plan
-    way = trailing(approach, (3,), "approach", "directions")
-    return replace(plan, approach=np.broadcast_to(way, (n, 3)).copy())
 
 
 def _components(machine: Machine, given: tuple[str, ...] | None) -> list[int]:
