@@ -75,7 +75,7 @@ def many(machine: sm.Machine, count: int, threads: int) -> None:
     turn = rng.uniform(-np.pi, np.pi, count)
     at = search.inside(rng.uniform(size=(count, 3)), turn, low, high)
     start, cpu = time.perf_counter(), time.process_time()
-    largest = search.largest(at, turn)
+    largest = search.largest((at, turn))
     seconds, cpu = time.perf_counter() - start, time.process_time() - cpu
     fits = largest[np.isfinite(largest)]
     print(
