@@ -13,8 +13,7 @@ from collections.abc import Iterator
 import numpy as np
 
 import stiffmap as sm
-from stiffmap.machining.milling.command import commanded
-from stiffmap.machining.milling.equilibrium import equilibrium
+from stiffmap.machining.milling.equilibrium import commanded, equilibrium
 from stiffmap.machining.milling.placement import Search
 from stiffmap.machining.milling.plant import Plant
 from stiffmap.machining.milling.setting import setting
@@ -57,9 +56,9 @@ def points(machine: sm.Machine, count: int, threads: int) -> None:
     plant = Plant(job, threads=threads)
     e = equilibrium(plant, job.position)
     half, busy = time.perf_counter(), time.process_time() - cpu
-    found = commanded(plant, e)
+    command, _, _ = commanded(plant, e)
     end, all_busy = time.perf_counter(), time.process_time() - cpu
-    left = equilibrium(plant, found.position).error
+    left = equilibrium(plant, command).error
     print(
         f"{machine.name}, {len(job)} points: equilibrium {half - start:.2f} s ({e.steps} solves), commands {end - half:.2f} s, together "
         f"{end - start:.2f} s; of processor {busy:.2f} s, {all_busy - busy:.2f} s, {all_busy:.2f} s; furthest from the path at the commands "
@@ -76,7 +75,7 @@ def many(machine: sm.Machine, count: int, threads: int) -> None:
     turn = rng.uniform(-np.pi, np.pi, count)
     at = search.inside(rng.uniform(size=(count, 3)), turn, low, high)
     start, cpu = time.perf_counter(), time.process_time()
-    largest = search.largest(at, turn)
+    largest = search.largest((at, turn))
     seconds, cpu = time.perf_counter() - start, time.process_time() - cpu
     fits = largest[np.isfinite(largest)]
     print(

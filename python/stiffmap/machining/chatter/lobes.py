@@ -14,11 +14,18 @@ from numpy.typing import ArrayLike
 from stiffmap.common.broadcasting import Floats, real_array, whole_number
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.tasks import workers
-from stiffmap.machining.chatter.coupling import coupling_depth
 from stiffmap.machining.chatter.cut import GivenProcess, cut_axes, milling_process
 from stiffmap.machining.chatter.floquet import multiplier_map
 from stiffmap.machining.chatter.modes import ToolModes, mode_rows, modes_of_machine
-from stiffmap.machining.chatter.zero_order import FEED, TOOL, at_periods, frequencies_of, least_depth, limits
+from stiffmap.machining.chatter.zero_order import (
+    FEED,
+    TOOL,
+    at_periods,
+    coupling_depth,
+    frequencies_of,
+    least_depth,
+    limits,
+)
 from stiffmap.machining.process import Process
 from stiffmap.solve.machine import Machine, as_machine
 from stiffmap.solve.options import keywords_of
@@ -114,17 +121,10 @@ def stability_lobes(
     frequency = frequencies_of(modes.frequency)
     depth0, angle = limits(modes.receptance(frequency), p)
     least = least_depth(frequency, modes.receptance, p)
-    s = (
-        _axis(speeds, "speeds", "rad/s")
-        if speeds is not None
-        else p.spindle * np.linspace(0.25, 1.5, diagram[0])
-    )
+    s = _axis(p.spindle * np.linspace(0.25, 1.5, diagram[0]) if speeds is None else speeds, "speeds", "rad/s")
     top = HIGHEST * least if np.isfinite(least) else p.cut.axial
-    d = (
-        _axis(depths, "depths", "m")
-        if depths is not None
-        else np.linspace(0, max(top, 1e-9), diagram[1] + 1)[1:]
-    )
+    usual = np.linspace(0, max(top, 1e-9), diagram[1] + 1)[1:]
+    d = _axis(usual if depths is None else depths, "depths", "m")
     zero = at_periods(frequency, depth0, angle, 2 * pi / (p.tool.teeth * s))
     own = np.array([p.spindle])
     ds = xr.Dataset(
@@ -134,8 +134,8 @@ def stability_lobes(
             "process": p.name, "method": method, "least": least, "damping": said, "modes": len(modes),
             "frequency": float(frequency[int(np.argmin(depth0.min(axis=-1)))]),
             "coupling": coupling_depth(modes, p),
-            "at_process": float(_multipliers(modes, p, own, np.array([p.cut.axial]), intervals, 1)[0, 0]),
-            "limit_at_process": float(_limits_at(modes, p, own, d, _multipliers(modes, p, own, d, intervals, 1), intervals)[0]),
+            "at_process": float(multipliers_at(modes, p, own, np.array([p.cut.axial]), intervals, 1)[0, 0]),
+            "limit_at_process": float(_limits_at(modes, p, own, d, multipliers_at(modes, p, own, d, intervals, 1), intervals)[0]),
             "tool": along.tolist(), "feed": ahead.tolist(),
             "helix": "left out: the tooth is straight" if p.tool.helix else "none",
         },
@@ -143,7 +143,7 @@ def stability_lobes(
     if method == "zero order":
         ds["limit"] = ds.limit_zero_order
     else:
-        mu = _multipliers(modes, p, s, d, intervals, threads, scheduler)
+        mu = multipliers_at(modes, p, s, d, intervals, threads, scheduler)
         ds["multiplier"] = (("speed", "depth"), mu)
         ds["limit"] = ("speed", _limits_at(modes, p, s, d, mu, intervals), {"units": "m"})
     ds.attrs["stable_speeds"] = pockets(s, ds.limit.values, d[-1])
@@ -176,7 +176,7 @@ def _limits_at(
         close, tried = (at[1] - at[0]) / CLOSE, np.linspace(at[0], at[1], ends)
         while at[1] - at[0] > close:
             tried = np.sort(tried[(tried > at[0]) & (tried < at[1])])
-            found = _multipliers(modes, p, speed[i : i + 1], tried, intervals, 1)[0]
+            found = multipliers_at(modes, p, speed[i : i + 1], tried, intervals, 1)[0]
             at, mu = np.r_[at[0], tried, at[1]], np.r_[mu[0], found, mu[1]]
             j = int(np.argmax(mu >= 1))
             at, mu = at[j - 1 : j + 1], mu[j - 1 : j + 1]
@@ -202,20 +202,19 @@ def _modes(
 
 
 def _axis(given: ArrayLike, name: str, unit: str) -> Floats:
-    out = np.atleast_1d(real_array(given, name, f"rising numbers above zero ({unit})"))
-    rises = out.ndim == 1 and out.size and np.isfinite(out).all() and out[0] > 0 and (np.diff(out) > 0).all()
-    if not rises:
-        raise StiffmapError(f"{name}: expected rising numbers above zero ({unit})")
+    what = f"rising numbers above zero ({unit})"
+    out = np.atleast_1d(real_array(given, name, what))
+    if (
+        out.ndim != 1
+        or not out.size
+        or not np.isfinite(out).all()
+        or not (np.diff(out, prepend=0.0) > 0).all()
+    ):
+        raise StiffmapError(f"{name}: expected {what}")
     return out
 
 
-def interval_counts(modes: ToolModes, p: Process, speed: Floats) -> Any:
-    """(speeds,) parts of a tooth period that the fastest mode needs, one of 40, 80, 160 and 320."""
-    waves = modes.frequency.max() * 2 * pi / (p.tool.teeth * speed)
-    return (2 ** np.ceil(np.log2(np.clip(PER_WAVE * waves, LEAST, MOST) / LEAST)) * LEAST).astype(int)
-
-
-def _multipliers(
+def multipliers_at(
     modes: ToolModes,
     p: Process,
     speed: Floats,
@@ -224,8 +223,10 @@ def _multipliers(
     threads: int | None,
     scheduler: Any = None,
 ) -> Floats:
-    """Speeds with the same number of intervals together."""
-    k = np.full(len(speed), intervals) if intervals is not None else interval_counts(modes, p, speed)
+    """(speeds, depths) multipliers; parts of a tooth period: `intervals`, or as many as the fastest mode needs, 40, 80, 160 or 320."""
+    waves = modes.frequency.max() * 2 * pi / (p.tool.teeth * speed)
+    needed = 2 ** np.ceil(np.log2(np.clip(PER_WAVE * waves, LEAST, MOST) / LEAST)) * LEAST
+    k = needed.astype(int) if intervals is None else np.full(len(speed), intervals)
     together = [np.flatnonzero(k == count) for count in np.unique(k)]
     if scheduler is not None:
         together = [rows[i : i + PER_TASK] for rows in together for i in range(0, len(rows), PER_TASK)]
@@ -249,11 +250,9 @@ def border(depth: Floats, multiplier: Floats) -> Floats:
     return np.where(over.any(axis=1), safe, np.inf)
 
 
-def pockets(speed: Floats, limit: Floats, top: float, most: int = 5) -> list[list[float]]:
-    """[rad/s, m] of the largest limits that are higher than their neighbours, the deepest first."""
+def pockets(speed: Floats, limit: Floats, top: float) -> list[list[float]]:
+    """[rad/s, m] of the five largest limits that are higher than their neighbours, the deepest first."""
     v = np.minimum(limit, top)
-    if len(v) < 3:
-        return []
-    peak = [i for i in range(1, len(v) - 1) if v[i] >= v[i - 1] and v[i] > v[i + 1]]
-    found = sorted(peak, key=lambda i: -v[i])[:most]
-    return [[float(speed[i]), float(v[i])] for i in found]
+    peak = np.flatnonzero((v[1:-1] >= v[:-2]) & (v[1:-1] > v[2:])) + 1
+    found = peak[np.argsort(-v[peak], kind="stable")][:5]
+    return np.stack([speed[found], v[found]], axis=1).tolist()  # type: ignore[no-any-return]

@@ -12,6 +12,7 @@ from stiffmap.common.broadcasting import Floats, instance_of, real_array, real_n
 from stiffmap.common.errors import StiffmapError
 from stiffmap.workspace.vibration.modes import TipModes
 
+ROW = "(frequency Hz, damping ratio, mass kg, direction)"
 WAYS = {
     f"{sign}{axis}": one * way
     for sign, one in (("", 1), ("-", -1))
@@ -40,11 +41,6 @@ class ToolModes:
     def stiffness(self) -> Floats:
         """(modes,) N/m."""
         return np.asarray(self.mass * (2 * np.pi * self.frequency) ** 2)
-
-    @property
-    def compliance(self) -> Floats:
-        """(3, 3) m/N, static."""
-        return np.asarray(np.einsum("k,ki,kj->ij", 1 / self.stiffness, self.way, self.way) + self.rest)
 
     def turned(self, axes: Floats) -> ToolModes:
         """The same along the rows of `axes` (3, 3)."""
@@ -78,16 +74,11 @@ def mode_rows(modes: ToolModes | Iterable[Any]) -> ToolModes:
     """Rows (frequency Hz, damping ratio, mass kg, direction), the direction x, y, z or a vector; checked."""
     if isinstance(modes, ToolModes):
         return modes
-    rows = list(
-        instance_of(modes, Iterable, "modes", "rows (frequency Hz, damping ratio, mass kg, direction)")
-    )
+    rows = list(instance_of(modes, Iterable, "modes", f"rows {ROW}"))
     if not rows:
-        raise StiffmapError(
-            "modes: expected rows (frequency Hz, damping ratio, mass kg, direction), got none"
-        )
-    found = [_row(i, row) for i, row in enumerate(rows)]
-    f, ratio, mass, way = zip(*found, strict=True)
-    return ToolModes(np.array(f), np.array(ratio), np.array(mass), np.array(way), np.zeros((3, 3)))
+        raise StiffmapError(f"modes: expected rows {ROW}, got none")
+    f, ratio, mass, way = map(np.array, zip(*(_row(i, row) for i, row in enumerate(rows)), strict=True))
+    return ToolModes(f, ratio, mass, way, np.zeros((3, 3)))
 
 
 def _row(i: int, row: Any) -> tuple[float, float, float, Floats]:
@@ -95,9 +86,7 @@ def _row(i: int, row: Any) -> tuple[float, float, float, Floats]:
     try:
         frequency, ratio, mass, *direction = row
     except (TypeError, ValueError):
-        raise StiffmapError(
-            f"{name}: expected (frequency Hz, damping ratio, mass kg, direction), got {row!r}"
-        ) from None
+        raise StiffmapError(f"{name}: expected {ROW}, got {row!r}") from None
     way = direction[0] if len(direction) == 1 else direction
     values = [real_number(v, name, "numbers") for v in (frequency, ratio, mass)]
     for value, what in zip(values, ("a frequency (Hz)", "a damping ratio", "a mass (kg)"), strict=True):

@@ -1,9 +1,11 @@
-"""Limits of a stable cut by the mean of the directional factors, in closed form (docs/theory.md V4; Altintas and Budak)."""
+"""Limits of a stable cut by the mean of the directional factors, in closed form (docs/theory.md V4; Altintas and Budak), and mode
+coupling without regeneration: eigenvalues of M and K - Kp f n' (docs/theory.md V6; Gasparetto; Pan, Zhang et al.)."""
 
 from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from math import pi
 from typing import Any
 
@@ -24,6 +26,8 @@ SEARCHED = 20_000
 """Frequencies between the samples, in all."""
 MOST_TERMS, EXACT = 80, 1e-10
 """Of a rational function through samples; largest error, as a share of the largest value."""
+DEEPEST = 1.0
+"""m: a limit of mode coupling beyond it is none."""
 ZOOMS, AROUND = 4, 400
 """Times that a least limit is looked at more closely, and frequencies close to each mode."""
 
@@ -163,3 +167,42 @@ def at_periods(frequency: Floats, depth: Floats, angle: Floats, period: Floats) 
         a, b = depth[..., :-1, :, None], depth[..., 1:, :, None]
         between = np.where(crossed & np.isfinite(a) & np.isfinite(b), a + share * (b - a), np.inf)
     return np.asarray(np.min(between, axis=(-2, -3)))
+
+
+@dataclass(frozen=True, eq=False)
+class ModeCoupling:
+    """Eigenvalues of the cut at one depth."""
+
+    square: np.ndarray
+    """(modes,) of M and K - Kp f n', (rad/s)²: complex or negative ones are unstable without damping."""
+    growth: float
+    """1/s, largest real part with damping: above zero unstable."""
+
+    @property
+    def unstable(self) -> bool:
+        """Without damping: a pair that is complex, or a square that is negative."""
+        size = np.abs(self.square).max()
+        return bool((np.abs(self.square.imag) > 1e-9 * size).any() or (self.square.real < 0).any())
+
+
+def mode_coupling(modes: ToolModes | Iterable[Any], process: GivenProcess, depth: float) -> ModeCoupling:
+    """At a depth of cut (m); modes in the axes of the cut. Raises StiffmapError for bad input."""
+    m, chip = mode_rows(modes), mean_chips(milling_process(process))
+    own = 2 * np.pi * m.frequency
+    square = np.diag(own**2) - depth * (m.way @ chip @ m.way[:, :2].T) / m.mass[:, None]
+    first = np.block([[np.zeros_like(square), np.eye(len(m))], [-square, -np.diag(2 * m.ratio * own)]])
+    return ModeCoupling(np.linalg.eigvals(square).astype(complex), float(np.linalg.eigvals(first).real.max()))
+
+
+def coupling_depth(modes: ToolModes | Iterable[Any], process: GivenProcess) -> float:
+    """m: least depth at which modes couple with damping, to 1e-6 of it; infinite where there is none up to 1 m."""
+    m, p = mode_rows(modes), milling_process(process)
+    depths = np.geomspace(1e-6, DEEPEST, 400)
+    bad = next((i for i, a in enumerate(depths) if mode_coupling(m, p, a).growth > 0), None)
+    if bad is None:
+        return float("inf")
+    low, high = (0.0 if bad == 0 else depths[bad - 1]), depths[bad]
+    while high - low > 1e-6 * high:
+        middle = (low + high) / 2
+        low, high = (low, middle) if mode_coupling(m, p, middle).growth > 0 else (middle, high)
+    return float(high)

@@ -8,7 +8,6 @@ is solved with the declared machine's Jacobian; the deviations change it little,
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import isfinite
 from os import PathLike
 from pathlib import Path
 
@@ -18,7 +17,7 @@ from scipy.spatial.transform import Rotation
 
 from stiffmap.common.broadcasting import Floats, trailing, wrench_array
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.outputs import write_rows
+from stiffmap.common.outputs import number_cells, write_rows
 from stiffmap.common.short import short_repr
 from stiffmap.experiment.experiment import AXES, Experiment
 from stiffmap.experiment.files.plan_file import load_plan
@@ -99,8 +98,7 @@ class Commands:
             columns |= {f"{word}_{a}_mm": values[:, i] * MM for i, a in enumerate(AXES[:3])}
         if self.beyond is not None:
             columns["beyond_calibration"] = self.beyond.astype(float)
-        rows = np.column_stack([*columns.values()]).tolist()
-        write_rows(path, list(columns), ([f"{v:.9g}" if isfinite(v) else "" for v in row] for row in rows))
+        write_rows(path, list(columns), map(number_cells, zip(*columns.values(), strict=True)))
 
 
 @takes_machine
@@ -155,21 +153,20 @@ def compensate(
         position, rotation, approach, ids = read.position, read.rotation, read.approach, read.ids
         wrench = read.wrench if read.wrench.any() else wrench
     plan = _plan(machine, position, rotation, actuators, wrench, approach, gravity, point)
-    wanted_p, wanted_r = plan.position, plan.rotation
-    assert wanted_r is not None  # as the kinematics has it
+    assert plan.rotation is not None  # as the kinematics has it
     chosen = _components(machine, components)
     start = coordinates_of(machine, plan)
     declared = of_drives(machine.compiled, start)
     valid = Validity.of_machine(machine)
     lost = np.asarray(~np.isfinite(start).all(axis=1))
     u = np.where(lost[:, None], np.nan, declared)
-    inverse = np.linalg.pinv(_rows(np.nan_to_num(drive_jacobian(machine, plan)), wanted_r, chosen))
+    inverse = np.linalg.pinv(_rows(np.nan_to_num(drive_jacobian(machine, plan)), plan.rotation, chosen))
     before = after = np.full((len(plan), 6), np.nan)
     for step in range(STEPS):
         at = forward_kinematics(machine, u, start=start)
-        after = _error(machine, plan, at, wanted_p, wanted_r, threads)
+        after = _error(machine, plan, at, threads)
         before = after if step == 0 else before
-        move = -np.einsum("nac,nc->na", inverse, _rows(after[:, :, None], wanted_r, chosen)[:, :, 0])
+        move = -np.einsum("nac,nc->na", inverse, _rows(after[:, :, None], plan.rotation, chosen)[:, :, 0])
         if not np.nanmax(np.abs(move), initial=0.0) > DONE:
             break
         u = u + move
@@ -180,7 +177,7 @@ def compensate(
         u,
         at.position,
         at.rotation,
-        wanted_p,
+        plan.position,
         before,
         after,
         tuple(TASK[i] for i in chosen),
@@ -214,7 +211,8 @@ def _plan(
         must_take(machine, p, r)
         at = inverse_kinematics(machine, p, r)
     names, n = machine.compiled.names, len(at.position)
-    plan = Experiment(
+    way = None if approach is None else trailing(approach, (3,), "approach", "directions")
+    return Experiment(
         name="commands",
         machine=machine.name,
         quantity="position",
@@ -227,12 +225,9 @@ def _plan(
         joints=at.coordinates[:, list(names.joints.values())],
         joint_names=tuple(names.joints),
         load_point=point,
+        approach=None if way is None else np.broadcast_to(way, (n, 3)).copy(),
         gravity=None if gravity is None else tuple(float(v) for v in np.asarray(gravity)),  # type: ignore[arg-type]
     )
-    if approach is None:
-        return plan
-    way = trailing(approach, (3,), "approach", "directions")
-    return replace(plan, approach=np.broadcast_to(way, (n, 3)).copy())
 
 
 def _components(machine: Machine, given: tuple[str, ...] | None) -> list[int]:
@@ -249,15 +244,9 @@ def _rows(columns: Floats, turns: Floats, chosen: list[int]) -> Floats:
     return np.concatenate([columns[:, :3], local], axis=1)[:, chosen]
 
 
-def _error(
-    machine: Machine,
-    plan: Experiment,
-    at: Kinematics,
-    wanted_p: Floats,
-    wanted_r: Floats,
-    threads: int | None,
-) -> Floats:
+def _error(machine: Machine, plan: Experiment, at: Kinematics, threads: int | None) -> Floats:
     """(n, 6) real pose less the wanted one; NaN where the machine has no equilibrium."""
+    assert plan.rotation is not None
     good = np.flatnonzero(np.isfinite(at.position).all(axis=1))
     out = np.full((len(plan), 6), np.nan)
     if not good.size:
@@ -265,8 +254,8 @@ def _error(
     joints = at.coordinates[:, list(machine.compiled.names.joints.values())]
     now = replace(plan, position=at.position, rotation=at.rotation, joints=joints, command=at.actuators)
     moved, _ = motions(machine, now.rows(good), threads)
-    shift = moved[:, :3] + at.position[good] - wanted_p[good]
+    shift = moved[:, :3] + at.position[good] - plan.position[good]
     turned = Rotation.from_rotvec(np.nan_to_num(moved[:, 3:])).as_matrix() @ at.rotation[good]
-    turn = Rotation.from_matrix(turned @ np.swapaxes(wanted_r[good], 1, 2)).as_rotvec()
+    turn = Rotation.from_matrix(turned @ np.swapaxes(plan.rotation[good], 1, 2)).as_rotvec()
     out[good] = np.where(np.isfinite(moved), np.hstack([shift, turn]), np.nan)
     return out

@@ -16,6 +16,7 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.outputs import write_text
 from stiffmap.machining.compensation.axis_errors import AxisErrors
+from stiffmap.machining.toolpath.gcode.load import lines_of
 
 MM = 1e3
 
@@ -78,13 +79,12 @@ def _heidenhain(e: AxisErrors) -> str:
 
 def _csv(e: AxisErrors) -> str:
     """All six errors in both directions, mm and mrad."""
-    scale = np.r_[np.full(3, MM), np.full(3, 1e3)]
     units = ("mm",) * 3 + ("mrad",) * 3
     head = [f"{e.axis}_mm"] + [
         f"{n}_{way}_{u}" for way in ("forward", "backward") for n, u in zip(e.names, units, strict=True)
     ]
     lines = [f"# {line}" for line in (*_about(e), "forward and backward: direction of arrival")]
-    rows = np.column_stack([MM * e.position, e.forward * scale, e.backward * scale])
+    rows = 1e3 * np.column_stack([e.position, e.forward, e.backward])  # of m and of rad
     return "\n".join([*lines, ",".join(head), *(",".join(f"{v:.10g}" for v in row) for row in rows)]) + "\n"
 
 
@@ -110,10 +110,7 @@ def read_table(path: str | PathLike[str], form: str) -> tuple[Floats, Floats, Fl
     """
     if form not in FORMATS:
         raise StiffmapError(f"format: expected one of {', '.join(FORMATS)}, got '{form}'")
-    try:
-        text = Path(path).read_text(encoding="utf-8")
-    except OSError as error:
-        raise FileError(f"cannot be read: {error.strerror}", file=str(path)) from error
+    text = "".join(lines_of(Path(path)))
     try:
         x, forward, backward = READERS[form](text)
     except (ValueError, IndexError, KeyError) as problem:

@@ -14,7 +14,7 @@ from stiffmap.machining.compensation.geometry import corrected_geometry, serial_
 from stiffmap.model.description import Joint, MachineDescription, Offset, Pose
 from stiffmap.model.urdf.chains import plain_name
 from stiffmap.model.urdf.editing import SAME, with_origins
-from stiffmap.model.urdf.model import UrdfJoint, UrdfModel
+from stiffmap.model.urdf.model import UrdfModel
 from stiffmap.model.urdf.reader import read_urdf
 from stiffmap.solve.machine import Machine, takes_machine
 
@@ -64,7 +64,9 @@ def _origins(description: MachineDescription, model: UrdfModel) -> tuple[dict[st
         own = known.get(
             e.name if isinstance(e, Joint) else e.name.removesuffix("_zero").removesuffix("_origin")
         )
-        if isinstance(e, Joint) and (own is None or not _alike(e, own)):
+        if isinstance(e, Joint) and (
+            own is None or own.kind != e.kind or np.abs(np.subtract(e.axes[0], own.axis)).max() >= CLOSE
+        ):
             raise _other(description, model, f"expected its joint {e.name} with the same type and axis, "
                          f"found {'no such joint' if own is None else 'another one'}")  # fmt: skip
         if own is not None and own.name not in out:
@@ -80,10 +82,6 @@ def _origins(description: MachineDescription, model: UrdfModel) -> tuple[dict[st
         if joint.name not in out and joint.kind == "fixed" and joint.parent == model.joint([*out][-1]).child:
             out[joint.name], after = after, Pose()
     return out, after
-
-
-def _alike(e: Joint, own: UrdfJoint) -> bool:
-    return e.kind == own.kind and bool(np.abs(np.subtract(e.axes[0], own.axis)).max() < CLOSE)
 
 
 def _check(description: MachineDescription, model: UrdfModel, declared: dict[str, Pose]) -> None:

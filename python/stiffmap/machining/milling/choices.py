@@ -55,16 +55,6 @@ class Choices:
     entry: Entry | None = None
     redundancy: Redundancy | None = None
 
-    @property
-    def said(self) -> dict[str, object]:
-        """Attributes of a dataset: what was asked for."""
-        out: dict[str, object] = {}
-        if self.placement is not None:
-            out["placement"] = self.placement.words(self.process.tolerance)
-        if self.entry is not None:
-            out["entry"] = self.entry.way
-        return out
-
 
 def choices(
     machine: Machine,

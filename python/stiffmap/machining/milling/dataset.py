@@ -1,28 +1,28 @@
-"""Errors, commands and states of a job as one table along the path."""
+"""Errors, commands and states of a job as one table along the path, sizes of the errors, and the verdict in words."""
 
 from __future__ import annotations
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.machining.milling.equilibrium import Equilibrium
 from stiffmap.machining.milling.limits import drive_speeds
 from stiffmap.machining.milling.setting import Setting
 from stiffmap.machining.milling.verify import Run
+from stiffmap.solve.status import Status
 
 
 def along(job: Setting, made: Run) -> xr.Variable:
     """The error of a run at the points of the job: of the run's points nearest in way, the largest in size."""
-    order = np.argsort(made.way, kind="stable")
-    way, value = made.way[order], made.normal[order]
+    order = np.argsort(made.job.points.way, kind="stable")
+    way, value = made.job.points.way[order], made.normal[order]
     edges = (job.points.way[1:] + job.points.way[:-1]) / 2
     bins = np.searchsorted(edges, way)
     out = np.interp(job.points.way, way, value)
-    best = np.lexsort((np.abs(value), bins))
-    last = np.r_[np.flatnonzero(np.diff(bins[best])), len(best) - 1]
-    out[bins[best][last]] = value[best][last]
+    rising = np.lexsort((np.abs(value), bins))
+    out[bins[rising]] = value[rising]  # of several in one place the last one, the largest
     return xr.Variable("point", out)
 
 
@@ -30,7 +30,7 @@ def flags_along(job: Setting, made: Run) -> NDArray[np.uint32]:
     """Flags of a run at the points of the job: all that its points between them have."""
     edges = (job.points.way[1:] + job.points.way[:-1]) / 2
     out = np.zeros(len(job), np.uint32)
-    np.bitwise_or.at(out, np.searchsorted(edges, made.way), made.state.flags)
+    np.bitwise_or.at(out, np.searchsorted(edges, made.job.points.way), made.state.flags)
     return out
 
 
@@ -96,3 +96,43 @@ def taper(job: Setting, state: Equilibrium) -> Floats:
         across = state.force - (state.force * job.tool).sum(axis=1, keepdims=True) * job.tool
         tilt = tilt - 1.5 * tool.compliance / tool.stick_out * across
     return np.asarray(depth * (tilt * job.off).sum(axis=1))
+
+
+def sizes(values: ArrayLike) -> dict[str, float]:
+    """rms and largest size of errors (m), in mm; points without an answer do not count."""
+    v = np.asarray(values, dtype=float)
+    v = v[np.isfinite(v)]
+    if not v.size:
+        return {"rms": float("nan"), "largest": float("nan")}
+    return {"rms": float(1e3 * np.sqrt((v**2).mean())), "largest": float(1e3 * np.abs(v).max())}
+
+
+def verdict(ds: xr.Dataset) -> str:
+    """The worst of what was found comes first: no equilibrium, chatter, broken limits, errors."""
+    states, points = ds.status.values, ds.sizes["point"]
+    told = []
+    away, bad = int((states == Status.UNSTABLE).sum()), int((states != Status.CONVERGED).sum())
+    if away:
+        told.append(f"The cut runs away at {away} points: the force grows faster than the machine resists.")
+    elif bad:
+        told.append(f"{bad} of {points} points have no equilibrium.")
+    if "multiplier" in ds and (ds.multiplier.values > 1).any():
+        told.append(f"{ds.multiplier.attrs['said']} The errors are those of a cut without chatter.")
+    names = ds.warnings.attrs["names"] if "warnings" in ds else []
+    over = [n for n in names if n not in ("chatter", "declared workspace", "outside corner")]
+    if over:
+        told.append(f"Limits are broken: {', '.join(over)}.")
+    if bad:
+        return " ".join(told)
+    b, a = sizes(ds.error_normal), sizes(ds.error_normal_after)
+    lost = int((~np.isfinite(ds.error_normal_after.values)).sum())
+    told.append(f"The part is off by {b['largest']:.3f} mm at most; with the compensated program ")
+    if lost:
+        told[-1] += f"{lost} of {points} points have no equilibrium."
+        return " ".join([told.pop(), *told])
+    told[-1] += f"by {a['largest']:.4f} mm."
+    if "tolerance" in ds.attrs:
+        t = 1e3 * ds.attrs["tolerance"]
+        words = [("within" if v["largest"] <= t else "beyond") for v in (b, a)]
+        told.append(f"The tolerance is {t:g} mm: {words[0]} it as it is, {words[1]} it compensated.")
+    return " ".join(told)

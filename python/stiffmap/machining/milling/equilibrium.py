@@ -1,29 +1,28 @@
-"""Deflection and cutting force together: each is what the other makes it (theory.md, M9)."""
+"""Deflection and cutting force together, each what the other makes it, and commands that undo the deflection (theory.md, M9)."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from stiffmap.common.broadcasting import Floats
-from stiffmap.machining.milling.plant import Plant
+from stiffmap.machining.milling.plant import Plant, Stand
 from stiffmap.machining.milling.setting import Setting
-from stiffmap.machining.toolpath import Engagement
 from stiffmap.solve.status import Flag, Status
 
-STEPS, INNER = 30, 40
+STEPS, INNER, INVERSE = 30, 40, 40
+"""Most solves of the machine, of the cut between two of them, and for a command."""
 DONE = 1e-11
-"""m: change of the tool's position below which an equilibrium stands."""
+"""m: change of the tool's position below which an equilibrium stands, and distance from the path below which a command does."""
 RANGES = int(Flag.JOINT_LIMIT | Flag.DRIVE_RANGE)
 LONGEST = 0.05
 """m: no deflection of interest is longer."""
 
 
 @dataclass(frozen=True, eq=False)
-class Equilibrium:
-    """m points; NaN where there is none."""
+class Equilibrium(Stand):
+    """m points under the force of the cut; NaN where there is no equilibrium."""
 
     error: Floats
     """(m, 3) m, the tool's tip from where it is wanted, base axes."""
@@ -31,31 +30,24 @@ class Equilibrium:
     """(m, 3) N, that the cut makes there."""
     gain: Floats
     """(m,) loop gain kp/k: largest real part of the eigenvalues of -C dF/de; below -1 the cut runs away."""
-    status: NDArray[np.uint8]
-    flags: NDArray[np.uint32]
-    effort: Floats
-    """(m, actuators)."""
-    compliance: Floats
-    """(m, 3, 3) m/N."""
-    turned: Floats
-    """(m, 3) rad, rotation vector of the tool's holder from the commanded orientation."""
     steps: int
+    """Solves of the machine."""
 
 
-def equilibrium(plant: Plant, command: Floats, rows: NDArray[np.int64] | None = None) -> Equilibrium:
+def equilibrium(plant: Plant, command: Floats) -> Equilibrium:
     """Where the tool stands at commanded positions (m, 3) m, base axes, under the force that the cut makes there.
 
     Newton: the machine is solved at a force, the cut and the machine's tangent are solved together, until the
     tool stands still. UNSTABLE where the force grows faster than the machine resists (det of I - C dF/de not positive).
     """
-    job = plant.job if rows is None else of_rows(plant.job, rows)
+    job = plant.job
     away = np.zeros((len(job), 2))
     force = job.force(away)
     error = np.full((len(job), 3), np.nan)
     steps, s = 0, None
     while steps < STEPS:
         steps += 1
-        s = plant.stand(command, force, full=True, rows=rows)
+        s = plant.stand(command, force, full=True)
         error = command + s.moved - job.position
         away = _together(job, error, s.compliance, force, away)
         new = job.force(away)
@@ -77,10 +69,34 @@ def equilibrium(plant: Plant, command: Floats, rows: NDArray[np.int64] | None = 
     strongest = np.abs(values).argmax(axis=1)[:, None]
     gain = np.take_along_axis(values, strongest, axis=1)[:, 0].real
     blank = np.where(lost[:, None], np.nan, 1.0)
-    return Equilibrium(
-        error * blank, force * blank, np.where(np.isfinite(error).all(axis=1), gain, np.nan), status, s.flags,
-        s.effort * blank, s.compliance, s.turned * blank, steps,
-    )  # fmt: skip
+    stand = vars(s) | {"status": status, "effort": s.effort * blank, "turned": s.turned * blank}
+    gain = np.where(np.isfinite(error).all(axis=1), gain, np.nan)
+    return Equilibrium(**stand, error=error * blank, force=force * blank, gain=gain, steps=steps)
+
+
+def commanded(plant: Plant, before: Equilibrium) -> tuple[Floats, Floats, Floats]:
+    """Commands (m, 3) m, base axes, at which the loaded machine stands on the path, NaN where it has no answer; (m,) m by which it is
+    still off there; and the mirrored commands (m, 3) m, the wanted position less the error.
+
+    Inverse of the loaded machine: on the path the cut is the wanted one, so that its force is known there.
+    """
+    job = plant.job
+    force = job.force(np.zeros((len(job), 2)))
+    steered = np.isin(["x", "y", "z"], job.machine.description.task)
+    # the machine's tangent tells where the tool would stand under the wanted cut
+    further = np.einsum("mij,mj->mi", before.compliance, force - before.force)
+    u = job.position - steered * (np.nan_to_num(before.error) + np.nan_to_num(further))
+    rest = np.full((len(job), 3), np.nan)
+    active = np.arange(len(job))
+    for _ in range(INVERSE):
+        s = plant.stand(u[active], force[active], rows=active)
+        rest[active] = u[active] + s.moved - job.position[active]
+        active = active[np.abs(steered * rest[active]).max(axis=1) > DONE]  # a lost point compares false
+        u[active] -= steered * rest[active]
+        if not active.size:
+            break
+    u[~np.isfinite(rest).all(axis=1)] = np.nan
+    return u, np.linalg.norm(rest, axis=1), job.position - steered * before.error
 
 
 def wall_errors(job: Setting, threads: int | None = None) -> Floats:
@@ -113,10 +129,3 @@ def _together(job: Setting, error: Floats, compliance: Floats, force: Floats, aw
         if not np.abs(move).max(initial=0.0) > DONE / 10:
             break
     return np.asarray(x)
-
-
-def of_rows(job: Setting, rows: NDArray[np.int64]) -> Setting:
-    """A job of some of the points."""
-    engaged = Engagement(*(getattr(job.engaged, f.name)[rows] for f in fields(Engagement)))
-    names = ("position", "tangent", "off", "tool", "rotation", "feed", "faster")
-    return replace(job, engaged=engaged, **{n: getattr(job, n)[rows] for n in names})

@@ -13,18 +13,16 @@ import xarray as xr
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.machining.milling.choices import Choices, choices
-from stiffmap.machining.milling.command import commanded
-from stiffmap.machining.milling.dataset import along, dataset_of
-from stiffmap.machining.milling.equilibrium import Equilibrium, equilibrium
+from stiffmap.machining.milling.dataset import along, dataset_of, verdict
+from stiffmap.machining.milling.equilibrium import Equilibrium, commanded, equilibrium
+from stiffmap.machining.milling.limits import Warned, warned
 from stiffmap.machining.milling.plant import Plant
 from stiffmap.machining.milling.program import WITHIN, Program, program
 from stiffmap.machining.milling.reach import must_reach
 from stiffmap.machining.milling.setting import Setting, setting
 from stiffmap.machining.milling.speed import Feeds, best_feeds
 from stiffmap.machining.milling.stability import PathStability, path_stability
-from stiffmap.machining.milling.verdict import verdict
 from stiffmap.machining.milling.verify import Run, run
-from stiffmap.machining.milling.warnings import Warned, warned
 from stiffmap.machining.process import Process, cutting_force
 from stiffmap.machining.toolpath import Toolpath, sampled
 from stiffmap.solve.machine import Machine, as_machine
@@ -96,12 +94,16 @@ def mill_job(
         job = setting(machine, p, cut, sampled(p, step), where, stock=box, thickness=thickness, angle=angle)
     plant = Plant(job, threads=threads)
     before = equilibrium(plant, job.position)
-    found = commanded(plant, before)
-    command = np.where(np.isfinite(found.position), found.position, job.position)
-    made = program(job, command, within, None if best is None else best.feed)
+    command, left, mirror = commanded(plant, before)
+    made = program(
+        job,
+        np.where(np.isfinite(command), command, job.position),
+        within,
+        None if best is None else best.feed,
+    )
     after = run(job, made, step=step, threads=threads)
-    mirrored = equilibrium(plant, np.where(np.isfinite(found.mirror), found.mirror, job.position))
-    ds = dataset_of(job, before, found.position, found.left, after, mirrored)
+    mirrored = equilibrium(plant, np.where(np.isfinite(mirror), mirror, job.position))
+    ds = dataset_of(job, before, command, left, after, mirrored)
     ds["ripple"] = ("point", ripple(job, before))
     if passes > 1:
         ds["error_normal_passes"] = (("passes", "point"), after_passes(job, before, passes, threads))
@@ -113,8 +115,12 @@ def mill_job(
     if isinstance(stability, PathStability):
         ds["multiplier"] = ("point", np.interp(job.points.way, stability.way, stability.multiplier))
         ds["multiplier"].attrs["said"] = stability.sentence(job.process.spindle)
-    ds.attrs |= {"program": made.text, "verdict": verdict(ds), **made_of.said}
-    found_warnings = warned(job, ds)
+    ds.attrs |= {"program": made.text, "verdict": verdict(ds)}
+    if made_of.placement is not None:
+        ds.attrs["placement"] = made_of.placement.words(cut.tolerance)
+    if made_of.entry is not None:
+        ds.attrs["entry"] = made_of.entry.way
+    warnings = warned(job, ds)
     if true_machine is not None:
         true_machine = as_machine(true_machine)
         if true_machine.actuators != machine.actuators:
@@ -125,9 +131,7 @@ def mill_job(
         real = equilibrium(Plant(job, true_machine, threads), job.position)
         ds["true_error_normal"] = ("point", job.across(real.error))
         ds["true_error_normal_after"] = along(job, run(job, made, true_machine, step=step, threads=threads))
-    return Milled(
-        job, before, found.position, made, after, ds, stability, feeds=best, warnings=found_warnings, choices=made_of
-    )  # fmt: skip
+    return Milled(job, before, command, made, after, ds, stability, best, warnings, made_of)
 
 
 @keywords_of(mill_job)

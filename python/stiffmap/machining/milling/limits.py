@@ -1,9 +1,16 @@
-"""Ranges, efforts and speeds of the drives along a job."""
+"""Ranges, efforts and speeds of the drives along a job, and warnings at its points.
+
+A further kind of warning is a function of the job and its dataset in SOURCES.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
+
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.machining.milling.setting import Setting
@@ -35,8 +42,66 @@ def outside(ds: xr.Dataset, machine: Machine) -> dict[str, np.ndarray]:
     out = {name: np.asarray(flags & flag > 0) for name, flag in BROKEN.items()}
     out["drive speed"] = (np.abs(ds.speed.values) > fastest(machine)).any(axis=1)
     if machine.description.workspace is not None:
-        low, high = (
-            np.array(c) - 1e-9 * s for c, s in zip(machine.description.workspace, (1, -1), strict=True)
-        )
+        low, high = np.array(machine.description.workspace) + [[-1e-9], [1e-9]]
         out["declared workspace"] = ((ds.wanted.values < low) | (ds.wanted.values > high)).any(axis=1)
     return out
+
+
+@dataclass(frozen=True, eq=False)
+class Warned:
+    """One warning: its name, the points that it is about, and a sentence."""
+
+    name: str
+    """Few words, as ``drive speed``."""
+    points: NDArray[np.bool_]
+    """(m,)."""
+    text: str
+    """A sentence for the report."""
+    finding: bool = True
+    """Whether the command ends with exit code 1."""
+
+
+def limits(job: Setting, ds: xr.Dataset) -> list[Warned]:
+    """Ranges, efforts and speeds of the drives; the box of the machine file is only mentioned."""
+    out = []
+    for name, points in outside(ds, job.machine).items():
+        text = f"The {name} is broken at {int(points.sum())} of {points.size} points."
+        if name == "declared workspace":
+            text = f"{int(points.sum())} of {points.size} points are outside the workspace that the machine file declares."
+        out.append(Warned(name, points, text, finding=name != "declared workspace"))
+    return out
+
+
+def chatter(job: Setting, ds: xr.Dataset) -> list[Warned]:
+    """Where the cut is unstable, with speeds of the spindle that are stable all along the path."""
+    if "multiplier" not in ds:
+        return []
+    return [Warned("chatter", ds.multiplier.values > 1, ds.multiplier.attrs["said"])]
+
+
+def corners(job: Setting, ds: xr.Dataset) -> list[Warned]:
+    """What happens to sharp outside corners: the two walls that meet in each."""
+    none = ~job.engaged.wall
+    last = np.flatnonzero(none != np.r_[none[1:], none[-1:]])  # beside it, on the one or the other side
+    beside = np.unique(np.where(none[last], np.minimum(last + 1, len(none) - 1), last))
+    most = [1e3 * np.nanmax(np.abs(ds[n].values[beside]), initial=0.0) for n in AT_CORNERS]
+    text = (
+        f"Sharp outside corners have no wall within a tool radius, so that {int(none.sum())} points next to them do not count; the "
+        f"walls that meet there are off by up to {most[0]:.4f} mm, compensated {most[1]:.4f} mm."
+    )
+    return [Warned("outside corner", none, text, finding=False)]
+
+
+AT_CORNERS = ("error_normal", "error_normal_after")
+SOURCES: tuple[Callable[[Setting, xr.Dataset], list[Warned]], ...] = (limits, chatter, corners)
+
+
+def warned(job: Setting, ds: xr.Dataset) -> tuple[Warned, ...]:
+    """All warnings that are about at least one point; the dataset gets `warnings` (m,), one bit for each of its attribute `names`."""
+    found = tuple(w for source in SOURCES for w in source(job, ds) if w.points.any())
+    bits = np.zeros(len(job), np.uint32)
+    for k, w in enumerate(found):
+        bits |= np.where(w.points, np.uint32(1 << k), np.uint32(0))
+    ds["warnings"] = ("point", bits)
+    ds["warnings"].attrs["names"] = [w.name for w in found]
+    return found

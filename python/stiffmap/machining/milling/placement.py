@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy.optimize import minimize
 from scipy.stats import qmc
 
@@ -18,7 +17,6 @@ from stiffmap.machining.milling.reach import followed, must_follow
 from stiffmap.machining.milling.setting import Setting, setting
 from stiffmap.machining.process.description import Process
 from stiffmap.machining.toolpath import Placement, Toolpath, sampled
-from stiffmap.machining.toolpath.sampling import Points
 from stiffmap.solve.machine import Machine
 
 AT_ONCE = 200_000
@@ -75,11 +73,6 @@ class Placements:
         fits = self.largest[np.isfinite(self.largest)]
         return float((fits > 3 * self.best_error).mean())
 
-    @property
-    def reachable(self) -> float:
-        """Share of the placements in which all of the path was in reach."""
-        return float(np.isfinite(self.largest).mean())
-
 
 def placements(
     machine: Machine,
@@ -87,41 +80,36 @@ def placements(
     process: Process,
     *,
     count: int = 1000,
-    turns: tuple[float, float] = (-np.pi, np.pi),
-    box: ArrayLike | None = None,
     points: int = 500,
-    seed: int = 0,
     threads: int | None = None,
     scheduler: Any = None,
 ) -> Placements:
     """Search for the placement with the smallest largest error across the wall, before compensation.
 
-    count: placements tried (a Sobol sequence over box and turns); turns: (2,) rad; box (2, 3) m for the part, None: the
-    workspace of the machine file; points: number of points of the path in the search. scheduler: address of a dask
-    scheduler, or a `distributed.Client`, whose workers try the placements, with the same answer. Raises StiffmapError where no placement holds the path.
+    count: placements tried (a Sobol sequence over the machine's workspace and a full turn); points: number of points of the path in
+    the search. scheduler: address of a dask scheduler, or a `distributed.Client`, whose workers try the placements, with the same
+    answer. Raises StiffmapError where no placement holds the path.
     """
     if count < 1 or points < 2:
         raise StiffmapError(f"count and points: expected 1 or more and 2 or more, got {count} and {points}")
-    low, high = np.asarray(machine.workspace if box is None else box, dtype=float)
-    # along what the machine does not command the part has one place
-    steered = [axis in machine.description.task for axis in "xyz"]
-    low, high = (np.where(steered, end, machine.description.home.p) for end in (low, high))
     search = Search(machine, path, process, points, threads)
-    middle = (low + high) / 2
-    naive = Placement(middle - search.middle, 0.0)
+    naive = Placement((search.low + search.high) / 2 - search.middle, 0.0)
     power = int(np.ceil(np.log2(max(count, 2))))
-    unit = qmc.Sobol(4, seed=seed).random_base2(power)[:count]
-    turn = turns[0] + unit[:, 3] * (turns[1] - turns[0])
-    at = search.inside(unit[:, :3], turn, low, high)
-    largest = _tried(search, at, turn, scheduler)
+    unit = qmc.Sobol(4, seed=0).random_base2(power)[:count]
+    turn = 2 * np.pi * unit[:, 3] - np.pi
+    at = search.inside(unit[:, :3], turn)
+    size = max(1, (AT_ONCE if scheduler is None else IN_A_TASK) // len(search.points))
+    rows = [slice(k, k + size) for k in range(0, len(at), size)]
+    with workers(Search.largest, search, scheduler=scheduler) as hands:
+        largest = np.concatenate(hands.in_order((at[r], turn[r]) for r in rows))
     if not np.isfinite(largest).any():
         must_follow(search.at_place(naive), threads)
         raise StiffmapError(
             f"no placement of {count} holds the path on {machine.name}: it measures "
-            f"{', '.join(f'{v:.0f}' for v in 1e3 * search.size)} mm, the box {', '.join(f'{v:.0f}' for v in 1e3 * (high - low))} mm"
+            f"{', '.join(f'{v:.0f}' for v in 1e3 * search.size)} mm, the box {', '.join(f'{v:.0f}' for v in 1e3 * (search.high - search.low))} mm"
         )
     order = np.argsort(largest)[:REFINED]
-    with workers(_refined, (search, low, high, turns), scheduler=scheduler) as hands:
+    with workers(Search.refined, search, scheduler=scheduler) as hands:
         tried = hands.in_order((at[i], float(turn[i])) for i in order if np.isfinite(largest[i]))
     tried.append((search.exact(naive), naive))
     error, best = min(tried, key=lambda t: t[0])
@@ -133,48 +121,30 @@ def placements(
         error,
         naive,
         tried[-1][0],
-        search.what_limits(best, low, high),
+        search.what_limits(best),
         search.errors(naive),
         search.errors(best),
     )
 
 
-def _tried(search: Search, at: Floats, turn: Floats, scheduler: Any) -> Floats:
-    """(n,) m: largest error of each placement."""
-    count = max(1, (AT_ONCE if scheduler is None else IN_A_TASK) // len(search.points))
-    rows = [slice(k, k + count) for k in range(0, len(at), count)]
-    with workers(_largest, search, scheduler=scheduler) as hands:
-        return np.concatenate(hands.in_order((at[r], turn[r]) for r in rows))
-
-
-def _largest(search: Search, some: tuple[Floats, Floats]) -> Floats:
-    """Some placements, as a task."""
-    return search.largest(*some)
-
-
-def _refined(
-    shared: tuple[Search, Floats, Floats, tuple[float, float]], begin: tuple[Floats, float]
-) -> tuple[float, Placement]:
-    """One descent, as a task."""
-    search, low, high, turns = shared
-    return search.refined(*begin, low, high, turns)
-
-
 class Search:
-    """Errors of one path on one machine at many placements."""
+    """Errors of one path on one machine at many placements in its workspace, from `low` to `high` (3,) m."""
 
     def __init__(
         self, machine: Machine, path: Toolpath, process: Process, points: int, threads: int | None
     ) -> None:
         self.machine, self.path, self.process, self.threads = machine, path, process, threads
         length = float(path.length[path.cuts].sum())
-        self.points: Points = sampled(path, max(length / points, 1e-6))
+        self.points = sampled(path, max(length / points, 1e-6))
         if len(self.points) > 1.3 * points:  # a table of points
             keep = np.unique(np.linspace(0, len(self.points) - 1, points).astype(int))
-            self.points = Points(*(getattr(self.points, n)[keep] for n in Points.__dataclass_fields__))
+            self.points = self.points.only(keep)
         self.job = self.at_place(Placement(np.zeros(3), 0.0))
         still = np.zeros((len(self.job), 2))
         self.force, self.slope = self.job.force(still), self.job.force_slopes(still)[:, :, 0]
+        # along what the machine does not command the part has one place
+        steered = np.isin(["x", "y", "z"], machine.description.task)
+        self.low, self.high = np.where(steered, machine.workspace, machine.description.home.p)
         p = self.points.position
         self.middle = (p.max(axis=0) + p.min(axis=0)) / 2
         self.size = np.ptp(p, axis=0)
@@ -191,16 +161,17 @@ class Search:
         low = np.stack([u.min(axis=1), v.min(axis=1), z.min() * one], axis=1)
         return low, np.stack([u.max(axis=1), v.max(axis=1), z.max() * one], axis=1)
 
-    def inside(self, unit: Floats, turn: Floats, low: Floats, high: Floats) -> Floats:
-        """(n, 3) m: places for shares (n, 3) of the room that the turned part has in the box; where it has none, the middle."""
+    def inside(self, unit: Floats, turn: Floats) -> Floats:
+        """(n, 3) m: places for shares (n, 3) of the room that the turned part has in the workspace; where it has none, the middle."""
         a, b = self._extent(turn)
-        first, last = low - a, high - b
+        first, last = self.low - a, self.high - b
         middle = (first + last) / 2
         first, last = np.minimum(first, middle), np.maximum(last, middle)
-        return np.asarray(np.where(high - b >= low - a, first + unit * (last - first), middle))
+        return np.asarray(np.where(self.high - b >= self.low - a, first + unit * (last - first), middle))
 
-    def largest(self, at: Floats, turn: Floats) -> Floats:
-        """(n,) m: largest error, the cut answering to first order; infinite where a point fails."""
+    def largest(self, some: tuple[Floats, Floats]) -> Floats:
+        """(n,) m: largest error at n places (n, 3) m and turns (n,) rad, the cut answering to first order; infinite where a point fails."""
+        at, turn = some
         places = [Placement(a, float(t)) for a, t in zip(at, turn, strict=True)]
         r = np.stack([p.rotation for p in places])
         position = np.einsum("nij,mj->nmi", r, self.points.position) + at[:, None]
@@ -230,11 +201,10 @@ class Search:
         job = self.at_place(place)
         return np.where(followed(job, job.position, self.threads), wall_errors(job, self.threads), np.inf)
 
-    def refined(
-        self, at: Floats, turn: float, low: Floats, high: Floats, turns: tuple[float, float]
-    ) -> tuple[float, Placement]:
-        """Error and placement after a descent along the gradient of a high mean of the errors, within the box."""
-        scale = np.array([*np.maximum(high - low, 1e-3), 1.0])
+    def refined(self, begin: tuple[Floats, float]) -> tuple[float, Placement]:
+        """Error and placement after a descent from a place and a turn along the gradient of a high mean of the errors, within the workspace."""
+        at, turn = begin
+        scale = np.array([*np.maximum(self.high - self.low, 1e-3), 1.0])
 
         def cost(x: Floats) -> float:
             e = self.errors(Placement(x[:3] * scale[:3], float(x[3])))
@@ -244,15 +214,13 @@ class Search:
             return 1e3 * top * float(((np.abs(e) / top) ** NORM).mean() ** (1 / NORM))
 
         a, b = self._extent(np.array([turn]))
-        first, last = np.minimum(low - a[0], at), np.maximum(high - b[0], at)
-        bounds = [
-            (f / s, g / s) for f, g, s in zip([*first, turns[0]], [*last, turns[1]], scale, strict=True)
-        ]
+        first, last = np.minimum(self.low - a[0], at), np.maximum(self.high - b[0], at)
+        bounds = np.array([[*first, -np.pi], [*last, np.pi]]) / scale
         found = minimize(
             cost,
             np.array([*at, turn]) / scale,
             method="L-BFGS-B",
-            bounds=bounds,
+            bounds=bounds.T,
             options={"maxiter": 12, "eps": 1e-4},
         )
         places = [Placement(at, turn), Placement(found.x[:3] * scale[:3], float(found.x[3]))]
@@ -260,12 +228,12 @@ class Search:
         best = int(np.argmin(errors))
         return errors[best], places[best]
 
-    def what_limits(self, place: Placement, low: Floats, high: Floats) -> str:
-        """Sides of the box that the part touches, else the machine's stiffness there."""
+    def what_limits(self, place: Placement) -> str:
+        """Sides of the workspace that the part touches, else the machine's stiffness there."""
         a, b = self._extent(np.array([place.turn]))
         names = [
             f"{side} {axis}"
-            for side, gap in (("low", place.at + a[0] - low), ("high", high - place.at - b[0]))
+            for side, gap in (("low", place.at + a[0] - self.low), ("high", self.high - place.at - b[0]))
             for axis, g in zip("xyz", gap, strict=True)
             if g < 1e-3
         ]

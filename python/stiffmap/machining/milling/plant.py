@@ -52,11 +52,11 @@ class Plant:
         moved = np.nan_to_num(here - before)
         top = np.abs(moved).max(axis=1, keepdims=True)
         sign = np.where(np.abs(moved) > STILL * np.where(top > 0, top, 1.0), np.sign(moved), 0.0)
-        out = []
-        for s in np.unique(sign, axis=0):
-            # friction of a drive that travels stays behind; its play is closed by the load
-            out.append((lagging(self.machine, s, True), np.flatnonzero((sign == s).all(axis=1))))
-        return out
+        # friction of a drive that travels stays behind; its play is closed by the load
+        return [
+            (lagging(self.machine, s, True), np.flatnonzero((sign == s).all(axis=1)))
+            for s in np.unique(sign, axis=0)
+        ]
 
     def stand(
         self, command: Floats, force: Floats, full: bool = False, rows: NDArray[np.int64] | None = None

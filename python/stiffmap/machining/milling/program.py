@@ -44,7 +44,7 @@ def program(job: Setting, command: Floats, within: float = WITHIN, feeds: Floats
 
     command: (m, 3) m, base axes. within: chord error, m. feeds: (moves,) m/s of the path's moves; None: as they are.
     """
-    turn = None if job.angle is None else np.unwrap(job.angle)
+    turn = np.full(len(job), np.nan) if job.angle is None else np.unwrap(job.angle)
     path, points = job.path, job.points
     part = job.place.back(command)
     first = np.flatnonzero(np.diff(points.move, prepend=-1) != 0)
@@ -56,57 +56,42 @@ def program(job: Setting, command: Floats, within: float = WITHIN, feeds: Floats
     end_before: Floats | None = None
     for a, b in zip(first, last, strict=True):
         i = int(points.move[a])
-        q, t = part[a:b], None if turn is None else turn[a:b]
+        q, t = part[a:b], turn[a:b]
         if points.share[a] > 0:  # the joint with the move before stands there
             assert end_before is not None
-            q = np.vstack([end_before, q])
-            t = None if turn is None else turn[a - 1 : b]
+            q, t = np.vstack([end_before, q]), turn[a - 1 : b]
         pieces = []
         joined = end_before is not None and i > 0 and path.cuts[i - 1]
-        if joined and end_before is not None and np.linalg.norm(q[0] - end_before) > TOUCH:
-            pieces.append(MovedPiece(Kind.LINE, q[0], np.full(3, np.nan), 0.0, _first(t)))
+        if joined and np.linalg.norm(q[0] - end_before) > TOUCH:
+            pieces.append(MovedPiece(Kind.LINE, q[0], np.full(3, np.nan), 0.0, float(t[0])))
         if path.kind[i] == Kind.ARC:
             pieces += arc_pieces(q, int(path.normal[i]), float(np.sign(path.sweep[i])), within, t)
         else:
             pieces += line_pieces(q, within, t)
-        moved[i], starts[i], end_before = pieces, (q[0], _first(t)), q[-1]
+        moved[i], starts[i], end_before = pieces, (q[0], float(t[0])), q[-1]
     for i in starts:  # what leads to a cut ends where the cut now starts
         if i > 0 and i - 1 not in starts:
             end, angle = starts[i]
             moved[i - 1] = [MovedPiece(Kind(int(path.kind[i - 1])), end, np.full(3, np.nan), 0.0, angle)]
-    text, origin = rewritten(_turning(path, points.move[first], turn, first, last), moved, feeds)
+    if job.angle is not None:
+        path = _turning(path, points.move[first], turn[first], turn[last - 1])
+    text, origin = rewritten(path, moved, feeds)
     again = load_gcode(StringIO(text), name=path.name, offsets=path.offsets or None)
     return Program(text, ".ngc", again, np.array(origin), sum(map(len, moved.values())), part, within)
 
 
-def _turning(
-    path: Toolpath,
-    cuts: NDArray[np.int64],
-    turn: Floats | None,
-    first: NDArray[np.int64],
-    last: NDArray[np.int64],
-) -> Toolpath:
-    """The path with the tool's turn on the moves between cuts: a retreat keeps it, what follows turns to where the next cut begins."""
-    if turn is None:
-        return path
-    now = np.full(len(path), turn[first[0]])
-    for k, i in enumerate(cuts):
-        later = cuts[k + 1] if k + 1 < len(cuts) else len(path)
-        next_turn = turn[first[k + 1]] if k + 1 < len(cuts) else turn[last[k] - 1]
-        now[i] = turn[last[k] - 1]
-        now[i + 1 : later] = next_turn
-        if later > i + 2:
-            now[i + 1] = now[i]
+def _turning(path: Toolpath, cuts: NDArray[np.int64], begin: Floats, end: Floats) -> Toolpath:
+    """The path with the tool's turn (rad, where each of the `cuts` begins and ends) on the moves between: a retreat keeps it, what
+    follows turns to where the next cut begins."""
+    now = np.append(begin, end[-1])[np.searchsorted(cuts, np.arange(len(path)))]
+    now[cuts] = end
+    retreats = cuts[np.diff(cuts, append=len(path)) > 2] + 1
+    now[retreats] = now[retreats - 1]
     return replace(path, turn=now)
 
 
-def _first(turn: Floats | None) -> float:
-    return float("nan") if turn is None else float(turn[0])
-
-
-def _table(job: Setting, part: Floats, turn: Floats | None) -> Program:
+def _table(job: Setting, part: Floats, turn: Floats) -> Program:
     """Points of the compensated path with feed, spindle and tool axis."""
-    command = part
     points, path = job.points, job.path
     buffer = StringIO()
     out = csv.writer(buffer, lineterminator="\n")
@@ -122,21 +107,19 @@ def _table(job: Setting, part: Floats, turn: Floats | None) -> Program:
     def column(of_moves: Floats, of_points: Floats) -> Floats:
         return np.concatenate([of_moves[head], of_moves[idle], of_points])[order]
 
-    part = np.concatenate([path.start[head], ends, part])[order]
+    way = np.concatenate([path.start[head], ends, part])[order]
     move = move[order]
     feed = column(np.where(np.isfinite(path.feed), path.feed, job.process.feed), job.feed)
     spindle = column(path.spindle, points.spindle)
     spindle = np.where(np.isfinite(spindle), spindle, job.process.spindle)
     tool = column(path.tool, points.tool)
-    if turn is not None:
-        turned = np.full(len(path), turn[0]) if path.turn is None else path.turn
-        turn = column(turned, turn)
     names = ["x_mm", "y_mm", "z_mm", "feed_mm_min", "spindle_rpm", "i", "j", "k"]
-    out.writerow(names + ([] if turn is None else ["turn_deg"]))
-    columns = np.hstack([1e3 * part, (6e4 * feed)[:, None], (spindle * 30 / np.pi)[:, None], tool])
-    if turn is not None:
-        columns = np.hstack([columns, np.degrees(turn)[:, None]])
-    for row in columns:
+    columns, turned = [1e3 * way, 6e4 * feed, spindle * 30 / np.pi, tool], None
+    if job.angle is not None:
+        turned = column(np.full(len(path), turn[0]) if path.turn is None else path.turn, turn)
+        names, columns = [*names, "turn_deg"], [*columns, np.degrees(turned)]
+    out.writerow(names)
+    for row in np.column_stack(columns):
         out.writerow([f"{v:.9g}" if k > 2 else f"{v:.6f}" for k, v in enumerate(row)])
-    again = path_of(np.round(part, 9), feed=feed, spindle=spindle, tool=tool, name=path.name, turn=turn)
-    return Program(buffer.getvalue(), ".csv", again, move[1:], len(points) - 1, command, WITHIN)
+    again = path_of(np.round(way, 9), feed=feed, spindle=spindle, tool=tool, name=path.name, turn=turned)
+    return Program(buffer.getvalue(), ".csv", again, move[1:], len(points) - 1, part, WITHIN)

@@ -60,11 +60,10 @@ def must_reach(job: Setting, threads: int | None = None) -> None:
     box = job.machine.description.workspace
     if box is None:
         raise StiffmapError(text)
-    low, high = np.array(box[0]), np.array(box[1])
+    low, high = np.array(box)
     out = np.maximum(np.maximum(low - job.position, job.position - high), 0.0).max(axis=0)
     text += f"; beyond the declared box by up to ({', '.join(f'{1e3 * v:.1f}' for v in out)}) mm"
-    size = job.position.max(axis=0) - job.position.min(axis=0)
-    if (size > high - low).any():
+    if (np.ptp(job.position, axis=0) > high - low).any():
         raise StiffmapError(f"{text}; the part is larger than that box")
     middle = (job.position.max(axis=0) + job.position.min(axis=0)) / 2
     shift = (low + high) / 2 - middle

@@ -67,7 +67,9 @@ def redundancy(
     if turns < 2:
         raise StiffmapError(f"turns: expected 2 or more, got {turns}")
     grid = -np.pi + 2 * np.pi * np.arange(turns) / turns
-    error, joints = grid_of(job, grid, threads, scheduler)
+    with workers(_turned, (job, threads), scheduler=scheduler) as hands:
+        errors, drives = zip(*hands.in_order(float(angle) for angle in grid), strict=True)
+    error, joints = np.stack(errors, axis=1), np.stack(drives, axis=1)
     time = np.linalg.norm(np.diff(job.position, axis=0), axis=1) / job.feed[1:]
     free = Steps(joints, time, fastest_drives(job.machine), grid, fastest)
     stage = np.abs(error)
@@ -85,15 +87,6 @@ def redundancy(
     assert chosen is not None
     rows = np.arange(len(job))
     return Redundancy(grid[chosen], error[rows, chosen], stage.max(axis=0), grid, joints[rows, chosen])
-
-
-def grid_of(
-    job: Setting, grid: Floats, threads: int | None = None, scheduler: Any = None
-) -> tuple[Floats, Floats]:
-    """(m, turns) m error across the wall, infinite where the arm fails, and (m, turns, actuators) drives."""
-    with workers(_turned, (job, threads), scheduler=scheduler) as hands:
-        errors, joints = zip(*hands.in_order(float(angle) for angle in grid), strict=True)
-    return np.stack(errors, axis=1), np.stack(joints, axis=1)
 
 
 def _turned(shared: tuple[Setting, int | None], angle: float) -> tuple[Floats, Floats]:

@@ -115,7 +115,7 @@ def setting(
     """A job; `angle` (m,) rad turns the tool of an arm about its axis. Raises StiffmapError for what does not go together."""
     if angle is not None and np.shape(angle) != (len(points),):
         raise StiffmapError(f"angle: expected {len(points)} turns of the tool (rad), one for each point")
-    _check(path, process, points)
+    faster = _faster(path, process, points)
     if angle is None and path.turn is not None:
         if len(machine.actuators) < 6:
             raise FileError(
@@ -137,13 +137,14 @@ def setting(
         tool,
         orientations(machine, tool, angle),
         np.where(np.isfinite(points.feed), points.feed, process.feed),
-        _faster(points, process),
+        faster,
         angle,
         scale,
     )
 
 
-def _check(path: Toolpath, process: Process, points: Points) -> None:
+def _faster(path: Toolpath, process: Process, points: Points) -> Floats:
+    """(m,) feed per revolution as a multiple of the process's own. Raises FileError for what cuts nothing, or too thick a chip."""
     for wrong, message in (
         (points.spindle == 0, "the spindle is off in a cut: expected M3 and S above zero before it"),
         (points.spindle < 0, "the spindle turns counter-clockwise (M4): the process is for a clockwise one"),
@@ -152,7 +153,10 @@ def _check(path: Toolpath, process: Process, points: Points) -> None:
         if wrong.any():
             line = int(path.line[points.move[int(np.argmax(wrong))]])
             raise FileError(message, file=path.name, line=line)
-    thick = _faster(points, process) * process.chip
+    feed = np.where(np.isfinite(points.feed), points.feed, process.feed)
+    spindle = np.where(np.isfinite(points.spindle), points.spindle, process.spindle)
+    faster = np.asarray(feed / spindle / (process.feed / process.spindle))
+    thick = faster * process.chip
     if process.tool.teeth and (thick > process.tool.diameter / 2).any():
         at = int(np.argmax(thick))
         raise FileError(
@@ -160,12 +164,7 @@ def _check(path: Toolpath, process: Process, points: Points) -> None:
             file=path.name,
             line=int(path.line[points.move[at]]),
         )
-
-
-def _faster(points: Points, process: Process) -> Floats:
-    feed = np.where(np.isfinite(points.feed), points.feed, process.feed)
-    spindle = np.where(np.isfinite(points.spindle), points.spindle, process.spindle)
-    return np.asarray(feed / spindle / (process.feed / process.spindle))
+    return faster
 
 
 def orientations(machine: Machine, tool: Floats, angle: Floats | None) -> Floats:

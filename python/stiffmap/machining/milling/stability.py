@@ -10,8 +10,7 @@ import numpy as np
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.machining.chatter.cut import milling_process
-from stiffmap.machining.chatter.floquet import multiplier_map
-from stiffmap.machining.chatter.lobes import interval_counts
+from stiffmap.machining.chatter.lobes import multipliers_at
 from stiffmap.machining.chatter.modes import modes_of_machine
 from stiffmap.machining.milling.setting import Setting
 from stiffmap.machining.process import EndMill, Kienzle
@@ -86,13 +85,8 @@ def path_stability(job: Setting, threads: int | None = None) -> PathStability | 
         if not np.isfinite(modes.rest[k, 0, 0]):
             continue
         own = modes_of_machine(modes, k).turned(job.axes[i]).below(np.inf)
-        mu = np.empty(len(speed))
-        counts = interval_counts(own, p, speed)
-        for count in np.unique(counts):
-            rows = counts == count
-            mu[rows] = multiplier_map(own, p, speed[rows], depth, int(count), threads)[:, 0]
         kept.append(i)
-        table.append(mu)
+        table.append(multipliers_at(own, p, speed, depth, None, threads)[:, 0])
     if not table:
         return "Stability is not judged: no place along the path has an equilibrium."
     mu_all = np.array(table)

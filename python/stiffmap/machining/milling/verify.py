@@ -34,8 +34,6 @@ class Run:
     state: Equilibrium
     normal: Floats
     """(k,) m: error across the wall, positive where material stays."""
-    way: Floats
-    """(k,) m along the wanted path."""
 
 
 def run(
@@ -50,24 +48,22 @@ def run(
     must_cut_whole(job, made)
     p = made.path
     own = sampled(p, step)
-    u = job.place.points(own.position)
-    wanted = made.origin[own.move].astype(np.int64)
-    cutting = job.path.cuts[wanted]
-    own_rows = np.flatnonzero(cutting)
-    u, wanted, feed, spindle = u[own_rows], wanted[own_rows], own.feed[own_rows], own.spindle[own_rows]
+    own = own.only(job.path.cuts[made.origin[own.move]])
+    wanted, u = made.origin[own.move], job.place.points(own.position)
     at = job.place.back(u)
     start = np.r_[0.0, np.cumsum(np.where(job.path.cuts, job.path.length, 0.0))][:-1]
     for _ in range(ROUNDS):
         share = nearest(job.path, wanted, at)
         position, tangent, bend = job.path.at(wanted, share)
         way = start[wanted] + share * job.path.length[wanted]
-        points = Points(wanted, share, position, tangent, job.path.tool[wanted], bend, way, feed, spindle)
-        here = _job(job, points, p.turn_at(own.move[own_rows], own.share[own_rows]))
+        points = Points(
+            wanted, share, position, tangent, job.path.tool[wanted], bend, way, own.feed, own.spindle
+        )
+        here = _job(job, points, p.turn_at(own.move, own.share))
         plant = Plant(here, machine, threads)
         state = equilibrium(plant, u)
         at = job.place.back(here.position + np.nan_to_num(state.error))
-    normal = here.across(state.error)
-    return Run(here, state, normal, way)
+    return Run(here, state, here.across(state.error))
 
 
 def must_cut_whole(job: Setting, made: Program) -> None:

@@ -15,7 +15,7 @@ from stiffmap.model.files.report import key_text, validated
 from stiffmap.model.files.schema.base import FileModel, Name, describe
 from stiffmap.workspace.performance.quantities import quantity
 
-LAWS = ("end_mill", "kienzle", "trimming")
+LAWS: dict[str, type[Law]] = {"end_mill": EndMill, "kienzle": Kienzle, "trimming": Trimming}
 PRESSURE, EDGE = "N/m2", "N/m"
 UNITS = {
     **dict.fromkeys(("Ktc", "Krc", "Kac", "kc11", "rubbing", "specific_energy"), PRESSURE),
@@ -172,13 +172,9 @@ def _law(m: ProcessFile, tool: Tool, r: Reader) -> Law:
     for k in ("Ktc", "kc11", "specific_energy"):
         if k in values and not values[k] > 0:
             r.fail(f"expected a number above zero, found {getattr(model, k).value!r}", "law", name, k)
-    if name == "end_mill":
-        return EndMill(**values)
-    if name == "trimming":
-        return Trimming(**values)
-    if not 0 <= values["mc"] < 1:
+    if not 0 <= values.get("mc", 0) < 1:
         r.fail(f"expected an exponent from 0 to below 1, found {model.mc.value!r}", "law", name, "mc")
-    return Kienzle(values["kc11"], values["mc"], values["radial"], values["axial"])
+    return LAWS[name](**values)
 
 
 Written = str | float | int

@@ -10,8 +10,6 @@ from stiffmap.common.short import short_repr
 
 SIDES = ("climb", "conventional", "slot")
 """Where the part's wall is: right of the travel, left of it, on both sides (clockwise spindle, from above)."""
-PRESSURES = ("Ktc", "Krc", "Kac")
-"""N/m² of chip area: tangential, radial, axial."""
 
 
 @dataclass(frozen=True)
@@ -52,11 +50,11 @@ class EndMill:
 
 @dataclass(frozen=True)
 class Kienzle:
-    """Chip pressure k = k11 (h / 1 mm)^-m; radial and axial parts as shares of the tangential one (M2)."""
+    """Chip pressure k = kc11 (h / 1 mm)^-mc; radial and axial parts as shares of the tangential one (M2)."""
 
-    k11: float
+    kc11: float
     """N/m², at a chip of 1 mm."""
-    exponent: float
+    mc: float
     radial: float = 0.3
     axial: float = 0.0
 

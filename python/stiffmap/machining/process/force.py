@@ -12,7 +12,7 @@ import numpy as np
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.short import short_repr
-from stiffmap.machining.process.description import EndMill, Process
+from stiffmap.machining.process.description import Process
 from stiffmap.machining.process.load import load_process
 from stiffmap.machining.process.mean import mean_force, slopes, tangential_force, with_coefficients
 from stiffmap.machining.process.revolution import leaves_cut, mean_with_runout, revolution
@@ -97,12 +97,9 @@ def cutting_force(process: Process | str | PathLike[str] | Mapping[str, Any]) ->
 
 def force_uncertainty(process: Process) -> Floats:
     """(3,) N, standard uncertainty of the mean force from those of the law's numbers (independent, to first order)."""
-
     base = mean_force(process, process.cut.radial, process.cut.axial)
     total = np.zeros(3)
-    names = {"kc11": "k11", "mc": "exponent"} if not isinstance(process.law, EndMill) else {}
     for name, u in process.uncertainty.items():
-        key = names.get(name, name)
-        moved = replace(process, law=replace(process.law, **{key: getattr(process.law, key) + u}))
+        moved = replace(process, law=replace(process.law, **{name: getattr(process.law, name) + u}))
         total += (mean_force(moved, process.cut.radial, process.cut.axial) - base) ** 2
     return np.sqrt(total)

@@ -22,7 +22,7 @@ def with_coefficients(process: Process) -> Process:
     if not isinstance(law, Kienzle):
         return process
     mm = 1e-3
-    k = law.k11 * (process.mean_chip / mm) ** -law.exponent
+    k = law.kc11 * (process.mean_chip / mm) ** -law.mc
     note = (
         f"Kienzle's law is taken by its secant at the mean chip thickness, {1e3 * process.mean_chip:.4g} mm: "
         f"{k / 1e6:.4g} N/mm²"
@@ -31,7 +31,7 @@ def with_coefficients(process: Process) -> Process:
         process,
         law=EndMill(k, law.radial * k, law.axial * k),
         note=note,
-        uncertainty={"Ktc": process.uncertainty.get("kc11", 0.0) / law.k11 * k},
+        uncertainty={"Ktc": process.uncertainty.get("kc11", 0.0) / law.kc11 * k},
     )
 
 
@@ -78,9 +78,7 @@ def mean_force(process: Process, width: ArrayLike, axial: ArrayLike, faster: Arr
 
     faster: (...) feed per revolution as a multiple of the process's own.
     """
-    w, a, more = np.broadcast_arrays(
-        np.asarray(width, float), np.asarray(axial, float), np.asarray(faster, float)
-    )
+    w, a, more = np.broadcast_arrays(width, axial, faster)
     edge, each = densities(process)
     chip = [more * k for k in each]
     f, t = engaged(process, w)

@@ -9,7 +9,7 @@ import numpy as np
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.machining.toolpath.gcode.load import load_gcode
-from stiffmap.machining.toolpath.gcode.state import CENTRES
+from stiffmap.machining.toolpath.gcode.state import AXES, CENTRES, PLANES
 from stiffmap.machining.toolpath.gcode.words import decimal
 from stiffmap.machining.toolpath.path import Kind, Toolpath
 
@@ -100,7 +100,6 @@ def _moved(points: Floats, old: Floats, shift: Floats) -> Floats:
 
 
 COOLANT = ("M7", "M8", "M9")
-PLANES = {2: "G17", 1: "G18", 0: "G19"}
 
 
 def fresh_text(path: Toolpath) -> str:
@@ -122,19 +121,13 @@ def fresh_text(path: Toolpath) -> str:
         kind, end = Kind(int(path.kind[i])), path.end[i]
         if kind == Kind.ARC and path.normal[i] != plane:
             plane = int(path.normal[i])
-            words.append(PLANES[plane])
+            words.append(next(f"G{code:g}" for code, normal in PLANES.items() if normal == plane))
         words.append({Kind.RAPID: "G0", Kind.LINE: "G1"}.get(kind, "G3" if path.sweep[i] > 0 else "G2"))
         # nothing sends an axis anywhere before the path does; a move at feed says all that is not known
-        free = [
-            a
-            for a in range(3)
-            if kind == Kind.RAPID and path.line[i] < path.given[a] and end[a] == path.start[i, a]
-        ]
-        axes = [
-            a for a in range(3) if a not in free and (end[a] != at[a] or (kind == Kind.ARC and a != plane))
-        ]
-        axes = axes or [a for a in range(3) if a not in free]
-        words += [f"{'XYZ'[a]}{decimal(1e3 * (end[a] - shift[a]), 7)}" for a in axes]
+        free = (kind == Kind.RAPID) & (path.line[i] < np.array(path.given)) & (end == path.start[i])
+        changed = ~free & ((end != at) | ((kind == Kind.ARC) & (np.arange(3) != plane)))
+        axes = np.flatnonzero(changed if changed.any() else ~free)
+        words += [f"{AXES[a]}{decimal(1e3 * (end[a] - shift[a]), 7)}" for a in axes]
         if kind == Kind.ARC:
             for word in CENTRES[plane]:
                 a = "IJK".index(word)
@@ -148,7 +141,7 @@ def fresh_text(path: Toolpath) -> str:
             feed = float(path.feed[i])
             words.append(f"F{decimal(6e4 * feed, 7)}")
         out.append(" ".join(words))
-        at = np.where([a in free for a in range(3)], at, end)
+        at = np.where(free, at, end)
     return "\n".join([*out, *(["M9"] if cooled else []), "M5", "M2"]) + "\n"
 
 

@@ -175,7 +175,6 @@ def path_of(
     tool: ArrayLike = (0.0, 0.0, 1.0),
     lines: ArrayLike | None = None,
     name: str = "path",
-    notes: tuple[str, ...] = (),
     turn: Floats | None = None,
 ) -> Toolpath:
     """Straight moves through points (k, 3) m; feed (k,) m/s, spindle (k,) rad/s, tool axis (k, 3) and turn (k,) rad are those on arriving."""
@@ -192,5 +191,5 @@ def path_of(
         np.full(n, Kind.LINE, np.uint8), p[:-1].copy(), p[1:].copy(), np.full((n, 3), np.nan), np.full(n, 2, np.int8),
         np.zeros(n), np.broadcast_to(np.asarray(feed, float), len(p))[1:].copy(),
         np.broadcast_to(np.asarray(spindle, float), len(p))[1:].copy(), along.astype(np.int64), (axis / size)[1:].copy(),
-        name, notes, turn=None if turn is None else np.asarray(turn, float)[1:].copy(),
+        name, turn=None if turn is None else np.asarray(turn, float)[1:].copy(),
     )  # fmt: skip

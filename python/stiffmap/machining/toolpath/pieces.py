@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import nan
+from math import isnan, nan
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +12,8 @@ from stiffmap.machining.toolpath.path import Kind
 
 WIDEST = np.pi
 """rad of one arc."""
+FLAT = {2: [0, 1], 1: [2, 0], 0: [1, 2]}
+"""Axes of the plane of an arc, right-handed about its normal."""
 EVEN = 1e-4
 """rad by which the turn of a tool may be off the even one over a piece."""
 
@@ -29,9 +31,9 @@ class MovedPiece(NamedTuple):
 
 def line_pieces(points: Floats, within: float, turn: Floats | None = None) -> list[MovedPiece]:
     """Lines through some of the points (k, 3), the others no further than `within` (m) from them; turn (k,) rad is even over each."""
+    turn = np.full(len(points), nan) if turn is None else turn
     out: list[MovedPiece] = []
     stack = [(0, len(points) - 1)]
-    none = np.full(3, np.nan)
     while stack:
         i, j = stack.pop()
         a, b = points[i], points[j]
@@ -47,17 +49,13 @@ def line_pieces(points: Floats, within: float, turn: Floats | None = None) -> li
                 middle = i + 1 + worst if far[worst] > within else skewed
                 stack += [(middle, j), (i, middle)]
                 continue
-        out.append(MovedPiece(Kind.LINE, b, none, 0.0, _at(turn, j)))
+        out.append(MovedPiece(Kind.LINE, b, np.full(3, nan), 0.0, float(turn[j])))
     return out
 
 
-def _at(turn: Floats | None, k: int) -> float:
-    return nan if turn is None else float(turn[k])
-
-
-def _uneven(turn: Floats | None, i: int, j: int) -> int:
+def _uneven(turn: Floats, i: int, j: int) -> int:
     """The point between i and j where the turn is furthest from even; 0 where it is even."""
-    if turn is None or j < i + 2:
+    if isnan(turn[i]) or j < i + 2:
         return 0
     far = np.abs(turn[i : j + 1] - np.linspace(turn[i], turn[j], j + 1 - i))
     worst = int(np.argmax(far))
@@ -68,25 +66,24 @@ def arc_pieces(
     points: Floats, normal: int, sense: float, within: float, turn: Floats | None = None
 ) -> list[MovedPiece]:
     """Arcs about an axis (0, 1, 2) through points (k, 3), k odd; lines where three points do not make one."""
+    turn = np.full(len(points), nan) if turn is None else turn
     out: list[MovedPiece] = []
     stack = [(0, len(points) - 1)]
     while stack:
         i, j = stack.pop()
         middle = (i + j) // 2
-        arc = _arc(points[i : j + 1], middle - i, normal, sense)
-        arc = None if arc is None else arc._replace(turn=_at(turn, j))
+        arc = _arc(points[i : j + 1], middle - i, normal, sense, float(turn[j]))
         near = arc is not None and abs(arc.sweep) <= WIDEST and _off(points[i : j + 1], arc, normal) <= within
         if arc is not None and near and not _uneven(turn, i, j):
             out.append(arc)
         elif j - i <= 2:
             lines = arc is None or abs(arc.sweep) > WIDEST or bool(_uneven(turn, i, j))
-            part = None if turn is None else turn[i : j + 1]
             if lines or arc is None or j - i < 2:
-                out += line_pieces(points[i : j + 1], within, part)
+                out += line_pieces(points[i : j + 1], within, turn[i : j + 1])
             else:  # one circle, but not one rise: an arc to the middle and one from it
                 share = _angles(points[i : j + 1], arc, normal)[1] / arc.sweep
                 out.append(
-                    MovedPiece(arc.kind, points[middle], arc.centre, share * arc.sweep, _at(turn, middle))
+                    MovedPiece(arc.kind, points[middle], arc.centre, share * arc.sweep, float(turn[middle]))
                 )
                 out.append(arc._replace(sweep=(1 - share) * arc.sweep))
         else:
@@ -97,10 +94,10 @@ def arc_pieces(
 
 def _flat(points: Floats, normal: int) -> Floats:
     """(k, 2) in the plane of the arc, right-handed about its normal."""
-    return points[:, {2: [0, 1], 1: [2, 0], 0: [1, 2]}[normal]]
+    return points[:, FLAT[normal]]
 
 
-def _arc(points: Floats, middle: int, normal: int, sense: float) -> MovedPiece | None:
+def _arc(points: Floats, middle: int, normal: int, sense: float, turn: float) -> MovedPiece | None:
     flat = _flat(points, normal)
     a, b, c = flat[0], flat[middle], flat[-1]
     ab, ac = b - a, c - a
@@ -114,8 +111,8 @@ def _arc(points: Floats, middle: int, normal: int, sense: float) -> MovedPiece |
     if sweep * sense < 0:
         sweep += sense * 2 * np.pi
     centre = points[0].copy()
-    centre[{2: [0, 1], 1: [2, 0], 0: [1, 2]}[normal]] = x
-    return MovedPiece(Kind.ARC, points[-1], centre, sweep)
+    centre[FLAT[normal]] = x
+    return MovedPiece(Kind.ARC, points[-1], centre, sweep, turn)
 
 
 def _off(points: Floats, arc: MovedPiece, normal: int) -> float:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +45,10 @@ class Points:
 
     def __len__(self) -> int:
         return len(self.move)
+
+    def only(self, chosen: NDArray[Any]) -> Points:
+        """Some of the points, by a mask (m,) or by their numbers."""
+        return Points(*(getattr(self, f.name)[chosen] for f in fields(self)))
 
     @property
     def normal(self) -> Floats:
@@ -96,8 +101,10 @@ def sampled(path: Toolpath, step: float = 2e-3) -> Points:
         keep[opens[1:][smooth]] = False
     before = np.repeat(np.cumsum(length) - length, n)
     way = before + share * np.repeat(length, n)
-    columns = (share, position, tangent, path.tool[move], bend, way, path.feed[move], path.spindle[move])
-    return Points(move[keep], *(c[keep] for c in columns))
+    made = Points(
+        move, share, position, tangent, path.tool[move], bend, way, path.feed[move], path.spindle[move]
+    )
+    return made.only(keep)
 
 
 def _smooth(path: Toolpath, cuts: Integers) -> NDArray[np.bool_]:

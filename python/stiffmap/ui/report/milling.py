@@ -12,12 +12,12 @@ import numpy as np
 
 from stiffmap.common.outputs import make_folder, write_rows, write_text
 from stiffmap.machining.milling.choices import Choices, part_lies
+from stiffmap.machining.milling.dataset import sizes, verdict
 from stiffmap.machining.milling.job import Milled
 from stiffmap.machining.milling.limits import outside
 from stiffmap.machining.milling.placement import Placements
 from stiffmap.machining.milling.redundancy import IDLE
 from stiffmap.machining.milling.stability import PathStability
-from stiffmap.machining.milling.verdict import sizes, verdict
 from stiffmap.machining.process import cutting_force
 from stiffmap.machining.process.force import force_uncertainty
 from stiffmap.solve.kinematics import inverse_kinematics
@@ -116,7 +116,7 @@ def _placement(found: Placements) -> dict[str, object]:
         "more_than_3_times_the_best": found.three_times,
         "worst_error_mm": float(1e3 * fits.max()),
         "tried": len(found.largest),
-        "in_reach": found.reachable,
+        "in_reach": float(np.isfinite(found.largest).mean()),
         "limited_by": found.limits,
     }
 

@@ -9,12 +9,11 @@ import pytest
 import xarray as xr
 
 import stiffmap as sm
-from stiffmap.machining.chatter.coupling import coupling_depth, mode_coupling
 from stiffmap.machining.chatter.cut import chips, cut_axes, milling_process
 from stiffmap.machining.chatter.floquet import multiplier_map
 from stiffmap.machining.chatter.lobes import border, pockets
 from stiffmap.machining.chatter.modes import mode_rows, modes_of_machine
-from stiffmap.machining.chatter.zero_order import at_periods, limits
+from stiffmap.machining.chatter.zero_order import at_periods, coupling_depth, limits, mode_coupling
 from stiffmap.solve.compiled import multipliers
 from stiffmap.ui.cli import main
 from stiffmap.workspace.vibration.modes import tip_modes

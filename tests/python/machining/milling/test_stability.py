@@ -9,12 +9,11 @@ import pytest
 from tests.python.machining.milling.gantry import gantry
 
 import stiffmap as sm
-from stiffmap.machining.milling import mill_job
+from stiffmap.machining.milling import mill_job, verdict
 from stiffmap.machining.milling.equilibrium import equilibrium
 from stiffmap.machining.milling.job import ripple
 from stiffmap.machining.milling.plant import Plant
 from stiffmap.machining.milling.setting import setting
-from stiffmap.machining.milling.verdict import verdict
 from stiffmap.machining.process.revolution import revolution
 from stiffmap.machining.toolpath import path_of, sampled
 from stiffmap.model.description import Body

@@ -1,6 +1,5 @@
 """Laws of the cutting force from measured forces."""
 
-from stiffmap.machining.process.identify.fitting import identify_process
-from stiffmap.machining.process.identify.law import IdentifiedLaw
+from stiffmap.machining.process.identify.law import IdentifiedLaw, identify_process
 
 __all__ = ["IdentifiedLaw", "identify_process"]

@@ -173,14 +173,11 @@ def _linear(model: Model, table: ForceTable, parameter: Floats, sigma: Floats | 
     if sigma is not None:
         return Fitted(model, values, parameter, np.zeros((0, 0)), residual, s, np.zeros(0))
     if model.exponents:  # slopes by the logarithms of the pressures, and by the exponents
-        turns = STEP * np.eye(len(parameter))
         by = [
-            np.stack([model.basis(p, parameter + d) - model.basis(p, parameter - d) for p in table.cuts])
-            for d in turns
+            [(model.basis(p, parameter + d) - model.basis(p, parameter - d)) @ values for p in table.cuts]
+            for d in STEP * np.eye(len(parameter))
         ]
-        basis = np.concatenate(
-            [basis * values, np.stack([b @ values for b in by], axis=2) / (2 * STEP)], axis=2
-        )
+        basis = np.concatenate([basis * values, np.stack(by, axis=2) / (2 * STEP)], axis=2)
     a = (basis / s[:, None]).reshape(3 * n, -1)
     size = np.linalg.norm(a, axis=0)
     size = np.where(size > 0, size, 1.0)
