@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.poses.configuration import drive_jacobian
-from stiffmap.model.description import CommandError, Element, Joint, Leg, MachineDescription
-from stiffmap.model.description.tree import edit_elements, joints
+from stiffmap.model.description import CommandError, Element, Joint, MachineDescription
+from stiffmap.model.description.tree import all_elements, core_name, edit, joints
 from stiffmap.solve.kinematics import inverse_kinematics
 from stiffmap.solve.machine import Machine
 
@@ -67,20 +68,17 @@ def lagging(machine: Machine, sign: Floats, weighs: bool = False) -> Machine:
     """
     way = dict(zip(machine.actuators, sign.tolist(), strict=True))
     d = machine.description
-
-    def behind(leg: Leg) -> Leg:
-        edited = edit_elements(
-            leg.elements, lambda e: _behind(e, way.get(f"{leg.name}.{e.name}", 0.0), weighs)
-        )
-        return replace(leg, elements=edited)
-
-    return Machine(replace(d, legs=tuple(map(behind, d.legs)), effects=(), declared=None), like=machine)
+    for name, element in all_elements(d):
+        if isinstance(element, Joint) and lag(element) > 0:
+            behind = partial(_behind, sign=way.get(core_name(name), 0.0), weighs=weighs)
+            d = edit(d, name, behind) or d
+    return Machine(replace(d, effects=(), declared=None), like=machine)
 
 
-def _behind(joint: Element, sign: float, weighs: bool) -> Element:
-    """A drive that lags on one side; other elements as they are."""
-    if not isinstance(joint, Joint) or joint.law is None or not lag(joint) > 0:
-        return joint
+def _behind(joint: Element, sign: float, weighs: bool) -> Element | None:
+    """A drive that lags on one side."""
+    if not isinstance(joint, Joint) or joint.law is None:
+        return None
     law = joint.law
     behind = law.friction / law.stiffness if weighs else lag(joint)
     free = replace(law, friction=0.0) if weighs else replace(law, friction=0.0, knots=())
