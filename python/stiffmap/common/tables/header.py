@@ -42,7 +42,13 @@ def header_of(
         names = _grouped(lines[-2][1], names, known)
     if units:
         names = [_with_own_unit(n, units[i] if i < len(units) else "") for i, n in enumerate(names)]
-    return number, names
+    return number, _of_metres(names)
+
+
+def _of_metres(names: Sequence[str]) -> list[str]:
+    """``x_m`` is x in metres where another header ends in ``_N``, ``_um`` and the like; without one it may be x as measured."""
+    said = any(split_unit(n)[1] and re.search(r"_[^\W_]+$", n) for n in names)
+    return [re.sub(r"^(.+)_m$", r"\1 [m]", n) if said else n for n in names]
 
 
 def refuse_twice(names: Sequence[str], file: str, line: int) -> None:
@@ -152,7 +158,7 @@ def split_unit(header: str) -> tuple[str, str]:
         return part[1].strip(), part[2].strip()
     said = re.match(r"^(.*?)(?:\s*[/,;]\s*|\s+in\s+)(\S+)\s*$", header)
     bare = re.match(r"^(.*\S)[\s_](\S{2,})\s*$", header)
-    newton = re.match(r"^(.*?[^\s,;/])(?:\s+in)?\s(k?N)\s*$", header)
+    newton = re.match(r"^(.*?[^\s,;/])(?:\s+in)?[\s_](k?N)\s*$", header)
     if newton:
         return newton[1].strip(), newton[2]
     if said and said[1] and unit_of(said[2]) and not unit_of(header):

@@ -15,11 +15,10 @@ from typing import NamedTuple
 from stiffmap.common.errors import FileError
 from stiffmap.common.number_text import number_in
 from stiffmap.common.tables.cells import BETWEEN, BLOCK, Cells, filled
-from stiffmap.common.tables.workbook import workbook_lines
+from stiffmap.common.tables.workbook import WORKBOOKS, workbook_lines
 
 Lines = Callable[[], Iterable[tuple[int, list[str]]]]
 """Number and cells of each line, from the first one whenever it is called."""
-EXCEL = (".xlsx", ".xlsm")
 COMMENTS = ("#", "%", "//")
 SEPARATORS = ";\t|, "
 BLANKS = re.compile(r"[ \t]+(?![\[(])")
@@ -55,7 +54,7 @@ def lines_of(path: Path, sheet: str | None = None) -> Source:
 
     Text: cells are separated by ; tab | , or blanks; UTF-8, UTF-16 and Latin-1 are read. Raises FileError.
     """
-    return Source(*workbook_lines(path, sheet), "") if path.suffix.lower() in EXCEL else _text(path)
+    return Source(*workbook_lines(path, sheet), "") if path.suffix.lower() in WORKBOOKS else _text(path)
 
 
 def kept(lines: Iterable[tuple[int, list[str]]]) -> Iterator[tuple[int, list[str]]]:

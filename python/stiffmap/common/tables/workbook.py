@@ -1,10 +1,10 @@
-"""Excel workbooks: what is in them is bounded, and what is damaged is said in one line."""
+"""Workbooks (xlsx, xlsm, xls, ods): what is in them is bounded, and what is damaged is said in one line."""
 
 from __future__ import annotations
 
 import re
 import warnings
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 from zipfile import ZipFile
@@ -17,8 +17,17 @@ MOST_BYTES = 200_000_000
 """Of a workbook when it is unpacked; a megabyte of blanks or repeats unpacks to a thousand."""
 FORMULA = re.compile(rb"<(\w+:)?f[ />]")
 """In the XML of a sheet."""
+ROW = re.compile(rb"<table:table-row\b([^>]*)(?<!/)>(.*?)</table:table-row>", re.DOTALL)
+CELL = re.compile(rb"<table:table-cell\b([^>]*value-type[^>]*)>")
+TIMES = re.compile(rb'number-(?:rows|columns)-repeated="(\d+)"')
+"""In the XML of an OpenDocument sheet: a row, a cell that is filled, how often they are repeated."""
+WHOLE = 1e15
+"""Numbers below it without decimals are written so: most workbooks do not tell 1 from 1.0."""
 LONGEST_GAP = 10_000
 """Blank lines after which a sheet is at its end."""
+EXCEL = (".xlsx", ".xlsm")
+WORKBOOKS = (*EXCEL, ".xls", ".ods")
+"""Suffixes."""
 
 
 def sheet_names(path: Path) -> list[str]:
@@ -36,6 +45,21 @@ def workbook_lines(
 
 def _opened(path: Path, sheet: str | None) -> tuple[list[str], list[tuple[int, list[str]]]]:
     """Names of all sheets, and lines of one of them: the first for an empty name, of none for None."""
+    read = _by_openpyxl if path.suffix.lower() in EXCEL else _by_calamine
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of styles and extensions, which nobody asked for
+            return read(path, sheet)
+    except (FileError, MissingPartError, MemoryError):
+        raise
+    except FileNotFoundError:
+        raise FileError("there is no such file", file=str(path)) from None
+    except Exception as error:  # many kinds for what is no workbook, or a damaged one
+        what = " ".join(str(error).split()) or type(error).__name__
+        raise FileError(f"cannot be read as a workbook ({what})", file=str(path)) from error
+
+
+def _by_openpyxl(path: Path, sheet: str | None) -> tuple[list[str], list[tuple[int, list[str]]]]:
     try:
         from openpyxl import load_workbook
     except ModuleNotFoundError:
@@ -43,45 +67,74 @@ def _opened(path: Path, sheet: str | None) -> tuple[list[str], list[tuple[int, l
             f"{path}: reading Excel files needs openpyxl, which is not installed: pip install openpyxl "
             "(or save the sheet as CSV)"
         ) from None
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of styles and extensions, which nobody asked for
-            with ZipFile(path) as packed:
-                parts = packed.infolist()
-                size = sum(part.file_size for part in parts)
-                if size > MOST_BYTES:
-                    raise FileError(
-                        f"expected at most {MOST_BYTES / 1e6:g} MB when unpacked; found {size / 1e6:.0f} MB; "
-                        "save the sheet as CSV",
-                        file=str(path),
-                    )
-                computes = any(FORMULA.search(packed.read(p)) for p in parts if "sheet" in p.filename)
-            book = load_workbook(path, data_only=True, read_only=True)
-            names = book.sheetnames
-            if not names:
-                raise ValueError("it has no sheet")
-            if sheet and sheet not in names:
-                raise FileError(f"no sheet '{sheet}'; there are: {', '.join(names)}", file=str(path))
-            lines = [] if sheet is None else _lines(book[sheet or names[0]], path)
-            if computes and sheet is not None:
-                _check_values(load_workbook(path, read_only=True)[sheet or names[0]], dict(lines), path)
-    except (FileError, MemoryError):
-        raise
-    except FileNotFoundError:
-        raise FileError("there is no such file", file=str(path)) from None
-    except Exception as error:  # many kinds for what is no workbook, or a damaged one
-        what = " ".join(str(error).split()) or type(error).__name__
-        raise FileError(f"cannot be read as an Excel workbook ({what})", file=str(path)) from error
+    computes = any(FORMULA.search(part) for part in _parts(path, "sheet"))
+    book = load_workbook(path, data_only=True, read_only=True)
+    names = book.sheetnames
+    page = _chosen(names, sheet, path)
+    lines = [] if page is None else _lines(_rows(book[page]), path)
+    if computes and page is not None:
+        _check_values(load_workbook(path, read_only=True)[page], dict(lines), path)
     return names, lines
 
 
-def _lines(page: Any, path: Path) -> list[tuple[int, list[str]]]:
+def _by_calamine(path: Path, sheet: str | None) -> tuple[list[str], list[tuple[int, list[str]]]]:
+    try:
+        from python_calamine import CalamineWorkbook
+    except ModuleNotFoundError:
+        raise MissingPartError(
+            f"{path}: reading {path.suffix} files needs python-calamine, which is not installed: "
+            "pip install 'stiffmap[excel]' (or save the sheet as CSV)"
+        ) from None
+    if path.suffix.lower() == ".ods":
+        rows_of = (row for content in _parts(path, "content.xml") for row in ROW.findall(content))
+        cells = sum(_times(row) * sum(map(_times, CELL.findall(body))) for row, body in rows_of)
+        if cells > MOST_CELLS:
+            raise FileError(f"expected at most {MOST_CELLS} cells; found {cells}", file=str(path))
+    book = CalamineWorkbook.from_path(str(path))
+    page = _chosen(book.sheet_names, sheet, path)
+    rows = [] if page is None else book.get_sheet_by_name(page).to_python(skip_empty_area=False)
+    return book.sheet_names, _lines(([None if v == "" else v for v in row] for row in rows), path)
+
+
+def _parts(path: Path, word: str) -> Iterator[bytes]:
+    """What is packed in a workbook under names with a word in them."""
+    with ZipFile(path) as packed:
+        size = sum(part.file_size for part in packed.infolist())
+        if size > MOST_BYTES:
+            raise FileError(
+                f"expected at most {MOST_BYTES / 1e6:g} MB when unpacked; found {size / 1e6:.0f} MB; "
+                "save the sheet as CSV",
+                file=str(path),
+            )
+        yield from (packed.read(part) for part in packed.infolist() if word in part.filename)
+
+
+def _times(attributes: bytes) -> int:
+    found = TIMES.search(attributes)
+    return int(found[1]) if found else 1
+
+
+def _chosen(names: list[str], sheet: str | None, path: Path) -> str | None:
+    """The sheet to read: the named one, or the first for an empty name; None for None."""
+    if not names:
+        raise ValueError("it has no sheet")
+    if sheet and sheet not in names:
+        raise FileError(f"no sheet '{sheet}'; there are: {', '.join(names)}", file=str(path))
+    return None if sheet is None else sheet or names[0]
+
+
+def _rows(page: Any) -> Iterable[Sequence[Any]]:
     if not hasattr(page, "iter_rows"):
         raise ValueError("the sheet is a chart")
     page.reset_dimensions()  # what the file says of them may be wrong; each row is then as long as its last cell
+    return page.iter_rows(values_only=True)  # type: ignore[no-any-return]
+
+
+def _lines(rows: Iterable[Sequence[Any]], path: Path) -> list[tuple[int, list[str]]]:
+    """Number, from 1, and cells of the lines that have any."""
     out: list[tuple[int, list[str]]] = []
     cells = 0
-    for n, row in enumerate(page.iter_rows(values_only=True), 1):
+    for n, row in enumerate(rows, 1):
         if all(v is None for v in row):
             continue
         if n - (out[-1][0] if out else 0) > LONGEST_GAP:
@@ -93,8 +146,14 @@ def _lines(page: Any, path: Path) -> list[tuple[int, list[str]]]:
         cells += len(row)
         if cells > MOST_CELLS:
             raise FileError(f"expected at most {MOST_CELLS} cells; found more", file=str(path), line=n)
-        out.append((n, ["" if v is None else repr(v) if isinstance(v, float) else str(v) for v in row]))
+        out.append((n, [_text(v) for v in row]))
     return out
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, float):
+        return str(int(value)) if value.is_integer() and abs(value) < WHOLE else repr(value)
+    return "" if value is None else str(value)
 
 
 def _check_values(page: Any, lines: dict[int, list[str]], path: Path) -> None:

@@ -15,9 +15,8 @@ from stiffmap.common.fingerprints import file_digest
 from stiffmap.common.outputs import new_file, putting
 from stiffmap.common.short import short_repr
 from stiffmap.common.tables.header import RECORD
-from stiffmap.common.tables.lines import EXCEL
 from stiffmap.common.tables.sheet import Layout, Sheet, column_letter, read_sheet
-from stiffmap.common.tables.workbook import sheet_names
+from stiffmap.common.tables.workbook import WORKBOOKS, sheet_names
 from stiffmap.experiment.experiment import Experiment
 from stiffmap.experiment.files.load import load_experiment
 from stiffmap.experiment.noise.level import against_the_load, contradictions
@@ -165,7 +164,7 @@ def _fitting(
     file: Path, sheet: str | None, understood: Understand, ask: Ask | None
 ) -> tuple[Meant, Imported]:
     """The sheet that fits with the answers in use, and what was understood of it."""
-    names = sheet_names(file) if sheet is None and file.suffix.lower() in EXCEL else [sheet]
+    names = sheet_names(file) if sheet is None and file.suffix.lower() in WORKBOOKS else [sheet]
     if len(names) == 1:
         return understood(sheet, ask)
     reasons: dict[str, StiffmapError] = {}

@@ -17,10 +17,10 @@ PATTERNS: tuple[tuple[str, str], ...] = (
     ("order", r"order|reihenfolge|sequence"),
     ("setup", r"set-?up|aufbau|aufspannung"),
     ("branch", r"branch|richtung der last|loading"),
-    *((f"f{a}", rf"f ?_?{a}|force ?_?(in )?{a}|{a} ?(force|kraft|load|last)|kraft ?_?{a}|last ?_?(in )?{a}|load ?_?(in )?{a}") for a in "xyz"),
+    *((f"f{a}", rf"f ?_?{a}|force ?_?(in )?{a}|{a} ?(force|kraft|load|last)|kraft ?_?{a}|last ?_?(in )?{a}|(load|effort) ?_?(in )?{a}") for a in "xyz"),
     *((f"m{a}", rf"m ?_?{a}|moment ?_?{a}|torque ?_?{a}") for a in "xyz"),
     *((f"u_d{a}", rf"u ?_?d?{a}|sigma ?_?d?{a}|std ?_?d?{a}") for a in "xyz"),
-    *((f"d{a}", rf"(d|delta|δ|defl|deflection|displ\.?|displacement|verschiebung|abweichung|error|dev|(dial )?gau?ge|dial|indicator|(mess)?uhr|reading|auslenkung|weg|dehnung) ?_?(in )?{a}|{a} ?_?(dif|diff|difference|dev|deviation|err|error|abweichung)|{a} ?(deflection|displ\.?|displacement|verschiebung|abweichung|dial|gau?ge|uhr|reading)") for a in "xyz"),
+    *((f"d{a}", rf"(d|delta|δ|defl|deflection|displ\.?|displacement|déplacement|verschiebung|verlagerung|verformung|durchbiegung|flèche|abweichung|error|dev|(dial )?gau?ge|dial|indicator|(mess)?uhr|reading|auslenkung|weg|dehnung) ?_?(in )?{a}|{a} ?_?(dif|diff|difference|dev|deviation|err|error|abweichung)|{a} ?(deflection|displ\.?|displacement|verschiebung|verlagerung|verformung|abweichung|dial|gau?ge|uhr|reading)") for a in "xyz"),
     *((f"p{a}", rf"p_?{a}") for a in "xyz"),
     ("ll", r"l|ll|(measured |gemessene )?(length|länge|laenge)|(draw[ -]?)?wire( ?length)?|(cable|string|ball-?bar|bar) ?length|seil(zug)?(länge)?|distance|abstand"),
     *((f"r{a}", rf"r ?_?{a}|rotation ?_?{a}") for a in "xyz"),
@@ -68,6 +68,10 @@ def guess(headers: Sequence[str], chosen: Mapping[str, Sequence[str]]) -> list[C
     if "ll" not in chosen and any(c.meaning in READINGS and c.meaning != "ll" for c in out):
         # a length of something else
         out = [replace(c, meaning="note") if c.meaning == "ll" else c for c in out]
+    meant = {c.meaning for c in out}
+    if meant & set(AXES) and not meant & set("xyz") and not set(chosen) & set(SEEN):
+        # where deflections are read, what was touched is where the tool stood
+        out = [replace(c, meaning=c.meaning[1]) if c.meaning in SEEN else c for c in out]
     first = {(c.meaning, c.repeat): c.index for c in reversed(out)}  # a second one is a note
     return [
         c if first[c.meaning, c.repeat] == c.index else Column(c.index, c.name, c.unit, "note") for c in out

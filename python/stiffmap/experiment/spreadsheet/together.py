@@ -120,7 +120,8 @@ def _differences(m: Meant) -> None:
             m.said.append(
                 f"'{m.sheet.header[i]}' is in no reading; if it was read without the load, call the other one the same but 'loaded'"
             )
-        if state == "before" or (name, "before") not in states or not m.sheet.is_numeric(i):
+        commanded = not state and (name, "after") in states
+        if state == "before" or commanded or (name, "before") not in states or not m.sheet.is_numeric(i):
             continue
         j = states.index((name, "before"))
         mapped = next(

@@ -27,7 +27,7 @@ from stiffmap.ui.cli.output import table as table_of
 def command(
     context: typer.Context,
     action: str = argument("new: make a folder from a spreadsheet."),
-    file: Path = argument("Spreadsheet: .xlsx, .csv, .txt (any separator and decimal sign)."),
+    file: Path = argument("Spreadsheet: .xlsx, .xls, .ods, .csv, .txt (any separator and decimal sign)."),
     output: Path = written("Folder of the experiment.", ...),
     machine: str | None = option("Declared machine: shipped name or machine file; or give --dh."),
     dh: Path | None = option(

@@ -11,6 +11,7 @@ from rich.text import Text
 from stiffmap.common.errors import FileError
 from stiffmap.common.outputs import new_file
 from stiffmap.common.outputs.option import written
+from stiffmap.common.tables.workbook import WORKBOOKS
 from stiffmap.model.urdf import Imported, import_urdf
 from stiffmap.solve.machine import Machine
 from stiffmap.ui.cli import options
@@ -18,11 +19,11 @@ from stiffmap.ui.cli.inputs import pairs
 from stiffmap.ui.cli.options import argument, option
 from stiffmap.ui.cli.output import show
 
-TABLES = (".csv", ".txt", ".tsv", ".xlsx", ".xlsm")
+TABLES = (".csv", ".txt", ".tsv", *WORKBOOKS)
 
 
 def command(
-    urdf: Path = argument("URDF file, or a table of Denavit and Hartenberg (.csv, .txt, .xlsx)."),
+    urdf: Path = argument("URDF file, or a table of Denavit and Hartenberg (.csv, .txt, .xlsx, .ods)."),
     sidecar: Path | None = option("YAML with what a URDF lacks: loops, motors, compliances."),
     output: Path | None = written("Machine file to write. [default: NAME.yaml]"),
     dh_convention: options.DhConvention = "standard",

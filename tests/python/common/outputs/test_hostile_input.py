@@ -18,6 +18,8 @@ from stiffmap.common.tables.cells import BETWEEN, BLOCK, Cells, packed
 from stiffmap.common.tables.sheet import read_sheet
 from stiffmap.ui.cli import main
 
+from ...experiment.spreadsheet.ugly import open_document
+
 DATA = Path(__file__).parents[4] / "tests/data/experiments/C-backlash"
 
 
@@ -112,10 +114,41 @@ def test_damaged_workbooks(damage: str, tmp_path: Path, capsys: pytest.CaptureFi
     path = workbook(tmp_path / "a.xlsx", TABLE)
     assert len(read_sheet(path).lines) == 2
     rewritten(path, DAMAGES[damage])
-    with pytest.raises(FileError, match=r"a\.xlsx.*cannot be read as an Excel workbook"):
+    with pytest.raises(FileError, match=r"a\.xlsx.*cannot be read as a workbook"):
         read_sheet(path)
     assert main(["experiment", "new", str(path), "--machine", "five-bar", "-o", str(tmp_path / "e")]) == 2
     assert "defect" not in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "row",
+    [
+        '<table:table-row table:number-rows-repeated="100000">{}</table:table-row>',
+        "<table:table-row>{}</table:table-row>" * 6000,
+    ],
+)
+def test_cells_that_repeat_themselves_without_end_are_refused(row: str, tmp_path: Path) -> None:
+    pytest.importorskip("python_calamine")
+    cell = (
+        '<table:table-cell table:number-columns-repeated="6000" office:value-type="float" office:value="1"/>'
+    )
+    path = open_document(tmp_path / "a.ods", [["x", "dx"], ["1", "0.5"]], "{}" + row.format(*[cell] * 6000))
+    with pytest.raises(FileError, match=r"a\.ods.*expected at most 30000000 cells"):
+        read_sheet(path)
+
+
+def test_a_damaged_open_document(tmp_path: Path) -> None:
+    pytest.importorskip("python_calamine")
+    path = open_document(tmp_path / "a.ods", [["x", "dx"], ["1", "0.5"], ["2", "1"]])
+    sheet = read_sheet(path)
+    assert (
+        sheet.header == ("x", "dx") and list(sheet.lines) == [2, 3] and list(sheet.columns[0]) == ["1", "2"]
+    )
+    with pytest.raises(FileError, match=r"a\.ods.*no sheet 'Other'; there are: Data"):
+        read_sheet(path, "Other")
+    path.write_bytes(path.read_bytes()[:300])
+    with pytest.raises(FileError, match=r"a\.ods.*cannot be read as a workbook"):
+        read_sheet(path)
 
 
 def test_one_cell_far_out_costs_nothing(tmp_path: Path) -> None:
