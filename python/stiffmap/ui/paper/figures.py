@@ -27,31 +27,19 @@ def figure_5(results: Results) -> Figure:
     return figure
 
 
-def figure_6(results: Results) -> Figure:
-    """Force against deflection at the four points."""
-    figure = sweep_figure(list(results.sweeps.values()), tolerance=TOLERANCE)
-    headline(figure, "Figure 6. Deflection against force at the four points")
-    return figure
-
-
-def figure_7(results: Results, variable: str = "worst_deflection_xy", case: str | None = None) -> Figure:
-    """Error maps of the three planes."""
-    return map_figure(results.maps, variable, case=case, tolerance=TOLERANCE)
-
-
 def all_figures(results: Results) -> dict[str, Figure]:
     """Every figure by the name of its file; Figure 7 in four readings, since the paper does not state its force."""
+    figure_6 = sweep_figure(list(results.sweeps.values()), tolerance=TOLERANCE)
+    headline(figure_6, "Figure 6. Deflection against force at the four points")
+    figures = {"figure5.png": figure_5(results), "figure6.png": figure_6}
+    for name, variable, case in (
+        ("worst", "worst_deflection_xy", None),
+        ("best", "best_deflection_xy", None),
+        ("Fx", "deflection_xy", "Fx"),
+        ("Fy", "deflection_xy", "Fy"),
+    ):
+        figures[f"figure7-{name}.png"] = map_figure(results.maps, variable, case=case, tolerance=TOLERANCE)
     worst = float(results.maps.worst_deflection_xy.max()) * MM
-    figures = {
-        "figure5.png": figure_5(results),
-        "figure6.png": figure_6(results),
-        "figure7-worst.png": figure_7(results),
-        "figure7-best.png": figure_7(results, "best_deflection_xy"),
-        "figure7-Fx.png": figure_7(results, "deflection_xy", "Fx"),
-        "figure7-Fy.png": figure_7(results, "deflection_xy", "Fy"),
-    }
-    headline(
-        figures["figure7-worst.png"],
-        f"Figure 7. {FORCE:g} N in the worst direction of the plane, up to {worst:.2f} mm",
-    )
+    title = f"Figure 7. {FORCE:g} N in the worst direction of the plane, up to {worst:.2f} mm"
+    headline(figures["figure7-worst.png"], title)
     return figures
