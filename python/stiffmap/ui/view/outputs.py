@@ -25,13 +25,13 @@ from stiffmap.ui.plot.scene import draw_box, draw_force, draw_skeleton, finish
 from stiffmap.ui.plot.style import COLOURS, MM, ORANGE, TOLERANCE, headline, leg_colours, paper
 from stiffmap.ui.view.colours import plane_image
 from stiffmap.ui.view.data import Data
-from stiffmap.ui.view.legend import legend
 from stiffmap.ui.view.moment import Moment
 from stiffmap.ui.view.numbers import write
 from stiffmap.ui.view.panels import (
     colour_bar,
     compliance_panel,
     efforts_panel,
+    legend,
     shares_panel,
     status_line,
 )
@@ -97,32 +97,23 @@ def _picture(moment: Moment, kind: str) -> bytes:
 def command_line(machine: str, moment: Moment) -> str:
     """For a shell; files and units as there: mm, deg, µm as mm."""
     s = moment.state
-    words = [
-        "stiffmap",
-        "view",
-        machine,
-        f"--at={_numbers(1e3 * np.array(s.position))}",
-        f"--force={_numbers(s.force)}",
-    ]
     default = State(s.position)
-    if s.rotation is not None:
-        words.append(f"--rotation={_numbers(np.rad2deg(s.rotation))}")
-    if any(s.moment):
-        words.append(f"--moment={_numbers(s.moment)}")
-    if s.gravity is not None:
-        words.append(f"--gravity={_numbers(s.gravity)}")
-    words.append(f"--plane={_numbers(s.normal) if s.plane == 'free' else s.plane}")
-    if s.quantity != default.quantity:
-        words.append(f"--quantity={s.quantity}")
-    if s.tolerance != default.tolerance:
-        words.append(f"--tolerance={1e3 * s.tolerance:.9g}")
-    if s.frequency:
-        words.append(f"--frequency={s.frequency:.9g}")
-    if s.magnification is not None:
-        words.append(f"--magnify={s.magnification:.9g}")
+    options = {
+        "at": _numbers(1e3 * np.array(s.position)),
+        "force": _numbers(s.force),
+        "rotation": s.rotation and _numbers(np.rad2deg(s.rotation)),
+        "moment": any(s.moment) and _numbers(s.moment),
+        "gravity": s.gravity and _numbers(s.gravity),
+        "plane": _numbers(s.normal) if s.plane == "free" else s.plane,
+        "quantity": s.quantity != default.quantity and s.quantity,
+        "tolerance": s.tolerance != default.tolerance and f"{1e3 * s.tolerance:.9g}",
+        "frequency": s.frequency and f"{s.frequency:.9g}",
+        "magnify": s.magnification is not None and f"{s.magnification:.9g}",
+    }
+    words = [f"--{name}={text}" for name, text in options.items() if text]
     words += [f"--set={a}={v!r}" for a, v in s.changes]
     words += [f"--start={_numbers(s.start)}"] if s.start is not None else []
-    return shlex.join(words)
+    return shlex.join(["stiffmap", "view", machine, *words])
 
 
 def python_lines(machine: str, moment: Moment) -> str:
