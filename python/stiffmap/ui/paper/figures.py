@@ -8,8 +8,8 @@ from matplotlib.figure import Figure
 
 from stiffmap.ui.paper.results import FORCE, TOLERANCE, Results
 from stiffmap.ui.plot.error_maps import map_figure
-from stiffmap.ui.plot.forces import draw_ellipse, draw_polar, position_text, sweep_figure
-from stiffmap.ui.plot.style import MM, headline, panel, paper
+from stiffmap.ui.plot.forces import draw_ellipse, draw_polar, sweep_figure
+from stiffmap.ui.plot.style import MM, headline, panel, paper, place_text
 
 
 def figure_5(results: Results) -> Figure:
@@ -20,7 +20,7 @@ def figure_5(results: Results) -> Figure:
         for i, pol in enumerate(many):
             top: Any = figure.add_subplot(2, 4, i + 1, projection="polar")
             draw_polar(top, pol, "deflection_xy", TOLERANCE)
-            top.set_title(f"{panel(i)} {position_text(pol)}")
+            top.set_title(f"{panel(i)} {place_text(pol.position.values)}")
             bottom = figure.add_subplot(2, 4, i + 5)
             draw_ellipse(bottom, pol, "xy", TOLERANCE)
             bottom.set_title(panel(i + 4), loc="left")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from io import BytesIO
 from pathlib import Path
 from textwrap import fill
@@ -45,11 +45,9 @@ SETTINGS: dict[str, Any] = {
 }
 
 
-@contextmanager
-def paper_style() -> Iterator[None]:
+def paper_style() -> AbstractContextManager[None]:
     """Settings of a picture while it is drawn; the caller's own settings come back."""
-    with matplotlib.rc_context(dict[Any, Any](SETTINGS)):
-        yield
+    return matplotlib.rc_context(dict[Any, Any](SETTINGS))
 
 
 class Picture(Figure):
