@@ -6,10 +6,11 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
+from stiffmap.common.number_text import place_text
 from stiffmap.ui.paper.results import FORCE, TOLERANCE, Results
 from stiffmap.ui.plot.error_maps import map_figure
 from stiffmap.ui.plot.forces import draw_ellipse, draw_polar, sweep_figure
-from stiffmap.ui.plot.style import MM, headline, panel, paper, place_text
+from stiffmap.ui.plot.style import MM, headline, panel, paper
 
 
 def figure_5(results: Results) -> Figure:

@@ -46,8 +46,7 @@ def workspace_figure(machine: Machine, found: Workspace, nodes: int = 90) -> Fig
     if not np.isfinite(found.box).all() or found.dimension < 2:
         raise StiffmapError(f"{machine.name}: no section of the workspace to draw")
     size = found.region[1] - found.region[0]
-    moves = [i for i in range(3) if size[i] > 0]
-    planes = planes_of(moves)
+    planes = planes_of(size > 0)
     middle = found.box.mean(axis=0)
     low, high = machine.workspace
     unit = {2: "m²", 3: "m³"}[found.dimension]
@@ -62,9 +61,9 @@ def workspace_figure(machine: Machine, found: Workspace, nodes: int = 90) -> Fig
     return figure
 
 
-def planes_of(moves: Sequence[int]) -> list[tuple[int, int]]:
-    """Pairs of the axes along which the machine moves."""
-    return [(a, b) for a, b in ((0, 1), (0, 2), (1, 2)) if a in moves and b in moves]
+def planes_of(moves: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Pairs of the axes along which the machine moves; moves (3,)."""
+    return [(a, b) for a, b in ((0, 1), (0, 2), (1, 2)) if moves[a] and moves[b]]
 
 
 def section(at: Floats, a: int, b: int, u: Floats, v: Floats) -> Floats:
@@ -117,8 +116,7 @@ def box_figure(machine: Machine, box: LargestBox, nodes: int = 80) -> Figure:
     """
     if not box.edge > 0:
         raise StiffmapError(f"{machine.name}: no box was found, so there is none to draw")
-    moves = [i for i in range(3) if box.edges[i] > THIN * box.edges.max()]
-    planes = planes_of(moves)
+    planes = planes_of(box.edges > THIN * box.edges.max())
     if not planes:
         raise StiffmapError(f"{machine.name}: the largest box is a line, so there is no section to draw")
     low, high = box.corners

@@ -10,6 +10,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from stiffmap.common.number_text import place_text
 from stiffmap.solve.status import Status
 from stiffmap.ui.plot.style import (
     BLACK,
@@ -22,7 +23,6 @@ from stiffmap.ui.plot.style import (
     line_look,
     panel,
     paper,
-    place_text,
 )
 
 

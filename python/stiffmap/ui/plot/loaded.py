@@ -11,13 +11,13 @@ from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import Floats, real_array
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.number_text import length_text, length_unit, percents, vector_text
+from stiffmap.common.number_text import length_text, length_unit, percents, place_text, vector_text
 from stiffmap.solve.budget import DeflectionBudget, deflection_budget
 from stiffmap.solve.compiled import Status
 from stiffmap.solve.machine import Machine, takes_machine
 from stiffmap.ui.plot.scene import draw_box, draw_force, draw_skeleton, finish, on, scene_axes
 from stiffmap.ui.plot.skeleton import Skeleton, skeleton, standing
-from stiffmap.ui.plot.style import BLUE, ORANGE, headline, leg_colours, paper, place_text
+from stiffmap.ui.plot.style import BLUE, ORANGE, headline, leg_colours, paper
 
 SHOWN = 0.08
 """Of the machine's extent, how far the tool moves in the picture."""

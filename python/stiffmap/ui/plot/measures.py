@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
+from stiffmap.common.number_text import place_text
 from stiffmap.solve.machine import Machine
 from stiffmap.ui.plot.box import box_figure, workspace_figure
 from stiffmap.ui.plot.modes import mode_figure, mode_frames
@@ -49,8 +50,7 @@ def transmission_figure(machine: Machine, position: ArrayLike, plane: str = "xy"
         _hexagon(axes[2], h.vertices, float(h.inner), float(h.outer))
         axes[2].set_title(f"(c) {plane} plane: {float(h.inner):.3g} … {float(h.outer):.3g}")
         axes[2].set(xlabel=f"$v_{plane[0]}$ per drive speed", ylabel=f"$v_{plane[1]}$ per drive speed")
-        where = ", ".join(f"{MM * x:.0f}" for x in p)
-        headline(figure, f"{machine.name} at ({where}) mm: velocity transmission")
+        headline(figure, f"{machine.name} at {place_text(p, '.0f')}: velocity transmission")
     return figure
 
 

@@ -10,11 +10,12 @@ from matplotlib.figure import Figure
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
+from stiffmap.common.number_text import place_text
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.status import Status
 from stiffmap.ui.plot.scene import draw_skeleton, finish, marks, on, scene_axes
 from stiffmap.ui.plot.skeleton import Skeleton, skeleton
-from stiffmap.ui.plot.style import BLACK, BLUE, GREEN, MM, VERMILLION, leg_colours, paper, place_text
+from stiffmap.ui.plot.style import BLACK, BLUE, GREEN, MM, VERMILLION, leg_colours, paper
 
 MARKS = {"limit": "^", "bifurcation": "X"}
 HALO = "#f5c9b0"

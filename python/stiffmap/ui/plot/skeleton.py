@@ -10,12 +10,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from stiffmap.common.broadcasting import Floats, real_array
 from stiffmap.common.errors import StiffmapError
+from stiffmap.common.number_text import place_text
 from stiffmap.model.description import Joint
 from stiffmap.model.description.tree import joints
 from stiffmap.solve.compiled import CompiledMachine, Role, Status
 from stiffmap.solve.kinematics import inverse_kinematics
 from stiffmap.solve.machine import Machine
-from stiffmap.ui.plot.style import place_text
 
 COINCIDENT = 1e-9
 FLAT = 1e-6  # m

@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation, Slerp
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.kept import Kept
+from stiffmap.common.number_text import place_text
 from stiffmap.model.addresses import listed
 from stiffmap.model.description import AppliedEffect, MachineDescription
 from stiffmap.model.effects import apply_records
@@ -21,7 +22,6 @@ from stiffmap.solve.closing import Kinematics
 from stiffmap.solve.compiled import Role, Status
 from stiffmap.solve.kinematics import inverse_kinematics
 from stiffmap.solve.machine import Machine, load_machine
-from stiffmap.ui.plot.style import place_text
 from stiffmap.ui.view.moment import Moment
 from stiffmap.ui.view.place import first_plane, orientation, rotation_of
 from stiffmap.ui.view.state import History, State, checked, with_change

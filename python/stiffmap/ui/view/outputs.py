@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.number_text import length_text, vector_text
+from stiffmap.common.number_text import length_text, place_text, vector_text
 from stiffmap.common.outputs import write_text
 from stiffmap.ui.plot import save
 from stiffmap.ui.plot.loaded import draw_budget
@@ -201,9 +201,8 @@ def view_figure(moment: Moment) -> Figure:
             bar = ScalarMappable(Normalize(factor * limits[0], factor * limits[1]), COLOURS)
             figure.colorbar(bar, ax=ax, label=f"{q.title}, {unit}", shrink=0.6, location="bottom", pad=0.08)
         _shares(figure.add_subplot(1, 2, 2), moment)
-        at = ", ".join(f"{MM * v:.4g}" for v in s.position)
         moved = length_text(float(np.linalg.norm(solution.displacement[:3])))
-        headline(figure, f"{moment.machine.name} at ({at}) mm under {vector_text(s.force, 4)} N: the tool moves {moved} "
+        headline(figure, f"{moment.machine.name} at {place_text(s.position, '.4g')} under {vector_text(s.force, 4)} N: the tool moves {moved} "
                          f"(orange: × {moment.magnification(rest, solution):g})")  # fmt: skip
     return figure
 

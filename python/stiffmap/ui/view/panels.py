@@ -8,7 +8,7 @@ from html import escape
 import numpy as np
 
 from stiffmap.common.broadcasting import Floats
-from stiffmap.common.number_text import length_text, length_unit, percents
+from stiffmap.common.number_text import length_text, length_unit, percents, place_text
 from stiffmap.solve.advice import RIGID
 from stiffmap.solve.budget import DeflectionBudget
 from stiffmap.solve.solution import Solution
@@ -37,8 +37,6 @@ DUST = 1e-12
 
 def status_line(moment: Moment, solution: Solution, message: str, error: str) -> str:
     """Where the tool is, how far it moves, what is wrong; a live region for screen readers."""
-    s = moment.state
-    at = ", ".join(f"{1e3 * v:.1f}" for v in s.position)
     size = float(np.linalg.norm(solution.displacement[:3]))
     if bool(solution.ok) and max(size, np.abs(solution.compliance[:3, :3]).max()) < DUST:
         said = RIGID
@@ -48,7 +46,7 @@ def status_line(moment: Moment, solution: Solution, message: str, error: str) ->
         said = f"the tool moves <b>{length_text(size)}</b> ({parts}) {unit}"
     else:
         said = f"<b>{escape(Status(int(solution.status)).name.lower())}</b>: no equilibrium"
-    lines = [f"{escape(moment.machine.name)} at ({at}) mm: {said}"]
+    lines = [f"{escape(moment.machine.name)} at {place_text(moment.state.position, '.1f')}: {said}"]
     lines += [f'<span style="color:{ORANGE}">{escape(message)}</span>'] if message else []
     for line in error.splitlines():
         lines.append(f'<span role="alert" style="color:{RED}">{escape(line)}</span>')
@@ -184,10 +182,9 @@ def probe_text(moment: Moment, point: Sequence[float]) -> str:
     """What the chosen quantity is at a point of the plane, solved there."""
     value, status = moment.at(point)
     q = QUANTITIES[moment.state.quantity]
-    at = ", ".join(f"{1e3 * v:.1f}" for v in point)
     unit, factor = q.shown(value * q.factor)
     said = f"{value * q.factor * factor:.5g} {unit}".strip() if np.isfinite(value) else status.name.lower()
-    return f"probe at ({at}) mm: {said}"
+    return f"probe at {place_text(point, '.1f')}: {said}"
 
 
 DOT = "width:.7em;height:.7em;border-radius:50%;border:1px solid #888"

@@ -59,7 +59,10 @@ class Scene:
         self._drives = self.points("/joints/drives", rest.actuators, rgb(BLACK), 0.014, "square")
         self._meshes = None if moment.meshes is None else Meshes(api, moment.machine, moment.meshes)
         self.remark = "" if self._meshes is None else self._meshes.remark
-        self._arrow: Any = None
+        self._arrow = api.add_arrows(
+            "/force", np.zeros((1, 2, 3), np.float32), rgb(FORCE), shaft_radius=0.005 * self.extent,
+            head_radius=0.013 * self.extent, head_length=0.035 * self.extent, visible=False,
+        )  # fmt: skip
         self._plate: Any = None
         self._surface: Any = None
         self.lines("/box", box_edges(*box_of(moment.machine)), GREY, 1.5, "screen")
@@ -149,18 +152,7 @@ class Scene:
         tail = tip - (self.arrow_length / (pulled or size) * f if size else 0.0)
         if not pulled:
             self.force_handle.position = tuple(tail if size else tip + (0.0, 0.0, self.arrow_length))
-        points = np.array([[tail, tip]], np.float32)
-        if self._arrow is None:
-            e = self.extent
-            self._arrow = self.api.add_arrows(
-                "/force",
-                points,
-                rgb(FORCE),
-                shaft_radius=0.005 * e,
-                head_radius=0.013 * e,
-                head_length=0.035 * e,
-            )
-        self._arrow.points = points
+        self._arrow.points = np.array([[tail, tip]], np.float32)
         self._arrow.visible = size > 0
 
     def plane(self, found: PlaneMap, limits: tuple[float, float], tolerance: float, lines: bool) -> None:
