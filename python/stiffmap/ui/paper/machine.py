@@ -15,6 +15,7 @@ from stiffmap.ui.paper.results import Results
 from stiffmap.ui.paper.statement import Statement, Verdict, judge, of_section_5_3, rounds_to
 from stiffmap.workspace.performance.motion.closing import drive_kinematics
 from stiffmap.workspace.performance.motion.velocity import singular_values
+from stiffmap.workspace.performance.poses import box_nodes
 
 LOW, HIGH = 0.5, 2.0
 
@@ -142,9 +143,7 @@ def diagonal_limits(machine: Machine, low: float, high: float, reach: float) -> 
 
 def box_factors(machine: Machine, box: Floats) -> tuple[float, float]:
     """Least and largest factor over a grid of 5³ positions in a box (2, 3), corners included."""
-    low, high = box
-    axes = np.linspace(low, high, 5).T
-    f = factors(machine, np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1))
+    f = factors(machine, box_nodes(box[0], box[1], 5))
     return float(f.min()), float(f.max())
 
 

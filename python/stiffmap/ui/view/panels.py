@@ -8,7 +8,7 @@ from html import escape
 import numpy as np
 
 from stiffmap.common.broadcasting import Floats
-from stiffmap.common.number_text import length_text, length_unit, percents, place_text
+from stiffmap.common.number_text import length_text, length_unit, place_text
 from stiffmap.solve.advice import RIGID
 from stiffmap.solve.budget import DeflectionBudget
 from stiffmap.solve.solution import Solution
@@ -111,19 +111,11 @@ def bars(title: str, rows: Sequence[Row]) -> str:
 def shares_panel(budget: DeflectionBudget, lit: str = "") -> str:
     """Where the deflection comes from."""
     found = budget_rows(budget)
-    biggest = max((abs(s) for _, _, s in found), default=1.0) or 1.0
-    size = float(np.linalg.norm(budget.displacement[:3]))
-    unit, factor, decimals = length_unit(size)
+    biggest = max((abs(s) for _, s, _ in found), default=1.0) or 1.0
     rows: list[Row] = [
-        (
-            f"▶ {n}" if n == lit else n,
-            s / biggest,
-            BLUE if s >= 0 else ORANGE,
-            f"{factor * part:z.{decimals}f} {unit}, {share} %",
-        )
-        for (n, part, s), share in zip(found, percents([s for _, _, s in found]), strict=True)
+        (f"▶ {n}" if n == lit else n, s / biggest, BLUE if s >= 0 else ORANGE, text) for n, s, text in found
     ]
-    return bars(f"where the {length_text(size)} come from", rows)
+    return bars(f"where the {length_text(float(np.linalg.norm(budget.displacement[:3])))} come from", rows)
 
 
 def principal(compliance: Floats) -> tuple[Floats, Floats]:

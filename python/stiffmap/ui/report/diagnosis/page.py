@@ -155,7 +155,8 @@ def _budget(d: Findings) -> dict[str, Any] | None:
         "size": length_text(whole),
         "unit": unit,
         "rows": [
-            (in_shop_words(n), f"{factor * part:.{decimals}f}", 100 * s) for n, part, s in budget_rows(found)
+            (in_shop_words(n), f"{factor * whole * s:.{decimals}f}", 100 * s)
+            for n, s, _ in budget_rows(found)
         ],
     }
 
