@@ -116,18 +116,19 @@ def box_figure(machine: Machine, box: LargestBox, nodes: int = 80) -> Figure:
     """
     if not box.edge > 0:
         raise StiffmapError(f"{machine.name}: no box was found, so there is none to draw")
-    planes = planes_of(box.edges > THIN * box.edges.max())
+    moves = box.edges > THIN * box.edges.max()
+    planes = planes_of(moves)
     if not planes:
         raise StiffmapError(f"{machine.name}: the largest box is a line, so there is no section to draw")
     low, high = box.corners
     at = _tightest(box)
     declared = np.allclose(box.orientation, np.eye(3))
     marks = "xyz" if declared else ("x′", "y′", "z′")
+    shown = [f"{MM * e:.2f}" for e in box.edges[moves]]
+    size = " × ".join(shown) if len(set(shown)) > 1 else shown[0]
     ends = f"; limited by {', '.join(box.limited_by)}" if box.limited_by else ""
     sure = "proven" if box.proven else "sampled"
-    title = (
-        f"{machine.name}: largest box {_edges(box)} mm ({sure}), none of {MM * box.edge_upper:.2f} mm{ends}"
-    )
+    title = f"{machine.name}: largest box {size} mm ({sure}), none of {MM * box.edge_upper:.2f} mm{ends}"
     with paper(max(3.1 * len(planes) + 0.4, 4.4), 4.1, title, most=4) as figure:
         for axes, (a, b) in zip(figure.subplots(1, len(planes), squeeze=False)[0], planes, strict=True):
             middle, reach = (low + high) / 2, AROUND * (high - low)
@@ -147,11 +148,6 @@ def box_figure(machine: Machine, box: LargestBox, nodes: int = 80) -> Figure:
             axes.set_xlim(MM * u[0], MM * u[-1])
             axes.set_ylim(MM * v[0], MM * v[-1])
     return figure
-
-
-def _edges(box: LargestBox) -> str:
-    shown = [f"{MM * e:.2f}" for e in box.edges if e > THIN * box.edges.max()]
-    return " × ".join(shown) if len(set(shown)) > 1 else shown[0]
 
 
 def _tightest(box: LargestBox) -> Floats:

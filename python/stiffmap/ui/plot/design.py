@@ -23,12 +23,8 @@ def front_figure(found: ParetoSet) -> Figure:
     names = found.design.model.objectives
     pairs = list(combinations(range(len(names)), 2)) or [(0, 0)]
     values = np.array([[get_measure(n).factor * j.values[n] for n in names] for j in found.judged])
-    with paper(
-        3.6 * len(pairs),
-        3.2,
-        f"{found.design.model.name}: {len(found.x)} designs that no other one betters",
-        most=0,
-    ) as figure:
+    title = f"{found.design.model.name}: {len(found.x)} designs that no other one betters"
+    with paper(3.6 * len(pairs), 3.2, title, most=0) as figure:
         for axes, (a, b) in zip(figure.subplots(1, len(pairs), squeeze=False)[0], pairs, strict=True):
             axes.plot(values[:, a], values[:, b], "o", color=SKY, markersize=4)
             for colour, (label, i) in zip(CYCLE[1:], found.chosen().items(), strict=False):

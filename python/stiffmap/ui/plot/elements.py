@@ -25,7 +25,11 @@ def thicknesses(machine: Machine, now: Skeleton) -> Floats:
     core = machine.compiled
     size = now.extent
     out = np.full(len(now.links), PLAIN * size)
-    springs = _springs(machine)
+    springs = {
+        core_name(n): np.array(e.compliance)
+        for n, e in all_elements(machine.description)
+        if isinstance(e, Spring) and e.compliance is not None
+    }
     position, rotation = core.frames(core.home_coordinates())
     first = _first_spring(core)
     for k, i in enumerate(now.ends):
@@ -41,15 +45,6 @@ def thicknesses(machine: Machine, now: Skeleton) -> Floats:
         if axial > 0 and bending > 0:
             out[k] = 4 * np.sqrt(axial / bending)
     return np.asarray(np.clip(out, THIN * size, THICK * size))
-
-
-def _springs(machine: Machine) -> dict[str, Floats]:
-    """Compliance (6, 6) of the link springs that declare one, by their names in the core."""
-    return {
-        core_name(n): np.array(e.compliance)
-        for n, e in all_elements(machine.description)
-        if isinstance(e, Spring) and e.compliance is not None
-    }
 
 
 def _first_spring(core: CompiledMachine) -> dict[int, str]:

@@ -45,6 +45,8 @@ class Scene:
         self.api = api
         self.rest = rest = moment.rest()
         self.extent = rest.extent
+        self.arrow_length = ARROW * self.extent
+        """Of a force that is not being dragged, m."""
         self._lines: dict[str, Any] = {}
         self._image: Any = None
         self._frame_size = (0.0, 0.0)
@@ -138,11 +140,6 @@ class Scene:
         """The gizmo at the tool of the state."""
         self.gizmo.position = moment.state.position
         self.gizmo.wxyz = quaternion(rotation_of(moment.machine, moment.state))
-
-    @property
-    def arrow_length(self) -> float:
-        """Of a force that is not being dragged, m."""
-        return ARROW * self.extent
 
     def force(self, moment: Moment, pulled: float = 0.0) -> None:
         """The arrow that ends at the tool; one that is dragged from a size `pulled` (N) is as long as it is pulled."""

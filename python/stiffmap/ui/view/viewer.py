@@ -52,6 +52,7 @@ class Viewer:
         self._plane: PlaneMap | None = None
         self._plane_key: object = None
         self._held: tuple[float, float] | None = None
+        self._held_quantity = ""
         self._solution: Solution | None = None
         self._cloud_key: object = None
         self._renewed = False
@@ -168,8 +169,6 @@ class Viewer:
             self._held, self._held_quantity = found.range, found.quantity
         self.scene.plane(found, self._held, state.tolerance, self.controls.isolines)
         self.controls.bar(colour_bar(found, self._held, state.tolerance))
-
-    _held_quantity = ""
 
     def redraw(self) -> None:
         """The plane is to be drawn again though the machine is the same."""
