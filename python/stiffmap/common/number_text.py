@@ -61,6 +61,11 @@ def vector_text(values: Iterable[float], digits: int = 6) -> str:
     return f"({', '.join(f'{v if abs(v) > dust else 0.0:.{digits}g}' for v in numbers)})"
 
 
+def place_text(position: Iterable[float], form: str = "g") -> str:
+    """A position (3,) m in mm, each coordinate in a form of `format`: ``(0, -200, 300) mm``."""
+    return f"({', '.join(f'{1e3 * v:{form}}' for v in position)}) mm"
+
+
 def with_uncertainty(value: float, u: float) -> str:
     """``0.301 ± 0.002``: both to the first digit of the uncertainty, to the second where that is a 1; the uncertainty is never 0."""
     return f"{within(value, u)} ± {within(u, u)}"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
+
 import numpy as np
 from scipy.optimize import brentq
 
@@ -13,49 +15,16 @@ from stiffmap.ui.paper.results import Results
 from stiffmap.ui.paper.statement import Statement, Verdict, judge, of_section_5_3, rounds_to
 from stiffmap.workspace.performance.motion.closing import drive_kinematics
 from stiffmap.workspace.performance.motion.velocity import singular_values
+from stiffmap.workspace.performance.poses import box_nodes
 
 LOW, HIGH = 0.5, 2.0
 
 
-def machine_statements(results: Results) -> list[Statement]:
+def machine_statements(results: Results) -> Iterator[Statement]:
     """Workspace, speed, transmission factors, geometry, revised bar."""
-    original, revised = (
-        cube_edge(m, reach) for m, reach in ((results.original, 0.13), (results.revised, 0.33))
-    )
-    return [
-        workspace_size(original),
-        wanted_size(revised),
-        speed(results.original),
-        _unchecked(
-            "acceleration in the isotropic point of … 14 m/s²",
-            "14 m/s²",
-            "the paper gives neither masses nor drive forces; those of our machine files are declared by us",
-        ),
-        _unchecked(
-            "payload of 4 kg",
-            "4 kg",
-            "the paper gives no criterion (drive force, deflection or stress) for it",
-        ),
-        transmission(results.original),
-        geometry(results.original),
-        too_small(original),
-        *bar_statements(results),
-    ]
-
-
-def _unchecked(words: str, printed: str, because: str) -> Statement:
-    return Statement("5.2", words, "no number", Verdict.NOT_CHECKED, because, printed=printed)
-
-
-def cube_edge(machine: Machine, reach: float) -> float:
-    """Edge (mm) of the cube on the diagonal whose corners bound the factors 0.5 … 2."""
-    low, high = diagonal_limits(machine, LOW, HIGH, reach)
-    return 1e3 * (high - low)
-
-
-def workspace_size(edge: float) -> Statement:
-    """The original's cube."""
-    return Statement(
+    original = results.original
+    edge, wanted = (cube_edge(m, reach) for m, reach in ((original, 0.13), (results.revised, 0.33)))
+    yield Statement(
         "5.2",
         "cubic Cartesian workspace of size 200×200×200 mm³",
         f"{edge:.2f} mm",
@@ -65,27 +34,19 @@ def workspace_size(edge: float) -> Statement:
         {"edge_mm": edge},
         printed="200 mm",
     )
-
-
-def wanted_size(edge: float) -> Statement:
-    """The cube that the application asks for."""
-    return Statement(
+    yield Statement(
         "5.2",
         "for selection treatment required workspace 200×200×200 mm³",
-        f"{edge:.2f} mm (revised)",
+        f"{wanted:.2f} mm (revised)",
         Verdict.DIFFERS,
         "§5.1 requires 0.5 m × 0.5 m × 0.5 m, and §5.3 says that the original's 200 mm are too small; 200 "
         "is a misprint. The revised machine reaches the factors 0.5–2 in a cube of this edge, "
-        f"{500 - edge:.2f} mm short of 500 (L = 776.5 mm would do)",
-        {"edge_mm": edge},
+        f"{500 - wanted:.2f} mm short of 500 (L = 776.5 mm would do)",
+        {"edge_mm": wanted},
         printed="200 mm",
     )
-
-
-def speed(original: Machine) -> Statement:
-    """Speed at the isotropic point: the Jacobian there is the identity."""
     f = factors(original, np.zeros(3))
-    return Statement(
+    yield Statement(
         "5.2",
         "Cartesian velocity … in the isotropic point of 1.2 m/s",
         f"{f[0]:.6f} … {f[-1]:.6f} times the drive's speed",
@@ -96,47 +57,31 @@ def speed(original: Machine) -> Statement:
         printed="1.2 m/s",
         own_input=True,
     )
-
-
-def transmission(original: Machine) -> Statement:
-    """Factors over the declared workspace box."""
+    for words, printed, because in UNCHECKED:
+        yield Statement("5.2", words, "no number", Verdict.NOT_CHECKED, because, printed=printed)
     low, high = box_factors(original, original.workspace)
-    corner = 1e3 * original.workspace[0, 0]
-    return Statement(
+    yield Statement(
         "5.2",
         "transmission factor range 0.5–2.0",
         f"{low:.3f} … {high:.3f}",
         judge(low >= LOW and high <= HIGH),
-        f"singular values of the Jacobian over the workspace box; the largest is at x = y = z = {corner:g} "
-        "mm. Within 0.5–2 the box must end at -L/√18 and L/√6",
+        "singular values of the Jacobian over the workspace box; the largest is at x = y = z = "
+        f"{1e3 * original.workspace[0, 0]:g} mm. Within 0.5–2 the box must end at -L/√18 and L/√6",
         {"smallest_factor": low, "largest_factor": high},
         printed="0.5 … 2.0",
     )
-
-
-def geometry(original: Machine) -> Statement:
-    """The lengths are ours as well: what the model's kinematics return."""
-    rho = inverse_kinematics(original, np.array([[0, 0, 0], [0, 0.1, 0]])).actuators[:, 0]
-    # rho = x - r - sqrt(L² - y² - z²): two positions give r and L.
-    d, y = rho[1] - rho[0], 0.1
-    length = (y**2 + d**2) / (2 * d)
-    r = -rho[0] - length
-    ok = rounds_to(1e3 * length, "310.0") and rounds_to(1e3 * r, "31.0")
-    return Statement(
+    length, r = lengths(original)
+    yield Statement(
         "5.2",
         "L = 310 mm, d = 100 mm, r = 31 mm",
-        f"L = {1e3 * length:.6g} mm, r = {1e3 * r:.6g} mm",
-        judge(ok),
+        f"L = {length:.6g} mm, r = {r:.6g} mm",
+        judge(rounds_to(length, "310.0") and rounds_to(r, "31.0")),
         "found again from the inverse kinematics of our model; d does not enter them",
-        {"L_mm": 1e3 * length, "r_mm": 1e3 * r},
+        {"L_mm": length, "r_mm": r},
         printed="L = 310 mm, r = 31 mm",
         own_input=True,
     )
-
-
-def too_small(edge: float) -> Statement:
-    """Why the machine is revised."""
-    return of_section_5_3(
+    yield of_section_5_3(
         "the workspace of the Orthoglide manipulator is lower than required for milling",
         f"{edge:.2f} mm < 500 mm",
         judge(edge < 500),
@@ -144,6 +89,37 @@ def too_small(edge: float) -> Statement:
         {"edge_mm": edge},
         printed="200 mm < 500 mm",
     )
+    yield from bar_statements({"original": bar(original), "revised": bar(results.revised)})
+
+
+UNCHECKED = (
+    (
+        "acceleration in the isotropic point of … 14 m/s²",
+        "14 m/s²",
+        "the paper gives neither masses nor drive forces; those of our machine files are declared by us",
+    ),
+    (
+        "payload of 4 kg",
+        "4 kg",
+        "the paper gives no criterion (drive force, deflection or stress) for it",
+    ),
+)
+"""The paper's words and number, and why it is not checked."""
+
+
+def cube_edge(machine: Machine, reach: float) -> float:
+    """Edge (mm) of the cube on the diagonal whose corners bound the factors 0.5 … 2."""
+    low, high = diagonal_limits(machine, LOW, HIGH, reach)
+    return 1e3 * (high - low)
+
+
+def lengths(machine: Machine) -> tuple[float, float]:
+    """L and r (mm), which the model's kinematics return: rho = x - r - sqrt(L² - y² - z²) at two positions."""
+    y = 0.1
+    rho = inverse_kinematics(machine, np.array([[0, 0, 0], [0, y, 0]])).actuators[:, 0]
+    d = rho[1] - rho[0]
+    length = (y**2 + d**2) / (2 * d)
+    return 1e3 * length, 1e3 * (-rho[0] - length)
 
 
 def factors(machine: Machine, position: Floats) -> Floats:
@@ -167,9 +143,7 @@ def diagonal_limits(machine: Machine, low: float, high: float, reach: float) -> 
 
 def box_factors(machine: Machine, box: Floats) -> tuple[float, float]:
     """Least and largest factor over a grid of 5³ positions in a box (2, 3), corners included."""
-    low, high = box
-    axes = np.linspace(low, high, 5).T
-    f = factors(machine, np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1))
+    f = factors(machine, box_nodes(box[0], box[1], 5))
     return float(f.min()), float(f.max())
 
 
@@ -183,42 +157,23 @@ TO_PRINTED = np.array([1e3] * 3 + [1e-3] * 3)
 LENGTH = {"original": 310.0, "revised": 775.0}
 
 
-def bar_statements(results: Results) -> list[Statement]:
-    """The two rows of Table 1, and what they say about the bar."""
-    bars = {"original": bar(results.original), "revised": bar(results.revised)}
-    rows = [_row(name, compliance) for name, compliance in bars.items()]
-    return [*rows, _stronger(bars), _length(bars["revised"])]
-
-
-def bar(machine: Machine) -> Floats:
-    """Compliance (6, 6) of a bar in the units of Table 1."""
-    block = next(e for e in machine.description.legs[0].elements if isinstance(e, Block))
-    spring = next(e for e in block.branches[0].elements if isinstance(e, Spring))
-    given = spring.compliance
-    compliance = np.linalg.inv(np.array(spring.stiffness)) if given is None else np.array(given)
-    return np.asarray(compliance * np.sqrt(np.outer(TO_PRINTED, TO_PRINTED)))
-
-
-def _row(name: str, compliance: Floats) -> Statement:
-    ours = np.diag(compliance)
-    same = all(np.isclose(o, float(p), rtol=1e-9) for o, p in zip(ours, PRINTED[name], strict=True))
-    text = ", ".join(f"{v:.3g}" for v in ours)
-    return of_section_5_3(
-        f"Table 1, {name} bar: k11 … k66 = {', '.join(PRINTED[name])}",
-        text,
-        judge(same),
-        "The table is headed Stiffness but holds compliances (its units say so), and only their diagonal; "
-        "our model adds k26 and k35 of beam theory",
-        {f"k{i}{i}": float(v) for i, v in enumerate(ours, 1)},
-        printed=", ".join(PRINTED[name]),
-        own_input=True,
-    )
-
-
-def _stronger(bars: dict[str, Floats]) -> Statement:
+def bar_statements(bars: Mapping[str, Floats]) -> Iterator[Statement]:
+    """The two rows of Table 1, and what they say about the bar; compliances (6, 6) in the units of Table 1."""
+    for name, compliance in bars.items():
+        ours, printed = np.diag(compliance), PRINTED[name]
+        yield of_section_5_3(
+            f"Table 1, {name} bar: k11 … k66 = {', '.join(printed)}",
+            ", ".join(f"{v:.3g}" for v in ours),
+            judge(bool(np.isclose(ours, np.array(printed, float), rtol=1e-9).all())),
+            "The table is headed Stiffness but holds compliances (its units say so), and only their diagonal; "
+            "our model adds k26 and k35 of beam theory",
+            {f"k{i}{i}": float(v) for i, v in enumerate(ours, 1)},
+            printed=", ".join(printed),
+            own_input=True,
+        )
     area = {n: LENGTH[n] / c[0, 0] for n, c in bars.items()}
     ratio = area["revised"] / area["original"]
-    return of_section_5_3(
+    yield of_section_5_3(
         "the length and cross-section of the bar element was increased",
         f"EA = L/k11 grows {ratio:.2f} times",
         judge(ratio > 1),
@@ -227,11 +182,9 @@ def _stronger(bars: dict[str, Floats]) -> Statement:
         printed="increased",
         own_input=True,
     )
-
-
-def _length(c: Floats) -> Statement:
+    c = bars["revised"]
     y, z = np.sqrt(3 * c[1, 1] / c[5, 5]), np.sqrt(3 * c[2, 2] / c[4, 4])
-    return of_section_5_3(
+    yield of_section_5_3(
         "new stiffness matrix for the bar element (its length is not stated)",
         f"L = {y:.0f} and {z:.0f} mm",
         judge(rounds_to(y, "780") and rounds_to(z, "790")),
@@ -241,3 +194,12 @@ def _length(c: Floats) -> Statement:
         printed="not stated",
         own_input=True,
     )
+
+
+def bar(machine: Machine) -> Floats:
+    """Compliance (6, 6) of a bar in the units of Table 1."""
+    block = next(e for e in machine.description.legs[0].elements if isinstance(e, Block))
+    spring = next(e for e in block.branches[0].elements if isinstance(e, Spring))
+    given = spring.compliance
+    compliance = np.linalg.inv(np.array(spring.stiffness)) if given is None else np.array(given)
+    return np.asarray(compliance * np.sqrt(np.outer(TO_PRINTED, TO_PRINTED)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from decimal import Decimal
 from enum import StrEnum
@@ -53,3 +54,8 @@ def rounds_to(ours: float, printed: str) -> bool:
 def judge(holds: bool) -> Verdict:
     """Agrees or differs."""
     return Verdict.AGREES if holds else Verdict.DIFFERS
+
+
+def by_point(name: str, values: Mapping[str, float]) -> dict[str, float]:
+    """Numbers behind a statement, one for each work point."""
+    return {f"{name}_{point.replace(' ', '_')}": float(v) for point, v in values.items()}

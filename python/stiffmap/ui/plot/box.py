@@ -46,8 +46,7 @@ def workspace_figure(machine: Machine, found: Workspace, nodes: int = 90) -> Fig
     if not np.isfinite(found.box).all() or found.dimension < 2:
         raise StiffmapError(f"{machine.name}: no section of the workspace to draw")
     size = found.region[1] - found.region[0]
-    moves = [i for i in range(3) if size[i] > 0]
-    planes = planes_of(moves)
+    planes = planes_of(size > 0)
     middle = found.box.mean(axis=0)
     low, high = machine.workspace
     unit = {2: "m²", 3: "m³"}[found.dimension]
@@ -62,9 +61,9 @@ def workspace_figure(machine: Machine, found: Workspace, nodes: int = 90) -> Fig
     return figure
 
 
-def planes_of(moves: Sequence[int]) -> list[tuple[int, int]]:
-    """Pairs of the axes along which the machine moves."""
-    return [(a, b) for a, b in ((0, 1), (0, 2), (1, 2)) if a in moves and b in moves]
+def planes_of(moves: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Pairs of the axes along which the machine moves; moves (3,)."""
+    return [(a, b) for a, b in ((0, 1), (0, 2), (1, 2)) if moves[a] and moves[b]]
 
 
 def section(at: Floats, a: int, b: int, u: Floats, v: Floats) -> Floats:
@@ -117,7 +116,7 @@ def box_figure(machine: Machine, box: LargestBox, nodes: int = 80) -> Figure:
     """
     if not box.edge > 0:
         raise StiffmapError(f"{machine.name}: no box was found, so there is none to draw")
-    moves = [i for i in range(3) if box.edges[i] > THIN * box.edges.max()]
+    moves = box.edges > THIN * box.edges.max()
     planes = planes_of(moves)
     if not planes:
         raise StiffmapError(f"{machine.name}: the largest box is a line, so there is no section to draw")
@@ -125,11 +124,11 @@ def box_figure(machine: Machine, box: LargestBox, nodes: int = 80) -> Figure:
     at = _tightest(box)
     declared = np.allclose(box.orientation, np.eye(3))
     marks = "xyz" if declared else ("x′", "y′", "z′")
+    shown = [f"{MM * e:.2f}" for e in box.edges[moves]]
+    size = " × ".join(shown) if len(set(shown)) > 1 else shown[0]
     ends = f"; limited by {', '.join(box.limited_by)}" if box.limited_by else ""
     sure = "proven" if box.proven else "sampled"
-    title = (
-        f"{machine.name}: largest box {_edges(box)} mm ({sure}), none of {MM * box.edge_upper:.2f} mm{ends}"
-    )
+    title = f"{machine.name}: largest box {size} mm ({sure}), none of {MM * box.edge_upper:.2f} mm{ends}"
     with paper(max(3.1 * len(planes) + 0.4, 4.4), 4.1, title, most=4) as figure:
         for axes, (a, b) in zip(figure.subplots(1, len(planes), squeeze=False)[0], planes, strict=True):
             middle, reach = (low + high) / 2, AROUND * (high - low)
@@ -149,11 +148,6 @@ def box_figure(machine: Machine, box: LargestBox, nodes: int = 80) -> Figure:
             axes.set_xlim(MM * u[0], MM * u[-1])
             axes.set_ylim(MM * v[0], MM * v[-1])
     return figure
-
-
-def _edges(box: LargestBox) -> str:
-    shown = [f"{MM * e:.2f}" for e in box.edges if e > THIN * box.edges.max()]
-    return " × ".join(shown) if len(set(shown)) > 1 else shown[0]
 
 
 def _tightest(box: LargestBox) -> Floats:

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
-from stiffmap.ui.plot.style import BLUE, COLOURS, CYCLE, MM, SKY, VERMILLION, headline, paper
+from stiffmap.ui.plot.style import BLUE, COLOURS, CYCLE, MM, SKY, VERMILLION, paper
 from stiffmap.workspace.design.search import ParetoSet
 from stiffmap.workspace.performance.registry import get_measure
 from stiffmap.workspace.performance.table import BoxMap, MeasuresTable, box_map, levels
@@ -23,12 +23,8 @@ def front_figure(found: ParetoSet) -> Figure:
     names = found.design.model.objectives
     pairs = list(combinations(range(len(names)), 2)) or [(0, 0)]
     values = np.array([[get_measure(n).factor * j.values[n] for n in names] for j in found.judged])
-    with paper(
-        3.6 * len(pairs),
-        3.2,
-        f"{found.design.model.name}: {len(found.x)} designs that no other one betters",
-        most=0,
-    ) as figure:
+    title = f"{found.design.model.name}: {len(found.x)} designs that no other one betters"
+    with paper(3.6 * len(pairs), 3.2, title, most=0) as figure:
         for axes, (a, b) in zip(figure.subplots(1, len(pairs), squeeze=False)[0], pairs, strict=True):
             axes.plot(values[:, a], values[:, b], "o", color=SKY, markersize=4)
             for colour, (label, i) in zip(CYCLE[1:], found.chosen().items(), strict=False):
@@ -45,7 +41,8 @@ def parallel_figure(found: ParetoSet) -> Figure:
     labels = [*found.design.variables, *names]
     low, high = table.min(axis=0), table.max(axis=0)
     scaled = (table - low) / np.where(high > low, high - low, 1)
-    with paper(max(6.0, 0.9 * len(labels)), 3.4, most=0) as figure:
+    title = f"{found.design.model.name}: variables and measures, each from its lowest to its highest"
+    with paper(max(6.0, 0.9 * len(labels)), 3.4, f"{title}; red: compromise", most=0) as figure:
         axes = figure.add_subplot()
         axes.plot(scaled.T, color=BLUE, alpha=0.25, linewidth=0.8)
         axes.plot(scaled[found.chosen()["compromise"]], color=VERMILLION, linewidth=1.6)
@@ -56,8 +53,6 @@ def parallel_figure(found: ParetoSet) -> Figure:
             ha="right",
         )
         axes.set_yticks([])
-        told = f"{found.design.model.name}: variables and measures, each from its lowest to its highest"
-        headline(figure, f"{told}; red: compromise")
     return figure
 
 

@@ -11,7 +11,7 @@ from stiffmap.model.description import Spring
 from stiffmap.model.description.tree import all_elements, core_name
 from stiffmap.solve.compiled import CompiledMachine, Role
 from stiffmap.solve.machine import Machine
-from stiffmap.ui.plot.skeleton import Skeleton, owners, skeleton
+from stiffmap.ui.plot.skeleton import Skeleton, owners, skeleton, to_base
 
 THICK, THIN = 0.02, 0.004
 """Of the machine's extent: most and least thickness of a link."""
@@ -25,7 +25,11 @@ def thicknesses(machine: Machine, now: Skeleton) -> Floats:
     core = machine.compiled
     size = now.extent
     out = np.full(len(now.links), PLAIN * size)
-    springs = _springs(machine)
+    springs = {
+        core_name(n): np.array(e.compliance)
+        for n, e in all_elements(machine.description)
+        if isinstance(e, Spring) and e.compliance is not None
+    }
     position, rotation = core.frames(core.home_coordinates())
     first = _first_spring(core)
     for k, i in enumerate(now.ends):
@@ -41,15 +45,6 @@ def thicknesses(machine: Machine, now: Skeleton) -> Floats:
         if axial > 0 and bending > 0:
             out[k] = 4 * np.sqrt(axial / bending)
     return np.asarray(np.clip(out, THIN * size, THICK * size))
-
-
-def _springs(machine: Machine) -> dict[str, Floats]:
-    """Compliance (6, 6) of the link springs that declare one, by their names in the core."""
-    return {
-        core_name(n): np.array(e.compliance)
-        for n, e in all_elements(machine.description)
-        if isinstance(e, Spring) and e.compliance is not None
-    }
 
 
 def _first_spring(core: CompiledMachine) -> dict[int, str]:
@@ -92,21 +87,12 @@ def element_links(machine: Machine, element: str, legs: Sequence[str] = ()) -> l
     firsts = {name: i for i, name in reversed(nodes_of(core, element, legs).items())}
     out = dict[int, None]()
     for first in reversed(firsts.values()):
-        for i in (*_chain_down(core, first), *_chain_up(core, first)):
+        for i in (*to_base(core, first), *_chain_up(core, first)):
             parent = core.nodes[i][0]
             if i in drawn and parent >= 0 and np.linalg.norm(position[i] - position[parent]) > 1e-6:
                 out[drawn[i]] = None
                 break
     return list(out)
-
-
-def _chain_down(core: CompiledMachine, node: int) -> list[int]:
-    """The frame itself and those towards the base."""
-    out = []
-    while node > 0:
-        out.append(node)
-        node = core.nodes[node][0]
-    return out
 
 
 def _chain_up(core: CompiledMachine, node: int) -> list[int]:

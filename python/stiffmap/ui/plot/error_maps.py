@@ -49,7 +49,9 @@ def map_figure(
     if case is None and "case" in ds.coords and not ds.case.dims:  # ds.sel(case=…): what is left is that case
         case = str(ds.case.values)
         variable = variable or "deflection"
-    variable = default_variable(ds) if variable is None else variable
+    if variable is None:
+        turned = [f"worst_deflection_{p}" for p in FORCE_PLANES if f"worst_deflection_{p}" in ds]
+        variable = turned[0] if turned else "deflection"
     values = pick(ds, variable, case)
     unit, factor = length_unit(limits[1] if limits else float(np.nanmax(values.values, initial=0.0)))
     how = planes(values)
@@ -115,12 +117,12 @@ class Drawn:
     @property
     def colour_label(self) -> str:
         """What the colours mean."""
-        name = str(self.values.name or "")
-        if name in ("dx", "dy", "dz"):
-            return f"{name}, {self.unit}"
+        name = self.variable
         if name.endswith("_std"):
-            return f"standard deviation, {self.unit}"
-        return f"{in_words(name)}, {self.unit}"
+            name = "standard deviation"
+        elif name not in ("dx", "dy", "dz"):
+            name = in_words(name)
+        return f"{name}, {self.unit}"
 
     @property
     def title(self) -> str:
@@ -134,12 +136,6 @@ class Drawn:
         return f"{machine}: {self.ds.attrs['turning_force_N']:g} N, {TITLES[base]}{ending}"
 
 
-def default_variable(ds: xr.Dataset) -> str:
-    """The worst deflection in the plane of the turning force; of a map without directions the deflection."""
-    found = [f"worst_deflection_{p}" for p in FORCE_PLANES if f"worst_deflection_{p}" in ds]
-    return found[0] if found else "deflection"
-
-
 def pick(ds: xr.Dataset, variable: str, case: str | None) -> xr.DataArray:
     """A deflection of one case, dims (z, y, x), the axes ascending."""
     values = component(ds, variable)
@@ -151,7 +147,7 @@ def pick(ds: xr.Dataset, variable: str, case: str | None) -> xr.DataArray:
                 f"case: expected one of {', '.join(map(str, values.case.values))}, got {case!r}"
             )
         values = values.sel(case=case)
-    return on_grid(values.to_dataset(name=variable))[variable].transpose("z", "y", "x")
+    return values.transpose("z", "y", "x")
 
 
 def component(ds: xr.Dataset, variable: str) -> xr.DataArray:
@@ -164,12 +160,10 @@ def component(ds: xr.Dataset, variable: str) -> xr.DataArray:
         raise StiffmapError(
             f"variable: the map has no deflection {variable!r}; there are: {', '.join(known)}, |d|, dx, dy, dz, d_xy, d_xz, d_yz"
         )
-    chosen = ds.displacement.sel(component=[f"d{a}" for a in axes])
-    found: xr.DataArray = (
-        chosen.isel(component=0, drop=True)
-        if len(axes) == 1
-        else (chosen**2).sum("component", skipna=False) ** 0.5
-    )
+    found: xr.DataArray = ds.displacement.sel(component=[f"d{a}" for a in axes])
+    if len(axes) == 1:
+        return found.squeeze("component", drop=True)
+    found = (found**2).sum("component", skipna=False) ** 0.5
     return found
 
 
@@ -206,7 +200,7 @@ def draw_line(ax: Axes, m: Drawn) -> None:
     """Deflection over the only coordinate that varies; positions without a value are crosses on the axis."""
     along = m.how.right
     at, v = MM * m.values[along].values, m.factor * m.values.values.reshape(-1)
-    ax.plot(at, v, color=BLUE, marker=".", ms=3, label=str(m.values.name).replace("_", " "))
+    ax.plot(at, v, color=BLUE, marker=".", ms=3, label=m.variable.replace("_", " "))
     if m.tolerance is not None:
         level, words = m.factor * m.tolerance, f"tolerance {MM * m.tolerance:g} mm"
         ax.axhline(level, color=TOLERANCE, ls="--", lw=1, label=words)

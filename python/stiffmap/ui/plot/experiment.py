@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from matplotlib.figure import Figure
 from scipy.stats import f as f_distribution
 
@@ -92,11 +93,11 @@ def vector_cases(e: Experiment) -> list[tuple[str, Floats]]:
 def views(at: Floats) -> tuple[tuple[int, int], ...]:
     """Planes in which poses (n, 3) spread; of poses in a plane that plane, of those on a line or at a point the first two."""
     extent = np.ptp(at, axis=0)
-    flat = [a for a in range(3) if extent[a] <= FLAT * max(float(extent.max()), 1.0)]
+    flat = {a for a in range(3) if extent[a] <= FLAT * max(float(extent.max()), 1.0)}
     all_ = ((0, 1), (0, 2), (1, 2))
-    if len(flat) != 1:
-        return all_ if not flat else tuple(v for v in all_ if any(a not in flat for a in v)) or all_[:1]
-    return tuple(v for v in all_ if flat[0] not in v)
+    if len(flat) == 1:
+        return tuple(v for v in all_ if not flat & set(v))
+    return tuple(v for v in all_ if not flat >= set(v)) or all_[:1]
 
 
 def _arrows(ax: Any, at: Floats, arrow: Floats, view: tuple[int, int], colour: str) -> None:
@@ -132,13 +133,12 @@ def against(r: Residual, drivers: list[Driver], channels: list[int]) -> Figure:
 
 def _scatter(ax: Any, r: Residual, channel: int, driver: Driver) -> None:
     _, x, labels = driver
-    values, floor = r.values[:, channel], float(r.noise.floor[channel])
-    scale = UM  # µm or µrad
-    ax.axhspan(-2 * floor * scale, 2 * floor * scale, color=NOISE, lw=0)
+    values, band = UM * r.values[:, channel], 2 * UM * float(r.noise.floor[channel])  # µm or µrad
+    ax.axhspan(-band, band, color=NOISE, lw=0)
     ax.axhline(0, color="0.5", lw=0.6)
     spread = 0.12 * np.sin(np.arange(len(x)) * 2.4) if labels else 0.0
-    ax.plot((x + spread)[~r.set_aside], values[~r.set_aside] * scale, ".", ms=3, color=AFTER, alpha=0.6)
-    ax.plot((x + spread)[r.set_aside], values[r.set_aside] * scale, "x", ms=5, color=BEFORE)
+    ax.plot((x + spread)[~r.set_aside], values[~r.set_aside], ".", ms=3, color=AFTER, alpha=0.6)
+    ax.plot((x + spread)[r.set_aside], values[r.set_aside], "x", ms=5, color=BEFORE)
     if labels:
         ax.set_xticks(range(len(labels)), labels, fontsize=7, rotation=30 if len(labels) > 3 else 0)
         ax.set_xlim(-0.5, len(labels) - 0.5)
@@ -289,8 +289,5 @@ def kept(found: Residual | Findings, values: Floats) -> Floats:
 
 def pose_means(e: Experiment, values: Floats) -> Floats:
     """(groups, k) mean of what is finite of each pose."""
-    number, good = int(e.groups.max()) + 1, np.isfinite(values)
-    sums = [np.bincount(e.groups, v, number) for v in np.where(good, values, 0.0).T]
-    counts = [np.bincount(e.groups, g, number) for g in good.T]
-    total, n = np.array(sums).T, np.array(counts).T
-    return np.asarray(np.where(n > 0, total / np.maximum(n, 1), np.nan))
+    finite = pd.DataFrame(np.where(np.isfinite(values), values, np.nan))
+    return np.asarray(finite.groupby(e.groups).mean())

@@ -10,6 +10,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from stiffmap.common.number_text import place_text
 from stiffmap.solve.status import Status
 from stiffmap.ui.plot.style import (
     BLACK,
@@ -22,7 +23,6 @@ from stiffmap.ui.plot.style import (
     line_look,
     panel,
     paper,
-    place_text,
 )
 
 
@@ -39,9 +39,8 @@ def polar_figure(
         for i, pol in enumerate(many):
             ax: Any = figure.add_subplot(1, len(many), i + 1, projection="polar")
             draw_polar(ax, pol, variable, tolerance, factor)
-            ax.set_title(f"{panel(i, len(many))} {position_text(pol)}".strip())
-        machine = many[0].attrs["machine"]
-        headline(figure, f"{machine}: deflection, {unit}, under {force_text(many[0])}")
+            ax.set_title(f"{panel(i, len(many))} {place_text(pol.position.values)}".strip())
+        headline(figure, f"{many[0].attrs['machine']}: deflection, {unit}, under {force_text(many[0])}")
     return figure
 
 
@@ -70,9 +69,8 @@ def ellipse_figure(
         axes = figure.subplots(1, len(many), squeeze=False)[0]
         for i, (ax, pol) in enumerate(zip(axes, many, strict=True)):
             draw_ellipse(ax, pol, plane, tolerance)
-            ax.set_title(f"{panel(i, len(many))} {position_text(pol)}".strip())
-        machine = many[0].attrs["machine"]
-        headline(figure, f"{machine}: displacement under {force_text(many[0])}")
+            ax.set_title(f"{panel(i, len(many))} {place_text(pol.position.values)}".strip())
+        headline(figure, f"{many[0].attrs['machine']}: displacement under {force_text(many[0])}")
     return figure
 
 
@@ -108,10 +106,10 @@ def sweep_figure(
         axes = figure.subplots(1, len(many), squeeze=False)[0]
         for i, (ax, lines) in enumerate(zip(axes, many, strict=True)):
             draw_sweeps(ax, lines, variable, tolerance)
-            ax.set_title(f"{panel(i, len(many))} {position_text(next(iter(lines.values())))}".strip())
+            one = next(iter(lines.values()))
+            ax.set_title(f"{panel(i, len(many))} {place_text(one.position.values)}".strip())
         axes[0].set_ylabel(f"{in_words(variable)}, mm")
-        machine = next(iter(many[0].values())).attrs["machine"]
-        headline(figure, f"{machine}: deflection against force")
+        headline(figure, f"{one.attrs['machine']}: deflection against force")
     return figure
 
 
@@ -141,11 +139,6 @@ def in_words(variable: str) -> str:
     """What a deflection variable means."""
     plane = variable.rpartition("_")[2]
     return f"deflection in the {plane} plane" if plane in ("xy", "xz", "yz") else "deflection"
-
-
-def position_text(ds: xr.Dataset) -> str:
-    """Position in mm."""
-    return place_text(ds.position.values)
 
 
 def force_text(ds: xr.Dataset) -> str:

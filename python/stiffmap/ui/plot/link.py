@@ -90,12 +90,10 @@ def _draw_entries(axes: Any, link: Link, error: Floats) -> None:
     """Entries over sqrt(kii kjj) with 95 % bars; the diagonal's values and units in the labels."""
     C, factor = link.compliance, unit_factor("mm")
     size = np.sqrt(np.abs(np.outer(np.diag(C), np.diag(C))))
-    pairs = [(i, i) for i in range(6)] + [(i, j) for i in range(6) for j in range(i + 1, 6)]
-    labels, y = [], np.arange(len(pairs))[::-1]
-    value = np.array([C[i, j] / size[i, j] for i, j in pairs])
-    bar = np.array([1.96 * error[i, j] / size[i, j] for i, j in pairs])
-    zero = np.array([bool(link.insignificant[i, j]) for i, j in pairs])
-    for (i, j), is_zero in zip(pairs, zero, strict=True):
+    at = tuple(np.hstack([np.diag_indices(6), np.triu_indices(6, 1)]))
+    labels, y = [], np.arange(len(at[0]))[::-1]
+    value, bar, zero = (C / size)[at], (1.96 * error / size)[at], np.asarray(link.insignificant, bool)[at]
+    for i, j, is_zero in zip(*at, zero, strict=True):
         number = f"{C[i, j] * factor[i, j]:.3e} ± {error[i, j] * factor[i, j]:.0e} {unit_name(i, j, 'mm')}"
         labels.append(f"k{i + 1}{j + 1} = {number}" + ("  (zero within the test)" if is_zero else ""))
     for chosen, colour in ((~zero, BLUE), (zero, GREY)):

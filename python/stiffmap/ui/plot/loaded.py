@@ -11,13 +11,13 @@ from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import Floats, real_array
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.number_text import length_text, length_unit, percents, vector_text
+from stiffmap.common.number_text import length_text, length_unit, percents, place_text, vector_text
 from stiffmap.solve.budget import DeflectionBudget, deflection_budget
 from stiffmap.solve.compiled import Status
 from stiffmap.solve.machine import Machine, takes_machine
 from stiffmap.ui.plot.scene import draw_box, draw_force, draw_skeleton, finish, on, scene_axes
 from stiffmap.ui.plot.skeleton import Skeleton, skeleton, standing
-from stiffmap.ui.plot.style import BLUE, ORANGE, headline, leg_colours, paper, place_text
+from stiffmap.ui.plot.style import BLUE, ORANGE, headline, leg_colours, paper
 
 SHOWN = 0.08
 """Of the machine's extent, how far the tool moves in the picture."""
@@ -142,28 +142,33 @@ def draw_loaded(
     finish(ax, view)
 
 
-def budget_rows(budget: DeflectionBudget) -> list[tuple[str, float, float]]:
-    """Element, its part (m) of the tool's deflection along that, and its share, the largest first; what is not worth a
+def budget_rows(budget: DeflectionBudget) -> list[tuple[str, float, str]]:
+    """Element, its share of the tool's deflection along that, and both in words, the largest first; what is not worth a
     row is one at the end."""
+    rows = [(n, s) for n, _, s in budget.ranked()]
+    shown = min(MOST_BARS, sum(abs(s) > FAINT for _, s in rows))
+    if len(rows) > shown + 1:
+        rows[shown:] = [(f"{len(rows) - shown} others", sum(s for _, s in rows[shown:]))]
     size = float(np.linalg.norm(budget.displacement[:3]))
-    ranked = [(n, size * s, s) for n, _, s in budget.ranked()]
-    shown = min(MOST_BARS, sum(abs(s) > FAINT for _, _, s in ranked))
-    if len(ranked) <= shown + 1:
-        return ranked
-    rest = sum(s for _, _, s in ranked[shown:])
-    return [*ranked[:shown], (f"{len(ranked) - shown} others", size * rest, rest)]
+    unit, factor, decimals = length_unit(size)
+    whole = percents([s for _, s in rows])
+    return [
+        (n, s, f"{factor * size * s:z.{decimals}f} {unit}, {p} %")
+        for (n, s), p in zip(rows, whole, strict=True)
+    ]
 
 
 def draw_budget(ax: Any, budget: DeflectionBudget) -> None:
     """A bar per element, in the direction in which the tool moves."""
-    ranked = budget_rows(budget)
-    at = np.arange(len(ranked))
-    unit, factor, decimals = length_unit(float(np.linalg.norm(budget.displacement[:3])))
-    values = [factor * v for _, v, _ in ranked]
+    rows = budget_rows(budget)
+    at = np.arange(len(rows))
+    size = float(np.linalg.norm(budget.displacement[:3]))
+    unit, factor, _ = length_unit(size)
+    values = [factor * size * s for _, s, _ in rows]
     ax.barh(at, values, color=[BLUE if v >= 0 else ORANGE for v in values])
-    for i, (v, share) in enumerate(zip(values, percents([s for _, _, s in ranked]), strict=True)):
-        ax.text(max(v, 0), i, f" {v:z.{decimals}f} {unit}, {share} %", va="center", fontsize=7)
-    ax.set_yticks(at, [n for n, _, _ in ranked])
+    for i, (v, (_, _, text)) in enumerate(zip(values, rows, strict=True)):
+        ax.text(max(v, 0), i, f" {text}", va="center", fontsize=7)
+    ax.set_yticks(at, [n for n, _, _ in rows])
     ax.invert_yaxis()
     ax.set_xlim(min(0.0, 1.15 * min(values, default=0)), 1.45 * max(max(values, default=1), 1e-9))
     ax.axvline(0, color="0.3", lw=0.6)

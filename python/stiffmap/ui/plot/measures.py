@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
+from stiffmap.common.number_text import place_text
 from stiffmap.solve.machine import Machine
 from stiffmap.ui.plot.box import box_figure, workspace_figure
 from stiffmap.ui.plot.modes import mode_figure, mode_frames
@@ -49,8 +50,7 @@ def transmission_figure(machine: Machine, position: ArrayLike, plane: str = "xy"
         _hexagon(axes[2], h.vertices, float(h.inner), float(h.outer))
         axes[2].set_title(f"(c) {plane} plane: {float(h.inner):.3g} … {float(h.outer):.3g}")
         axes[2].set(xlabel=f"$v_{plane[0]}$ per drive speed", ylabel=f"$v_{plane[1]}$ per drive speed")
-        where = ", ".join(f"{MM * x:.0f}" for x in p)
-        headline(figure, f"{machine.name} at ({where}) mm: velocity transmission")
+        headline(figure, f"{machine.name} at {place_text(p, '.0f')}: velocity transmission")
     return figure
 
 
@@ -121,16 +121,16 @@ def moving_modes(table: MeasuresTable) -> Iterator[Figure]:
 
 
 def _slowest(table: MeasuresTable) -> Floats | None:
-    row = next((r for r in table.rows if r.measure.name == "frequency"), None)
-    return row.found.worst_at if row is not None and np.isfinite(row.found.worst) else None
+    rows = [r for r in table.rows if r.measure.name == "frequency" and np.isfinite(r.found.worst)]
+    return rows[0].found.worst_at if rows else None
 
 
 ALONG = ("path_compliance", "path_effort")
 
 
-def path_rows(table: MeasuresTable) -> list[Row]:
-    """Measures along the path that have values there."""
-    return [r for r in table.rows if r.measure.name in ALONG and r.found.values is not None]
+def path_rows(table: MeasuresTable) -> dict[str, Row]:
+    """Measures along the path that have values there, by their names."""
+    return {r.measure.name: r for r in table.rows if r.measure.name in ALONG and r.found.values is not None}
 
 
 def path_measures_figure(tables: Mapping[str, MeasuresTable]) -> Figure:
@@ -138,7 +138,7 @@ def path_measures_figure(tables: Mapping[str, MeasuresTable]) -> Figure:
 
     Raises StiffmapError where nothing was measured along a path.
     """
-    names = [n for n in ALONG if any(r.measure.name == n for t in tables.values() for r in path_rows(t))]
+    names = [n for n in ALONG if any(n in path_rows(t) for t in tables.values())]
     if not names:
         raise StiffmapError("no measure along a toolpath; asked for path_compliance, path_effort")
     one = len(tables) == 1
@@ -146,9 +146,8 @@ def path_measures_figure(tables: Mapping[str, MeasuresTable]) -> Figure:
         panels = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
         for axes, name in zip(panels, names, strict=True):
             for i, (machine, table) in enumerate(tables.items()):
-                for row in path_rows(table):
-                    if row.measure.name == name:
-                        _lines(axes, row, machine, i, one)
+                if (row := path_rows(table).get(name)) is not None:
+                    _lines(axes, row, machine, i, one)
             axes.set_ylim(bottom=0)
         panels[-1].set_xlabel("way along the path, mm")
         told = f"{next(iter(tables))}: along" if one else "Along"
@@ -198,16 +197,20 @@ def requirement_figure(table: MeasuresTable) -> Figure:
     rows = [r for r in table.rows if r.bound is not None]
     with paper(6.4, 0.6 + 0.42 * len(rows), most=0) as figure:
         axes = figure.add_subplot()
-        for i, r in enumerate(rows):
-            share = _share(r)
-            good = r.verdict == "pass"
-            axes.barh(i, share if np.isfinite(share) else 0.0, color=BLUE if good else VERMILLION, height=0.6)
+        shares = np.nan_to_num([_share(r) for r in rows], posinf=0.0, neginf=0.0)
+        axes.barh(
+            range(len(rows)),
+            shares,
+            color=[BLUE if r.verdict == "pass" else VERMILLION for r in rows],
+            height=0.6,
+        )
+        for i, (r, share) in enumerate(zip(rows, shares, strict=True)):
             text = f"{r.measure.factor * r.found.worst:.4g} {r.measure.shown} – {r.verdict}"
-            axes.text(max(share if np.isfinite(share) else 0.0, 1.0) * 1.02, i, text, va="center")
+            axes.text(max(share, 1.0) * 1.02, i, text, va="center")
         axes.axvline(1.0, color="black", linewidth=1)
         axes.set_yticks(range(len(rows)), [_bound_text(r) for r in rows])
         axes.invert_yaxis()
-        axes.set_xlim(0, 1.45 * max([1.0, *(s for s in map(_share, rows) if np.isfinite(s))]))
+        axes.set_xlim(0, 1.45 * max([1.0, *shares]))
         axes.set_xlabel("worst value over the bound (line: the bound)")
         axes.set_title(f"{table.machine.name} against {table.requirements.name}")
     return figure

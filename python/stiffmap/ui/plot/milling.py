@@ -28,7 +28,7 @@ def outline_figure(found: Milled) -> Figure:
     Points next to sharp outside corners, which have no wall, are left out; the magnified lines end at each corner, all lines between cuts that do not touch.
     """
     job, ds = found.job, found.dataset
-    off, position, has_wall = _back(job.off, found), job.points.position, job.engaged.wall
+    off, position, has_wall = job.off @ job.place.rotation, job.points.position, job.engaged.wall
     apart = np.abs(np.diff(position, axis=0)).max(axis=1) > 1e-9
     turned = np.abs(np.diff(off, axis=0)).max(axis=1) > 1e-6
     corner = np.flatnonzero((np.diff(job.points.way) < 1e-9) & (apart | turned))
@@ -72,10 +72,6 @@ def outline_figure(found: Milled) -> Figure:
         ax.autoscale_view()
         ax.set(xlabel="x of the part, mm", ylabel="y of the part, mm")
     return figure
-
-
-def _back(vectors: Floats, found: Milled) -> Floats:
-    return np.asarray(vectors @ found.job.place.rotation)
 
 
 def error_figure(ds: xr.Dataset) -> Figure:

@@ -10,9 +10,9 @@ from matplotlib.figure import Figure
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
+from stiffmap.common.number_text import place_text
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.status import Status
-from stiffmap.ui.plot.forces import position_text
 from stiffmap.ui.plot.scene import draw_skeleton, finish, marks, on, scene_axes
 from stiffmap.ui.plot.skeleton import Skeleton, skeleton
 from stiffmap.ui.plot.style import BLACK, BLUE, GREEN, MM, VERMILLION, leg_colours, paper
@@ -38,7 +38,7 @@ def path_figure(path: xr.Dataset) -> Figure:
                         color=BLACK, ms=6, ls="", label=f"{kind} point")  # fmt: skip
         ax.axhline(0, color="0.7", lw=0.6, zorder=0)
         ax.set(xlabel="displacement along the force, mm", ylabel="force, N")
-        ax.set_title(f"{path.attrs['machine']}, {position_text(path)}")
+        ax.set_title(f"{path.attrs['machine']}, {place_text(path.position.values)}")
     return figure
 
 

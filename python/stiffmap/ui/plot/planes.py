@@ -56,10 +56,9 @@ class Planes:
 
 def on_grid(ds: xr.Dataset) -> xr.Dataset:
     """The map with x, y and z as dimensions, ascending: `ds.sel(z=0)` lacks one."""
-    missing = [a for a in AXES if a not in ds.coords and a not in ds.dims]
-    if missing:
-        raise StiffmapError(f"the map has no coordinate {missing[0]!r}; expected a Dataset of error_map")
     for a in AXES:
+        if a not in ds.coords and a not in ds.dims:
+            raise StiffmapError(f"the map has no coordinate {a!r}; expected a Dataset of error_map")
         if a not in ds.dims:
             ds = ds.expand_dims(a)
     return ds.sortby(list(AXES))

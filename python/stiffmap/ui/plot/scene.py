@@ -124,15 +124,12 @@ def finish(ax: Any, view: tuple[float, float] | None = None) -> None:
         ax.set_axisbelow(True)
         return
     ax.set(zlabel="z, mm", aspect="equal")
-    for limits, to in (
-        (ax.get_xlim(), ax.set_xlim),
-        (ax.get_ylim(), ax.set_ylim),
-        (ax.get_zlim(), ax.set_zlim),
-    ):
-        widest = max(float(np.ptp(other())) for other in (ax.get_xlim, ax.get_ylim, ax.get_zlim))
-        if float(np.ptp(limits)) < THINNEST * widest:  # room for the numbers of the axis
-            to(np.mean(limits) - THINNEST * widest / 2, np.mean(limits) + THINNEST * widest / 2)
-    spans = [float(np.ptp(limits)) for limits in (ax.get_xlim(), ax.get_ylim(), ax.get_zlim())]
+    limits = {a: np.array(getattr(ax, f"get_{a}lim")()) for a in "xyz"}
+    least = THINNEST * max(float(np.ptp(v)) for v in limits.values())
+    for axis, v in limits.items():
+        if np.ptp(v) < least:  # room for the numbers of the axis
+            getattr(ax, f"set_{axis}lim")(v.mean() - least / 2, v.mean() + least / 2)
+    spans = [max(float(np.ptp(v)), least) for v in limits.values()]
     ax.set_box_aspect(spans, zoom=ZOOM)
     ax.view_init(*(view or (22.0, 35.0)))
     ax.locator_params(nbins=5)  # numbers of slanting axes would run into each other

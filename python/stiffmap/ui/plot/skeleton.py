@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,12 +10,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from stiffmap.common.broadcasting import Floats, real_array
 from stiffmap.common.errors import StiffmapError
+from stiffmap.common.number_text import place_text
 from stiffmap.model.description import Joint
 from stiffmap.model.description.tree import joints
 from stiffmap.solve.compiled import CompiledMachine, Role, Status
 from stiffmap.solve.kinematics import inverse_kinematics
 from stiffmap.solve.machine import Machine
-from stiffmap.ui.plot.style import place_text
 
 COINCIDENT = 1e-9
 FLAT = 1e-6  # m
@@ -160,14 +161,17 @@ def around(points: Floats) -> NDArray[np.intp]:
     return np.argsort(np.arctan2(away @ axes[1], away @ axes[0]))
 
 
+def to_base(core: CompiledMachine, node: int) -> Iterator[int]:
+    """The node itself and those below it, towards the base."""
+    while node >= 0:
+        yield node
+        node = core.nodes[node][0]
+
+
 def _moves(core: CompiledMachine, node: int) -> bool:
     """Whether a joint lies below a node: a prismatic one above it is a strut, not a guide."""
-    while node >= 0:
-        parent, c = core.nodes[node]
-        if c >= 0 and core.names.roles[c] in (Role.ACTUATOR, Role.PASSIVE):
-            return True
-        node = parent
-    return False
+    coordinates = [core.nodes[i][1] for i in to_base(core, node)]
+    return any(c >= 0 and core.names.roles[c] in (Role.ACTUATOR, Role.PASSIVE) for c in coordinates)
 
 
 def owners(core: CompiledMachine) -> list[str]:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from io import BytesIO
 from pathlib import Path
 from textwrap import fill
@@ -45,11 +45,9 @@ SETTINGS: dict[str, Any] = {
 }
 
 
-@contextmanager
-def paper_style() -> Iterator[None]:
+def paper_style() -> AbstractContextManager[None]:
     """Settings of a picture while it is drawn; the caller's own settings come back."""
-    with matplotlib.rc_context(dict[Any, Any](SETTINGS)):
-        yield
+    return matplotlib.rc_context(dict[Any, Any](SETTINGS))
 
 
 class Picture(Figure):
@@ -113,11 +111,6 @@ def paper(width: float, height: float, title: str = "", *, most: int = 7) -> Ite
 def length_unit(largest: float) -> tuple[str, float]:
     """Unit and factor of an axis for deflections up to this size (m): no 0.0xx mm."""
     return number_text.length_unit(largest, 0.0995e-3)[:2]
-
-
-def place_text(position: Iterable[float]) -> str:
-    """A position (3,) m in mm."""
-    return f"({', '.join(f'{MM * v:g}' for v in position)}) mm"
 
 
 def wrench_text(wrench: Floats) -> str:

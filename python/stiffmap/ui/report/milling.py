@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from stiffmap.common.number_text import place_text
 from stiffmap.common.outputs import make_folder, write_rows, write_text
 from stiffmap.machining.milling.choices import Choices, part_lies
 from stiffmap.machining.milling.dataset import sizes, verdict
@@ -193,7 +194,7 @@ def _sheet(found: Milled) -> Sheet:
     gain = abs(gain) if abs(gain) < 1e-9 else gain
     lines = [
         f"{job.path.name} on {job.machine.name}: {s['length_mm']:.0f} mm of cut, {s['time_s']:.1f} s, part at "
-        f"({', '.join(f'{v:.1f}' for v in s['at_mm'])}) mm, turned by {s['turn_deg']:.1f} deg.",
+        f"{place_text(job.place.at, '.1f')}, turned by {s['turn_deg']:.1f} deg.",
         f"Process {p.name}: {p.cut.side} cut, {1e3 * p.cut.axial:g} mm deep. Along the path as simulated: feed "
         f"{_range(60 * job.feed)} m/min, force {_range(s['force_N'].values())} N.",
         f"At the process file's own feed ({60 * p.feed:.3g} m/min), speed and cut the mean force would be {mean} N along the feed, "

@@ -11,8 +11,8 @@ import numpy as np
 from stiffmap.common.errors import StiffmapError
 from stiffmap.ui.plot.modes import swung
 from stiffmap.ui.plot.skeleton import skeleton
-from stiffmap.ui.view.dynamics import modes_at
 from stiffmap.ui.view.moment import Moment
+from stiffmap.ui.view.plane import modes_at
 from stiffmap.ui.view.scene import GHOST
 from stiffmap.workspace.performance.motion.inertia import NaturalFrequencies
 

@@ -9,10 +9,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.ui.view.legend import hint, legend
 from stiffmap.ui.view.moment import Moment
 from stiffmap.ui.view.numbers import Numbers, write
 from stiffmap.ui.view.outputs import Outputs
+from stiffmap.ui.view.panels import hint, legend
 from stiffmap.ui.view.place import first_plane, moves, rotation_of, turns
 from stiffmap.ui.view.quantities import QUANTITIES
 from stiffmap.ui.view.state import PLANES

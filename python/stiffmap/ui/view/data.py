@@ -143,18 +143,17 @@ class Data:
             self._said["Experiment"] = f"{escape(e.name)} reads no displacement of the tool along an axis"
             return
         factor = round_factor(DRAWN * scene.extent, float(np.linalg.norm(before[1], axis=1).max()))
-        sets = [("before", BEFORE, "red", "as opened", before)]
-        sets += [] if np.array_equal(now, before) else [("now", NOW, "blue", "as changed here", now)]
-        sets += (
-            [] if self._named is None else [("diagnosed", NAMED, "pink", "with the diagnosis", self._named)]
-        )
-        for name in ("before", "now", "diagnosed"):
-            scene.lines(f"/rows/{name}", np.zeros((0, 2, 3)), BEFORE, 1.0)
         words = []
-        for name, colour, said, which, (at, arrows) in sets:
+        for name, colour, said, which, found in (
+            ("before", BEFORE, "red", "as opened", before),
+            ("now", NOW, "blue", "as changed here", None if np.array_equal(now, before) else now),
+            ("diagnosed", NAMED, "pink", "with the diagnosis", self._named),
+        ):
+            at, arrows = found or (np.zeros((0, 3)),) * 2
             pieces = np.stack([at, at + factor * arrows], axis=1)
             scene.lines(f"/rows/{name}", pieces, colour, 0.004 * scene.extent)
-            words.append(f"{said} {which} {1e6 * rms(arrows):.3g} µm rms")
+            if found is not None:
+                words.append(f"{said} {which} {1e6 * rms(arrows):.3g} µm rms")
         text = f"{len(places)} rows, residuals (measured less predicted) × {factor:g}: {', '.join(words)}"
         self._said["Experiment"] = f"{escape(e.name)}, {text}"
         scene.points("/rows/places", places, rgb("#444444"), 0.005)
@@ -216,7 +215,7 @@ def thinned(path: Floats) -> Floats:
     return np.asarray(p[:: max(1, -(-len(p) // MOST_POINTS))])
 
 
-def residual_arrows(machine: Machine, experiment: Experiment) -> tuple[Floats, Floats]:
+def residual_arrows(machine: Machine, experiment: Experiment) -> Arrows:
     """Places (n, 3) m of the rows that read a displacement along an axis, and their residuals (n, 3) m; 0 where an
     axis is not read."""
     r = residual(machine, experiment)
@@ -239,6 +238,5 @@ def path_errors(moment: Moment, path: Floats, size: float) -> tuple[Floats, Floa
     good = np.isfinite(command).all(axis=1)
     left = np.full_like(path, np.nan)
     left[good] = off(command[good]) + command[good] - path[good]
-    most = float(np.nanmax(np.linalg.norm(cut, axis=1), initial=0.0))
-    factor = round_factor(size, most)
+    factor = round_factor(size, largest(cut))
     return path, path + factor * cut, path + factor * left, factor

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections.abc import Hashable, Mapping
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
@@ -14,12 +14,14 @@ from scipy.spatial.transform import Rotation, Slerp
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.kept import Kept
+from stiffmap.common.number_text import place_text
+from stiffmap.model.addresses import listed
+from stiffmap.model.description import AppliedEffect, MachineDescription
+from stiffmap.model.effects import apply_records
 from stiffmap.solve.closing import Kinematics
 from stiffmap.solve.compiled import Role, Status
 from stiffmap.solve.kinematics import inverse_kinematics
 from stiffmap.solve.machine import Machine, load_machine
-from stiffmap.ui.plot.style import place_text
-from stiffmap.ui.view.changes import changed
 from stiffmap.ui.view.moment import Moment
 from stiffmap.ui.view.place import first_plane, orientation, rotation_of
 from stiffmap.ui.view.state import History, State, checked, with_change
@@ -195,3 +197,42 @@ def why_not(machine: Machine, k: Kinematics) -> list[str]:
             shown = f"{1e3 * limit:.4g} mm" if sliding else f"{np.rad2deg(limit):.4g} deg"
             out.append(f"{name} is at its limit, {shown}")
     return out
+
+
+EFFECTS = "effects"
+"""How the address of a parameter of an effect begins, ``effects/NUMBER/parameter``; all others are those of `Machine.numbers`."""
+
+
+def addresses(description: MachineDescription) -> dict[str, float]:
+    """Every address that may be changed, with its value."""
+    own = {n.address: n.value for n in listed(description.declared or description)}
+    return own | _of_effects(description.effects)
+
+
+def _of_effects(records: tuple[AppliedEffect, ...]) -> dict[str, float]:
+    return {f"{EFFECTS}/{i}/{name}": value for i, r in enumerate(records) for name, value in r.parameters}
+
+
+def changed(machine: Machine, changes: Mapping[str, float]) -> Machine:
+    """The machine with numbers changed; StiffmapError for an unknown address or an impossible machine."""
+    own = {a: v for a, v in changes.items() if a.partition("/")[0] != EFFECTS}
+    of_effects = {a: v for a, v in changes.items() if a not in own}
+    if own:
+        machine = machine.with_numbers(own)
+    return _with_effects(machine, of_effects) if of_effects else machine
+
+
+def _with_effects(machine: Machine, changes: Mapping[str, float]) -> Machine:
+    d = machine.description
+    values = _of_effects(d.effects)
+    for address in changes:
+        if address not in values:
+            known = ", ".join(values) or "no address of effects: there are none"
+            raise StiffmapError(f"{address}: expected {known}")
+    values |= changes
+    records = tuple(
+        replace(r, parameters=tuple((n, values[f"{EFFECTS}/{i}/{n}"]) for n, _ in r.parameters))
+        for i, r in enumerate(d.effects)
+    )
+    bare = replace(d.declared or d, effects=(), declared=None)
+    return Machine(apply_records(bare, records), like=machine)

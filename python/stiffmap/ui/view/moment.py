@@ -21,6 +21,7 @@ from stiffmap.ui.view.place import box_of, moves, orientation, solved
 from stiffmap.ui.view.plane import FINE, NO_LINES, PlaneMap, plane_map, values_at
 from stiffmap.ui.view.quantities import QUANTITIES
 from stiffmap.ui.view.state import State
+from stiffmap.workspace.performance.poses import box_nodes
 
 CLOUD = 15
 """Poses of the cloud along each commanded axis."""
@@ -55,12 +56,8 @@ class Moment:
         quantity, at = QUANTITIES[self.state.quantity], self.state.position
         if quantity.of is None:
             return np.zeros((0, 3)), np.zeros(0)
-        low, high = box_of(self.machine)
-        axes = [
-            np.linspace(low[i], high[i], CLOUD) if free else np.array([at[i]])
-            for i, free in enumerate(moves(self.machine))
-        ]
-        points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+        low, high = (np.where(moves(self.machine), end, at) for end in box_of(self.machine))
+        points = box_nodes(low, high, CLOUD)
         return points, values_at(self.machine, self.state, points)[0] * quantity.factor
 
     def rest(self) -> Skeleton:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from stiffmap.model.addresses import listed
-from stiffmap.ui.view.changes import addresses
+from stiffmap.ui.view.model import addresses
 from stiffmap.ui.view.moment import Moment
 from stiffmap.ui.view.state import State
 

@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.number_text import length_text, vector_text
+from stiffmap.common.number_text import length_text, place_text, vector_text
 from stiffmap.common.outputs import write_text
 from stiffmap.ui.plot import save
 from stiffmap.ui.plot.loaded import draw_budget
@@ -25,13 +25,13 @@ from stiffmap.ui.plot.scene import draw_box, draw_force, draw_skeleton, finish
 from stiffmap.ui.plot.style import COLOURS, MM, ORANGE, TOLERANCE, headline, leg_colours, paper
 from stiffmap.ui.view.colours import plane_image
 from stiffmap.ui.view.data import Data
-from stiffmap.ui.view.legend import legend
 from stiffmap.ui.view.moment import Moment
 from stiffmap.ui.view.numbers import write
 from stiffmap.ui.view.panels import (
     colour_bar,
     compliance_panel,
     efforts_panel,
+    legend,
     shares_panel,
     status_line,
 )
@@ -97,32 +97,23 @@ def _picture(moment: Moment, kind: str) -> bytes:
 def command_line(machine: str, moment: Moment) -> str:
     """For a shell; files and units as there: mm, deg, µm as mm."""
     s = moment.state
-    words = [
-        "stiffmap",
-        "view",
-        machine,
-        f"--at={_numbers(1e3 * np.array(s.position))}",
-        f"--force={_numbers(s.force)}",
-    ]
     default = State(s.position)
-    if s.rotation is not None:
-        words.append(f"--rotation={_numbers(np.rad2deg(s.rotation))}")
-    if any(s.moment):
-        words.append(f"--moment={_numbers(s.moment)}")
-    if s.gravity is not None:
-        words.append(f"--gravity={_numbers(s.gravity)}")
-    words.append(f"--plane={_numbers(s.normal) if s.plane == 'free' else s.plane}")
-    if s.quantity != default.quantity:
-        words.append(f"--quantity={s.quantity}")
-    if s.tolerance != default.tolerance:
-        words.append(f"--tolerance={1e3 * s.tolerance:.9g}")
-    if s.frequency:
-        words.append(f"--frequency={s.frequency:.9g}")
-    if s.magnification is not None:
-        words.append(f"--magnify={s.magnification:.9g}")
+    options = {
+        "at": _numbers(1e3 * np.array(s.position)),
+        "force": _numbers(s.force),
+        "rotation": s.rotation and _numbers(np.rad2deg(s.rotation)),
+        "moment": any(s.moment) and _numbers(s.moment),
+        "gravity": s.gravity and _numbers(s.gravity),
+        "plane": _numbers(s.normal) if s.plane == "free" else s.plane,
+        "quantity": s.quantity != default.quantity and s.quantity,
+        "tolerance": s.tolerance != default.tolerance and f"{1e3 * s.tolerance:.9g}",
+        "frequency": s.frequency and f"{s.frequency:.9g}",
+        "magnify": s.magnification is not None and f"{s.magnification:.9g}",
+    }
+    words = [f"--{name}={text}" for name, text in options.items() if text]
     words += [f"--set={a}={v!r}" for a, v in s.changes]
     words += [f"--start={_numbers(s.start)}"] if s.start is not None else []
-    return shlex.join(words)
+    return shlex.join(["stiffmap", "view", machine, *words])
 
 
 def python_lines(machine: str, moment: Moment) -> str:
@@ -210,9 +201,8 @@ def view_figure(moment: Moment) -> Figure:
             bar = ScalarMappable(Normalize(factor * limits[0], factor * limits[1]), COLOURS)
             figure.colorbar(bar, ax=ax, label=f"{q.title}, {unit}", shrink=0.6, location="bottom", pad=0.08)
         _shares(figure.add_subplot(1, 2, 2), moment)
-        at = ", ".join(f"{MM * v:.4g}" for v in s.position)
         moved = length_text(float(np.linalg.norm(solution.displacement[:3])))
-        headline(figure, f"{moment.machine.name} at ({at}) mm under {vector_text(s.force, 4)} N: the tool moves {moved} "
+        headline(figure, f"{moment.machine.name} at {place_text(s.position, '.4g')} under {vector_text(s.force, 4)} N: the tool moves {moved} "
                          f"(orange: × {moment.magnification(rest, solution):g})")  # fmt: skip
     return figure
 

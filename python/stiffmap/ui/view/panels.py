@@ -7,19 +7,23 @@ from html import escape
 
 import numpy as np
 
-from stiffmap.common.number_text import length_text, length_unit, percents
+from stiffmap.common.broadcasting import Floats
+from stiffmap.common.number_text import length_text, length_unit, place_text
 from stiffmap.solve.advice import RIGID
 from stiffmap.solve.budget import DeflectionBudget
 from stiffmap.solve.solution import Solution
 from stiffmap.solve.status import Status
 from stiffmap.ui.plot.loaded import budget_rows
 from stiffmap.ui.plot.planes import levels
-from stiffmap.ui.plot.style import BLUE, ORANGE, TOLERANCE
+from stiffmap.ui.plot.scene import FORCE
+from stiffmap.ui.plot.skeleton import Skeleton
+from stiffmap.ui.plot.style import BLACK, BLUE, ORANGE, TOLERANCE, leg_colours
 from stiffmap.ui.view.colours import STATUS_COLOURS, table
 from stiffmap.ui.view.moment import Moment
+from stiffmap.ui.view.place import turns
 from stiffmap.ui.view.plane import PlaneMap
 from stiffmap.ui.view.quantities import QUANTITIES, tolerance_level
-from stiffmap.ui.view.surfaces import principal
+from stiffmap.ui.view.scene import DARK, GHOST, GREY
 from stiffmap.workspace.performance.motion.scaling import drive_table
 
 RED = "#B00020"
@@ -33,8 +37,6 @@ DUST = 1e-12
 
 def status_line(moment: Moment, solution: Solution, message: str, error: str) -> str:
     """Where the tool is, how far it moves, what is wrong; a live region for screen readers."""
-    s = moment.state
-    at = ", ".join(f"{1e3 * v:.1f}" for v in s.position)
     size = float(np.linalg.norm(solution.displacement[:3]))
     if bool(solution.ok) and max(size, np.abs(solution.compliance[:3, :3]).max()) < DUST:
         said = RIGID
@@ -44,7 +46,7 @@ def status_line(moment: Moment, solution: Solution, message: str, error: str) ->
         said = f"the tool moves <b>{length_text(size)}</b> ({parts}) {unit}"
     else:
         said = f"<b>{escape(Status(int(solution.status)).name.lower())}</b>: no equilibrium"
-    lines = [f"{escape(moment.machine.name)} at ({at}) mm: {said}"]
+    lines = [f"{escape(moment.machine.name)} at {place_text(moment.state.position, '.1f')}: {said}"]
     lines += [f'<span style="color:{ORANGE}">{escape(message)}</span>'] if message else []
     for line in error.splitlines():
         lines.append(f'<span role="alert" style="color:{RED}">{escape(line)}</span>')
@@ -109,19 +111,17 @@ def bars(title: str, rows: Sequence[Row]) -> str:
 def shares_panel(budget: DeflectionBudget, lit: str = "") -> str:
     """Where the deflection comes from."""
     found = budget_rows(budget)
-    biggest = max((abs(s) for _, _, s in found), default=1.0) or 1.0
-    size = float(np.linalg.norm(budget.displacement[:3]))
-    unit, factor, decimals = length_unit(size)
+    biggest = max((abs(s) for _, s, _ in found), default=1.0) or 1.0
     rows: list[Row] = [
-        (
-            f"▶ {n}" if n == lit else n,
-            s / biggest,
-            BLUE if s >= 0 else ORANGE,
-            f"{factor * part:z.{decimals}f} {unit}, {share} %",
-        )
-        for (n, part, s), share in zip(found, percents([s for _, _, s in found]), strict=True)
+        (f"▶ {n}" if n == lit else n, s / biggest, BLUE if s >= 0 else ORANGE, text) for n, s, text in found
     ]
-    return bars(f"where the {length_text(size)} come from", rows)
+    return bars(f"where the {length_text(float(np.linalg.norm(budget.displacement[:3])))} come from", rows)
+
+
+def principal(compliance: Floats) -> tuple[Floats, Floats]:
+    """Principal compliances (3,) m/N, the largest first, and their directions (3, 3) as rows."""
+    values, vectors = np.linalg.eigh((compliance + compliance.T) / 2)
+    return np.asarray(values[::-1]), np.asarray(vectors.T[::-1])
 
 
 def compliance_panel(solution: Solution) -> str:
@@ -174,7 +174,42 @@ def probe_text(moment: Moment, point: Sequence[float]) -> str:
     """What the chosen quantity is at a point of the plane, solved there."""
     value, status = moment.at(point)
     q = QUANTITIES[moment.state.quantity]
-    at = ", ".join(f"{1e3 * v:.1f}" for v in point)
     unit, factor = q.shown(value * q.factor)
     said = f"{value * q.factor * factor:.5g} {unit}".strip() if np.isfinite(value) else status.name.lower()
-    return f"probe at ({at}) mm: {said}"
+    return f"probe at {place_text(point, '.1f')}: {said}"
+
+
+DOT = "width:.7em;height:.7em;border-radius:50%;border:1px solid #888"
+PADDED = "padding:.3em .6em;font-size:85%"
+SQUARE, LINE = "width:.7em;height:.7em", "width:1.4em;height:.25em"
+
+
+def legend(moment: Moment, rest: Skeleton, factor: float) -> str:
+    """Rows of what is drawn of this machine; `factor`: the magnification of the deflected one."""
+    state = moment.state
+    size = float(np.linalg.norm(state.force))
+    rows = [(LINE, c, f"leg {leg}") for leg, c in leg_colours(moment.machine.legs).items() if leg]
+    rows += [(LINE, GREY, "travel of the drives")] if len(rest.guides) else []
+    rows += [(SQUARE, BLACK, "drive")] if len(rest.actuators) else []
+    rows += [(DOT, "#FFFFFF", "passive joint")] if len(rest.passive) else []
+    rows += [(SQUARE, DARK, "platform")] if len(rest.plate) else []
+    rows += [("width:.6em;height:.6em;border:1px solid #888", "none", "workspace box")]
+    rows += [(LINE, GHOST, f"under the load, × {factor:g}")] if factor else []
+    rows += [(LINE, FORCE, f"force, {size:.4g} N")] if size else []
+    if tolerance_level(state.quantity, state.tolerance) is not None:
+        rows.append((LINE, TOLERANCE, f"tolerance, {length_text(state.tolerance)}"))
+    said = "".join(
+        f'<span style="display:inline-block;margin-right:1em"><span style="display:inline-block;vertical-align:middle;{shape};'
+        f'background:{colour}"></span> {escape(text)}</span> '
+        for shape, colour, text in rows
+    )
+    return f'<div style="{PADDED}">{said}</div>'
+
+
+def hint(moment: Moment) -> str:
+    """What can be dragged."""
+    turned = "; its rings turn it" if any(turns(moment.machine)) else ""
+    return (
+        f'<div style="{PADDED}"><b>Drag</b> the tool by its arrows and squares{turned}. Drag the force by the arrows at its tail. '
+        "Click the plane to place the probe, and drag its red dot.</div>"
+    )

@@ -14,14 +14,19 @@ from stiffmap.solve.compiled import Status
 from stiffmap.solve.machine import Machine
 from stiffmap.ui.plot.planes import levels
 from stiffmap.ui.plot.scene import box_corners
-from stiffmap.ui.view.dynamics import dynamic_stiffness, lowest_frequency
-from stiffmap.ui.view.place import drawn_box, solved
+from stiffmap.ui.view.place import drawn_box, orientation, solved
 from stiffmap.ui.view.quantities import QUANTITIES, Mask, tolerance_level
 from stiffmap.ui.view.state import State
+from stiffmap.workspace.performance.motion.inertia import NaturalFrequencies, natural_frequencies
+from stiffmap.workspace.vibration import frequency_response
 
 FINE, COARSE, DEAR = 101, 51, 15
 """Poses along each edge: at rest, while something is dragged, and of quantities that need modes."""
 NO_LINES = np.zeros((0, 2, 3))
+MODES = 40
+"""As parallel machines have dozens of modes of their bars below those that move the tool."""
+DAMPING = 0.02
+"""Modal damping ratio of every mode."""
 INSIDE = 1e-9
 """Of the box, how far outside it a pose may lie by round-off."""
 
@@ -178,3 +183,31 @@ def plane_map(machine: Machine, state: State, count: int = FINE) -> PlaneMap:
     values, status = values_at(machine, state, p)
     values = np.where(outside, np.nan, values)
     return PlaneMap(frame, state.quantity, values, status, outside, time.perf_counter() - begun)
+
+
+def modes_at(
+    machine: Machine, state: State, position: Floats, modes: int, threads: int | None = None
+) -> NaturalFrequencies:
+    """The lowest modes at (..., 3) m under the load of a state; StiffmapError where bodies lack masses."""
+    return natural_frequencies(
+        machine, position, state.wrench, rotation=orientation(state), gravity=state.gravity, modes=modes,
+        threads=threads,
+    )  # fmt: skip
+
+
+def lowest_frequency(machine: Machine, state: State, position: Floats) -> tuple[Floats, Floats]:
+    """(...) Hz and statuses."""
+    w = modes_at(machine, state, position, 1)
+    return np.asarray(w.frequency[..., 0]), np.asarray(w.status, dtype=float)
+
+
+def dynamic_stiffness(machine: Machine, state: State, position: Floats) -> tuple[Floats, Floats]:
+    """(...) N/m of the softest direction at the state's frequency, and statuses; modes beyond the lowest count as statics."""
+    found = frequency_response(
+        machine, position, [state.frequency], state.wrench, rotation=orientation(state), gravity=state.gravity,
+        damping=DAMPING, modes=MODES, symmetrise=True,
+    )  # fmt: skip
+    c = found.values[..., 0, :3, :3]
+    good = np.isfinite(c).all(axis=(-2, -1))
+    softest = np.linalg.norm(np.where(good[..., None, None], c, np.eye(3)), 2, axis=(-2, -1))
+    return np.where(good, 1.0 / softest, np.nan), np.asarray(found.status, dtype=float)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from stiffmap.common.broadcasting import Floats
@@ -18,7 +20,6 @@ from stiffmap.ui.view.meshes import Meshes
 from stiffmap.ui.view.moment import Moment
 from stiffmap.ui.view.place import box_of, moves, rotation_of, turns
 from stiffmap.ui.view.plane import NO_LINES, PlaneMap
-from stiffmap.ui.view.surfaces import ellipsoid, polar_surface, sphere
 
 SURFACE = 0.12
 """Of the extent, size of the surface at the tool."""
@@ -44,6 +45,8 @@ class Scene:
         self.api = api
         self.rest = rest = moment.rest()
         self.extent = rest.extent
+        self.arrow_length = ARROW * self.extent
+        """Of a force that is not being dragged, m."""
         self._lines: dict[str, Any] = {}
         self._image: Any = None
         self._frame_size = (0.0, 0.0)
@@ -58,7 +61,10 @@ class Scene:
         self._drives = self.points("/joints/drives", rest.actuators, rgb(BLACK), 0.014, "square")
         self._meshes = None if moment.meshes is None else Meshes(api, moment.machine, moment.meshes)
         self.remark = "" if self._meshes is None else self._meshes.remark
-        self._arrow: Any = None
+        self._arrow = api.add_arrows(
+            "/force", np.zeros((1, 2, 3), np.float32), rgb(FORCE), shaft_radius=0.005 * self.extent,
+            head_radius=0.013 * self.extent, head_length=0.035 * self.extent, visible=False,
+        )  # fmt: skip
         self._plate: Any = None
         self._surface: Any = None
         self.lines("/box", box_edges(*box_of(moment.machine)), GREY, 1.5, "screen")
@@ -135,11 +141,6 @@ class Scene:
         self.gizmo.position = moment.state.position
         self.gizmo.wxyz = quaternion(rotation_of(moment.machine, moment.state))
 
-    @property
-    def arrow_length(self) -> float:
-        """Of a force that is not being dragged, m."""
-        return ARROW * self.extent
-
     def force(self, moment: Moment, pulled: float = 0.0) -> None:
         """The arrow that ends at the tool; one that is dragged from a size `pulled` (N) is as long as it is pulled."""
         f = np.array(moment.state.force)
@@ -148,18 +149,7 @@ class Scene:
         tail = tip - (self.arrow_length / (pulled or size) * f if size else 0.0)
         if not pulled:
             self.force_handle.position = tuple(tail if size else tip + (0.0, 0.0, self.arrow_length))
-        points = np.array([[tail, tip]], np.float32)
-        if self._arrow is None:
-            e = self.extent
-            self._arrow = self.api.add_arrows(
-                "/force",
-                points,
-                rgb(FORCE),
-                shaft_radius=0.005 * e,
-                head_radius=0.013 * e,
-                head_length=0.035 * e,
-            )
-        self._arrow.points = points
+        self._arrow.points = np.array([[tail, tip]], np.float32)
         self._arrow.visible = size > 0
 
     def plane(self, found: PlaneMap, limits: tuple[float, float], tolerance: float, lines: bool) -> None:
@@ -232,3 +222,39 @@ def look_at_machine(server: Any, rest: Skeleton) -> None:
     server.initial_camera.look_at = tuple(middle)
     server.initial_camera.position = tuple(middle + 0.8 * rest.extent * direction / np.linalg.norm(direction))
     server.initial_camera.up = (0.0, 0.0, 1.0)
+
+
+RINGS, SECTORS = 24, 48
+"""Of the sphere of directions in which the tool is pushed."""
+
+
+@cache
+def sphere() -> tuple[Floats, NDArray[np.uint32]]:
+    """Vertices (n, 3) and triangles (m, 3) of a unit sphere."""
+    a = np.linspace(0, np.pi, RINGS + 1)[:, None]
+    b = np.linspace(0, 2 * np.pi, SECTORS, endpoint=False)[None]
+    points = np.stack([np.sin(a) * np.cos(b), np.sin(a) * np.sin(b), np.cos(a) + 0 * b], axis=-1)
+    i, j = np.meshgrid(np.arange(RINGS), np.arange(SECTORS), indexing="ij")
+    right = (j + 1) % SECTORS
+    p, q, r, s = (u * SECTORS + v for u, v in ((i, j), (i + 1, j), (i + 1, right), (i, right)))
+    faces = np.concatenate([np.stack(t, -1).reshape(-1, 3) for t in ((p, q, r), (p, r, s))])
+    return points.reshape(-1, 3), faces.astype(np.uint32)
+
+
+def polar_surface(compliance: Floats, size: float) -> tuple[Floats, float]:
+    """Vertices relative to the tool, and the deflection (m/N) that the longest stands for.
+
+    In each direction u of a force the distance is the deflection |C u|; the longest is drawn `size` (m).
+    """
+    u, _ = sphere()
+    far = np.linalg.norm(u @ compliance.T, axis=1)
+    most = float(far.max())
+    return np.asarray(u * far[:, None] * (size / most if most > 0 else 0.0)), most
+
+
+def ellipsoid(compliance: Floats, size: float) -> tuple[Floats, float]:
+    """The same of the displacements C u themselves: an ellipsoid."""
+    u, _ = sphere()
+    d = u @ compliance.T
+    most = float(np.linalg.norm(d, axis=1).max())
+    return np.asarray(d * (size / most if most > 0 else 0.0)), most

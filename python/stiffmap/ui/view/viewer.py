@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.solution import Solution
@@ -31,6 +32,7 @@ from stiffmap.ui.view.place import rotation_of
 from stiffmap.ui.view.plane import COARSE, FINE, PlaneMap
 from stiffmap.ui.view.quantities import QUANTITIES
 from stiffmap.ui.view.scene import Scene, look_at_machine
+from stiffmap.ui.view.serving import silent
 from stiffmap.ui.view.state import State
 from stiffmap.ui.view.worker import Worker
 
@@ -50,6 +52,7 @@ class Viewer:
         self._plane: PlaneMap | None = None
         self._plane_key: object = None
         self._held: tuple[float, float] | None = None
+        self._held_quantity = ""
         self._solution: Solution | None = None
         self._cloud_key: object = None
         self._renewed = False
@@ -90,7 +93,6 @@ class Viewer:
 
     def drag(self, position: Any, wxyz: Any) -> None:
         """The gizmo was moved (m, quaternion)."""
-        from scipy.spatial.transform import Rotation
 
         def deed(model: Model) -> None:
             turned = Rotation.from_quat(np.roll(wxyz, -1)).as_matrix()
@@ -168,8 +170,6 @@ class Viewer:
         self.scene.plane(found, self._held, state.tolerance, self.controls.isolines)
         self.controls.bar(colour_bar(found, self._held, state.tolerance))
 
-    _held_quantity = ""
-
     def redraw(self) -> None:
         """The plane is to be drawn again though the machine is the same."""
         self._plane_key = None
@@ -237,8 +237,6 @@ class Viewer:
 
     def close(self) -> None:
         """End the threads and the server."""
-        from stiffmap.ui.view.serving import silent
-
         self.swing.stop()
         self.worker.stop()
         with silent():

@@ -18,7 +18,7 @@ class Worker:
     def __init__(self, stages: list[Stage], failed: Callable[[Exception], None]) -> None:
         self.stages, self._failed = stages, failed
         self._wake = threading.Condition()
-        self._asked = self._done = 0
+        self._asked = self._done = self._finished = 0
         self._since: float | None = None
         self._stopped = False
         self.latencies: deque[float] = deque(maxlen=1000)
@@ -34,17 +34,10 @@ class Worker:
                 self._since = time.perf_counter()
             self._wake.notify_all()
 
-    @property
-    def overtaken(self) -> bool:
-        """Whether what is being drawn is old already."""
-        return self._asked != self._done or self._stopped
-
     def idle(self, seconds: float = 30.0) -> bool:
         """Wait until all is drawn; False where that takes longer."""
         with self._wake:
             return self._wake.wait_for(lambda: self._finished == self._asked, seconds)
-
-    _finished = 0
 
     def _run(self) -> None:
         while True:
@@ -60,8 +53,8 @@ class Worker:
 
     def _draw(self, since: float | None) -> None:
         for i, stage in enumerate(self.stages):
-            if i and self.overtaken:
-                return
+            if i and (self._asked != self._done or self._stopped):
+                return  # what is being drawn is old already
             try:
                 stage()
             except Exception as problem:  # the thread lives on; the panel shows it

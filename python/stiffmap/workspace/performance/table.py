@@ -14,12 +14,13 @@ from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import Floats, real_array, thread_count
 from stiffmap.common.errors import StiffmapError
+from stiffmap.common.number_text import place_text
 from stiffmap.common.short import short_repr
 from stiffmap.common.tasks import client_of
 from stiffmap.solve.machine import Machine, takes_machine
 from stiffmap.solve.status import Status
 from stiffmap.workspace.maps.inputs import magnitude
-from stiffmap.workspace.performance.motion.closing import drive_kinematics, place_text
+from stiffmap.workspace.performance.motion.closing import drive_kinematics
 from stiffmap.workspace.performance.motion.motion_files import Motion, load_motion
 from stiffmap.workspace.performance.poses import box_nodes, read_box
 from stiffmap.workspace.performance.registry import Case, Found, Measure, all_measures, get_measure
@@ -232,7 +233,7 @@ def _outside(machine: Machine, low: Floats, high: Floats, what: str) -> tuple[tu
     bad = drive_kinematics(machine, p, patient=False).status != Status.CONVERGED
     if not bad.any():
         return (), True
-    first = place_text(p[int(np.argmax(bad))])
+    first = place_text(p[int(np.argmax(bad))], ".1f")
     lost = f"{what} is not within reach: {int(bad.sum())} of {len(p)} nodes, for example {first}"
     return (lost,), not bad.all()
 

@@ -13,10 +13,10 @@ from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.model.files.shipped import find
 from stiffmap.ui.plot.elements import THICK, THIN, element_links, thicknesses
 from stiffmap.ui.plot.skeleton import skeleton
-from stiffmap.ui.view.changes import addresses, changed
-from stiffmap.ui.view.model import Model
+from stiffmap.ui.view.model import Model, addresses, changed
+from stiffmap.ui.view.panels import principal
 from stiffmap.ui.view.place import first_plane, moves, turns
-from stiffmap.ui.view.surfaces import ellipsoid, polar_surface, principal, sphere
+from stiffmap.ui.view.scene import ellipsoid, polar_surface, sphere
 
 
 @pytest.fixture(scope="module")

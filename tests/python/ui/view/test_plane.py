@@ -11,9 +11,8 @@ import stiffmap as sm
 from stiffmap.solve.status import Status
 from stiffmap.ui.plot.planes import levels
 from stiffmap.ui.view.colours import DARK, GREY, colours_of, plane_image, table
-from stiffmap.ui.view.dynamics import dynamic_stiffness
 from stiffmap.ui.view.model import Model
-from stiffmap.ui.view.plane import plane_frame, plane_map
+from stiffmap.ui.view.plane import dynamic_stiffness, plane_frame, plane_map
 from stiffmap.ui.view.quantities import QUANTITIES, greatest
 from stiffmap.ui.view.state import State
 

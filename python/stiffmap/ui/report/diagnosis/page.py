@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from stiffmap.common.fingerprints import digest
-from stiffmap.common.number_text import length_text, length_unit, vector_text
+from stiffmap.common.number_text import length_text, length_unit, place_text, vector_text
 from stiffmap.common.outputs import write_text
 from stiffmap.experiment.noise.checks import Check
-from stiffmap.identification.diagnosis.report.findings import Detectability, Effect, Findings, Number, Rest
+from stiffmap.identification.diagnosis.report.findings import Detectability, Effect, Findings, Rest
 from stiffmap.identification.diagnosis.report.sentences import (
     UNITS,
     alias_words,
@@ -86,7 +86,12 @@ def html(d: Findings, *, date: str | None = None, inputs: Iterable[str | PathLik
         checks=_checks(d.checks_before, d.checks_after),
         left=[(p.what, f"{100 * p.share:.0f} %", p.axis, _at(p)) for p in d.unexplained],
         numbers=[
-            (n.name, *in_number_units(n), f"{abs(n.value) / n.sigma:.1f}")
+            (
+                n.name,
+                in_shop_units(n.value, n.unit),
+                in_shop_units(n.u, n.unit, 2),
+                f"{abs(n.value) / n.sigma:.1f}",
+            )
             for n in (d.calibration.beyond if d.calibration else ())
         ],
         seen=_seen(d),
@@ -150,7 +155,8 @@ def _budget(d: Findings) -> dict[str, Any] | None:
         "size": length_text(whole),
         "unit": unit,
         "rows": [
-            (in_shop_words(n), f"{factor * part:.{decimals}f}", 100 * s) for n, part, s in budget_rows(found)
+            (in_shop_words(n), f"{factor * whole * s:.{decimals}f}", 100 * s)
+            for n, s, _ in budget_rows(found)
         ],
     }
 
@@ -184,8 +190,7 @@ def _checks(before: Sequence[Check], after: Sequence[Check]) -> list[tuple[objec
 def _at(p: Rest) -> str:
     if p.position is None:
         return ""
-    where = ", ".join(f"{1e3 * v:.0f}" for v in p.position)
-    return f"({where}) mm: {in_axis_units(p.axis, p.size)} rms"
+    return f"{place_text(p.position, '.0f')}: {in_axis_units(p.axis, p.size)} rms"
 
 
 def _seen(d: Findings) -> list[tuple[str, str, str]]:
@@ -230,16 +235,10 @@ def in_axis_units(axis: str, value: float) -> str:
     return f"{1e6 * value:.2f} {'µrad' if axis.startswith('r') else 'µm'}"
 
 
-def in_shop_units(value: float, unit: str) -> str:
-    """A number of an effect: µm, µm/N, mrad."""
+def in_shop_units(value: float, unit: str, digits: int = 4) -> str:
+    """A number of an effect or a machine: µm, µm/N, mrad."""
     factor, name = UNITS.get(unit, (1.0, unit))
-    return f"{factor * value:.4g} {name}".rstrip()
-
-
-def in_number_units(n: Number) -> tuple[str, str]:
-    """What a number is off by, and its standard uncertainty, with units."""
-    factor, name = UNITS.get(n.unit, (1.0, n.unit))
-    return f"{factor * n.value:.4g} {name}".rstrip(), f"{factor * n.u:.2g} {name}".rstrip()
+    return f"{factor * value:.{digits}g} {name}".rstrip()
 
 
 def p_text(p: float) -> str:

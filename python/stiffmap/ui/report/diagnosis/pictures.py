@@ -216,7 +216,8 @@ def histogram(d: Findings) -> Figure:
 
 def maps(d: Findings) -> Figure:
     """Error over a z-plane: the file's machine, the corrected machine, and what changes."""
-    x, y, force, one, other = plane_errors(d)
+    position, force, one, other = plane_errors(d)
+    x, y, z = MM * position[0, :, 0], MM * position[:, 0, 1], MM * position[0, 0, 2]
     if not np.isfinite(one).any() or not np.isfinite(other).any():
         raise StiffmapError("no pose of the plane of the maps has an equilibrium under this force")
     figure = new_figure(11, 3.8)
@@ -226,11 +227,11 @@ def maps(d: Findings) -> Figure:
     for ax, title, v in zip(axes, titles, (one, other, other - one), strict=True):
         size = np.linalg.norm(v, axis=-1) * MM
         limit = {} if title.startswith("difference") else {"vmin": 0.0, "vmax": top}
-        shade = ax.pcolormesh(x * MM, y * MM, size, shading="nearest", cmap="viridis", **limit)
+        shade = ax.pcolormesh(x, y, size, shading="nearest", cmap="viridis", **limit)
         figure.colorbar(shade, ax=ax, label="|error|, mm")
         ax.set(title=title, xlabel="x, mm", ylabel="y, mm", aspect="equal")
     load = "no force" if not force.any() else "force (" + ", ".join(f"{f:.0f}" for f in force[:3]) + ") N"
-    figure.suptitle(f"Error of the TCP over the plane z = {_middle(d.declared)[2] * MM:.0f} mm, {load}")
+    figure.suptitle(f"Error of the TCP over the plane z = {z:.0f} mm, {load}")
     return figure
 
 
@@ -241,36 +242,27 @@ def worst_pose(d: Findings) -> tuple[Floats, Floats] | None:
     """
     if d.declared.description.workspace is None:
         return None
-    x, y, force, _, errors = plane_errors(d)
+    position, force, _, errors = plane_errors(d)
     size = np.linalg.norm(errors, axis=-1)
     if not force.any() or not np.isfinite(size).any():
         return None
-    row, column = np.unravel_index(int(np.nanargmax(size)), size.shape)
-    return np.array([x[column], y[row], _middle(d.declared)[2]]), force
+    return position[np.unravel_index(int(np.nanargmax(size)), size.shape)], force
 
 
-def plane_errors(d: Findings) -> tuple[Floats, Floats, Floats, Floats, Floats]:
-    """x, y (25), the force (6,), and errors (25, 25, 3) m before and after."""
+def plane_errors(d: Findings) -> tuple[Floats, Floats, Floats, Floats]:
+    """Positions (25, 25, 3) m in the middle plane of the workspace, the wrench (6,) N, N·m, and errors (25, 25, 3) m before and after.
+
+    Of the forces used, along x, y or z, it is the one under which the machines differ most.
+    """
     low, high = d.declared.workspace
     x, y, _ = np.linspace(low, high, 25).T
-    gx, gy = np.meshgrid(x, y)
-    position = np.stack([gx, gy, np.full_like(gx, _middle(d.declared)[2])], axis=-1)
-    one, other, force = _worst_force(d, position)
-    return x, y, force, one, other
-
-
-def _worst_force(d: Findings, position: Floats) -> tuple[Floats, Floats, Floats]:
-    """Of the forces used, along x, y or z, the one under which the machines differ most."""
+    position = np.stack(np.broadcast_arrays(*np.meshgrid(x, y), (low[2] + high[2]) / 2), axis=-1)
     size = float(np.abs(d.experiment.wrench[:, :3]).max())
     tried = [np.append(size * axis, np.zeros(3)) for axis in np.eye(3)] if size > 0 else [np.zeros(6)]
-    pairs = [(_errors(d.declared, position, w), _errors(d.machine, position, w), w) for w in tried]
-    return max(pairs, key=lambda p: float(np.max(np.abs(np.nan_to_num(p[1] - p[0])))))
+    found = [(position, w, _errors(d.declared, position, w), _errors(d.machine, position, w)) for w in tried]
+    return max(found, key=lambda f: float(np.max(np.abs(np.nan_to_num(f[3] - f[2])))))
 
 
 def _errors(machine: Machine, position: Floats, wrench: Floats) -> Floats:
     solution = machine.solve(position, wrench)
     return np.where(solution.ok[..., None], solution.displacement[..., :3], np.nan)
-
-
-def _middle(machine: Machine) -> Floats:
-    return np.asarray(machine.workspace.mean(axis=0))

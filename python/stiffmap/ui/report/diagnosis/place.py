@@ -9,12 +9,11 @@ from matplotlib.figure import Figure
 
 from stiffmap.experiment.experiment import Floats
 from stiffmap.identification.diagnosis.report.findings import Effect, Findings
-from stiffmap.solve.compiled import Role, Status
-from stiffmap.solve.kinematics import inverse_kinematics
+from stiffmap.solve.compiled import Role
 from stiffmap.solve.machine import Machine
 from stiffmap.ui.plot.elements import nodes_of
 from stiffmap.ui.plot.scene import draw_skeleton, finish, marks, on, scene_axes
-from stiffmap.ui.plot.skeleton import COINCIDENT, owners, skeleton
+from stiffmap.ui.plot.skeleton import COINCIDENT, owners, standing
 from stiffmap.ui.plot.style import new_figure
 
 LIT, GREY = "#d62728", "0.65"
@@ -23,11 +22,8 @@ LIT, GREY = "#d62728", "0.65"
 def place_figure(d: Findings) -> Figure:
     """The declared machine at home in grey; legs of the named effects dark, their elements red."""
     machine = d.declared
-    k = inverse_kinematics(machine, machine.description.home.p)
+    shape = standing(machine)
     figure = new_figure(4.6, 3.4)
-    if int(k.status) != Status.CONVERGED:
-        return figure
-    shape = skeleton(machine, k.coordinates)
     ax: Any = scene_axes(figure, shape, None)
     legs = {leg for e in d.effects for leg in e.legs}
     dark = legs if len(legs) < len(machine.legs) else ()
@@ -35,7 +31,7 @@ def place_figure(d: Findings) -> Figure:
         ax, shape, {leg: "0.2" if leg in dark else GREY for leg in ("", *machine.legs)}, joints=False
     )
     for e in d.effects:
-        points, pieces = lit(machine, k.coordinates, e)
+        points, pieces = lit(machine, shape.coordinates, e)
         for ends in pieces:
             ax.plot(*on(ax, ends), color=LIT, lw=4)
         ax.scatter(*on(ax, points if len(points) else shape.tcp[None]), s=90, color=LIT, **marks(ax))

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from stiffmap.common.broadcasting import Floats, batch, rows, thread_count, trailing
 from stiffmap.common.errors import StiffmapError
+from stiffmap.common.number_text import place_text
 from stiffmap.solve.closing import commanded
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.status import Status
@@ -120,7 +121,7 @@ def refuse_failed(machine: Machine, k: DriveKinematics, time: Floats | None, pos
     word = {Status.UNREACHABLE: "leaves the reach", Status.SINGULAR: "meets a singularity"}
     what = word.get(status, "passes a singularity")
     when = "" if time is None else f", t = {time[i] - share * (time[i] - time[max(i - 1, 0)]):.4g} s"
-    raise StiffmapError(f"{machine.name}: the trajectory {what} at {place_text(p)}{when}")
+    raise StiffmapError(f"{machine.name}: the trajectory {what} at {place_text(p, '.1f')}{when}")
 
 
 def _between(machine: Machine, k: DriveKinematics, position: Floats, i: int) -> tuple[float, Floats]:
@@ -162,8 +163,3 @@ def _crossed(machine: Machine, jacobian: Floats, together: NDArray[np.int32]) ->
     gram = np.linalg.det(np.swapaxes(j, 1, 2) @ j)
     out[ok] = flipped | (gram < 1e-18 * scale)
     return out
-
-
-def place_text(p: Floats) -> str:
-    """``(1.0, 2.0, 3.0) mm``."""
-    return "({:.1f}, {:.1f}, {:.1f}) mm".format(*(1e3 * p))

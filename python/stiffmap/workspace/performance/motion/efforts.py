@@ -11,12 +11,12 @@ from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import Floats, instance_of
 from stiffmap.common.errors import StiffmapError
+from stiffmap.common.number_text import place_text
 from stiffmap.model.description.elements import Drive
 from stiffmap.solve.machine import Machine, takes_machine
 from stiffmap.workspace.performance.motion.closing import (
     DriveKinematics,
     drive_kinematics,
-    place_text,
     refuse_failed,
 )
 from stiffmap.workspace.performance.motion.inertia import (
@@ -82,7 +82,7 @@ def drive_efforts(
         i = int(np.argmax(bad))
         raise StiffmapError(
             f"{machine.name}: the trajectory asks for a motion that the machine cannot do at "
-            f"{place_text(t.position[i])}, t = {t.time[i]:.4g} s (its drives leave {out['misfit'][i]:.1e} of it open)"
+            f"{place_text(t.position[i], '.1f')}, t = {t.time[i]:.4g} s (its drives leave {out['misfit'][i]:.1e} of it open)"
         )
     if h is not None:
         out["effort"] = as_tensions(machine, h, k, out["effort"], h.most, sharing)
@@ -91,7 +91,7 @@ def drive_efforts(
             i = int(np.argmax(slack))
             raise StiffmapError(
                 f"{machine.name}: no tensions between 0 and the largest ones hold the motion at "
-                f"{place_text(t.position[i])}, t = {t.time[i]:.4g} s"
+                f"{place_text(t.position[i], '.1f')}, t = {t.time[i]:.4g} s"
             )
     friction_effort = motion_friction(machine, out["rate"]) if friction else np.zeros_like(out["rate"])
     return _dataset(machine, t, k, out, friction_effort)

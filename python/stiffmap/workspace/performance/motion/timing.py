@@ -13,8 +13,9 @@ from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import Floats, real_array
 from stiffmap.common.errors import StiffmapError
+from stiffmap.common.number_text import place_text
 from stiffmap.solve.machine import Machine
-from stiffmap.workspace.performance.motion.closing import drive_kinematics, place_text, refuse_failed
+from stiffmap.workspace.performance.motion.closing import drive_kinematics, refuse_failed
 from stiffmap.workspace.performance.motion.inertia import friction_efforts, need_masses, rigid_dynamics
 from stiffmap.workspace.performance.motion.scaling import drive_values
 from stiffmap.workspace.performance.motion.tensions import PUSHES, held, in_cables, inertia_columns
@@ -68,7 +69,7 @@ def fastest(
     if ((low > 0) | (high < 0)).any():
         i = int(np.argmax(((low > 0) | (high < 0)).any(axis=1)))
         raise StiffmapError(
-            f"{machine.name}: its drives cannot hold the load at {place_text(path.position[i])} of the path"
+            f"{machine.name}: its drives cannot hold the load at {place_text(path.position[i], '.1f')} of the path"
         )
     x = _passes(np.diff(path.s), a, b, low, high, np.minimum(top, FASTEST))
     return _run(path, x)
@@ -147,7 +148,7 @@ def _run(path: Path, x: Floats) -> Trajectory:
     if not np.isfinite(spans).all():
         i = int(np.argmax(~np.isfinite(spans)))
         raise StiffmapError(
-            f"the drives cannot move the tool along the path at {place_text(path.position[i])}"
+            f"the drives cannot move the tool along the path at {place_text(path.position[i], '.1f')}"
         )
     u = np.append(np.diff(x) / (2 * step), 0.0)
     return run_along(path, np.concatenate([[0.0], np.cumsum(spans)]), root, x, u)
