@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from stiffmap.common.errors import StiffmapError
+from stiffmap.common.json_text import plain
 from stiffmap.common.outputs import write_rows, write_text, writing
-from stiffmap.common.plain import plain
 
 if TYPE_CHECKING:
     import pandas as pd
