@@ -16,8 +16,8 @@ from stiffmap.model.description import Body, Cable, Joint, Spring
 from stiffmap.model.description.tree import all_elements
 from stiffmap.model.files.shipped import find
 from stiffmap.solve.compiled import Status
-from stiffmap.solve.free_motions import direction, free_motions
 from stiffmap.solve.machine import Machine
+from stiffmap.solve.mobility import NAMES, direction, free_motions
 from stiffmap.solve.singular_home import serial_home, singular_words
 from stiffmap.solve.trial import tried
 
@@ -26,7 +26,6 @@ TRIAL = 0.01
 STEEL = 8000.0
 SOLID = (1e7, 2e12)
 """Pa: from rubber to diamond."""
-NAMES = "xyz"
 RIGID = "the machine is rigid: no spring and no drive yields, so nothing deflects"
 
 

@@ -14,6 +14,7 @@ from stiffmap.model.files.load import load_description
 from stiffmap.model.files.shipped import find
 from stiffmap.model.home import Gap, gap_text
 from stiffmap.solve.compiled import CompiledMachine
+from stiffmap.solve.compiled.lowering import home_gaps
 from stiffmap.solve.redesign import HomeChange, home_changes
 
 GAP_LIMIT, TURN_LIMIT = 1e-4, 1e-3
@@ -56,7 +57,7 @@ def check_file(path: str | PathLike[str]) -> FileCheck:
     description = load_description(path)
     # refuses a home configuration that does not close, with each leg's gap
     compiled = CompiledMachine(description)
-    changes, gaps = home_changes(compiled), compiled.home_gaps()
+    changes, gaps = home_changes(compiled), home_gaps(description)
     warnings = _warnings(description, gaps, compiled.length)
     return FileCheck(find(path), description, _counts(description), gaps, changes, warnings)
 

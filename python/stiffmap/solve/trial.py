@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.solve.compiled import Status
-from stiffmap.solve.free_motions import free_motions
 from stiffmap.solve.machine import Machine
+from stiffmap.solve.mobility import free_motions
 
 INSIDE = (0.05, 0.5, 0.95)
 """Of the box, where it is tried: its very border may be the machine's own."""
