@@ -172,9 +172,7 @@ def _reach(machine: Machine) -> list[str]:
 
 def _limits(machine: Machine) -> Iterator[str]:
     for name, e in all_elements(machine.description):
-        if not isinstance(e, Joint) or len(e.home) != 1:
-            continue
-        if e.ends is None:
+        if not isinstance(e, Joint) or len(e.home) != 1 or e.ends is None:
             continue
         share = (e.home[0] - e.ends[0]) / (e.ends[1] - e.ends[0])
         if not 0.01 <= share <= 0.99:

@@ -63,8 +63,7 @@ def rank(matrix: Floats, scale: Floats) -> int:
     """Number of singular values that count relative to the largest one of another matrix."""
     if 0 in matrix.shape:
         return 0
-    largest = float(np.linalg.svd(scale, compute_uv=False)[0])
-    return int((np.linalg.svd(matrix, compute_uv=False) > RANK * largest).sum())
+    return int(np.linalg.matrix_rank(matrix, tol=RANK * np.linalg.norm(scale, 2)))
 
 
 def _rates(machine: Machine, x: Floats, index: int, loops: list[tuple[int, int]]) -> tuple[Floats, Floats]:

@@ -141,6 +141,9 @@ def _solve(
     loaded = [o.point, *extra]
     types = load_types(o, loaded)
     read = reading_points(machine, o, loaded)
+    steps = 0  # adaptive
+    if o.load_steps != "auto":
+        steps = whole_number(o.load_steps, "load_steps", 1, what="'auto' or a positive number")
     answer = machine.solve(
         rows(p, shape, (3,)),
         rows_or_one(r, shape, (3, 3)),
@@ -150,7 +153,7 @@ def _solve(
         read_points=read,
         gravity=machine.gravity(o.gravity),
         fast=o.method == "fast",
-        load_steps=step_count(o.load_steps),
+        load_steps=steps,
         threads=thread_count(o.threads),
         stiffness=o.stiffness,
         variants=variants,
@@ -203,10 +206,3 @@ def reading_points(machine: CompiledMachine, options: SolveOptions, loaded: Sequ
         if name not in there:
             raise StiffmapError(f"point: expected one of {', '.join(there)}, got {name!r}")
     return list(dict.fromkeys((options.point, *options.read_points)))
-
-
-def step_count(load_steps: int | str) -> int:
-    """Number of equal load steps; 0: adaptive."""
-    if load_steps == "auto":
-        return 0
-    return whole_number(load_steps, "load_steps", 1, what="'auto' or a positive number")
