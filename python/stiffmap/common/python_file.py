@@ -1,14 +1,23 @@
-"""Python files that users write: kinds of effects and of readings of their own."""
+"""Python files of which each is one kind of thing, an effect, a reading or a measure: those of a folder, and those that users write."""
 
 from __future__ import annotations
 
 import hashlib
+from importlib import import_module
 from importlib.util import module_from_spec, spec_from_file_location
 from os import PathLike
 from pathlib import Path
+from pkgutil import iter_modules
 from types import ModuleType
 
 from stiffmap.common.errors import FileError
+
+
+def modules_of(package: ModuleType) -> list[ModuleType]:
+    """Every module that lies in a package, by name; those with a leading underscore are helpers of the others."""
+    names = sorted(m.name for m in iter_modules(package.__path__))
+    return [import_module(f"{package.__name__}.{n}") for n in names if not n.startswith("_")]
+
 
 _RUN: dict[str, str] = {}
 

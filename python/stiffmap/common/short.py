@@ -29,7 +29,10 @@ def short_repr(cls: type[T]) -> type[T]:
 def shown_as(value: Any) -> str:
     """A value in a few characters."""
     if isinstance(value, np.ndarray):
-        return _array(value)
+        if value.size <= MOST_NUMBERS and value.dtype.kind in "fiub":
+            text = ", ".join(shown_as(v) for v in value.ravel().tolist())
+            return text if value.ndim == 0 else f"[{text}]"
+        return "(" + ", ".join(map(str, value.shape)) + ")"
     if isinstance(value, bool | int | np.bool_ | np.integer) or value is None:
         return str(value)
     if isinstance(value, float | np.floating):
@@ -41,10 +44,3 @@ def shown_as(value: Any) -> str:
             return "[" + ", ".join(shown_as(v) for v in value) + "]"
         return f"{len(value)} entries" if len(value) != 1 else "1 entry"
     return f"<{type(value).__name__}>"
-
-
-def _array(value: Any) -> str:
-    if value.size <= MOST_NUMBERS and value.dtype.kind in "fiub":
-        text = ", ".join(shown_as(v) for v in value.ravel().tolist())
-        return text if value.ndim == 0 else f"[{text}]"
-    return "(" + ", ".join(map(str, value.shape)) + ")"

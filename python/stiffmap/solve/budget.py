@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -163,16 +163,11 @@ def deflection_budget(
 
 
 def budget_where_stable(
-    machine: Machine,
-    position: ArrayLike,
-    wrench: ArrayLike,
-    *,
-    rotation: ArrayLike | None = None,
-    gravity: ArrayLike | None = None,
+    machine: Machine, position: ArrayLike, wrench: ArrayLike, **options: Any
 ) -> DeflectionBudget | None:
     """`deflection_budget`; None where no stable pose without load is there to compare with, as of a machine that has play."""
     try:
-        return deflection_budget(machine, position, wrench, rotation=rotation, gravity=gravity)
+        return deflection_budget(machine, position, wrench, **options)
     except StiffmapError:
         return None
 

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from stiffmap.common.broadcasting import Floats, batch, rows, thread_count, trailing
+from stiffmap.common.broadcasting import Floats, batch, rows, thread_count, trailing, wrench_array
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.rotations import as_rotations
 from stiffmap.common.short import short_repr
 from stiffmap.solve.compiled import CompiledMachine
-from stiffmap.solve.results import OverPoses
+from stiffmap.solve.labels import OverPoses
 
 Start = ArrayLike | Mapping[str, ArrayLike]
 """Coordinates (..., coordinates) as `Solution.coordinates` has them, or joint name -> (...) m or rad."""
@@ -48,6 +48,17 @@ def commanded(
     if rotation is None:
         return p, machine.home_rotation
     return p, as_rotations(trailing(rotation, (3, 3), "rotation", "rotation matrices"))
+
+
+def loaded_poses(
+    machine: CompiledMachine, position: ArrayLike, wrench: ArrayLike | None, rotation: ArrayLike | None
+) -> tuple[tuple[int, ...], Floats, Floats, Floats]:
+    """Batch axes of commanded poses under a wrench each, and positions (n, 3) m, rotations (n, 3, 3), wrenches (n, 6) N, N·m of all of
+    them; None: as at home, no wrench. StiffmapError for bad input."""
+    p, r = commanded(machine, position, rotation)
+    w = wrench_array(wrench)
+    shape = batch(p.shape[:-1], w.shape[:-1], r.shape[:-2])
+    return shape, rows(p, shape, (3,)), rows(r, shape, (3, 3)), rows(w, shape, (6,))
 
 
 def close_poses(

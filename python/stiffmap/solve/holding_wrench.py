@@ -12,7 +12,7 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.common.short import short_repr
 from stiffmap.solve.closing import commanded
 from stiffmap.solve.compiled import CompiledMachine, Status
-from stiffmap.solve.results import OverPoses
+from stiffmap.solve.labels import OverPoses
 
 
 @short_repr

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from stiffmap.common.broadcasting import Floats, real_array, rows, thread_count
+from stiffmap.common.broadcasting import Floats, thread_count
 from stiffmap.common.short import short_repr
 from stiffmap.model.description.tree import joint_of, joints
+from stiffmap.solve.closing import loaded_poses
+from stiffmap.solve.labels import OverPoses
 from stiffmap.solve.machine import Machine, takes_machine
-from stiffmap.solve.results import OverPoses
 
 
 @short_repr
@@ -68,17 +69,9 @@ def assembly_wrenches(
         threads=threads,
         method="reference",
     )
-    shape = s.status.shape
-    load = np.zeros(6) if wrench is None else real_array(wrench, "wrench")
-    turned = machine.compiled.home_rotation if rotation is None else real_array(rotation, "rotation")
-    force = machine.compiled.reactions(
-        rows(real_array(position, "position"), shape, (3,)),
-        rows(turned, shape, (3, 3)),
-        rows(load, shape, (6,)),
-        point=point,
-        gravity=machine.compiled.gravity(gravity),
-        threads=thread_count(threads),
-    )
+    shape, p, r, w = loaded_poses(machine.compiled, position, wrench, rotation)
+    gravity = machine.compiled.gravity(gravity)
+    force = machine.compiled.reactions(p, r, w, point=point, gravity=gravity, threads=thread_count(threads))
     force = force.reshape((*shape, force.shape[-1]))
     named = joints(machine.description)
     sprung = {n for n in s.joint_index if (joint := joint_of(named, n)) is not None and any(joint.laws)}

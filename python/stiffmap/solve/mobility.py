@@ -1,4 +1,4 @@
-"""Degrees of freedom of a machine at a configuration, counted from its closure equations."""
+"""Degrees of freedom of a machine at a configuration, counted from its closure equations; motions that nothing holds, in words."""
 
 from __future__ import annotations
 
@@ -63,8 +63,7 @@ def rank(matrix: Floats, scale: Floats) -> int:
     """Number of singular values that count relative to the largest one of another matrix."""
     if 0 in matrix.shape:
         return 0
-    largest = float(np.linalg.svd(scale, compute_uv=False)[0])
-    return int((np.linalg.svd(matrix, compute_uv=False) > RANK * largest).sum())
+    return int(np.linalg.matrix_rank(matrix, tol=RANK * np.linalg.norm(scale, 2)))
 
 
 def _rates(machine: Machine, x: Floats, index: int, loops: list[tuple[int, int]]) -> tuple[Floats, Floats]:
@@ -75,3 +74,30 @@ def _rates(machine: Machine, x: Floats, index: int, loops: list[tuple[int, int]]
     twist = np.concatenate([p1 - p0, Rotation.from_matrix(r1 @ np.swapaxes(r0, 1, 2)).as_rotvec()], axis=1)
     twist /= 2 * STEP
     return np.array([twist[end] - twist[primary] for primary, end in loops]).ravel(), twist[-1]
+
+
+NAMES = "xyz"
+
+
+def twist_words(twist: Floats, length: float) -> str:
+    """``turn about z`` or ``move along x`` for a twist (6,), m and rad."""
+    v, w = twist[:3], twist[3:]
+    if np.linalg.norm(w) * length > 0.1 * np.linalg.norm(v):
+        moved = " and shift with it" if np.linalg.norm(v) > 0.1 * np.linalg.norm(w) * length else ""
+        return f"turn about {direction(w)}{moved}"
+    return f"move along {direction(v)}"
+
+
+def direction(v: Floats) -> str:
+    """An axis by its name, or the vector."""
+    u = v / np.linalg.norm(v)
+    main = int(np.argmax(np.abs(u)))
+    if abs(u[main]) > 0.999:
+        return NAMES[main]
+    return f"({', '.join(f'{c:.2g}' for c in u)})"
+
+
+def free_motions(machine: Machine, free_twists: Floats) -> list[str]:
+    """The free twists of a singular pose (6, 6), columns, in words."""
+    columns = [c for c in free_twists.T if np.isfinite(c).all()]
+    return [twist_words(c, machine.compiled.length) for c in columns]

@@ -42,18 +42,17 @@ class SolveOptions:
 
     def as_plain(self) -> dict[str, Any]:
         """What of the shared options changes numbers, as JSON data; threads do not."""
-        plain = {k: getattr(self, k) for k in ("point", "load_type", "method", "load_steps")}
-        for name in ("rotation", "gravity"):
-            value = getattr(self, name)
-            plain[name] = None if value is None else np.asarray(value, dtype=float).tolist()
-        if self.start is not None:
-            mapping = isinstance(self.start, Mapping)
-            plain["start"] = (
-                {k: np.asarray(v, dtype=float).tolist() for k, v in self.start.items()}  # type: ignore[union-attr]
-                if mapping
-                else np.asarray(self.start, dtype=float).tolist()
-            )
-        return plain
+        out = {k: getattr(self, k) for k in ("point", "load_type", "method", "load_steps")}
+        out |= {"rotation": _listed(self.rotation), "gravity": _listed(self.gravity)}
+        if isinstance(self.start, Mapping):
+            out["start"] = {k: _listed(v) for k, v in self.start.items()}
+        elif self.start is not None:
+            out["start"] = _listed(self.start)
+        return out
+
+
+def _listed(value: ArrayLike | None) -> Any:
+    return None if value is None else np.asarray(value, dtype=float).tolist()
 
 
 class LoadingKeywords(TypedDict, total=False):

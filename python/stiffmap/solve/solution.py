@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from stiffmap.common.broadcasting import Floats
 from stiffmap.solve.closing import Kinematics
 from stiffmap.solve.compiled import Answer, Flag, Names, Status, counted
-from stiffmap.solve.labels import solution_dataset
-from stiffmap.solve.results import OverPoses
+from stiffmap.solve.labels import OverPoses, solution_dataset
 
 if TYPE_CHECKING:
     import xarray as xr

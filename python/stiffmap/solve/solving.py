@@ -1,4 +1,4 @@
-"""From the arguments of `Machine.solve` to the compiled core and back."""
+"""From the arguments of `Machine.solve` to the compiled core and back; machines near a machine, solved through its elimination."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from stiffmap.common.broadcasting import (
     wrench_array,
 )
 from stiffmap.common.errors import StiffmapError
+from stiffmap.model.description.alike import alike
 from stiffmap.solve.closing import Kinematics, close_actuators, close_poses, commanded
 from stiffmap.solve.compiled import CompiledMachine
 from stiffmap.solve.compiled.machine import LOAD_TYPES
@@ -74,6 +75,45 @@ def solve_call(
     return _solve(machine, o, (p, w, r, extra), variants, unloaded)
 
 
+def solve_varied(
+    machine: CompiledMachine, call: Call, variants: Sequence[CompiledMachine]
+) -> tuple[Solution, Floats]:
+    """The answer, and the displacements (..., variants, 6) of machines with a parameter moved a little.
+
+    One step through the factors of the answer, exact to second order in the move (docs/fast_path.md F10). Poses of
+    the reference path, variants under another gravity, and under gravity those to which one step does not lead
+    (`alike`) are solved in full. NaN where a pose failed.
+    """
+    solution, varied = solve_call(machine, call, variants)
+    return solution, fill_holes(machine, call, variants, solution, varied)
+
+
+def fill_holes(
+    machine: CompiledMachine,
+    call: Call,
+    variants: Sequence[CompiledMachine],
+    solution: Solution,
+    varied: Floats,
+) -> Floats:
+    """The same displacements, those that one step does not give solved in full."""
+    gravity = machine.description.gravity
+    heavy = bool(machine.gravity(call.options.gravity).any())
+    heavier = [
+        (call.options.gravity is None and m.description.gravity != gravity)
+        or (heavy and not alike(machine.description, m.description, heavy=True))
+        for m in variants
+    ]
+    if not any(heavier) and not np.isnan(varied.sum()):  # nothing is missing
+        return varied
+    for i, (m, other) in enumerate(zip(variants, heavier, strict=True)):
+        hole = solution.ok & (other | np.isnan(varied[..., i, :]).any(axis=-1))
+        if hole.any():
+            part = call.only(hole)
+            part = replace(part, options=replace(part.options, stiffness=False))
+            varied[hole, i] = solve_call(m, part)[0].displacement
+    return varied
+
+
 def solve_joints(machine: CompiledMachine, actuators: ArrayLike, call: Call) -> Solution:
     """The answer at actuator coordinates (..., actuators): see `Machine.solve_joints`."""
     o = call.options
@@ -101,6 +141,9 @@ def _solve(
     loaded = [o.point, *extra]
     types = load_types(o, loaded)
     read = reading_points(machine, o, loaded)
+    steps = 0  # adaptive
+    if o.load_steps != "auto":
+        steps = whole_number(o.load_steps, "load_steps", 1, what="'auto' or a positive number")
     answer = machine.solve(
         rows(p, shape, (3,)),
         rows_or_one(r, shape, (3, 3)),
@@ -110,7 +153,7 @@ def _solve(
         read_points=read,
         gravity=machine.gravity(o.gravity),
         fast=o.method == "fast",
-        load_steps=step_count(o.load_steps),
+        load_steps=steps,
         threads=thread_count(o.threads),
         stiffness=o.stiffness,
         variants=variants,
@@ -163,10 +206,3 @@ def reading_points(machine: CompiledMachine, options: SolveOptions, loaded: Sequ
         if name not in there:
             raise StiffmapError(f"point: expected one of {', '.join(there)}, got {name!r}")
     return list(dict.fromkeys((options.point, *options.read_points)))
-
-
-def step_count(load_steps: int | str) -> int:
-    """Number of equal load steps; 0: adaptive."""
-    if load_steps == "auto":
-        return 0
-    return whole_number(load_steps, "load_steps", 1, what="'auto' or a positive number")

@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.solve.compiled import Status
-from stiffmap.solve.free_motions import free_motions
 from stiffmap.solve.machine import Machine
+from stiffmap.solve.mobility import free_motions
 
 INSIDE = (0.05, 0.5, 0.95)
 """Of the box, where it is tried: its very border may be the machine's own."""
@@ -59,9 +59,7 @@ def tried(machine: Machine) -> Trial:
             f"very stiff: the tool moves by 1 µm under {1e-6 * ends[1]:.2g} N; are compliances in the file's units?"
         )
     force = TINY * machine.compiled.length / float(np.nanmax(soft))
-    loads = np.zeros((3, 6))
-    loads[:, :3] = force * np.eye(3)
-    for axis, load in zip("xyz", loads, strict=True):
+    for axis, load in zip("xyz", force * np.eye(3, 6), strict=True):
         under = machine.solve(at[good], load)
         findings += _failed(
             machine, at[good], under.status, under.free_twists, f"under {force:.2g} N along {axis} "

@@ -45,10 +45,8 @@ def shortfalls(machine: Machine, position: ArrayLike, rotation: ArrayLike | None
     position (3,) m, rotation (3, 3), None: as at home; base axes, task components alone. One entry without a name where
     each leg reaches it alone and not all together; none where they do. Raises StiffmapError for what is no pose.
     """
-    p, r = (
-        real_array(position, "position"),
-        real_array(machine.compiled.home_rotation if rotation is None else rotation, "rotation"),
-    )
+    p = real_array(position, "position")
+    r = real_array(machine.compiled.home_rotation if rotation is None else rotation, "rotation")
     if p.shape != (3,) or r.shape != (3, 3) or not (np.isfinite(p).all() and np.isfinite(r).all()):
         raise StiffmapError(
             f"expected a position of 3 finite numbers and a rotation (3, 3), got {position!r}, {rotation!r}"

@@ -32,8 +32,7 @@ from stiffmap.model.description import (
     Pose,
     Spring,
 )
-from stiffmap.solve.advice import advice
-from stiffmap.solve.check import check_file
+from stiffmap.solve.advice import advice, check_file
 from stiffmap.workspace.performance.motion.trajectory import line, timed
 
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}

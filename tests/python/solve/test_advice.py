@@ -11,7 +11,7 @@ import stiffmap as sm
 from stiffmap.model.description import ExternalSpring, Joint, Leg, MachineDescription, Point
 from stiffmap.model.files.shipped import machine_folder, starter_text
 from stiffmap.solve.advice import advice
-from stiffmap.solve.free_motions import twist_words
+from stiffmap.solve.mobility import twist_words
 from stiffmap.solve.trial import positions, tried
 from stiffmap.ui.cli import main
 

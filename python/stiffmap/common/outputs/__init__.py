@@ -2,11 +2,13 @@
 
 from stiffmap.common.outputs.alone import only_job, reserved
 from stiffmap.common.outputs.keeping import asked_to_replace, new_file, one_command
-from stiffmap.common.outputs.space import bytes_text, mapped_array, needs_space
 from stiffmap.common.outputs.tables import guarded, number_cells, unguarded, write_rows
 from stiffmap.common.outputs.writing import (
     add_lines,
+    bytes_text,
     make_folder,
+    mapped_array,
+    needs_space,
     put_folder,
     putting,
     write_picture,

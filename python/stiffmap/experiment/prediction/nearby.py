@@ -23,9 +23,8 @@ from stiffmap.model.description import Body, MachineDescription, Offset, Point
 from stiffmap.model.description.alike import alike
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.options import SolveOptions
-from stiffmap.solve.solving import Call, solve_call
+from stiffmap.solve.solving import Call, fill_holes, solve_call
 from stiffmap.solve.status import Flag
-from stiffmap.solve.variants import fill_holes
 
 MOST_BYTES = 2**25
 """Of the displacements of all machines of one call."""

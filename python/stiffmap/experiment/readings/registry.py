@@ -6,8 +6,7 @@ from os import PathLike
 
 import stiffmap.experiment.readings.library as library
 from stiffmap.common.errors import FileError, StiffmapError
-from stiffmap.common.library import modules_of
-from stiffmap.common.python_file import run_python_file
+from stiffmap.common.python_file import modules_of, run_python_file
 from stiffmap.experiment.channels import AXES, Channel
 from stiffmap.experiment.readings.types import ReadingKind
 

@@ -7,9 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any
 
-from stiffmap.common.json_text import json_text
+from stiffmap.common.json_text import json_text, plain
 from stiffmap.common.number_text import with_uncertainty, within
-from stiffmap.common.plain import plain
 from stiffmap.common.short import short_repr
 from stiffmap.experiment.comparison.summary import Summary
 from stiffmap.experiment.experiment import Experiment, Floats

@@ -27,6 +27,7 @@ from stiffmap.model.description import (
     Spring,
 )
 from stiffmap.model.description.numbers import numbers_of
+from stiffmap.model.description.pose import IDENTITY
 from stiffmap.model.description.strokes import present_rows
 from stiffmap.model.description.tree import ENDS, all_elements, core_name
 from stiffmap.model.home import Gap, misfit_text
@@ -88,23 +89,9 @@ def add_free_platform(out: _core.Chain, machine: MachineDescription) -> None:
     guide = pose(Pose((x, y, z)))
     out.offset("platform.guide", guide, guide)
     for i, name in enumerate(TASK):
-        if name not in machine.freedoms:
-            continue
-        out.joint(
-            name=f"platform.{name}",
-            prismatic=i < 3,
-            axis=np.eye(3)[i % 3],
-            actuated=False,
-            home=body.translation[i] if i < 3 else 0.0,
-            law=None,
-            numbers={},
-            errors=[],
-            lower=-UNLIMITED,
-            upper=UNLIMITED,
-            guide_errors=[],
-            friction=0.0,
-            about_command=False,
-        )
+        if name in machine.freedoms:
+            kind, home = ("prismatic", body.translation[i]) if i < 3 else ("revolute", 0.0)
+            add_joint(out, Joint(f"platform.{name}", kind, (IDENTITY[i % 3],), (home,)))
     turn = pose(Pose((0.0, 0.0, 0.0), body.rotation))
     out.offset("platform.home", turn, turn)
 

@@ -14,8 +14,7 @@ from stiffmap.common.broadcasting import Floats, real_array
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.description import MachineDescription
 from stiffmap.model.description.tree import joints, of_same_sequence
-from stiffmap.model.home import Gap
-from stiffmap.solve.compiled.lowering import build_mechanism, home_gaps
+from stiffmap.solve.compiled.lowering import build_mechanism
 from stiffmap.solve.compiled.names import Names, names_of
 
 
@@ -52,10 +51,6 @@ class CompiledMachine:
     def home_rotation(self) -> Floats:
         """(3, 3) orientation of the tcp at home."""
         return self.description.home.r
-
-    def home_gaps(self) -> list[Gap]:
-        """Gap of every leg and of every branch of a block at the declared home coordinates."""
-        return home_gaps(self.description)
 
     @cached_property
     def spun_balls(self) -> dict[str, tuple[Floats, Floats]]:

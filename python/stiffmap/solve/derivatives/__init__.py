@@ -1,8 +1,7 @@
 """Derivatives of an equilibrium and its stiffness with respect to parameters, pose and load (docs/effects.md)."""
 
 from stiffmap.solve.derivatives.differentiate import differentiate
-from stiffmap.solve.derivatives.prepared import Prepared, prepare
-from stiffmap.solve.derivatives.requests import Request, read_requests
+from stiffmap.solve.derivatives.prepared import Prepared, Request, prepare, read_requests
 
 __all__ = [
     "Prepared",

@@ -11,11 +11,9 @@ from scipy.spatial.transform import Rotation
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.rotations import rotation_about
 from stiffmap.solve.compiled import CompiledMachine
-from stiffmap.solve.derivatives.prepared import Prepared, central, combine_all
-from stiffmap.solve.derivatives.requests import INPUTS, Requests
+from stiffmap.solve.derivatives.prepared import INPUTS, Prepared, Requests, central
 from stiffmap.solve.solution import Solution
-from stiffmap.solve.solving import Call, load_types, solve_call
-from stiffmap.solve.variants import solve_varied
+from stiffmap.solve.solving import Call, load_types, solve_call, solve_varied
 
 Table = dict[str, dict[str, Floats]]  # quantity -> name of the variable -> derivative
 
@@ -39,10 +37,9 @@ def _displacement(ready: Prepared, call: Call, table: Table) -> Solution:
     """One step of each neighbour through the factors of the base: docs/fast_path.md F10."""
     machines = [m for p in ready.parameters for m in p.machines]
     solution, varied = solve_varied(ready.base, call, machines)
-    if ready.parameters:
-        slopes = combine_all([p.stencil for p in ready.parameters], solution.displacement, varied)
-        for i, p in enumerate(ready.parameters):
-            table["displacement"][p.name] = slopes[..., i, :]
+    for i, p in enumerate(ready.parameters):
+        ends = [varied[..., k, :] for k in (2 * i, 2 * i + 1)]
+        table["displacement"][p.name] = p.stencil.combine(solution.displacement, ends)
     return solution
 
 

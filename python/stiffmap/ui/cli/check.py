@@ -9,8 +9,7 @@ import typer
 from rich.text import Text
 
 from stiffmap.model.home import ENOUGH, gap_text
-from stiffmap.solve.advice import advice
-from stiffmap.solve.check import FileCheck, check_file
+from stiffmap.solve.advice import FileCheck, advice, check_file
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.trial import tried
 from stiffmap.ui.cli import options

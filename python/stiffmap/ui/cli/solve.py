@@ -15,8 +15,8 @@ from stiffmap.common.number_text import length_text
 from stiffmap.common.outputs import write_rows
 from stiffmap.common.outputs.option import written
 from stiffmap.common.tables.poses import PoseTable, read_pose_table
-from stiffmap.solve.free_motions import free_motions
 from stiffmap.solve.machine import Machine
+from stiffmap.solve.mobility import free_motions
 from stiffmap.solve.solution import Solution
 from stiffmap.solve.status import Flag, Status
 from stiffmap.solve.unreachable import why_unreachable

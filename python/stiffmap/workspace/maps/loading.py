@@ -16,9 +16,8 @@ from stiffmap.solve.labels import COMPONENTS, TWIST_UNITS, flag_attrs, meaning, 
 from stiffmap.solve.machine import Machine, solve_with
 from stiffmap.solve.options import LoadingKeywords, options_of
 from stiffmap.solve.solution import Solution
-from stiffmap.solve.solving import Call
+from stiffmap.solve.solving import Call, solve_varied
 from stiffmap.solve.status import Status
-from stiffmap.solve.variants import solve_varied
 from stiffmap.workspace.maps.fixed_order_sums import norm
 from stiffmap.workspace.maps.inputs import plane_axes
 

@@ -1,4 +1,4 @@
-"""Loaded poses, and boxes of poses."""
+"""Boxes of poses."""
 
 from __future__ import annotations
 
@@ -7,28 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from stiffmap.common.broadcasting import (
-    Floats,
-    batch,
-    real_array,
-    rows,
-    whole_number,
-    wrench_array,
-)
+from stiffmap.common.broadcasting import Floats, real_array, whole_number
 from stiffmap.common.errors import StiffmapError
-from stiffmap.solve.closing import commanded
 from stiffmap.solve.machine import Machine
-
-
-def loaded_poses(
-    machine: Machine, position: ArrayLike, wrench: ArrayLike | None, rotation: ArrayLike | None
-) -> tuple[tuple[int, ...], Floats, Floats, Floats]:
-    """Batch axes of commanded poses under a wrench each, and positions (n, 3) m, rotations (n, 3, 3), wrenches (n, 6) N, N·m of all of
-    them; None: as at home, no wrench. StiffmapError for bad input."""
-    p, r = commanded(machine.compiled, position, rotation)
-    w = wrench_array(wrench)
-    shape = batch(p.shape[:-1], w.shape[:-1], r.shape[:-2])
-    return shape, rows(p, shape, (3,)), rows(r, shape, (3, 3)), rows(w, shape, (6,))
 
 
 def read_box(machine: Machine, box: ArrayLike | None) -> tuple[Floats, Floats]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.library import modules_of
+from stiffmap.common.python_file import modules_of
 from stiffmap.common.tasks import workers
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.solution import Solution

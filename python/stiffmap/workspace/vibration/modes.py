@@ -18,9 +18,9 @@ from stiffmap.common.broadcasting import (
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.description import Cable, Joint, Spring
 from stiffmap.model.description.tree import all_elements, core_name
+from stiffmap.solve.closing import loaded_poses
 from stiffmap.solve.machine import Machine
 from stiffmap.workspace.performance.motion.inertia import inertias, need_masses
-from stiffmap.workspace.performance.poses import loaded_poses
 
 ASSUMED = 0.02
 """Damping ratio of every mode of a machine that declares none."""
@@ -181,7 +181,7 @@ def tip_modes(
             f"point: no point '{point}' on {machine.name}; there are: {', '.join(machine.points)}"
         )
     declared = damping_of(machine, damping)
-    shape, poses, turns, loads = loaded_poses(machine, position, wrench, rotation)
+    shape, poses, turns, loads = loaded_poses(compiled, position, wrench, rotation)
     cores = thread_count(threads)
     out = compiled.modes(
         inertias(machine), poses, turns, loads, viscous=declared.viscous, loss=declared.loss,

@@ -39,15 +39,12 @@ def receptance(modes: TipModes, frequency: Floats, threads: int | None = None) -
         ok = np.isfinite(modes.rest[rows, 0, 0])
         out[rows[~ok]] = np.nan
         if ok.any():
-            out[rows[ok]] = solve(_rows(modes, rows[ok]), s)
+            arrays = ("square", "tip", "viscous", "loss", "rest")
+            out[rows[ok]] = solve({n: getattr(modes, n)[rows[ok]] for n in arrays}, s)
 
     with ThreadPoolExecutor(thread_count(threads)) as pool:
         list(pool.map(block, range(0, n, BLOCK)))
     return out
-
-
-def _rows(m: TipModes, rows: NDArray[np.intp]) -> dict[str, Any]:
-    return {k: getattr(m, k)[rows] for k in ("square", "tip", "viscous", "loss", "rest")}
 
 
 def _real_modes(m: dict[str, Floats], s: Complex) -> Complex:

@@ -14,7 +14,7 @@ import pytest
 
 import stiffmap as sm
 import stiffmap.machining.chatter.workspace as workspace_of_chatter
-from stiffmap.common.tasks.cluster import OnCluster
+from stiffmap.common.tasks import OnCluster
 from stiffmap.machining.milling.placement import placements
 from stiffmap.machining.milling.redundancy import redundancy
 from stiffmap.machining.milling.setting import Setting, setting

@@ -11,7 +11,7 @@ import pytest
 import stiffmap as sm
 from stiffmap.model.description import Joint
 from stiffmap.model.files import description_from_text, description_text, shipped_machines
-from stiffmap.solve.check import check_file
+from stiffmap.solve.advice import check_file
 from stiffmap.solve.status import Status
 from stiffmap.ui.cli import main
 

@@ -7,7 +7,8 @@ import pytest
 
 import stiffmap as sm
 from stiffmap.workspace.performance import drive_kinematics
-from stiffmap.workspace.performance.kinds.singularity import TYPES, distances
+from stiffmap.workspace.performance.kinds.transmission import TYPES
+from stiffmap.workspace.performance.motion.velocity import distances
 
 
 def found(name, p):

@@ -2,7 +2,7 @@
 
 import sys
 
-from stiffmap.common.library import modules_of
+from stiffmap.common.python_file import modules_of
 from stiffmap.model.effects.types import EffectType
 
 EFFECTS: tuple[EffectType, ...] = tuple(

@@ -94,10 +94,8 @@ def sample(bounds: Bounds, centre: Floats, half: Floats, axes: Floats) -> Cells:
     closed, limits = bounds.at((centre[:, None] + local @ axes.T).reshape(-1, 3))
     closed = closed.reshape(n, 27)
     names = ["closure", *(limit.name for limit in limits)]
-    most, mid = (
-        [np.where(closed.all(axis=1), -np.inf, np.inf)],
-        [np.where(closed[:, _MIDDLE], -np.inf, np.inf)],
-    )
+    most = [np.where(closed.all(axis=1), -np.inf, np.inf)]
+    mid = [np.where(closed[:, _MIDDLE], -np.inf, np.inf)]
     bend = np.zeros((n, 3))
     for limit in limits:
         values = limit.array.reshape(n, 3, 3, 3, -1)
@@ -134,12 +132,8 @@ def enclose(bounds: Bounds, centre: Floats, half: Floats, axes: Floats) -> Cells
         slopes=6 if wide else 3, watched=watched, threads=thread_count(bounds.threads),
     )  # fmt: skip
     ok = np.asarray(e["enclosed"])
-    names, most, least = (
-        ["closure"],
-        [np.where(ok, -np.inf, np.inf)],
-        [np.where(e["closed"], -np.inf, np.inf)],
-    )
-    places = [np.zeros_like(half)]
+    names, places = ["closure"], [np.zeros_like(half)]
+    most, least = [np.where(ok, -np.inf, np.inf)], [np.where(e["closed"], -np.inf, np.inf)]
 
     def add(name: str, value: Floats, slack: Floats, bound: float, place: Floats) -> None:
         """A limit's value at its worst corner, by the linear model, and what that may miss."""

@@ -41,9 +41,8 @@ class Bars:
     def _joints(self, node: int) -> list[int]:
         """Frames of the joints from the base to a frame; what lies beyond the last one is the platform."""
         roles = self._compiled.names.roles
-        return [at for at, coordinate in movers(self._compiled, node) if roles[coordinate] != Role.SPRING][
-            ::-1
-        ]
+        found = [at for at, c in movers(self._compiled, node) if roles[c] != Role.SPRING]
+        return found[::-1]
 
     def _leg(self, node: int) -> str:
         """Leg that moves a frame; empty where none does."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +11,6 @@ from numpy.typing import ArrayLike
 from stiffmap.common.broadcasting import Floats, instance_of
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import place_text
-from stiffmap.model.description.elements import Drive
 from stiffmap.solve.machine import Machine, takes_machine
 from stiffmap.workspace.performance.motion.closing import (
     DriveKinematics,
@@ -104,6 +102,8 @@ def _dataset(
     power = effort * out["rate"]
     span = t.time[-1] - t.time[0]
     peak_effort, peak_speed = np.abs(effort).max(axis=0), np.abs(out["rate"]).max(axis=0)
+    ends = np.array([d.range or (np.nan, np.nan) for d in drive_table(machine)])
+    room = np.minimum(k.actuators - ends[:, 0], ends[:, 1] - k.actuators).min(axis=0)
     over = ("time", "drive")
     return xr.Dataset(
         {
@@ -121,17 +121,11 @@ def _dataset(
             "peak_power": ("drive", np.abs(power).max(axis=0)),
             "effort_margin": ("drive", declared(machine, "force", np.nan) - peak_effort),
             "speed_margin": ("drive", declared(machine, "speed", np.nan) - peak_speed),
-            "range_margin": ("drive", _room(drive_table(machine), k.actuators)),
+            "range_margin": ("drive", room),
         },
         coords={"time": t.time, "drive": list(machine.actuators)},
         attrs={"machine": machine.name, "revolute": revolute_drives(machine).astype(int).tolist()},
     )
-
-
-def _room(drives: Sequence[Drive], coordinates: Floats) -> Floats:
-    """(drives,) least distance from the ends of the declared range; NaN where none is declared."""
-    ends = np.array([d.range or (np.nan, np.nan) for d in drives])
-    return np.asarray(np.minimum(coordinates - ends[:, 0], ends[:, 1] - coordinates).min(axis=0))
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,8 +12,8 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.short import short_repr
 from stiffmap.solve.kinematics import forward_kinematics
+from stiffmap.solve.labels import OverPoses
 from stiffmap.solve.machine import Machine, takes_machine
-from stiffmap.solve.results import OverPoses
 from stiffmap.workspace.maps.inputs import plane_axes
 from stiffmap.workspace.performance.motion.closing import DriveKinematics, drive_kinematics
 from stiffmap.workspace.performance.motion.inertia import rest_efforts

@@ -18,14 +18,14 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.common.short import short_repr
 from stiffmap.model.description import Body
 from stiffmap.model.description.tree import all_elements, core_name
+from stiffmap.solve.closing import loaded_poses
 from stiffmap.solve.compiled.machine import CompiledMachine
 from stiffmap.solve.compiled.names import Role
+from stiffmap.solve.labels import OverPoses
 from stiffmap.solve.machine import Machine, takes_machine
-from stiffmap.solve.results import OverPoses
 from stiffmap.workspace.performance.motion.closing import DriveKinematics
 from stiffmap.workspace.performance.motion.scaling import declared, revolute_drives
 from stiffmap.workspace.performance.motion.sharing import drive_weights, followed
-from stiffmap.workspace.performance.poses import loaded_poses
 
 
 def movers(compiled: CompiledMachine, node: int) -> Iterator[tuple[int, int]]:
@@ -89,18 +89,16 @@ def motion_friction(machine: Machine, rates: Floats) -> Floats:
     fastest = np.where(turn, own.max(where=turn, initial=0.0), own.max(where=~turn, initial=0.0))
     speed = declared(machine, "speed", 0.0)
     limit = SLOW * np.where(speed > 0.0, speed, fastest)
-    return _friction(machine, rates, np.clip(rates / np.where(limit > 0.0, limit, 1.0), -1.0, 1.0))
+    return friction_efforts(machine, rates, np.clip(rates / np.where(limit > 0.0, limit, 1.0), -1.0, 1.0))
 
 
-def friction_efforts(machine: Machine, rates: Floats) -> Floats:
-    """(..., drives) Coulomb and viscous friction of the drives against their rates."""
-    return _friction(machine, rates, np.sign(rates))
+def friction_efforts(machine: Machine, rates: Floats, sense: Floats | None = None) -> Floats:
+    """(..., drives) Coulomb and viscous friction of the drives against their rates (..., drives).
 
-
-def _friction(machine: Machine, rates: Floats, sense: Floats) -> Floats:
-    """With the share of Coulomb friction that acts, -1 to 1."""
+    `sense` (..., drives) is the share of Coulomb friction that acts, -1 to 1; None: the sign of the rate.
+    """
     coulomb, viscous = (declared(machine, f"{word}_friction", 0.0) for word in ("coulomb", "viscous"))
-    return np.asarray(coulomb * sense + viscous * rates)
+    return np.asarray(coulomb * (np.sign(rates) if sense is None else sense) + viscous * rates)
 
 
 def rigid_dynamics(
@@ -192,7 +190,7 @@ def natural_frequencies(
     """
     need_masses(machine, "a natural frequency")
     whole_number(modes, "modes", 1)
-    shape, p, r, w = loaded_poses(machine, position, wrench, rotation)
+    shape, p, r, w = loaded_poses(machine.compiled, position, wrench, rotation)
     out = machine.compiled.modes(
         inertias(machine), p, r, w, count=modes, whole=True, gravity=machine.compiled.gravity(gravity),
         threads=thread_count(threads),

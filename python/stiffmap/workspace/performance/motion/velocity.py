@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.short import short_repr
 from stiffmap.model.files.load import Source
+from stiffmap.solve.labels import OverPoses
 from stiffmap.solve.machine import Machine, as_machine, takes_machine
 from stiffmap.solve.options import keywords_of
-from stiffmap.solve.results import OverPoses
 from stiffmap.workspace.maps.inputs import plane_axes
 from stiffmap.workspace.performance.motion.closing import DriveKinematics, drive_kinematics
 from stiffmap.workspace.performance.motion.scaling import (
@@ -88,6 +88,22 @@ def transmission_of(
             condition=high / low, dexterity=low / high, manipulability=np.nanprod(s, axis=-1) + 0 * high,
             jacobian=k.jacobian, length=size, limits=speeds, status=k.status, flags=k.flags,
         )  # fmt: skip
+
+
+APART = 0.1
+"""The loops lose rank at type 2 as well, but not that much faster than the tool runs away."""
+
+
+def distances(v: VelocityTransmission, pivot: Floats) -> Floats:
+    """(3, ...) numbers from 0 (singular) to 1, one for each type.
+
+    Type 1: smallest transmission factor. Type 2: one over the largest. Constraint: root of the relative pivot of
+    the loops' normal matrix with the drives held, 1 unless it is far smaller than the number of type 2.
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        one, two, loops = v.sphere_min, 1 / v.sphere_max, np.sqrt(pivot)
+        third = np.where(loops < APART * two, loops, 1.0)
+    return np.asarray(np.minimum(np.stack([one, two, third]), 1.0))
 
 
 @keywords_of(transmission_of)
