@@ -14,12 +14,12 @@ import numpy as np
 
 import stiffmap as sm
 from stiffmap.machining.milling.equilibrium import commanded, equilibrium
-from stiffmap.machining.milling.placement import Search
+from stiffmap.machining.milling.placement import PlacementSearch
 from stiffmap.machining.milling.plant import Plant
 from stiffmap.machining.milling.setting import setting
 from stiffmap.machining.toolpath import outline, sampled
 from stiffmap.machining.toolpath.gcode.load import load_gcode
-from stiffmap.machining.toolpath.gcode.read import Reader, read_moves
+from stiffmap.machining.toolpath.gcode.read import ProgramReader, read_moves
 
 
 def main() -> None:
@@ -69,7 +69,7 @@ def points(machine: sm.Machine, count: int, threads: int) -> None:
 
 def many(machine: sm.Machine, count: int, threads: int) -> None:
     """Placements of a part of 500 points."""
-    search = Search(machine, outline("rectangle"), sm.load_process("trimming"), 500, threads)
+    search = PlacementSearch(machine, outline("rectangle"), sm.load_process("trimming"), 500, threads)
     rng = np.random.default_rng(0)
     low, high = machine.workspace
     turn = rng.uniform(-np.pi, np.pi, count)
@@ -88,7 +88,7 @@ def program(count: int) -> None:
     """A program of many lines: read one by one, and kept."""
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     start = time.process_time()
-    moves = sum(1 for _ in read_moves(lines(count), Reader("p")))
+    moves = sum(1 for _ in read_moves(lines(count), ProgramReader("p")))
     seconds = time.process_time() - start
     streamed = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     start = time.process_time()

@@ -20,7 +20,7 @@ from stiffmap.identification.taps import TapTest, explain_taps
 from stiffmap.identification.taps.causes import causes
 from stiffmap.identification.taps.causes import term as change
 from stiffmap.identification.taps.explain import _fitted, _refined
-from stiffmap.identification.taps.problem import Problem, shifted, uncertain_numbers
+from stiffmap.identification.taps.problem import TapsProblem, shifted, uncertain_numbers
 from stiffmap.model.effects import apply_records
 
 MACHINES = ("ur10", "orthoglide-revised", "five-bar", "linear-delta", "travelling-column")
@@ -53,7 +53,7 @@ def visible(problem, place, scale):
 
 def drawn(machine, rng):
     """A drive that is softer than its file says, visible to these taps."""
-    problem = Problem(machine, twin(machine, rng), None, DEFAULT)
+    problem = TapsProblem(machine, twin(machine, rng), None, DEFAULT)
     own = {a.rpartition(".")[2] for a in machine.actuators}
     drives = [c for c in causes(problem) if c.kind == "compliance" and c.element in own]
     while True:
@@ -86,7 +86,7 @@ def main() -> None:
         right = str(place) in names
         how = "named" if right and len(names) == 1 else "listed" if right else "wrong" if names else "missed"
         tally.setdefault(name, []).append(how)
-        problem = Problem(machine, taps, None, DEFAULT)
+        problem = TapsProblem(machine, taps, None, DEFAULT)
         true = _refined(problem, _fitted(problem, place))
         off.append(
             float(np.log(true.parameters["scale"] / scale) * true.parameters["scale"] / true.u["scale"])

@@ -22,7 +22,7 @@ import numpy as np
 import stiffmap as sm
 from stiffmap.experiment import Predictor
 from stiffmap.experiment.experiment import Floats, Mask
-from stiffmap.experiment.noise.whitening import Problem, nuisance_part
+from stiffmap.experiment.noise.whitening import LinearProblem, nuisance_part
 from stiffmap.identification.calibration import Calibration
 from stiffmap.identification.inference.travel import Profile
 from stiffmap.identification.numbers import Tolerances
@@ -117,7 +117,7 @@ def elsewhere(first: str, c: Calibration, series: str, folder: Path, own: Calibr
     declared = Predictor(sm.load_machine("ur10"), own.experiment)
     found = Predictor(c.machine, own.experiment)()
     for name, prediction in (("as declared", declared()), (f"calibrated on {first}", found)):
-        problem = Problem.of(own.experiment, declared.experiment.sigma, prediction, ~aside)
+        problem = LinearProblem.of(own.experiment, declared.experiment.sigma, prediction, ~aside)
         raw = own.experiment.reading - prediction
         left = (raw - nuisance_part(problem, raw))[~aside, :3]
         print(f"    {name:35}  {LENGTH * float(np.sqrt(np.mean(left**2))):.3f}")

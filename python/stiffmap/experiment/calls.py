@@ -20,7 +20,7 @@ from stiffmap.experiment.noise.checks import checks
 from stiffmap.experiment.noise.nuisance import nuisance_columns
 from stiffmap.experiment.noise.outliers import without_suspects
 from stiffmap.experiment.noise.over_time import over_time
-from stiffmap.experiment.noise.whitening import Problem, nuisance_part
+from stiffmap.experiment.noise.whitening import LinearProblem, nuisance_part
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.model.description import AppliedEffect
 from stiffmap.model.effects import parse_effect
@@ -63,7 +63,7 @@ def residual(
     refuse_unreachable(e, base)
     raw = e.reading - base
     noise, out = without_suspects(e, base)
-    problem = Problem.of(e, noise.sigma, base, ~out)
+    problem = LinearProblem.of(e, noise.sigma, base, ~out)
     part = nuisance_part(problem, raw)
     kept = np.where(out[:, None], np.nan, raw - part)
     white = problem.residual(base)
@@ -83,7 +83,7 @@ def residual(
     )
 
 
-def _groups_off(problem: Problem, white: Floats) -> int:
+def _groups_off(problem: LinearProblem, white: Floats) -> int:
     total, number = np.bincount(problem.groups, white**2), np.bincount(problem.groups)
     p = chi2.sf(total[number > 0], number[number > 0])
     return int((p < 1e-3 / max(len(p), 1)).sum())

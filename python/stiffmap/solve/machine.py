@@ -296,7 +296,7 @@ class Machine:
     ) -> Any:
         """Look at the machine and its map live in a browser; the view that is open is returned (``close()`` ends it).
 
-        All in SI and base axes; what is None is as `stiffmap.ui.view.State` has it. In a notebook the view is shown where it is
+        All in SI and base axes; what is None is as `stiffmap.ui.view.ViewState` has it. In a notebook the view is shown where it is
         the last value of a cell. docs/view.md.
 
         position (3,) m, None: home; rotation (3,) rad, rotation vector. port: of 127.0.0.1; None: a free one from 8080 on.

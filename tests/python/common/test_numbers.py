@@ -26,7 +26,7 @@ from stiffmap.common.tables.cells import Cells
 from stiffmap.common.tables.sheet import read_sheet
 from stiffmap.common.value_units import read_value
 from stiffmap.ui.cli import main
-from stiffmap.ui.view.state import State, from_permalink, permalink
+from stiffmap.ui.view.state import ViewState, from_permalink, permalink
 
 ENORMOUS = ["1e160", "-1e61", "1" + 300 * "0"]
 DUST = ["1e-300", "-1e-114", "5e-324"]
@@ -81,7 +81,7 @@ def test_noise_of_any_size_is_no_defect(
 
 
 def test_a_number_of_a_link_to_the_view_is_bounded() -> None:
-    for state in (State((0.0, 0.0, 1e300)), State((0.0, 0.0, 0.0), tolerance=10**400)):
+    for state in (ViewState((0.0, 0.0, 1e300)), ViewState((0.0, 0.0, 0.0), tolerance=10**400)):
         with pytest.raises(StiffmapError, match=r"at most|finite"):
             from_permalink(permalink("orthoglide-revised", state))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -139,3 +140,10 @@ def test_bindings_hand_arrays_over_and_decide_nothing() -> None:
     files = sorted((ROOT / "python/bindings").glob("*.[ch]pp"))
     assert files
     assert {p.name: words.search(code(p)) for p in files if words.search(code(p))} == {}
+
+
+def test_a_class_has_a_name_of_its_own() -> None:
+    found = re.findall(
+        r"^class ([A-Z]\w*)", "\n".join(map(text, (ROOT / "python/stiffmap").rglob("*.py"))), re.MULTILINE
+    )
+    assert not [name for name, times in Counter(found).items() if times > 1]

@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import stiffmap as sm
-from stiffmap.experiment.spreadsheet.dh import Row, arm
+from stiffmap.experiment.spreadsheet.dh import DHRow, arm
 from stiffmap.model.description import TASK, MachineDescription
 from stiffmap.solve.advice import _reach
 from stiffmap.solve.compiled import CompiledMachine
@@ -48,7 +48,7 @@ TWO = ((0.0, 0.0, 0.4, 0.0), (0.0, 0.0, 0.3, 0.0))
 
 
 def machine(rows: tuple[tuple[float, ...], ...], q: list[float] | None = None) -> MachineDescription:
-    table = [Row(f"j{i + 1}", *r, False, None) for i, r in enumerate(rows)]
+    table = [DHRow(f"j{i + 1}", *r, False, None) for i, r in enumerate(rows)]
     return arm(table, "standard", "m", home=None if q is None else np.array(q, dtype=float))
 
 

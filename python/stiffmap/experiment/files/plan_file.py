@@ -13,7 +13,7 @@ from stiffmap.experiment.channels import AXES
 from stiffmap.experiment.experiment import Experiment
 from stiffmap.experiment.files.fields import EULER, PLAN, TURNED2
 from stiffmap.experiment.files.load import rows_of
-from stiffmap.experiment.files.schema import ExperimentFile, UnitsModel
+from stiffmap.experiment.files.schema import ExperimentFile, ExperimentUnitsModel
 from stiffmap.experiment.files.table import read_table
 from stiffmap.experiment.files.units import Units
 from stiffmap.experiment.virtual.plans import unread
@@ -35,7 +35,7 @@ def load_plan(
 ) -> Experiment:
     """Plan of a CSV file with x, y, z and, as wanted, loads, orientation, order, temperature, branch,
     set-up, approach and points. Raises `FileError` naming file, row and column."""
-    units = UnitsModel(length="mm", force="N", angle="rad")
+    units = ExperimentUnitsModel(length="mm", force="N", angle="rad")
     model = ExperimentFile(machine=machine.name, quantity=quantity, units=units)  # type: ignore[arg-type]
     table = Units(model, str(path)).of_header(read_table(path))
     table.refuse_unknown(KNOWN, "a plan knows")

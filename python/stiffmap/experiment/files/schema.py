@@ -23,7 +23,7 @@ UNITS: dict[str | None, Any] = {"length": Length, "angle": Angle, "force": Force
 """Quantity of a column -> units that the file may declare for it."""
 
 
-class UnitsModel(FileModel):
+class ExperimentUnitsModel(FileModel):
     """Units of data.csv, of the noise and of the frame; angle only where there are rotations.
 
     A column that has a unit of its own is named as well: ``{length: mm, force: N, dx: um, fx: kN}``. Its
@@ -51,7 +51,7 @@ class NoiseModel(FileModel):
 LengthOrAngle = Literal[Length, Angle]
 
 
-class JointModel(FileModel):
+class EncoderModel(FileModel):
     """A column that an encoder reads: full name of the joint, unit of the column and its noise in it.
 
     ``load``: the joint itself, behind the drive's elasticity. ``motor``: before it.
@@ -138,7 +138,7 @@ class ExperimentFile(FileModel):
 
     machine: str
     quantity: Literal["deflection", "position"]
-    units: UnitsModel
+    units: ExperimentUnitsModel
     title: str = ""
     data: str = "data.csv"
     rows: Annotated[int, Field(gt=0)] | None = None
@@ -148,7 +148,7 @@ class ExperimentFile(FileModel):
     axes: Literal["base"] = "base"
     noise: NoiseModel = NoiseModel()
     zero_noise: NoiseModel = NoiseModel()
-    joints: dict[str, JointModel] = Field(default_factory=dict)
+    joints: dict[str, EncoderModel] = Field(default_factory=dict)
     command: dict[str, CommandModel] = Field(default_factory=dict)
     unloaded: Literal["centre", "approach", "unknown"] = "centre"
     frame: Literal["known", "offset_unknown", "unknown"] = "known"
@@ -180,7 +180,7 @@ def _with_columns(
     sizes: dict[str, Any] = dict.fromkeys(readings, (Positive | None, None))
     noise = create_model("NoiseModel", __base__=NoiseModel, **sizes)
     fields: dict[str, Any] = {
-        "units": (create_model("UnitsModel", __base__=UnitsModel, **units), ...),
+        "units": (create_model("UnitsModel", __base__=ExperimentUnitsModel, **units), ...),
         "noise": (noise, noise()),
         "zero_noise": (noise, noise()),
     }

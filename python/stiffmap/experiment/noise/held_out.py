@@ -7,7 +7,7 @@ import numpy as np
 from stiffmap.common.broadcasting import random_numbers
 from stiffmap.experiment.experiment import Experiment, Floats, Integers, Mask
 from stiffmap.experiment.noise.nuisance import nuisance_columns
-from stiffmap.experiment.noise.whitening import Problem, best_fit
+from stiffmap.experiment.noise.whitening import LinearProblem, best_fit
 
 FOLDS = 5
 
@@ -24,12 +24,12 @@ def folds(experiment: Experiment, seed: int) -> tuple[Integers, str]:
 def left_unseen(e: Experiment, sigma: Floats, prediction: Floats, seen: Mask, unseen: Mask) -> Floats:
     """(n, c) reading minus prediction (n, c) at noise `sigma` (n, c), less the nuisances of rows `unseen` (n,) as those in
     `seen` (n,) determine them. What frames and tools change is taken at the prediction."""
-    others, own = (Problem.of(e, sigma, prediction, rows) for rows in (seen, unseen))
+    others, own = (LinearProblem.of(e, sigma, prediction, rows) for rows in (seen, unseen))
     left = e.reading - prediction
     return np.asarray(left - unseen_nuisances(others, own, left))
 
 
-def unseen_nuisances(others: Problem, own: Problem, values: Floats) -> Floats:
+def unseen_nuisances(others: LinearProblem, own: LinearProblem, values: Floats) -> Floats:
     """(n, c) what nuisances say of `values` (n, c) where the readings of `own` are held out: as the readings of `others`
     determine them; those that none of `others` knows (the frame of another set-up, the zero of another pose) as their
     own readings do."""

@@ -9,7 +9,7 @@ from scipy.stats import chi2
 
 from stiffmap.experiment.experiment import Experiment, Floats, Integers, Mask
 from stiffmap.experiment.noise.level import Noise, noise_of
-from stiffmap.experiment.noise.whitening import Problem, nuisance_part
+from stiffmap.experiment.noise.whitening import LinearProblem, nuisance_part
 from stiffmap.experiment.setups import target_positions
 
 MANY, LEAST_MANY = 0.1, 2
@@ -128,7 +128,7 @@ def without_suspects(experiment: Experiment, base: Floats) -> tuple[Noise, Mask]
     out, raw = np.zeros(len(experiment), bool), experiment.reading - base
     while True:
         noise = noise_of(experiment, ~out)
-        problem = Problem.of(experiment, noise.sigma, base, ~out)
+        problem = LinearProblem.of(experiment, noise.sigma, base, ~out)
         bare = np.where(out[:, None], np.nan, raw - nuisance_part(problem, raw, robust=True))
         more = whole_stays(experiment, out | suspects(experiment, bare, noise.sigma))
         if not (more & ~out).any():

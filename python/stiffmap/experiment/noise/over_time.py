@@ -8,7 +8,7 @@ import numpy as np
 from scipy.stats import f
 
 from stiffmap.experiment.experiment import Experiment, Floats
-from stiffmap.experiment.noise.whitening import Problem, basis
+from stiffmap.experiment.noise.whitening import LinearProblem, basis
 
 SELDOM = 1e-4
 """p-value below which what is left goes with time."""
@@ -43,7 +43,7 @@ class OverTime:
         return f"over time ({self.clock}) what is left shows no drift, creep or warming (p = {self.p:.2g})"
 
 
-def over_time(problem: Problem, residual: Floats) -> OverTime | None:
+def over_time(problem: LinearProblem, residual: Floats) -> OverTime | None:
     """Of a residual (N,), whitened; None where no times were recorded or there are too few rows. By an F-test: noise may have
     any size."""
     q = courses(problem)
@@ -56,7 +56,7 @@ def over_time(problem: Problem, residual: Floats) -> OverTime | None:
     return OverTime(p, float(np.sqrt(gain / max(rest, 1e-300))), _clock(problem.experiment)[0])
 
 
-def courses(problem: Problem) -> Floats:
+def courses(problem: LinearProblem) -> Floats:
     """(N, k) orthonormal courses, whitened: linear, quadratic, cubic, settling, and with the temperature where it is recorded;
     each set-up and channel has its own."""
     e = problem.experiment

@@ -19,7 +19,7 @@ from stiffmap.experiment.noise.robust import ROUNDS, fitted
 
 
 @dataclass(frozen=True, eq=False)
-class Problem:
+class LinearProblem:
     """Kept readings, in the order of rows and axes; N of them."""
 
     experiment: Experiment
@@ -37,13 +37,13 @@ class Problem:
     """(n, c) prediction of the declared machine."""
 
     @staticmethod
-    def of(experiment: Experiment, sigma: Floats, base: Floats, keep: Mask | None = None) -> Problem:
+    def of(experiment: Experiment, sigma: Floats, base: Floats, keep: Mask | None = None) -> LinearProblem:
         """Problem of the rows in `keep`; `base` (n, c) is the declared machine's prediction."""
         rows = np.ones(len(experiment), bool) if keep is None else keep
         at, axis = readings_of(experiment, base)
         index = (at[rows[at]], axis[rows[at]])
         none = np.zeros((len(index[0]), 0))
-        bare = Problem(experiment, sigma, rows, index, none, _blocks(experiment, sigma, index), base)
+        bare = LinearProblem(experiment, sigma, rows, index, none, _blocks(experiment, sigma, index), base)
         columns = nuisance_columns(experiment, base)
         if columns.shape[-1]:
             bare = replace(bare, nuisance=basis(bare.white(columns)))
@@ -103,12 +103,12 @@ def readings_of(experiment: Experiment, base: Floats) -> tuple[Integers, Integer
     return at.astype(np.intp), axis.astype(np.intp)
 
 
-def nuisance_part(problem: Problem, values: Floats, *, robust: bool = False) -> Floats:
+def nuisance_part(problem: LinearProblem, values: Floats, *, robust: bool = False) -> Floats:
     """(n, c) what the nuisances of best fit say of `values` (n, c); NaN where they are."""
     return best_fit(problem, nuisance_columns(problem.experiment, problem.base), values, robust=robust)
 
 
-def best_fit(problem: Problem, columns: Floats, values: Floats, *, robust: bool = False) -> Floats:
+def best_fit(problem: LinearProblem, columns: Floats, values: Floats, *, robust: bool = False) -> Floats:
     """(n, c) what columns (n, c, q) of best fit to the kept readings say of `values` (n, c), nothing else fitted; `robust`:
     readings that are far off do not count."""
     if not columns.shape[-1]:

@@ -36,7 +36,7 @@ class Question(StiffmapError):
 
 
 @dataclass(frozen=True)
-class Imported:
+class ImportedSheet:
     """What was understood of a sheet."""
 
     columns: list[Column]
@@ -49,7 +49,7 @@ class Imported:
     """What the reader must know, in words."""
 
 
-def understand(m: Meant, loaded: bool = False) -> Imported:
+def understand(m: Meant, loaded: bool = False) -> ImportedSheet:
     """Columns, units and rows of data.csv of a sheet, as it is meant; raises StiffmapError that asks for what cannot be guessed.
 
     ``loaded``: whether a load must be there.
@@ -84,7 +84,9 @@ def understand(m: Meant, loaded: bool = False) -> Imported:
             said += [why] if why else []
     named = {m: u.name for m, u in found.items()}
     factors = {m: u.factor for m, u in found.items() if u.factor != 1.0}
-    return Imported(columns, named, factors, Rows(sheet, used, m.constants, factors), dict(m.constants), said)
+    return ImportedSheet(
+        columns, named, factors, Rows(sheet, used, m.constants, factors), dict(m.constants), said
+    )
 
 
 def _ask(sheet: Sheet, known_: set[str], joints: bool) -> None:
@@ -221,7 +223,7 @@ class Rows:
 
 
 def write_folder(
-    found: Imported,
+    found: ImportedSheet,
     m: Meant,
     folder: Path,
     machine: str,
@@ -260,7 +262,7 @@ def write_folder(
         write_text(folder / "experiment.yaml", text_of(head))
 
 
-def head_units(found: Imported) -> dict[str, str]:
+def head_units(found: ImportedSheet) -> dict[str, str]:
     """Units for experiment.yaml: mm and N in common, every column that differs by its name."""
     common = {"length": "mm", "force": "N"}
     out = dict(common)

@@ -44,7 +44,7 @@ ROOM = 0.2
 
 
 @dataclass(frozen=True)
-class Row:
+class DHRow:
     """One joint, SI."""
 
     name: str
@@ -56,7 +56,7 @@ class Row:
     range: tuple[float, float] | None
 
 
-def read_dh(sheet: Sheet, units: Mapping[str, str]) -> list[Row]:
+def read_dh(sheet: Sheet, units: Mapping[str, str]) -> list[DHRow]:
     """Rows of a table; `units` (theta, d, a, alpha -> unit) for columns without brackets.
 
     Raises StiffmapError that names the column which is missing or has no unit.
@@ -83,12 +83,12 @@ def read_dh(sheet: Sheet, units: Mapping[str, str]) -> list[Row]:
         range_ = (float(ends[0][0][i] * scale), float(ends[0][1][i] * scale)) if ends else None
         known = range_ is not None and all(map(math.isfinite, range_))
         theta, d, a, alpha = (float(numbers[n][i]) for n in NUMBERS)
-        out.append(Row(names[i], theta, d, a, alpha, slides[i], range_ if known else None))
+        out.append(DHRow(names[i], theta, d, a, alpha, slides[i], range_ if known else None))
     return out
 
 
 def arm(
-    rows: Sequence[Row], convention: str, name: str, source: str = "", home: Floats | None = None
+    rows: Sequence[DHRow], convention: str, name: str, source: str = "", home: Floats | None = None
 ) -> MachineDescription:
     """The machine; `home` (joints,) m, rad of its home configuration, None: one that is far from singular."""
     if convention not in CONVENTIONS:
@@ -116,7 +116,7 @@ def arm(
     )  # fmt: skip
 
 
-def forward(rows: Sequence[Row], standard: bool, q: Floats) -> Floats:
+def forward(rows: Sequence[DHRow], standard: bool, q: Floats) -> Floats:
     """(4, 4) frame behind the last row at coordinates (joints,)."""
     out = np.eye(4)
     for r, v in zip(rows, q, strict=True):
@@ -126,7 +126,7 @@ def forward(rows: Sequence[Row], standard: bool, q: Floats) -> Floats:
     return out
 
 
-def _home(rows: Sequence[Row], standard: bool) -> Floats:
+def _home(rows: Sequence[DHRow], standard: bool) -> Floats:
     """Of coordinates in steps of 30 degrees those whose slopes are farthest from losing a direction."""
     rng = np.random.default_rng(0)
     reach = _reach(rows, standard)
@@ -140,7 +140,7 @@ def _home(rows: Sequence[Row], standard: bool) -> Floats:
     return where
 
 
-def _reach(rows: Sequence[Row], standard: bool) -> float:
+def _reach(rows: Sequence[DHRow], standard: bool) -> float:
     """Of the tool, m: at most the sum of all lengths. Between nearly parallel axes these are hundreds of metres to and fro,
     and the lever arms about the axes say how large the arm is."""
     total = sum(abs(r.a) + abs(r.d) for r in rows) or 1.0
@@ -151,12 +151,12 @@ def _reach(rows: Sequence[Row], standard: bool) -> float:
     return min(total, LEVERS * float(np.max(arms, initial=0.0))) if turning else total
 
 
-def _within(r: Row, turn: float, reach: float) -> float:
+def _within(r: DHRow, turn: float, reach: float) -> float:
     v = turn / math.pi * 0.5 * reach if r.slides else turn
     return v if r.range is None else float(np.clip(v, *r.range))
 
 
-def _slopes(rows: Sequence[Row], standard: bool, q: Floats, reach: float) -> Floats:
+def _slopes(rows: Sequence[DHRow], standard: bool, q: Floats, reach: float) -> Floats:
     """(6, joints) of the pose, lengths in reaches."""
     out, step, at = np.zeros((6, len(q))), 1e-6, forward(rows, standard, q)
     for i in range(len(q)):

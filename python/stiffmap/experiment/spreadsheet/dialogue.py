@@ -19,7 +19,7 @@ from stiffmap.common.yaml_text import read, text_of
 from stiffmap.experiment.experiment import WRENCH
 from stiffmap.experiment.files.fields import SEEN, quantity_of
 from stiffmap.experiment.spreadsheet.answers import Answers, Meant
-from stiffmap.experiment.spreadsheet.convert import Imported, Question, understand
+from stiffmap.experiment.spreadsheet.convert import ImportedSheet, Question, understand
 from stiffmap.experiment.spreadsheet.guess import READINGS
 from stiffmap.experiment.spreadsheet.together import together
 
@@ -79,11 +79,11 @@ def remember(sheet: Sheet, a: Answers) -> Path:
     return file
 
 
-def ask_all(m: Meant, ask: Ask | None, loaded: bool = False) -> Imported:
+def ask_all(m: Meant, ask: Ask | None, loaded: bool = False) -> ImportedSheet:
     """What is understood of the sheet with the answers to every question that it leaves, which `m` gathers, and with columns of
     the other sign where an answer wants them; raises StiffmapError."""
 
-    def understood() -> Imported:
+    def understood() -> ImportedSheet:
         signed = Meant.of_sheet(m.sheet, m)
         together(signed, False)
         m.sheet, m.chosen = signed.sheet, signed.chosen

@@ -21,7 +21,7 @@ from stiffmap.experiment.experiment import Experiment
 from stiffmap.experiment.files.load import load_experiment
 from stiffmap.experiment.noise.level import against_the_load, contradictions
 from stiffmap.experiment.spreadsheet.answers import Answers, Meant
-from stiffmap.experiment.spreadsheet.convert import Imported, Question, write_folder
+from stiffmap.experiment.spreadsheet.convert import ImportedSheet, Question, write_folder
 from stiffmap.experiment.spreadsheet.dh import LEG, arm, read_dh
 from stiffmap.experiment.spreadsheet.dialogue import (
     Ask,
@@ -39,7 +39,7 @@ from stiffmap.experiment.spreadsheet.sockets import seated
 from stiffmap.experiment.spreadsheet.together import oriented, together
 from stiffmap.solve.machine import Machine, load_machine
 
-Understand = Callable[[str | None, Ask | None], tuple[Meant, Imported]]
+Understand = Callable[[str | None, Ask | None], tuple[Meant, ImportedSheet]]
 """What is meant by a sheet of that name, with answers to its questions."""
 
 
@@ -57,7 +57,7 @@ class FromTable:
     remarks: tuple[str, ...]
     """What was taken for granted, and what was left out."""
     sheet: Sheet = field(repr=False)
-    understood: Imported = field(repr=False)
+    understood: ImportedSheet = field(repr=False)
     commanded: Meant | None = field(repr=False)
     """Joints that the table commands."""
 
@@ -162,7 +162,7 @@ def experiment_from_table(
 
 def _fitting(
     file: Path, sheet: str | None, understood: Understand, ask: Ask | None
-) -> tuple[Meant, Imported]:
+) -> tuple[Meant, ImportedSheet]:
     """The sheet that fits with the answers in use, and what was understood of it."""
     names = sheet_names(file) if sheet is None and file.suffix.lower() in WORKBOOKS else [sheet]
     if len(names) == 1:
@@ -190,7 +190,7 @@ def _understood(
     given: Answers,
     name: str | None,
     ask: Ask | None,
-) -> tuple[Meant, Imported]:
+) -> tuple[Meant, ImportedSheet]:
     """One sheet: `drives` (name -> whether it slides) it may command, what `wrote` it, the sign of its `difference`; rows of a
     `deflection` need a load."""
     form = read_sheet(file, name, layout)
@@ -222,7 +222,7 @@ def _understood(
     return m, found
 
 
-def _of_sheet(error: FileError, found: Imported, sheet: Sheet, fresh: Path) -> FileError:
+def _of_sheet(error: FileError, found: ImportedSheet, sheet: Sheet, fresh: Path) -> FileError:
     """An error of the generated files in the words of the sheet."""
     reason = re.sub(r" \(first in line \d+\)", "", error.reason)
     columns = {c.meaning: c for c in found.columns if c.meaning != "note"}

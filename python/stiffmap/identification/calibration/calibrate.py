@@ -17,8 +17,8 @@ from stiffmap.experiment.comparison.limitations import refuse
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.noise.outliers import swapped
 from stiffmap.experiment.prediction.predict import Predictor
-from stiffmap.identification.calibration.result import Calibration, Row
-from stiffmap.identification.candidates.plan import Plan
+from stiffmap.identification.calibration.result import Calibration, CalibrationRow
+from stiffmap.identification.candidates.plan import CandidatePlan
 from stiffmap.identification.clock import Clock, Progress
 from stiffmap.identification.inference.amplitudes import OFF, Fit, evaluated
 from stiffmap.identification.inference.columns import Columns
@@ -89,7 +89,7 @@ def calibrate(
     with clock.on_interrupt():
         predictor = Predictor(declared, data, threads=threads)
         refuse(predictor.experiment, predictor())
-        without_effects = Plan(predictor(), (), ())
+        without_effects = CandidatePlan(predictor(), (), ())
         found = infer(predictor, without_effects, tolerances, exclude, clock, seed, travel=True)
         return _answer(predictor, found, clock, seed, start)
 
@@ -155,7 +155,7 @@ def _answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, star
     )
 
 
-def table_of(columns: Columns, fit: Fit, best: Corrected | None) -> tuple[tuple[Row, ...], int]:
+def table_of(columns: Columns, fit: Fit, best: Corrected | None) -> tuple[tuple[CalibrationRow, ...], int]:
     """Rows of all numbers that the readings show, with their values at the optimum, and how many directions the readings
     determine."""
     at = {}
@@ -176,7 +176,7 @@ def table_of(columns: Columns, fit: Fit, best: Corrected | None) -> tuple[tuple[
         informed = 1.0 - (sd / prior[k]) ** 2
         pull = float(value / np.sqrt(informed)) if informed > 1e-9 else 0.0
         more = bool(informed > 0.5), float(prior[k] / sd), k in minimal
-        out.append(Row(u.name, u.group, u.leg, u.unit, value * u.u, u.u, sd * u.u, pull, *more))
+        out.append(CalibrationRow(u.name, u.group, u.leg, u.unit, value * u.u, u.u, sd * u.u, pull, *more))
     return tuple(out), int((np.linalg.eigvalsh(gram) > SEEN**2).sum())
 
 

@@ -31,7 +31,7 @@ FACTOR = 0.5
 
 
 @dataclass(frozen=True)
-class Row:
+class CalibrationRow:
     """One unknown: declared standard uncertainty, posterior, and whether the readings determine it."""
 
     name: str
@@ -89,8 +89,8 @@ class Calibration:
     """Both on readings that no fit saw; None where there are not two folds, or time was over."""
     over_time: OverTime | None
     """What `machine` leaves over time; None where no times were recorded."""
-    rows: tuple[Row, ...]
-    beyond: tuple[Row, ...]
+    rows: tuple[CalibrationRow, ...]
+    beyond: tuple[CalibrationRow, ...]
     """Numbers that no tolerance allows."""
     wide: Mapping[str, float]
     """Groups whose numbers are off by so many times their standard uncertainties (rms), where that is beyond doubt."""

@@ -17,7 +17,7 @@ from stiffmap.model.effects import get, kinds
 
 
 @dataclass(frozen=True)
-class Plan:
+class CandidatePlan:
     """What does not depend on the readings."""
 
     base: Floats
@@ -27,10 +27,10 @@ class Plan:
     failed: tuple[tuple[Candidate, str], ...]
 
 
-_PLANS: Kept[str, Plan] = Kept(8)
+_PLANS: Kept[str, CandidatePlan] = Kept(8)
 
 
-def plan_of(predictor: Predictor, clock: Clock | None = None) -> Plan:
+def plan_of(predictor: Predictor, clock: Clock | None = None) -> CandidatePlan:
     """Sensitivities of a machine under a plan; the last eight are kept. The clock learns which are computed; where it
     is over those that there are make the plan, which is not kept."""
     clock = clock or Clock()
@@ -63,5 +63,5 @@ def plan_of(predictor: Predictor, clock: Clock | None = None) -> Plan:
         good += usable
         if not usable:
             failed.append((candidate, "the machine has no equilibrium with it at some poses"))
-    plan = Plan(base, tuple(good), tuple(failed))
+    plan = CandidatePlan(base, tuple(good), tuple(failed))
     return _PLANS.put(key, plan) if whole else plan

@@ -17,7 +17,13 @@ from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.identification.candidates.candidates import Candidate
 from stiffmap.identification.clock import Clock
 from stiffmap.identification.diagnosis.report.effects import detectable, effects_of
-from stiffmap.identification.diagnosis.report.findings import Effect, NoiseReport, Number, Numbers, Rest
+from stiffmap.identification.diagnosis.report.findings import (
+    Effect,
+    FoundNumber,
+    FoundNumbers,
+    NoiseReport,
+    Rest,
+)
 from stiffmap.identification.diagnosis.report.result import Diagnosis
 from stiffmap.identification.diagnosis.report.separation import separation
 from stiffmap.identification.inference.amplitudes import Fit
@@ -263,13 +269,13 @@ def _or_number(n: Named) -> str:
     return f"instead of {n.chosen.place.candidate} these declared numbers may be out of tolerance: {names}"
 
 
-def _numbers(found: Inferred, v: Verdict, best: Corrected | None, given: Readings) -> Numbers | None:
+def _numbers(found: Inferred, v: Verdict, best: Corrected | None, given: Readings) -> FoundNumbers | None:
     if best is None or not len(best.numbers):
         return None
     said = zip(found.columns.unknowns, of_numbers(found.columns, found.search.best.fit), strict=True)
     at = dict(zip((u.name for u in given.sensitivity.unknowns), best.numbers.tolist(), strict=True))
     table = [
-        Number(u.name, u.group, u.leg, u.unit, at[u.name] * u.u, u.u, sd * u.u, share)
+        FoundNumber(u.name, u.group, u.leg, u.unit, at[u.name] * u.u, u.u, sd * u.u, share)
         for u, (_, sd, share) in said
         if u.name in at
     ]
@@ -277,7 +283,7 @@ def _numbers(found: Inferred, v: Verdict, best: Corrected | None, given: Reading
     beyond = sorted((n for n in table if n.name in off), key=lambda n: -n.share)
     names = ", ".join(n.name for n in beyond)
     word = f"beyond tolerance: {names}" if beyond else "adjusted within tolerance"
-    return Numbers(word, tuple(beyond), tuple(table))
+    return FoundNumbers(word, tuple(beyond), tuple(table))
 
 
 def _unobservable(found: Inferred) -> list[str]:

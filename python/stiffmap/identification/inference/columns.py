@@ -20,11 +20,11 @@ from stiffmap.experiment.noise.outliers import GROSS, MANY
 from stiffmap.experiment.noise.robust import fitted
 from stiffmap.experiment.noise.whitening import basis, readings_of
 from stiffmap.experiment.prediction.predict import Predictor
-from stiffmap.identification.candidates.plan import Plan
+from stiffmap.identification.candidates.plan import CandidatePlan
 from stiffmap.identification.candidates.sensitivity import Variant
 from stiffmap.identification.inference.constants import STANDS_OUT
 from stiffmap.identification.inference.free import Free
-from stiffmap.identification.inference.kernels import Kernel, Points, gaps
+from stiffmap.identification.inference.kernels import Kernel, ReadingPoints, gaps
 from stiffmap.identification.inference.places import NULL, Place, places
 from stiffmap.identification.inference.travel import drives_of
 from stiffmap.identification.numbers.sensitivity import Sensitivity, sensitivity, zeros_anew
@@ -76,7 +76,7 @@ class Columns:
 
     def scale_of(self, kernel: Kernel) -> float:
         """Variance of a kernel in a part of mean variance one."""
-        points = Points(self.rows, self.channel, self.sigma)
+        points = ReadingPoints(self.rows, self.channel, self.sigma)
         size = float(np.sum(self.free * (kernel.between(points, points) @ self.free)))
         return len(self) / size if size > 0.0 else 0.0
 
@@ -119,7 +119,7 @@ class Columns:
 
 def columns(
     predictor: Predictor,
-    plan: Plan,
+    plan: CandidatePlan,
     sigma: Floats,
     unknowns: Sequence[Unknown],
     seed: int = 0,
@@ -153,7 +153,7 @@ def columns(
     s = zeros_anew(sensitivity(predictor, unknowns), e)
     numbers = free.T @ (s.columns[index] / noise[:, None])
     seen = np.linalg.norm(numbers, axis=0) > NULL
-    points = Points(rows, channel, noise)
+    points = ReadingPoints(rows, channel, noise)
     common = free.T @ zeros(e, points)
     found = tuple(
         (k.kind, k.name, free.T @ k.between(points, points) @ free)
@@ -220,7 +220,7 @@ def _averages(e: Experiment, rows: Integers, channel: Integers, noise: Floats, r
     return average
 
 
-def zeros(e: Experiment, points: Points) -> Floats:
+def zeros(e: Experiment, points: ReadingPoints) -> Floats:
     """(N, k) factor of the covariance, in noise, of the declared zero that readings of one pose share."""
     if e.quantity != "deflection" or not e.zeros.any():
         return np.zeros((len(points), 0))

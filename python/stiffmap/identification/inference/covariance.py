@@ -14,7 +14,7 @@ import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 
 from stiffmap.experiment.experiment import Floats, Mask
-from stiffmap.identification.inference.kernels import Kernel, Points
+from stiffmap.identification.inference.kernels import Kernel, ReadingPoints
 
 MOST_BLOCKS = 600
 """Blocks that have a column, those of most readings first. Effort only."""
@@ -67,7 +67,11 @@ class Covariance:
 
 
 def covariance(
-    points: Points, some: Points, kernels: Sequence[tuple[Kernel, float]], noise: Floats, more: Floats
+    points: ReadingPoints,
+    some: ReadingPoints,
+    kernels: Sequence[tuple[Kernel, float]],
+    noise: Floats,
+    more: Floats,
 ) -> Covariance:
     """Of kernels with their variances, known by some readings; `noise` (N,) and further columns `more` (N, k) of the factor."""
     smooth = [(k, v) for k, v in kernels if k.label is None]

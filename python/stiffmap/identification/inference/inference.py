@@ -13,7 +13,7 @@ from stiffmap.experiment.experiment import Experiment, Floats, Mask
 from stiffmap.experiment.noise.level import Noise
 from stiffmap.experiment.noise.outliers import without_suspects
 from stiffmap.experiment.prediction.predict import Predictor
-from stiffmap.identification.candidates.plan import Plan, plan_of
+from stiffmap.identification.candidates.plan import CandidatePlan, plan_of
 from stiffmap.identification.clock import Clock
 from stiffmap.identification.inference.chosen import Chosen
 from stiffmap.identification.inference.columns import Columns, columns
@@ -28,7 +28,7 @@ from stiffmap.solve.machine import Machine
 class Inferred:
     """What a search had, and what it found."""
 
-    plan: Plan
+    plan: CandidatePlan
     noise: Noise
     suspects: Mask
     """(n,) rows that stand alone before any cause is known."""
@@ -48,7 +48,7 @@ def inferred(machine: Machine, experiment: Experiment) -> tuple[Columns, Search]
 
 def infer(
     predictor: Predictor,
-    plan: Plan,
+    plan: CandidatePlan,
     tolerances: Tolerances | None = None,
     exclude: Sequence[str] = (),
     clock: Clock | None = None,

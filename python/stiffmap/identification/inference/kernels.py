@@ -23,7 +23,7 @@ TOUCHED = 0.1
 
 
 @dataclass(frozen=True, eq=False)
-class Points:
+class ReadingPoints:
     """Readings: row, channel and noise (m, rad) of each of N."""
 
     rows: Integers
@@ -41,15 +41,15 @@ class Kernel:
     kind: str
     """``field``, ``pose`` or ``time``."""
     name: str
-    between: Callable[[Points, Points], Floats]
+    between: Callable[[ReadingPoints, ReadingPoints], Floats]
     """(N, M)."""
-    own: Callable[[Points], Floats]
+    own: Callable[[ReadingPoints], Floats]
     """(N,) variances."""
-    label: Callable[[Points], Integers] | None = None
+    label: Callable[[ReadingPoints], Integers] | None = None
     """(N,) number of the block that each reading is in, where it is one within blocks and zero between them."""
 
 
-def gaps(machine: Machine, e: Experiment, points: Points) -> Iterator[Kernel]:
+def gaps(machine: Machine, e: Experiment, points: ReadingPoints) -> Iterator[Kernel]:
     """What nobody can name that some readings can hold."""
     angle = np.array([c.unit == "rad" for c in e.channels])
     load = e.wrench / max(float(np.abs(e.wrench).max(initial=0.0)), 1e-300)
@@ -72,12 +72,12 @@ def gaps(machine: Machine, e: Experiment, points: Points) -> Iterator[Kernel]:
 def _field(name: str, here: Mask, x: Floats, load: Floats | None) -> Kernel:
     """Over places x (n, k) in lengths, of channels `here` (c,); with `load` (n, 6) times load with load."""
 
-    def between(a: Points, b: Points) -> Floats:
+    def between(a: ReadingPoints, b: ReadingPoints) -> Floats:
         same = (a.channel[:, None] == b.channel) & here[a.channel][:, None]
         k = same * matern(cdist(x[a.rows], x[b.rows])) / np.outer(a.sigma, b.sigma)
         return np.asarray(k if load is None else k * (load[a.rows] @ load[b.rows].T))
 
-    def own(a: Points) -> Floats:
+    def own(a: ReadingPoints) -> Floats:
         carried = 1.0 if load is None else np.sum(load[a.rows] ** 2, axis=1)
         return np.asarray(here[a.channel] * carried / a.sigma**2)
 
@@ -87,7 +87,7 @@ def _field(name: str, here: Mask, x: Floats, load: Floats | None) -> Kernel:
 def _wander(name: str, t: Floats, session: Integers) -> Kernel:
     """Over times t (n,) in lengths, within sessions (n,)."""
 
-    def between(a: Points, b: Points) -> Floats:
+    def between(a: ReadingPoints, b: ReadingPoints) -> Floats:
         together = (a.channel[:, None] == b.channel) & (session[a.rows][:, None] == session[b.rows])
         return np.asarray(together * np.exp(-np.abs(t[a.rows][:, None] - t[b.rows])))
 
@@ -97,16 +97,16 @@ def _wander(name: str, t: Floats, session: Integers) -> Kernel:
 def blocks(kind: str, name: str, of: Integers, channels: int) -> Kernel:
     """Of readings of one channel whose rows have the same number (n,)."""
 
-    def label(a: Points) -> Integers:
+    def label(a: ReadingPoints) -> Integers:
         return np.asarray(of[a.rows] * channels + a.channel)
 
-    def between(a: Points, b: Points) -> Floats:
+    def between(a: ReadingPoints, b: ReadingPoints) -> Floats:
         return np.asarray(label(a)[:, None] == label(b), dtype=float)
 
     return Kernel(kind, name, between, lambda a: np.ones(len(a)), label)
 
 
-def shared(e: Experiment, points: Points) -> Iterator[Kernel]:
+def shared(e: Experiment, points: ReadingPoints) -> Iterator[Kernel]:
     """What readings of one condition and of one pose share; nothing where that is the noise, or the one before, itself."""
     number = len(points)
     for name, of in (("condition", e.conditions), ("pose", e.groups)):

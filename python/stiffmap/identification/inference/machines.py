@@ -14,7 +14,7 @@ from stiffmap.experiment.experiment import Floats, Integers, Mask
 from stiffmap.experiment.noise.held_out import folds, left_unseen
 from stiffmap.experiment.noise.outliers import GROSS
 from stiffmap.experiment.noise.over_time import OverTime, over_time
-from stiffmap.experiment.noise.whitening import Problem, nuisance_part
+from stiffmap.experiment.noise.whitening import LinearProblem, nuisance_part
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.identification.inference.amplitudes import Fit
 from stiffmap.identification.inference.columns import MOST_READINGS, Columns, drawn
@@ -86,7 +86,7 @@ def written(
         machine, prediction, promise = machine_of(best), best.prediction, promised(best)
         if held is not None and held.by == "poses":
             promise = borne_out(promise, held.after.size[0], len(np.unique(e.groups)))
-    problems = [Problem.of(e, sigma, p, ~listed) for p in (declared, prediction)]
+    problems = [LinearProblem.of(e, sigma, p, ~listed) for p in (declared, prediction)]
     before, after = (e.reading - p.base - nuisance_part(p, e.reading - p.base) for p in problems)
     first, last = (summary(np.where(listed[:, None], np.nan, r), sigma, e.channels) for r in (before, after))
     late = over_time(problems[1], problems[1].residual(prediction))
@@ -133,7 +133,7 @@ def own_zeros(found: Corrected, own: Mask) -> Floats:
     if not mine:
         return np.zeros_like(found.prediction)
     columns = np.nan_to_num(given.sensitivity.columns[..., mine]) * given.spread[mine]
-    problem = Problem.of(e, given.sigma, found.prediction, own)
+    problem = LinearProblem.of(e, given.sigma, found.prediction, own)
     white = problem.white(columns)
     values = np.linalg.solve(
         white.T @ white + np.eye(len(mine)), white.T @ problem.residual(found.prediction)

@@ -8,7 +8,7 @@ import numpy as np
 
 from stiffmap.experiment.experiment import Floats, Integers
 from stiffmap.identification.candidates.candidates import Candidate
-from stiffmap.identification.candidates.plan import Plan
+from stiffmap.identification.candidates.plan import CandidatePlan
 from stiffmap.identification.candidates.sensitivity import Variant
 from stiffmap.identification.inference.constants import LARGEST_ERROR
 from stiffmap.model.description import Joint, MachineDescription
@@ -51,7 +51,7 @@ class Place:
 
 
 def places(
-    plan: Plan, free: Floats, noise: Floats, use: Integers, description: MachineDescription
+    plan: CandidatePlan, free: Floats, noise: Floats, use: Integers, description: MachineDescription
 ) -> tuple[Place, ...]:
     """Candidates with their directions; those that show alike under one name, that of the coarsest part."""
     by: dict[int, list[Shape]] = {}

@@ -16,8 +16,8 @@ from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.identification.inference.amplitudes import NOTHING, Fit
 from stiffmap.identification.inference.columns import Columns, drawn, zeros
 from stiffmap.identification.inference.covariance import Covariance, covariance
-from stiffmap.identification.inference.kernels import Points, gaps
-from stiffmap.identification.inference.travel import Drive, Profile, drives_of, knots_of
+from stiffmap.identification.inference.kernels import ReadingPoints, gaps
+from stiffmap.identification.inference.travel import DriveErrors, Profile, drives_of, knots_of
 from stiffmap.identification.numbers.sensitivity import Sensitivity, predicted, sensitivity, zeros_anew
 from stiffmap.identification.numbers.unknowns import Unknown, joint_name
 from stiffmap.model.description import AppliedEffect
@@ -51,7 +51,7 @@ class Readings:
     sensitivity: Sensitivity
     spread: Floats
     """(p,) standard deviation of each number, in standard uncertainties."""
-    drives: tuple[tuple[Drive, Floats], ...] = ()
+    drives: tuple[tuple[DriveErrors, Floats], ...] = ()
     """Drives that err along their travel, and the root (k, k) of the covariance at their knots, m² or rad²."""
 
     @cached_property
@@ -143,8 +143,8 @@ def readings(
     kept = drawn(e.groups[rows], 0, MOST_FITTED)
     rows, channel = rows[kept], channel[kept]
     own = sigma[rows, channel]
-    points = Points(rows, channel, own)
-    some = Points(columns.rows, columns.channel, columns.sigma)
+    points = ReadingPoints(rows, channel, own)
+    some = ReadingPoints(columns.rows, columns.channel, columns.sigma)
     amplitude = {p.name: float(np.exp(t)) for p, t in fit.on}
     kernels = [
         (k, amplitude[k.name] * scale)
@@ -180,7 +180,7 @@ def readings(
 
 def _erring(
     predictor: Predictor, s: Sensitivity, columns: Columns, amplitude: Mapping[str, float]
-) -> Iterator[tuple[Drive, Floats]]:
+) -> Iterator[tuple[DriveErrors, Floats]]:
     """Drives that err along their travel in a fit, with the roots at their knots; `amplitude`: variances of its parts, in noise."""
     variance = {name: amplitude[name] * sd**2 for name, _, sd in columns.travel if name in amplitude}
     for drive in drives_of(predictor, s):

@@ -35,7 +35,7 @@ TURNS = 2
 
 
 @dataclass(frozen=True, eq=False)
-class Drive:
+class DriveErrors:
     """A drive whose zero the readings show."""
 
     name: str
@@ -68,7 +68,7 @@ class Drive:
         return np.asarray(root - line @ (line.T @ root))
 
 
-def drives_of(predictor: Predictor, s: Sensitivity) -> list[Drive]:
+def drives_of(predictor: Predictor, s: Sensitivity) -> list[DriveErrors]:
     """The drives of a machine where positions were read at enough poses; none otherwise."""
     e, machine = predictor.experiment, predictor.machine
     knots = min(MOST, len(np.unique(e.groups)) // POSES)
@@ -83,7 +83,7 @@ def drives_of(predictor: Predictor, s: Sensitivity) -> list[Drive]:
         at = q[:, machine.compiled.names.joints[joint_name(name)]]
         places = apart(np.nanquantile(at, np.linspace(0.0, 1.0, knots)))
         if len(places) >= FEWEST:
-            out.append(Drive(name, u.unit, s.columns[..., i] / u.u, at, places))
+            out.append(DriveErrors(name, u.unit, s.columns[..., i] / u.u, at, places))
     return out
 
 
@@ -130,7 +130,7 @@ def knots_of(joint: Joint, p: Profile) -> Knots:
 
 
 def profiles(
-    drives: Sequence[tuple[Drive, Floats]], values: Floats, covariance: Floats
+    drives: Sequence[tuple[DriveErrors, Floats]], values: Floats, covariance: Floats
 ) -> tuple[Profile, ...]:
     """Of drives with roots (k, k), by values (K,) of all their directions, one drive after the other, and their covariance (K, K)."""
     out, done = [], 0

@@ -25,7 +25,7 @@ K = 2.0
 
 
 @dataclass(frozen=True)
-class Line:
+class BudgetLine:
     """One source of uncertainty of one number, SI."""
 
     source: str
@@ -37,13 +37,13 @@ class Line:
 
 
 @dataclass(frozen=True)
-class Budget:
+class NumberBudget:
     """Budget of one number."""
 
     name: str
     unit: str
     value: float
-    lines: tuple[Line, ...]
+    lines: tuple[BudgetLine, ...]
 
     @property
     def u(self) -> float:
@@ -80,7 +80,7 @@ def budgets(
     experiment: Experiment,
     found: Estimate,
     others: Sequence[tuple[AppliedEffect, Mapping[str, float]]] = (),
-) -> list[Budget]:
+) -> list[NumberBudget]:
     """A budget for every number of an estimate.
 
     Parameters
@@ -118,11 +118,11 @@ def budgets(
     out = []
     for k, (name, unit, value) in enumerate(zip(found.names, found.units, found.values, strict=True)):
         sigma = float(found.sigma[k])
-        lines = [Line("noise of the readings", "A", sigma, freedom)]
+        lines = [BudgetLine("noise of the readings", "A", sigma, freedom)]
         if form > 0:
-            lines.append(Line("misfit beyond noise", "model form", form * sigma, freedom))
-        lines += [Line(source, "B", abs(u * float(s[k])), float("inf")) for source, u, s in shifts]
-        out.append(Budget(name, unit, float(value), tuple(lines)))
+            lines.append(BudgetLine("misfit beyond noise", "model form", form * sigma, freedom))
+        lines += [BudgetLine(source, "B", abs(u * float(s[k])), float("inf")) for source, u, s in shifts]
+        out.append(NumberBudget(name, unit, float(value), tuple(lines)))
     return out
 
 

@@ -19,7 +19,7 @@ from stiffmap.experiment.noise.whitening import basis, readings_of
 from stiffmap.identification.inference.amplitudes import Fit, fitted
 from stiffmap.identification.inference.columns import Columns, drawn
 from stiffmap.identification.inference.free import Free
-from stiffmap.identification.inference.kernels import Points, gaps
+from stiffmap.identification.inference.kernels import ReadingPoints, gaps
 from stiffmap.identification.inference.parts import Part
 from stiffmap.identification.planning.design import joined
 from stiffmap.identification.planning.estimate import Estimate, estimate
@@ -156,7 +156,7 @@ def _gaps(
     spared = Free.across(basis(np.hstack([frames, numbers])), np.eye(len(frames)))
     free = spared.matrix
     kernels, parts = {}, []
-    points = Points(rows, channel, np.ones(len(rows)))
+    points = ReadingPoints(rows, channel, np.ones(len(rows)))
     for kernel in gaps(machine, e, points):
         shown = white @ kernel.between(points, points) @ white.T
         size = float(np.sum(free * (shown @ free))) / free.shape[1]

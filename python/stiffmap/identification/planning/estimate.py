@@ -11,7 +11,7 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.common.short import short_repr
 from stiffmap.experiment.experiment import Experiment
 from stiffmap.experiment.noise.level import noise_of
-from stiffmap.experiment.noise.whitening import Problem
+from stiffmap.experiment.noise.whitening import LinearProblem
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.identification.candidates.candidates import words
 from stiffmap.identification.candidates.sensitivity import step_of
@@ -43,7 +43,7 @@ class Estimate:
     chi2: float
     freedom: int
     """Readings less nuisances less parameters that they determine."""
-    problem: Problem = field(repr=False)
+    problem: LinearProblem = field(repr=False)
     jacobian: Floats = field(repr=False)
     """(N, k) change of the whitened readings per unit of each number."""
     residual: Floats = field(repr=False)
@@ -72,7 +72,7 @@ def estimate(machine: Machine, experiment: Experiment, terms: Sequence[AppliedEf
     """
     predictor = Predictor(machine, experiment)
     e, begun = predictor.experiment, tuple(terms)
-    problem = Problem.of(e, noise_of(e).sigma, predictor())
+    problem = LinearProblem.of(e, noise_of(e).sigma, predictor())
     parameters = fitted(machine.description, begun)
     scale, low, high = (np.array([getattr(p, s) for _, p in parameters]) for s in ("scale", "lower", "upper"))
 

@@ -10,7 +10,7 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.experiment import Experiment, Integers
 from stiffmap.experiment.noise.nuisance import nuisance_columns
-from stiffmap.experiment.noise.whitening import Problem
+from stiffmap.experiment.noise.whitening import LinearProblem
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.experiment.virtual.plans import plan_of_poses
 from stiffmap.identification.inference.optimum import covariance
@@ -57,7 +57,7 @@ class Information:
     def sigma(self, rows: Integers) -> Floats:
         """(k,) standard uncertainties that a fit to some rows will have, SI; inf where they do not determine a parameter."""
         e = self.plan.rows(rows)
-        white = Problem.of(e, e.sigma, self.base[rows]).white(self.columns[rows])
+        white = LinearProblem.of(e, e.sigma, self.base[rows]).white(self.columns[rows])
         return np.asarray(np.sqrt(np.diag(covariance(white)[0])) * self.scale)
 
 

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from stiffmap.identification.candidates.candidates import Candidate, of_kind
 from stiffmap.identification.taps.predict import predict_taps
-from stiffmap.identification.taps.problem import Problem, Term
+from stiffmap.identification.taps.problem import TapsProblem, Term
 from stiffmap.identification.taps.table import TapTest
 from stiffmap.model import effects
 from stiffmap.model.description import Body, Cable, Joint, MachineDescription
@@ -32,7 +32,7 @@ HAMMER = {
 }  # fmt: skip
 
 
-def causes(problem: Problem) -> list[Candidate]:
+def causes(problem: TapsProblem) -> list[Candidate]:
     """All that the readings can speak of, with one number each: frequencies are few."""
     d, kinds = problem.machine.description, set(problem.kind[problem.used])
     found = [c for kind in KINDS for c in of_kind(effects.get(kind), d)]
@@ -56,7 +56,7 @@ def _at(kind: str, full: str, number: Parameter) -> Candidate:
     return Candidate(kind, path, () if sequence == "platform" else (sequence,), (number,))
 
 
-def _damper(problem: Problem, full: str, e: Joint) -> list[Candidate]:
+def _damper(problem: TapsProblem, full: str, e: Joint) -> list[Candidate]:
     """With the size that adds a typical damping ratio to one of the modes; none where it adds nothing."""
     unit = "N·s/m" if e.kind == "prismatic" else "N·m·s/rad"
     own = e.damping or 0.0

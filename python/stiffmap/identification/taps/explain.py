@@ -20,7 +20,7 @@ from stiffmap.identification.candidates.candidates import Candidate
 from stiffmap.identification.inference.optimum import Optimum, covariance, differences, optimum, possible
 from stiffmap.identification.taps.causes import causes, scaled, term
 from stiffmap.identification.taps.predict import predict_taps
-from stiffmap.identification.taps.problem import LEAST, STEP, STEPS, Problem
+from stiffmap.identification.taps.problem import LEAST, STEP, STEPS, TapsProblem
 from stiffmap.identification.taps.table import TapTest
 from stiffmap.solve.machine import Machine, takes_machine
 
@@ -116,7 +116,7 @@ def explain_taps(
 
     Raises StiffmapError for bad input.
     """
-    problem = Problem(machine, taps, statics, default_u)
+    problem = TapsProblem(machine, taps, statics, default_u)
     before = problem.settled().chi2
     n = int(problem.used.sum())
     tried = [c for c in causes(problem) if only is None or c.kind in only]
@@ -148,7 +148,7 @@ def explain_taps(
     return TapDiagnosis(before, n, best if fits and fall >= certain else None, alike, said)
 
 
-def _remarks(problem: Problem) -> str:
+def _remarks(problem: TapsProblem) -> str:
     """What of the readings has no say, and how damping compares."""
     p, taps, text = predict_taps(problem.machine, problem.taps), problem.taps, ""
     lost = int(np.isnan(p.frequency).sum())
@@ -188,7 +188,7 @@ def _sentence(best: Explained, alike: tuple[Explained, ...], before: float, n: i
     return text
 
 
-def _promise(problem: Problem, c: Candidate) -> float:
+def _promise(problem: TapsProblem, c: Candidate) -> float:
     """Fall of chi-square that one small step promises, to first order."""
     rows, W = problem.whitener()
     r0 = W @ problem.residual()[rows]
@@ -200,7 +200,7 @@ def _promise(problem: Problem, c: Candidate) -> float:
     return float(slope @ r0) ** 2 / size if size > 0 else -1.0
 
 
-def _fitted(problem: Problem, c: Candidate, part: str = "") -> Explained | None:
+def _fitted(problem: TapsProblem, c: Candidate, part: str = "") -> Explained | None:
     """With uncertain numbers to first order; None where the readings do not identify it."""
     p = c.parameters[0]
     to, low, high = scaled(p)
@@ -219,7 +219,7 @@ def _fitted(problem: Problem, c: Candidate, part: str = "") -> Explained | None:
     return found if np.isfinite(found.u[p.name]) else None
 
 
-def _refined(problem: Problem, e: Explained) -> Explained:
+def _refined(problem: TapsProblem, e: Explained) -> Explained:
     """The fit again with the uncertain numbers as unknowns of their own, which are not taken to be small."""
     p = e.place.parameters[0]
     to, low, high = scaled(p)
@@ -229,7 +229,7 @@ def _refined(problem: Problem, e: Explained) -> Explained:
     return _explained(problem, e.place, problem.settled(begin, lambda t: term(e.place, to(t)), (low, high)))
 
 
-def _explained(problem: Problem, c: Candidate, fit: Optimum) -> Explained:
+def _explained(problem: TapsProblem, c: Candidate, fit: Optimum) -> Explained:
     """A candidate where the first number of a fit is its own, and further ones are the uncertain numbers."""
     p, off = c.parameters[0], fit.x[1:]
     value = scaled(p)[0](float(fit.x[0]))
@@ -238,7 +238,7 @@ def _explained(problem: Problem, c: Candidate, fit: Optimum) -> Explained:
     return Explained(c, {p.name: value}, {p.name: u}, fit.chi2, machine=machine, off=off)
 
 
-def _both(problem: Problem, best: Explained) -> Explained:
+def _both(problem: TapsProblem, best: Explained) -> Explained:
     """The same parameter by statics alone and by frequencies alone."""
     if problem.statics is None:
         return best

@@ -8,7 +8,7 @@ from stiffmap.common.broadcasting import Floats, whole_number
 from stiffmap.common.errors import StiffmapError
 from stiffmap.identification.planning.information import exchange, information_of
 from stiffmap.identification.taps.causes import causes, scaled, term
-from stiffmap.identification.taps.problem import Problem
+from stiffmap.identification.taps.problem import TapsProblem
 from stiffmap.identification.taps.table import TapTest
 from stiffmap.solve.machine import Machine, takes_machine
 from stiffmap.workspace.vibration.modes import tip_modes
@@ -44,7 +44,7 @@ def where_to_tap(
     low, high = machine.workspace
     position = np.random.default_rng(seed).uniform(low, high, (pool, 3))
     taps, pose = _own_modes(machine, position, whole_number(modes, "modes", 1))
-    problem = Problem(machine, taps, None, default_u)
+    problem = TapsProblem(machine, taps, None, default_u)
     here = problem.residual()
     columns = []
     for c in causes(problem):

@@ -40,7 +40,7 @@ Term = Callable[[MachineDescription, TapTest], tuple[MachineDescription, TapTest
 
 
 @dataclass(eq=False)
-class Problem:
+class TapsProblem:
     """Residuals divided by the noise of the readings; numbers of the machine file that are uncertain move with them."""
 
     machine: Machine

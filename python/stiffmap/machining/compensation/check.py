@@ -12,7 +12,7 @@ from stiffmap.experiment.comparison.limitations import refuse
 from stiffmap.experiment.comparison.summary import Summary, summary
 from stiffmap.experiment.experiment import Experiment, Mask
 from stiffmap.experiment.noise.level import noise_of
-from stiffmap.experiment.noise.whitening import Problem, nuisance_part
+from stiffmap.experiment.noise.whitening import LinearProblem, nuisance_part
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.identification.validity import beyond
 from stiffmap.solve.machine import Machine, takes_machine
@@ -67,7 +67,7 @@ def prediction_error(
     e, expected = predictor.experiment, predictor()
     refuse(e, expected)
     sigma = noise_of(e).sigma
-    problem = Problem.of(e, sigma, expected)
+    problem = LinearProblem.of(e, sigma, expected)
     bare = (r - nuisance_part(problem, r) for r in (e.reading, e.reading - expected))
     kept = np.ones(len(e), bool) if rows is None else rows
     before, after = (summary(np.where(kept[:, None], r, np.nan), sigma, e.channels) for r in bare)

@@ -92,7 +92,7 @@ def placements(
     """
     if count < 1 or points < 2:
         raise StiffmapError(f"count and points: expected 1 or more and 2 or more, got {count} and {points}")
-    search = Search(machine, path, process, points, threads)
+    search = PlacementSearch(machine, path, process, points, threads)
     naive = Placement((search.low + search.high) / 2 - search.middle, 0.0)
     power = int(np.ceil(np.log2(max(count, 2))))
     unit = qmc.Sobol(4, seed=0).random_base2(power)[:count]
@@ -100,7 +100,7 @@ def placements(
     at = search.inside(unit[:, :3], turn)
     size = max(1, (AT_ONCE if scheduler is None else IN_A_TASK) // len(search.points))
     rows = [slice(k, k + size) for k in range(0, len(at), size)]
-    with workers(Search.largest, search, scheduler=scheduler) as hands:
+    with workers(PlacementSearch.largest, search, scheduler=scheduler) as hands:
         largest = np.concatenate(hands.in_order((at[r], turn[r]) for r in rows))
     if not np.isfinite(largest).any():
         must_follow(search.at_place(naive), threads)
@@ -109,7 +109,7 @@ def placements(
             f"{', '.join(f'{v:.0f}' for v in 1e3 * search.size)} mm, the box {', '.join(f'{v:.0f}' for v in 1e3 * (search.high - search.low))} mm"
         )
     order = np.argsort(largest)[:REFINED]
-    with workers(Search.refined, search, scheduler=scheduler) as hands:
+    with workers(PlacementSearch.refined, search, scheduler=scheduler) as hands:
         tried = hands.in_order((at[i], float(turn[i])) for i in order if np.isfinite(largest[i]))
     tried.append((search.exact(naive), naive))
     error, best = min(tried, key=lambda t: t[0])
@@ -127,7 +127,7 @@ def placements(
     )
 
 
-class Search:
+class PlacementSearch:
     """Errors of one path on one machine at many placements in its workspace, from `low` to `high` (3,) m."""
 
     def __init__(

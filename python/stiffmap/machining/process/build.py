@@ -26,7 +26,7 @@ LONGEST = 1.0
 
 
 @dataclass
-class Reader:
+class NumberReader:
     """Numbers of one file, with the place of what is wrong."""
 
     document: Document
@@ -56,7 +56,7 @@ class Reader:
             self.fail(f"expected a number above zero{limit}, found {value!r}", *keys)
         return out
 
-    def with_u(self, given: Quantity, unit: str, name: str, *keys: str) -> float:
+    def with_u(self, given: ProcessQuantity, unit: str, name: str, *keys: str) -> float:
         """SI value of a number of the law; its uncertainty is kept."""
         out = self.si(given.value, unit, *keys)
         if given.u is not None:
@@ -80,7 +80,7 @@ def process_of(document: Document, file: str) -> Process:
     """Schema, then units; raises `FileError` naming file, line and key."""
     expected = "a process file is a mapping with name, tool, law, spindle, feed and cut"
     m = validated(ProcessFile, document, file, expected)
-    r = Reader(document, file)
+    r = NumberReader(document, file)
     tool = _tool(m, r)
     spindle = r.rate(m.spindle, "spindle")
     feed = _feed(m.feed, tool, spindle, r)
@@ -99,7 +99,7 @@ def process_of(document: Document, file: str) -> Process:
     return process
 
 
-def _tool(m: ProcessFile, r: Reader) -> Tool:
+def _tool(m: ProcessFile, r: NumberReader) -> Tool:
     t = m.tool
     diameter = r.positive(t.diameter, "m", "tool", "diameter", most=LONGEST)
     coated = t.teeth == "coated"
@@ -125,7 +125,7 @@ def _tool(m: ProcessFile, r: Reader) -> Tool:
     return Tool(diameter, teeth, helix, out, angle, stick, modulus)
 
 
-def _feed(value: object, tool: Tool, spindle: float, r: Reader) -> float:
+def _feed(value: object, tool: Tool, spindle: float, r: NumberReader) -> float:
     text = str(value).strip()
     if text.endswith("/tooth"):
         if not tool.teeth:
@@ -134,7 +134,7 @@ def _feed(value: object, tool: Tool, spindle: float, r: Reader) -> float:
     return r.positive(value, "m/s", "feed")
 
 
-def _cut(m: ProcessFile, tool: Tool, r: Reader) -> Cut:
+def _cut(m: ProcessFile, tool: Tool, r: NumberReader) -> Cut:
     c = m.cut
     axial = r.positive(c.axial, "m", "cut", "axial", most=LONGEST)
     if c.radial is None:
@@ -154,7 +154,7 @@ def _cut(m: ProcessFile, tool: Tool, r: Reader) -> Cut:
     return Cut(c.side, radial, axial, c.through)
 
 
-def _law(m: ProcessFile, tool: Tool, r: Reader) -> Law:
+def _law(m: ProcessFile, tool: Tool, r: NumberReader) -> Law:
     given = [n for n in LAWS if getattr(m.law, n) is not None]
     if len(given) != 1:
         r.fail(f"expected one of {', '.join(LAWS)}, found {', '.join(given) or 'none'}", "law")
@@ -180,7 +180,7 @@ def _law(m: ProcessFile, tool: Tool, r: Reader) -> Law:
 Written = str | float | int
 
 
-class Quantity(FileModel):
+class ProcessQuantity(FileModel):
     """A number with its unit, or ``{value: 958.8 N/mm2, u: 12 N/mm2, note: …}``."""
 
     value: Written
@@ -218,32 +218,32 @@ class ToolModel(FileModel):
 class EndMillModel(FileModel):
     """Shear and edge coefficients."""
 
-    Ktc: Quantity
-    Krc: Quantity
-    Kac: Quantity
-    Kte: Quantity
-    Kre: Quantity
-    Kae: Quantity
+    Ktc: ProcessQuantity
+    Krc: ProcessQuantity
+    Kac: ProcessQuantity
+    Kte: ProcessQuantity
+    Kre: ProcessQuantity
+    Kae: ProcessQuantity
 
 
 class KienzleModel(FileModel):
     """Chip pressure kc1.1 at a chip of 1 mm and its exponent."""
 
-    kc11: Quantity
-    mc: Quantity
-    radial: Quantity
-    axial: Quantity = Quantity(value=0.0)
+    kc11: ProcessQuantity
+    mc: ProcessQuantity
+    radial: ProcessQuantity
+    axial: ProcessQuantity = ProcessQuantity(value=0.0)
 
 
 class TrimmingModel(FileModel):
     """A coated tool."""
 
-    specific_energy: Quantity
-    rubbing: Quantity = Quantity(value="0 N/mm2")
-    radial: Quantity
+    specific_energy: ProcessQuantity
+    rubbing: ProcessQuantity = ProcessQuantity(value="0 N/mm2")
+    radial: ProcessQuantity
 
 
-class LawModel(FileModel):
+class ProcessLawModel(FileModel):
     """One law."""
 
     end_mill: EndMillModel | None = None
@@ -267,7 +267,7 @@ class ProcessFile(FileModel):
     title: str = ""
     source: str = ""
     tool: ToolModel
-    law: LawModel
+    law: ProcessLawModel
     spindle: Written = Field(description="with its unit: 6000 rpm")
     feed: Written = Field(description="10 m/min, or 0.075 mm/tooth")
     cut: CutModel

@@ -28,7 +28,7 @@ from stiffmap.model.files.build_strokes import with_strokes
 from stiffmap.model.files.context import Context, Gathered, LinkUse
 from stiffmap.model.files.schema import MachineFile
 from stiffmap.model.files.schema.base import Number, suggestion
-from stiffmap.model.files.schema.geometry import Box
+from stiffmap.model.files.schema.geometry import BoxModel
 from stiffmap.model.files.schema.machine import EffectModel, ExternalSpringModel
 
 GRAVITY_LIMIT = 1000.0  # m/s²; above it, the file gave mm/s²
@@ -90,7 +90,7 @@ def _check_points(description: MachineDescription, context: Context) -> None:
 
 
 def build_workspace(
-    box: Box | None, context: Context, task: Sequence[str], home: Pose
+    box: BoxModel | None, context: Context, task: Sequence[str], home: Pose
 ) -> tuple[Vector, Vector] | None:
     """The box; flat at home along an axis that it leaves out, which the tool is not commanded along."""
     if box is None:

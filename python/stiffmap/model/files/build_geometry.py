@@ -10,7 +10,7 @@ from stiffmap.common.units import ANGLE, LENGTH, NONE, Dimension
 from stiffmap.model.description.pose import IDENTITY, Pose, Rows, Vector, rows
 from stiffmap.model.files.context import Context
 from stiffmap.model.files.schema.base import Number
-from stiffmap.model.files.schema.geometry import NAMED, Frame
+from stiffmap.model.files.schema.geometry import NAMED, FrameModel
 
 ROTATION_TOLERANCE = 1e-6
 EXACT = 1e-14  # such rows stay as written: saved files must load back equal
@@ -22,7 +22,7 @@ def build_vector(numbers: list[Number], dimension: Dimension, context: Context, 
     return (x, y, z)
 
 
-def build_pose(frame: Frame | None, context: Context, prefix: str = "") -> Pose:
+def build_pose(frame: FrameModel | None, context: Context, prefix: str = "") -> Pose:
     """SI pose of a frame (identity where absent)."""
     if frame is None:
         return Pose()
@@ -32,7 +32,7 @@ def build_pose(frame: Frame | None, context: Context, prefix: str = "") -> Pose:
     return Pose(translation, build_rotation(frame, context))
 
 
-def build_rotation(frame: Frame, context: Context) -> Rows:
+def build_rotation(frame: FrameModel, context: Context) -> Rows:
     """Rotation as rows; columns are the frame's axes seen from outside."""
     if frame.rotation is not None:
         return _checked_rows(frame.rotation, context.at("rotation"))

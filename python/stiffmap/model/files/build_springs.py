@@ -16,7 +16,7 @@ from stiffmap.model.files.build_numbers import build_numbers
 from stiffmap.model.files.context import Context, LinkUse
 from stiffmap.model.files.schema.base import FileModel, Number
 from stiffmap.model.files.schema.elements import SpringModel
-from stiffmap.model.files.schema.springs import Beam, LawModel, Material, Matrix
+from stiffmap.model.files.schema.springs import Beam, LawModel, MaterialModel, Matrix
 
 
 def build_spring(model: SpringModel, context: Context) -> Spring:
@@ -115,7 +115,7 @@ def _read(
     return tuple(out)
 
 
-def _material(beam: Beam, context: Context) -> Material | None:
+def _material(beam: Beam, context: Context) -> MaterialModel | None:
     """None where none of this name is declared."""
     return context.materials.get(beam.material) if isinstance(beam.material, str) else beam.material
 

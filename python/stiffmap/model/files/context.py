@@ -15,7 +15,7 @@ from stiffmap.common.yaml_text import Document, KeyPath
 from stiffmap.model.files.report import key_text
 from stiffmap.model.files.schema.base import Noted, Number
 from stiffmap.model.files.schema.elements import SpringModel
-from stiffmap.model.files.schema.springs import Material
+from stiffmap.model.files.schema.springs import MaterialModel
 
 T = TypeVar("T")
 
@@ -49,7 +49,7 @@ class Context:
     document: Document
     folder: Path
     units: UnitSystem
-    materials: dict[str, Material]
+    materials: dict[str, MaterialModel]
     gathered: Gathered
     path: KeyPath = ()
     full: str = ""

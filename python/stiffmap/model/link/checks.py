@@ -16,7 +16,7 @@ COLLINEAR = 1e-6  # second singular value of the centred nodes over the first
 RANK = 1e-9  # singular value of the column-scaled wrenches over the largest
 
 
-class Field(NamedTuple):
+class DisplacementField(NamedTuple):
     """Displacement field of a set of load cases: SI units, link axes."""
 
     points: Floats  # (n, 3) m
@@ -27,7 +27,7 @@ class Field(NamedTuple):
 
 def checked_field(
     points: ArrayLike, displacements: ArrayLike, wrenches: ArrayLike, reference: ArrayLike
-) -> Field:
+) -> DisplacementField:
     """The four arrays as float64 after all checks of shape, finiteness and geometry.
 
     Raises:
@@ -38,7 +38,7 @@ def checked_field(
     w = _finite("wrenches", wrenches, (None, 6), "(cases, 6) in N and N·m")
     u = _finite("displacements", displacements, (len(w), len(p), 3), "(cases, n, 3) in m")
     r = _finite("reference", reference, (3,), "(3,) in m")
-    return Field(p, u, w, r)
+    return DisplacementField(p, u, w, r)
 
 
 def check_points(points: Floats) -> None:

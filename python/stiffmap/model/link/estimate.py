@@ -9,9 +9,9 @@ import numpy as np
 from scipy.stats import chi2, t
 
 from stiffmap.model.link.arrays import Bools, Floats, Ints, standard_errors, unit_diagonal
-from stiffmap.model.link.checks import Field
+from stiffmap.model.link.checks import DisplacementField
 from stiffmap.model.link.correlation import Correlation
-from stiffmap.model.link.noise import Noise
+from stiffmap.model.link.noise import FieldNoise
 from stiffmap.model.link.regression import Regression
 from stiffmap.model.link.rigidfit import RigidFit
 from stiffmap.model.link.transport import transport_compliance
@@ -20,10 +20,10 @@ from stiffmap.model.link.transport import transport_compliance
 class Evidence(NamedTuple):
     """All that the estimate is made from; kept so that it can be made again under other constraints."""
 
-    field: Field
+    field: DisplacementField
     kept: Bools  # (cases, n)
     fits: tuple[RigidFit, ...]
-    noise: Noise
+    noise: FieldNoise
     correlation: Correlation | None
     twist_covariance: Floats  # (cases, 6, 6)
     regression: Regression
@@ -32,7 +32,7 @@ class Evidence(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Estimate:
+class SpringEstimate:
     """Spring of a link at its reference point, link axes, SI. Entries are row-major where flattened."""
 
     compliance: Floats  # (6, 6) m/N, rad/(N·m), ...

@@ -10,10 +10,16 @@ from numpy.typing import ArrayLike
 from stiffmap.common.broadcasting import real_array
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.link.arrays import Bools, Floats
-from stiffmap.model.link.checks import Field, check_points, checked_field, identifiable_columns, on_one_line
+from stiffmap.model.link.checks import (
+    DisplacementField,
+    check_points,
+    checked_field,
+    identifiable_columns,
+    on_one_line,
+)
 from stiffmap.model.link.correlation import Correlation, analyse_correlation
 from stiffmap.model.link.estimate import Evidence
-from stiffmap.model.link.noise import Noise, estimate_noise
+from stiffmap.model.link.noise import FieldNoise, estimate_noise
 from stiffmap.model.link.outliers import LEVEL, find_outliers
 from stiffmap.model.link.regression import regress
 from stiffmap.model.link.result import Link, build_link
@@ -101,7 +107,7 @@ def known_noise(noise: Known, cases: int) -> Floats | None:
     return np.asarray(np.broadcast_to(sigma, (cases,)))
 
 
-def _outliers(field: Field, known: Floats | None, wanted: bool, method: str) -> Bools:
+def _outliers(field: DisplacementField, known: Floats | None, wanted: bool, method: str) -> Bools:
     found = np.zeros(field.displacements.shape[:2], dtype=bool)
     if wanted:
         for k, u in enumerate(field.displacements):
@@ -112,13 +118,13 @@ def _outliers(field: Field, known: Floats | None, wanted: bool, method: str) -> 
     return found
 
 
-def _fit(field: Field, case: int, kept: Bools, method: str) -> RigidFit:
+def _fit(field: DisplacementField, case: int, kept: Bools, method: str) -> RigidFit:
     points = field.points[kept]
     check_points(points)
     return FITS[method](points, field.displacements[case, kept], field.reference)
 
 
-def _noise(field: Field, fits: list[RigidFit], known: Floats | None) -> Noise:
+def _noise(field: DisplacementField, fits: list[RigidFit], known: Floats | None) -> FieldNoise:
     rss, dof = np.array([f.rss for f in fits]), np.array([f.dof for f in fits], dtype=np.int64)
     size = np.abs(field.displacements).max(axis=(1, 2))
     floor = ROUND_OFF * np.where(size > 0, size, size.max(initial=1e-300))
@@ -128,7 +134,7 @@ def _noise(field: Field, fits: list[RigidFit], known: Floats | None) -> Noise:
     return noise._replace(used=known, used_dof=np.full(len(known), np.inf), pooled=False)
 
 
-def _correlation(field: Field, kept: Bools, noise: Known, method: str) -> Correlation | None:
+def _correlation(field: DisplacementField, kept: Bools, noise: Known, method: str) -> Correlation | None:
     """Correlation of the residuals on the nodes that every case keeps; None when not asked for."""
     common = kept.all(axis=0)
     if noise is not None or common.sum() < 12:
@@ -142,7 +148,11 @@ def _correlation(field: Field, kept: Bools, noise: Known, method: str) -> Correl
 
 
 def _twist_covariances(
-    field: Field, kept: Bools, fits: list[RigidFit], noise: Noise, correlation: Correlation | None
+    field: DisplacementField,
+    kept: Bools,
+    fits: list[RigidFit],
+    noise: FieldNoise,
+    correlation: Correlation | None,
 ) -> Floats:
     """(cases, 6, 6): sigma² times (19), inflated for correlated noise at the centroid, at the reference."""
     out = np.empty((len(fits), 6, 6))
@@ -160,7 +170,7 @@ EVIDENCE = 20.0  # difference of the residual sums in units of the noise varianc
 MATERIAL = 1e-3  # of the displacement: a smaller misfit of the linear motion is accepted
 
 
-def finite_rotation(field: Field, kept: Bools) -> str:
+def finite_rotation(field: DisplacementField, kept: Bools) -> str:
     """Why a field turns by more than the linearised rotation (14) can follow; empty where it does not.
 
     A linear solver's field stays linear at any size, so size alone is no fault: it counts as finite when

@@ -12,7 +12,7 @@ from stiffmap.model.link.arrays import Floats, Ints
 HOMOGENEITY_LEVEL = 0.01
 
 
-class Noise(NamedTuple):
+class FieldNoise(NamedTuple):
     """Standard deviation of one displacement component."""
 
     sigma: Floats  # (cases,) m, each case by itself
@@ -23,7 +23,7 @@ class Noise(NamedTuple):
     pooled: bool
 
 
-def estimate_noise(rss: Floats, dof: Ints, floor: Floats) -> Noise:
+def estimate_noise(rss: Floats, dof: Ints, floor: Floats) -> FieldNoise:
     """Noise of each case from its residual sum of squares (m²), link (5).
 
     The cases are pooled, with the sum of their degrees of freedom, when Bartlett's test does not distinguish their
@@ -35,10 +35,10 @@ def estimate_noise(rss: Floats, dof: Ints, floor: Floats) -> Noise:
     p = bartlett(sized**2, dof)
     pooled = bool(np.isnan(p) or p > HOMOGENEITY_LEVEL)
     if not pooled:
-        return Noise(sigma, dof, sized, dof.astype(float), p, False)
+        return FieldNoise(sigma, dof, sized, dof.astype(float), p, False)
     common = np.sqrt(np.sum(dof * sized**2) / np.sum(dof))
     full = np.ones(len(rss))
-    return Noise(sigma, dof, common * full, float(np.sum(dof)) * full, p, True)
+    return FieldNoise(sigma, dof, common * full, float(np.sum(dof)) * full, p, True)
 
 
 def bartlett(variance: Floats, dof: Ints) -> float:

@@ -21,7 +21,7 @@ from stiffmap.model.link.solve import Material, Setup, mean_motion, solve_skfem
 
 
 @dataclass(frozen=True)
-class Budget:
+class CovarianceBudget:
     """Covariance (36, 36) by source; each systematic source is one common scale on its matrix of shifts."""
 
     parts: dict[str, Floats]
@@ -68,7 +68,7 @@ class PartLink:
     """An identified part: the spring of the finest mesh, its uncertainty by source, and the fields."""
 
     link: Link
-    budget: Budget
+    budget: CovarianceBudget
     refinement: Refinement | None
     mesh: SolidMesh
     nodes: Ints  # (n,) nodes of the loaded face in the mesh
@@ -156,7 +156,9 @@ def link_from_part(
         shifts = [another(mesh, s, solve_skfem) - link.compliance for s in others]
         # Head and support are two questions: their shares add.
         parts["boundary"] = np.sum([shift_covariance([s]) for s in shifts], axis=0)
-    return PartLink(link, Budget(parts), refinement, mesh, nodes, field, wrenches, chosen, material, setup)
+    return PartLink(
+        link, CovarianceBudget(parts), refinement, mesh, nodes, field, wrenches, chosen, material, setup
+    )
 
 
 def chosen_solver(solver: Solver) -> str:

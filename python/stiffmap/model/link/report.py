@@ -6,7 +6,7 @@ import numpy as np
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.link.arrays import Floats
-from stiffmap.model.link.estimate import Estimate
+from stiffmap.model.link.estimate import SpringEstimate
 
 
 def unit_factor(length: str) -> Floats:
@@ -28,12 +28,12 @@ def unit_name(i: int, j: int, length: str) -> str:
     return f"rad/(N·{length})" if i >= 3 and j >= 3 else "1/N"
 
 
-def write_report(link: Estimate, length: str) -> str:
+def write_report(link: SpringEstimate, length: str) -> str:
     """See :meth:`stiffmap.model.link.result.Link.report`."""
     return "\n".join([*_table(link, length), *_field_lines(link), *_matrix_lines(link)])
 
 
-def _table(link: Estimate, length: str) -> list[str]:
+def _table(link: SpringEstimate, length: str) -> list[str]:
     factor = unit_factor(length)
     C, error = link.compliance * factor, link.standard_error * factor
     zero = link.insignificant
@@ -60,7 +60,7 @@ def _table(link: Estimate, length: str) -> list[str]:
     return lines
 
 
-def _field_lines(link: Estimate) -> list[str]:
+def _field_lines(link: SpringEstimate) -> list[str]:
     e, noise = link.evidence, link.evidence.noise
     size = np.sqrt(np.mean(np.sum(e.field.displacements**2, axis=2), axis=1))
     place = np.array2string(link.reference, precision=6)
@@ -89,7 +89,7 @@ def _field_lines(link: Estimate) -> list[str]:
     return lines
 
 
-def _matrix_lines(link: Estimate) -> list[str]:
+def _matrix_lines(link: SpringEstimate) -> list[str]:
     missing = ~np.isfinite(link.compliance)
     lines = [
         f"asymmetry before symmetrisation: {link.asymmetry:.2e} of sqrt(kii kjj) "

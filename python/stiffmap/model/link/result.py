@@ -10,15 +10,15 @@ from stiffmap.common.broadcasting import random_numbers
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.html import table, titled
 from stiffmap.model.link.arrays import Bools, Floats, Ints, standard_errors
-from stiffmap.model.link.estimate import Estimate, Evidence, critical_multiple
-from stiffmap.model.link.noise import Noise
+from stiffmap.model.link.estimate import Evidence, SpringEstimate, critical_multiple
+from stiffmap.model.link.noise import FieldNoise
 from stiffmap.model.link.regression import constrain, structure
 from stiffmap.model.link.report import unit_factor, unit_name, write_report
 from stiffmap.model.link.rigidfit import design_matrix
 
 
 @dataclass(frozen=True)
-class Link(Estimate):
+class Link(SpringEstimate):
     """An identified link: its numbers, and what can be made of them."""
 
     def with_zeros(self) -> Link:
@@ -109,7 +109,7 @@ def _projection(e: Evidence, symmetric: bool, zeros: Bools | None) -> Floats:
     return constrain(e.regression.covariance, Z, measured.ravel())
 
 
-def _satterthwaite(share: Floats, noise: Noise) -> Floats:
+def _satterthwaite(share: Floats, noise: FieldNoise) -> Floats:
     """(6, 6) degrees of freedom of a sum of per-case variances; pooled cases share one estimate."""
     if noise.pooled or not np.all(np.isfinite(noise.used_dof)):
         return np.full((6, 6), float(noise.used_dof[0]))

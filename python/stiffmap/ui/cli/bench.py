@@ -23,7 +23,7 @@ FORCE = 300.0  # N, along z
 GRID, REFERENCE_GRID, MANY = 14, 4, 40  # poses along each side of the workspace
 
 
-class Line(NamedTuple):
+class BenchCase(NamedTuple):
     """One measured case: median of the rounds, microseconds per pose or a ratio."""
 
     case: str
@@ -60,7 +60,7 @@ def command(
     show(as_json, data, [table(title, ("case", "value", "unit"), words, left=("case", "unit"))])
 
 
-def machine_lines(machine: Machine, rounds: int) -> list[Line]:
+def machine_lines(machine: Machine, rounds: int) -> list[BenchCase]:
     """Unloaded, loaded, reference path and a call on one pose."""
     wrench = np.array([0, 0, FORCE, 0, 0, 0])
     many, few, one = grid(machine, GRID), grid(machine, REFERENCE_GRID), grid(machine, 1)
@@ -75,15 +75,15 @@ def machine_lines(machine: Machine, rounds: int) -> list[Line]:
     )
     loaded, reference = t["loaded"] / len(many), t["reference"] / len(few)
     return [
-        Line(f"{machine.name}, stiffness without load", 1e6 * t["unloaded"] / len(many), "µs/pose"),
-        Line(f"{machine.name}, equilibrium and stiffness at {FORCE:g} N", 1e6 * loaded, "µs/pose"),
-        Line(f"{machine.name}, the same by the reference path", 1e6 * reference, "µs/pose"),
-        Line(f"{machine.name}, reference path / fast path", reference / loaded, "times"),
-        Line(f"{machine.name}, one call on one pose", 1e6 * t["one"], "µs"),
+        BenchCase(f"{machine.name}, stiffness without load", 1e6 * t["unloaded"] / len(many), "µs/pose"),
+        BenchCase(f"{machine.name}, equilibrium and stiffness at {FORCE:g} N", 1e6 * loaded, "µs/pose"),
+        BenchCase(f"{machine.name}, the same by the reference path", 1e6 * reference, "µs/pose"),
+        BenchCase(f"{machine.name}, reference path / fast path", reference / loaded, "times"),
+        BenchCase(f"{machine.name}, one call on one pose", 1e6 * t["one"], "µs"),
     ]
 
 
-def thread_lines(machine: Machine, rounds: int) -> list[Line]:
+def thread_lines(machine: Machine, rounds: int) -> list[BenchCase]:
     """All cores against one."""
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     poses, wrench = grid(machine, MANY), np.array([0, 0, FORCE, 0, 0, 0])
@@ -94,7 +94,7 @@ def thread_lines(machine: Machine, rounds: int) -> list[Line]:
         },
         rounds,
     )
-    return [Line(f"{machine.name}, {cores} threads against one", t["one"] / t["all"], "times")]
+    return [BenchCase(f"{machine.name}, {cores} threads against one", t["one"] / t["all"], "times")]
 
 
 def grid(machine: Machine, n: int) -> np.ndarray[Any, np.dtype[np.float64]]:

@@ -61,14 +61,14 @@ def loaded(result: MapSummary) -> dict[str, Figure]:
 
 def write_report(result: MapSummary, path: Path, figures: dict[str, Figure]) -> Path:
     """The map as one page: its worst pose in words, the table, the pictures."""
-    from stiffmap.ui.report.sheet import Sheet, write_sheet
+    from stiffmap.ui.report.sheet import ReportSheet, write_sheet
 
     ds, table = result.ds, result.table()
     head, rows = as_text(table)
     lines = [
         f"{n} poses have no value: {name.lower().replace('_', ' ')}." for name, n in result.failed.items()
     ]
-    sheet = Sheet(
+    sheet = ReportSheet(
         title=f"Error map of {ds.attrs['machine']}",
         answer=_answer(result),
         lines=[result.given, *lines, f"{table.title}."],

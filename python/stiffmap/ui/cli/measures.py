@@ -19,7 +19,7 @@ from stiffmap.ui.cli.output import as_text, show, write_files
 from stiffmap.ui.cli.output import table as table_of
 from stiffmap.workspace.maps.loading import machine_digest
 from stiffmap.workspace.performance import MeasuresTable, measures
-from stiffmap.workspace.performance.table import Row
+from stiffmap.workspace.performance.table import MeasureRow
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -112,7 +112,7 @@ def remarks(table: MeasuresTable) -> list[str]:
     return [f"{r.measure.name}: {r.reason or r.found.note}" for r in table.rows if r.reason or r.found.note]
 
 
-def cells(r: Row) -> tuple[str, ...]:
+def cells(r: MeasureRow) -> tuple[str, ...]:
     """What the table shows of a measure."""
     f, unit = r.measure.factor, r.measure.shown
     colours = {"pass": "green", "fail": "red", "unknown": "yellow"}
@@ -129,7 +129,7 @@ def cells(r: Row) -> tuple[str, ...]:
     )
 
 
-def required(r: Row) -> str:
+def required(r: MeasureRow) -> str:
     """``≥ 500`` and the like."""
     return "" if r.bound is None else r.bound.text(r.measure.factor)
 
@@ -150,11 +150,11 @@ def write(table: MeasuresTable, output: Path) -> list[Path]:
 def write_report(table: MeasuresTable, path: Path, figures: dict[str, Figure | bytes]) -> Path:
     """The table as one page with its pictures."""
     from stiffmap.ui.plot.measures import caption
-    from stiffmap.ui.report.sheet import Sheet, write_sheet
+    from stiffmap.ui.report.sheet import ReportSheet, write_sheet
 
     text = as_table(table)
     head, rows = as_text(text)
-    sheet = Sheet(
+    sheet = ReportSheet(
         title=f"Measures of {table.machine.name}",
         answer=verdict_of(table),
         lines=[f"{text.title}.", *table.notes, *remarks(table)],

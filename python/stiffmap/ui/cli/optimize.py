@@ -19,7 +19,7 @@ from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import finish
 from stiffmap.ui.cli.options import argument, option
 from stiffmap.ui.cli.output import show, table, write_files
-from stiffmap.ui.report.design import Chosen, Report, measured
+from stiffmap.ui.report.design import ChosenDesign, Report, measured
 from stiffmap.workspace.design import ParetoSet, load_design, optimize
 from stiffmap.workspace.performance.registry import get_measure
 
@@ -159,7 +159,7 @@ def remarks(report: Report) -> list[str]:
     return out
 
 
-def refined(c: Chosen) -> dict[str, Any]:
+def refined(c: ChosenDesign) -> dict[str, Any]:
     """A chosen design as plain data, SI."""
     out: dict[str, Any] = {"found": c.found.values, "refined": c.judged.values, "x": c.x.tolist()}
     if c.robust is not None:

@@ -98,7 +98,7 @@ def command(
 def _model(
     machine: str, effect: list[str] | None, link: str | None, meshes: Path | None, **given: Any
 ) -> Any:
-    from stiffmap.ui.view.model import Model
+    from stiffmap.ui.view.model import ViewModel
     from stiffmap.ui.view.state import from_permalink
 
     m = machine_with(machine, effect)
@@ -107,7 +107,7 @@ def _model(
         name, state = from_permalink(link.rpartition("state=")[2])
         if name not in (machine, m.name):
             raise StiffmapError(f"--link: is of the machine {name}, not of {machine}")
-        return Model(m, state, file=file, meshes=meshes)
+        return ViewModel(m, state, file=file, meshes=meshes)
     from stiffmap.ui.view import model_of
 
     return model_of(m, **_state(given), file=file, meshes=meshes)

@@ -10,10 +10,10 @@ from stiffmap.ui.paper.directions import direction_statements
 from stiffmap.ui.paper.forces import force_statements
 from stiffmap.ui.paper.machine import machine_statements
 from stiffmap.ui.paper.results import Results, compute
-from stiffmap.ui.paper.statement import Statement, Verdict
+from stiffmap.ui.paper.statement import Statement, StatementVerdict
 from stiffmap.ui.paper.workspace import workspace_statements
 
-__all__ = ["Results", "Statement", "Verdict", "all_statements", "compute"]
+__all__ = ["Results", "Statement", "StatementVerdict", "all_statements", "compute"]
 
 
 def all_statements(results: Results) -> list[Statement]:

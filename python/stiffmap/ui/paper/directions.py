@@ -15,7 +15,7 @@ from stiffmap.ui.paper.statement import Statement, by_point, judge, of_section_5
 
 def direction_statements(results: Results) -> Iterator[Statement]:
     """How the deflection depends on the direction of the force."""
-    at = {name: Point(results, name) for name in results.points}
+    at = {name: WorkPoint(results, name) for name in results.points}
     others = {name: p for name, p in at.items() if name != "isotropic"}
     ratios = {name: p.ratio for name, p in at.items()}
     yield of_section_5_3(
@@ -72,7 +72,7 @@ def direction_statements(results: Results) -> Iterator[Statement]:
     )
 
 
-class Point:
+class WorkPoint:
     """Deflections in the plane (mm) and directions (deg) at one work point."""
 
     def __init__(self, results: Results, name: str) -> None:
@@ -87,7 +87,7 @@ class Point:
         """Range of the ratio over the variants."""
 
 
-def _on_the_diagonal(near: Point, far: Point) -> Iterator[Statement]:
+def _on_the_diagonal(near: WorkPoint, far: WorkPoint) -> Iterator[Statement]:
     """x = y = z = -200 mm and 300 mm, where the planar compliance is aI + b·ones."""
     more = 100 * (near.worst / near.fx - 1)
     yield of_section_5_3(

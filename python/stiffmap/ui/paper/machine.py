@@ -12,7 +12,7 @@ from stiffmap.model.description import Block, Spring
 from stiffmap.solve.kinematics import inverse_kinematics
 from stiffmap.solve.machine import Machine
 from stiffmap.ui.paper.results import Results
-from stiffmap.ui.paper.statement import Statement, Verdict, judge, of_section_5_3, rounds_to
+from stiffmap.ui.paper.statement import Statement, StatementVerdict, judge, of_section_5_3, rounds_to
 from stiffmap.workspace.performance.motion.closing import drive_kinematics
 from stiffmap.workspace.performance.motion.velocity import singular_values
 from stiffmap.workspace.performance.poses import box_nodes
@@ -38,7 +38,7 @@ def machine_statements(results: Results) -> Iterator[Statement]:
         "5.2",
         "for selection treatment required workspace 200×200×200 mm³",
         f"{wanted:.2f} mm (revised)",
-        Verdict.DIFFERS,
+        StatementVerdict.DIFFERS,
         "§5.1 requires 0.5 m × 0.5 m × 0.5 m, and §5.3 says that the original's 200 mm are too small; 200 "
         "is a misprint. The revised machine reaches the factors 0.5–2 in a cube of this edge, "
         f"{500 - wanted:.2f} mm short of 500 (L = 776.5 mm would do)",
@@ -58,7 +58,7 @@ def machine_statements(results: Results) -> Iterator[Statement]:
         own_input=True,
     )
     for words, printed, because in UNCHECKED:
-        yield Statement("5.2", words, "no number", Verdict.NOT_CHECKED, because, printed=printed)
+        yield Statement("5.2", words, "no number", StatementVerdict.NOT_CHECKED, because, printed=printed)
     low, high = box_factors(original, original.workspace)
     yield Statement(
         "5.2",

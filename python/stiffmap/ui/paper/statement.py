@@ -9,7 +9,7 @@ from enum import StrEnum
 from functools import partial
 
 
-class Verdict(StrEnum):
+class StatementVerdict(StrEnum):
     """How a statement fares."""
 
     AGREES = "agrees"
@@ -25,7 +25,7 @@ class Statement:
     words: str
     ours: str
     """Our number in words, with its unit."""
-    verdict: Verdict
+    verdict: StatementVerdict
     because: str
     numbers: dict[str, float] = field(default_factory=dict)
     """The numbers behind `ours`, by name; the unit is part of the name."""
@@ -51,9 +51,9 @@ def rounds_to(ours: float, printed: str) -> bool:
     return abs(Decimal(ours) - value) <= last / 2
 
 
-def judge(holds: bool) -> Verdict:
+def judge(holds: bool) -> StatementVerdict:
     """Agrees or differs."""
-    return Verdict.AGREES if holds else Verdict.DIFFERS
+    return StatementVerdict.AGREES if holds else StatementVerdict.DIFFERS
 
 
 def by_point(name: str, values: Mapping[str, float]) -> dict[str, float]:

@@ -11,9 +11,13 @@ from rich.markup import escape
 from rich.padding import Padding
 from rich.text import Text
 
-from stiffmap.ui.paper.statement import Statement, Verdict
+from stiffmap.ui.paper.statement import Statement, StatementVerdict
 
-COLOUR = {Verdict.AGREES: "green", Verdict.DIFFERS: "yellow", Verdict.NOT_CHECKED: "dim"}
+COLOUR = {
+    StatementVerdict.AGREES: "green",
+    StatementVerdict.DIFFERS: "yellow",
+    StatementVerdict.NOT_CHECKED: "dim",
+}
 HEAD = ("§", "the paper's words", "the paper's number", "our number", "verdict", "our own input", "because")
 INDENT = 5
 
@@ -67,12 +71,12 @@ def cells(s: Statement) -> tuple[str, ...]:
 
 def count(statements: Sequence[Statement]) -> dict[str, int]:
     """Number of statements per verdict."""
-    return {str(v): sum(s.verdict == v for s in statements) for v in Verdict}
+    return {str(v): sum(s.verdict == v for s in statements) for v in StatementVerdict}
 
 
 def count_text(statements: Sequence[Statement]) -> str:
     """The numbers per verdict, and how many agreeing ones are inputs of our model."""
-    own = sum(s.own_input and s.verdict is Verdict.AGREES for s in statements)
+    own = sum(s.own_input and s.verdict is StatementVerdict.AGREES for s in statements)
     n = count(statements)
     return (
         f"{n['agrees']} agree ({own} of them are inputs of our model, {n['agrees'] - own} are results), "

@@ -23,7 +23,7 @@ from stiffmap.workspace.performance.box.box import LargestBox
 from stiffmap.workspace.performance.box.workspace import Workspace
 from stiffmap.workspace.performance.motion.trajectory import way_along
 from stiffmap.workspace.performance.requirements import Bound
-from stiffmap.workspace.performance.table import MeasuresTable, Row, box_map, levels
+from stiffmap.workspace.performance.table import MeasureRow, MeasuresTable, box_map, levels
 
 
 def transmission_figure(machine: Machine, position: ArrayLike, plane: str = "xy") -> Figure:
@@ -128,7 +128,7 @@ def _slowest(table: MeasuresTable) -> Floats | None:
 ALONG = ("path_compliance", "path_effort")
 
 
-def path_rows(table: MeasuresTable) -> dict[str, Row]:
+def path_rows(table: MeasuresTable) -> dict[str, MeasureRow]:
     """Measures along the path that have values there, by their names."""
     return {r.measure.name: r for r in table.rows if r.measure.name in ALONG and r.found.values is not None}
 
@@ -155,7 +155,7 @@ def path_measures_figure(tables: Mapping[str, MeasuresTable]) -> Figure:
     return figure
 
 
-def _lines(axes: Axes, row: Row, machine: str, number: int, one: bool) -> None:
+def _lines(axes: Axes, row: MeasureRow, machine: str, number: int, one: bool) -> None:
     positions, values = row.found.positions, row.found.values
     assert positions is not None
     assert values is not None
@@ -221,12 +221,12 @@ def _limit(bound: Bound | None) -> float | None:
     return None if bound is None else bound.at_least if bound.at_least is not None else bound.at_most
 
 
-def _share(r: Row) -> float:
+def _share(r: MeasureRow) -> float:
     limit = _limit(r.bound)
     return float(r.found.worst / limit) if limit else float("nan")
 
 
-def _bound_text(r: Row) -> str:
+def _bound_text(r: MeasureRow) -> str:
     limit = _limit(r.bound)
     assert r.bound is not None
     assert limit is not None
@@ -234,7 +234,7 @@ def _bound_text(r: Row) -> str:
     return f"{r.measure.name} {sign} {r.measure.factor * limit:.4g} {r.measure.shown}".rstrip()
 
 
-def map_figure(table: MeasuresTable, row: Row) -> Figure:
+def map_figure(table: MeasuresTable, row: MeasureRow) -> Figure:
     """A measure on the lowest, middle and highest z-plane of the box."""
     over = box_map(row)
     assert over is not None
@@ -256,7 +256,7 @@ def map_figure(table: MeasuresTable, row: Row) -> Figure:
     return figure
 
 
-def _plane(axes: Axes, row: Row, x: Floats, y: Floats, values: Floats, steps: Floats) -> None:
+def _plane(axes: Axes, row: MeasureRow, x: Floats, y: Floats, values: Floats, steps: Floats) -> None:
     measure, limit = row.measure, _limit(row.bound)
     if not np.isfinite(values).any():
         axes.text(0.5, 0.5, "no value in this plane", transform=axes.transAxes, ha="center", va="center")

@@ -12,7 +12,7 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.common.outputs import write_text
 from stiffmap.solve.machine import load_machine
 from stiffmap.workspace.design.judging import Judged, refine
-from stiffmap.workspace.design.problem import Design
+from stiffmap.workspace.design.problem import DesignProblem
 from stiffmap.workspace.design.robustness import DRAWS, Robustness, robustness
 from stiffmap.workspace.design.search import ParetoSet
 from stiffmap.workspace.performance.table import MeasuresTable, measures
@@ -22,7 +22,7 @@ SLIGHT = 0.01
 
 
 @dataclass(frozen=True, eq=False)
-class Chosen:
+class ChosenDesign:
     """A design of the Pareto set, refined by gradients, and what its tolerances do to it."""
 
     found: Judged
@@ -40,7 +40,7 @@ class Report:
 
     beside: dict[str, MeasuresTable]
     """``start`` and the machines that the design file names."""
-    chosen: dict[str, Chosen]
+    chosen: dict[str, ChosenDesign]
 
     @property
     def tables(self) -> dict[str, MeasuresTable]:
@@ -65,23 +65,25 @@ def measured(found: ParetoSet, place: Path, nodes: int = 21, draws: int = DRAWS)
     for other in design.model.beside:
         near = Path(design.file).parent / other
         beside[Path(other).stem] = full(near if near.is_file() else other)
-    chosen: dict[str, Chosen] = {}
+    chosen: dict[str, ChosenDesign] = {}
     for name, i in found.chosen().items():
         x, judged = refine(design, found.x[i], _weights(design, name), keep=name == "compromise")
         file = place / f"{name}.yaml"
         write_machine(design, x, name, file)
-        chosen[name] = Chosen(found.judged[i], x, judged, robustness(design, x, draws=draws), full(file))
+        chosen[name] = ChosenDesign(
+            found.judged[i], x, judged, robustness(design, x, draws=draws), full(file)
+        )
     return Report(beside, chosen)
 
 
-def _weights(design: Design, name: str) -> Floats:
+def _weights(design: DesignProblem, name: str) -> Floats:
     objectives = design.model.objectives
     if name == "compromise":
         return np.ones(len(objectives))
     return np.array([1.0 if name == f"best-{n}" else SLIGHT for n in objectives])
 
 
-def write_machine(design: Design, x: Floats, name: str, file: Path) -> None:
+def write_machine(design: DesignProblem, x: Floats, name: str, file: Path) -> None:
     """The machine file of a vector of variables."""
     data = dict(design.data(x))
     data["name"] = f"{design.model.name}-{name}"

@@ -25,7 +25,7 @@ from stiffmap.solve.kinematics import inverse_kinematics
 from stiffmap.solve.status import Status
 from stiffmap.ui.plot.milling import error_figure, machine_path_figure, outline_figure
 from stiffmap.ui.plot.style import save
-from stiffmap.ui.report.sheet import Sheet, write_sheet
+from stiffmap.ui.report.sheet import ReportSheet, write_sheet
 from stiffmap.workspace.maps.files import write_dataset
 
 
@@ -185,7 +185,7 @@ def _range(values: Iterable[float]) -> str:
     return " to ".join(dict.fromkeys(f"{v:.3g}" for v in (min(numbers), max(numbers))))
 
 
-def _sheet(found: Milled) -> Sheet:
+def _sheet(found: Milled) -> ReportSheet:
     job = found.job
     s: dict[str, Any] = summary(found)
     force, u = cutting_force(job.process), force_uncertainty(job.process)
@@ -232,4 +232,4 @@ def _sheet(found: Milled) -> Sheet:
     measured += [(f"after pass {k}", v) for k, v in enumerate(s.get("error_normal_passes_mm", []), 1)]
     rows = [[label, f"{v['rms']:.5f}", f"{v['largest']:.5f}"] for label, v in measured]
     head = ["error", "rms, mm", "largest, mm"]
-    return Sheet(f"Milling: {job.path.name}", verdict(found.dataset), lines, head, rows, (2, 3))
+    return ReportSheet(f"Milling: {job.path.name}", verdict(found.dataset), lines, head, rows, (2, 3))

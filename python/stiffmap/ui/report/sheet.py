@@ -86,7 +86,7 @@ def _png(figure: Figure, dpi: int) -> bytes:
 
 
 @dataclass(frozen=True)
-class Sheet:
+class ReportSheet:
     """What the page says, in the units that it shows."""
 
     title: str
@@ -100,7 +100,10 @@ class Sheet:
 
 
 def write_sheet(
-    path: str | PathLike[str], sheet: Sheet, pictures: Mapping[str, Figure | bytes], digests: dict[str, str]
+    path: str | PathLike[str],
+    sheet: ReportSheet,
+    pictures: Mapping[str, Figure | bytes],
+    digests: dict[str, str],
 ) -> Path:
     """Write the page; `pictures` by their captions (figures, or GIFs as bytes), `digests` of what went in. Raises FileError."""
     text = render(

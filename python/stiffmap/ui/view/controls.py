@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.ui.view.moment import Moment
-from stiffmap.ui.view.numbers import Numbers, write
+from stiffmap.ui.view.numbers import ChangedNumbers, write
 from stiffmap.ui.view.outputs import Outputs
 from stiffmap.ui.view.panels import hint, legend
 from stiffmap.ui.view.place import first_plane, moves, rotation_of, turns
@@ -45,7 +45,7 @@ class Controls:
         with tabs.add_tab("Why"):
             self._why_tab(gui)
         with tabs.add_tab("Numbers"):
-            self.numbers = Numbers(self, gui, moment)
+            self.numbers = ChangedNumbers(self, gui, moment)
         with tabs.add_tab("Out"):
             self.outputs = Outputs(viewer, gui)
         panel = gui.add_panel()

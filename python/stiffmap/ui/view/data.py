@@ -39,7 +39,7 @@ RESULT, CORRECTED = "diagnosis.json", "machine.yaml"
 
 
 @dataclass(frozen=True)
-class Named:
+class ShownEffect:
     """An effect on its element; `legs` is empty where the element is in none."""
 
     kind: str
@@ -53,22 +53,24 @@ class Named:
 
 
 @dataclass(frozen=True, eq=False)
-class Findings:
+class ShownFindings:
     """A verdict, the effects that it names, and the machine with them."""
 
     verdict: str
-    effects: tuple[Named, ...]
+    effects: tuple[ShownEffect, ...]
     machine: Machine
 
 
-def findings(diagnosis: Any) -> Findings:
+def findings(diagnosis: Any) -> ShownFindings:
     """Of a `Diagnosis`, or of the folder of one (or its ``diagnosis.json``); FileError where that cannot be read."""
     if isinstance(diagnosis, str | PathLike):
         return _from_folder(Path(diagnosis))
-    return Findings(diagnosis.verdict, tuple(map(_named, diagnosis.as_plain()["effects"])), diagnosis.machine)
+    return ShownFindings(
+        diagnosis.verdict, tuple(map(_named, diagnosis.as_plain()["effects"])), diagnosis.machine
+    )
 
 
-def _from_folder(given: Path) -> Findings:
+def _from_folder(given: Path) -> ShownFindings:
     file = given / RESULT if given.is_dir() else given
     try:
         data = json.loads(file.read_text(encoding="utf-8"))
@@ -78,10 +80,10 @@ def _from_folder(given: Path) -> Findings:
         raise FileError(message, file=str(file)) from None
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         raise FileError(f"expected the {RESULT} that stiffmap diagnose -o wrote", file=str(file)) from None
-    return Findings(verdict, effects, load_machine(file.with_name(CORRECTED)))
+    return ShownFindings(verdict, effects, load_machine(file.with_name(CORRECTED)))
 
 
-def _named(e: Any) -> Named:
+def _named(e: Any) -> ShownEffect:
     legs = tuple(map(str, e["legs"]))
     where = f", leg{'s' if len(legs) > 1 else ''} {', '.join(legs)}" if legs else ""
     values = ", ".join(
@@ -89,7 +91,7 @@ def _named(e: Any) -> Named:
     )
     others = len(e["aliases"])
     more = f" (or {others} other place{'s' if others > 1 else ''})" if others else ""
-    return Named(
+    return ShownEffect(
         str(e["kind"]), str(e["element"]), legs, f"{e['kind']} of {e['element']}{where}: {values}{more}"
     )
 
@@ -101,7 +103,7 @@ class Data:
         self,
         experiment: Experiment | None = None,
         path: Floats | None = None,
-        diagnosis: Findings | None = None,
+        diagnosis: ShownFindings | None = None,
         opened: Machine | None = None,
     ) -> None:
         """opened: the machine whose residuals come before; None: the first that is drawn."""
@@ -158,7 +160,7 @@ class Data:
         self._said["Experiment"] = f"{escape(e.name)}, {text}"
         scene.points("/rows/places", places, rgb("#444444"), 0.005)
 
-    def _effects(self, scene: Scene, moment: Moment, found: Findings) -> None:
+    def _effects(self, scene: Scene, moment: Moment, found: ShownFindings) -> None:
         scene.diagnosed = list(dict.fromkeys(i for e in found.effects for i in e.links(moment.machine)))
         named = "; ".join(escape(e.text) for e in found.effects) or "no effect is named"
         self._said["Diagnosis (pink)"] = f"{escape(found.verdict)}: {named}"

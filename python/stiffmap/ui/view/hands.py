@@ -10,7 +10,7 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.ui.view.panels import probe_text
 
 
-class Probe:
+class ProbePoint:
     """A point of the plane at which the quantity is solved, not read off the picture."""
 
     def __init__(self, viewer: Any) -> None:

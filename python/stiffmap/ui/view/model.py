@@ -24,18 +24,18 @@ from stiffmap.solve.kinematics import inverse_kinematics
 from stiffmap.solve.machine import Machine, load_machine
 from stiffmap.ui.view.moment import Moment
 from stiffmap.ui.view.place import first_plane, orientation, rotation_of
-from stiffmap.ui.view.state import History, State, checked, with_change
+from stiffmap.ui.view.state import History, ViewState, checked, with_change
 
 KEPT_MACHINES = 16
 
 
-class Model:
+class ViewModel:
     """State, history and what they mean; every method that changes anything says what went wrong by StiffmapError."""
 
     def __init__(
         self,
         machine: Machine,
-        state: State | None = None,
+        state: ViewState | None = None,
         *,
         file: str | PathLike[str] | None = None,
         meshes: Path | None = None,
@@ -47,13 +47,13 @@ class Model:
         self.declared = machine
         self._machines: Kept[Hashable, Machine] = Kept(KEPT_MACHINES)
         home = machine.description.home.p
-        first = State((float(home[0]), float(home[1]), float(home[2])), plane=first_plane(machine))
+        first = ViewState((float(home[0]), float(home[1]), float(home[2])), plane=first_plane(machine))
         self.history = History(checked(state) if state else first)
         self.message = ""
         self._check(self.state)
 
     @property
-    def state(self) -> State:
+    def state(self) -> ViewState:
         """What is on the screen."""
         return self.history.now
 
@@ -72,7 +72,7 @@ class Model:
         key = (id(declared), changes)
         return self._machines.made(key, lambda: changed(declared, dict(changes)))
 
-    def _check(self, state: State) -> None:
+    def _check(self, state: ViewState) -> None:
         k = inverse_kinematics(
             self._with(state.changes), state.position, orientation(state), start=state.start_array, threads=1
         )
@@ -80,7 +80,7 @@ class Model:
             where = place_text(state.position)
             raise StiffmapError(f"{self.declared.name} cannot reach {where} with this orientation")
 
-    def put(self, *, keep: bool = True, **values: Any) -> State:
+    def put(self, *, keep: bool = True, **values: Any) -> ViewState:
         """New values of the state; all or none. The message on the screen is cleared."""
         new = checked(replace(self.state, **values))
         if {"position", "rotation", "start", "changes"} & set(values):
@@ -89,13 +89,13 @@ class Model:
         self.history.put(new, keep=keep)
         return new
 
-    def change(self, address: str, value: float | None, *, keep: bool = True) -> State:
+    def change(self, address: str, value: float | None, *, keep: bool = True) -> ViewState:
         """A number of the machine (SI) by its address; None: as in the file."""
         if value is not None and not np.isfinite(value):
             raise StiffmapError(f"{address}: expected a finite number, got {value}")
         return self.put(changes=with_change(self.state, address, value).changes, keep=keep)
 
-    def drag(self, position: Floats, rotation: Floats | None = None) -> State:
+    def drag(self, position: Floats, rotation: Floats | None = None) -> ViewState:
         """The tool follows a hand (m; (3, 3), None: as it is) as far as the machine goes; `message` says what stops it.
 
         Not kept for undo: call `history.mark` when a drag begins.
@@ -118,12 +118,12 @@ class Model:
         self.history.put(replace(s, position=(x, y, z), rotation=turn), keep=False)
         return self.state
 
-    def undo(self) -> State:
+    def undo(self) -> ViewState:
         """Back by one step."""
         self.message = ""
         return self.history.undo()
 
-    def reset(self) -> State:
+    def reset(self) -> ViewState:
         """As it was opened."""
         self.message = ""
         return self.history.reset()

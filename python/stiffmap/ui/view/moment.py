@@ -20,7 +20,7 @@ from stiffmap.ui.plot.skeleton import Skeleton, skeleton, standing
 from stiffmap.ui.view.place import box_of, moves, orientation, solved
 from stiffmap.ui.view.plane import FINE, NO_LINES, PlaneMap, plane_map, values_at
 from stiffmap.ui.view.quantities import QUANTITIES
-from stiffmap.ui.view.state import State
+from stiffmap.ui.view.state import ViewState
 from stiffmap.workspace.performance.poses import box_nodes
 
 CLOUD = 15
@@ -34,7 +34,7 @@ class Moment:
     """The machine with its changed numbers, and the state."""
 
     machine: Machine
-    state: State
+    state: ViewState
     meshes: Path | None = None
     """The URDF whose meshes are drawn."""
 

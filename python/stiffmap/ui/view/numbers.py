@@ -9,12 +9,12 @@ import numpy as np
 from stiffmap.model.addresses import listed
 from stiffmap.ui.view.model import addresses
 from stiffmap.ui.view.moment import Moment
-from stiffmap.ui.view.state import State
+from stiffmap.ui.view.state import ViewState
 
 DECADE = 1.0
 
 
-class Numbers:
+class ChangedNumbers:
     """One number at a time, and a list of those that are changed."""
 
     def __init__(self, controls: Any, gui: Any, moment: Moment) -> None:
@@ -43,7 +43,7 @@ class Numbers:
         self._find.on_update(changed)
         self._address.on_update(lambda e: controls.viewer.worker.ask())
 
-    def show(self, state: State) -> None:
+    def show(self, state: ViewState) -> None:
         """The chosen number as it is now, and all that are changed."""
         address, given = self._address.value, dict(state.changes)
         plain = self.all.get(address, 0.0)

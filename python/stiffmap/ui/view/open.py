@@ -14,9 +14,9 @@ from stiffmap.common.broadcasting import given_path, real_array
 from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.machine import Machine
 from stiffmap.ui.view.data import Data, findings
-from stiffmap.ui.view.model import Model
+from stiffmap.ui.view.model import ViewModel
 from stiffmap.ui.view.serving import HERE, LOCAL, Guard, need_viser, silent, start_server
-from stiffmap.ui.view.state import State, as_plain, from_permalink, from_plain, permalink
+from stiffmap.ui.view.state import ViewState, as_plain, from_permalink, from_plain, permalink
 from stiffmap.ui.view.viewer import Viewer
 
 POLL = 0.2
@@ -27,7 +27,7 @@ class View:
     """A view that is open; `close` ends it, as the end of a ``with`` block and of the program do."""
 
     def __init__(
-        self, model: Model, host: str = HERE, port: int | None = None, data: Data | None = None
+        self, model: ViewModel, host: str = HERE, port: int | None = None, data: Data | None = None
     ) -> None:
         need_viser()
         self._guard = Guard(host, self._go)
@@ -56,7 +56,7 @@ class View:
         return f"{self.url}{joint}state={permalink(name, self.state)}"
 
     @property
-    def state(self) -> State:
+    def state(self) -> ViewState:
         """What is on the screen."""
         return self._viewer.model.state
 
@@ -67,7 +67,7 @@ class View:
         self._viewer.worker.ask()
 
     def _go(self, word: str) -> None:
-        def deed(model: Model) -> None:
+        def deed(model: ViewModel) -> None:
             machine, state = from_permalink(word)
             if machine not in (model.declared.name, str(model.file)):
                 raise StiffmapError(
@@ -170,9 +170,9 @@ def model_of(
     file: str | PathLike[str] | None = None,
     meshes: str | PathLike[str] | None = None,
     **state: Any,
-) -> Model:
+) -> ViewModel:
     """A model in a state given by keywords; StiffmapError for bad ones."""
-    model = Model(
+    model = ViewModel(
         machine, file=file, meshes=None if meshes is None else given_path(meshes, "meshes", "a URDF file")
     )
     given = {k: _listed(v) for k, v in state.items() if v is not None}
@@ -180,7 +180,7 @@ def model_of(
         given["position"] = _listed(position)
     if not given:
         return model
-    return Model(machine, from_plain(as_plain(model.state) | given), file=model.file, meshes=model.meshes)
+    return ViewModel(machine, from_plain(as_plain(model.state) | given), file=model.file, meshes=model.meshes)
 
 
 def _listed(value: Any) -> Any:

@@ -40,7 +40,7 @@ from stiffmap.ui.view.plane import PlaneMap
 from stiffmap.ui.view.quantities import QUANTITIES
 from stiffmap.ui.view.scene import Scene, look_at_machine
 from stiffmap.ui.view.serving import HERE, need_viser, silent
-from stiffmap.ui.view.state import State, as_plain, permalink
+from stiffmap.ui.view.state import ViewState, as_plain, permalink
 
 SHOWN = 51
 """Poses along each edge of the plane in a picture."""
@@ -97,7 +97,7 @@ def _picture(moment: Moment, kind: str) -> bytes:
 def command_line(machine: str, moment: Moment) -> str:
     """For a shell; files and units as there: mm, deg, µm as mm."""
     s = moment.state
-    default = State(s.position)
+    default = ViewState(s.position)
     options = {
         "at": _numbers(1e3 * np.array(s.position)),
         "force": _numbers(s.force),

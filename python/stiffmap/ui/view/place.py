@@ -13,7 +13,7 @@ from stiffmap.solve.compiled import Status
 from stiffmap.solve.kinematics import inverse_kinematics
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.solution import Solution
-from stiffmap.ui.view.state import State
+from stiffmap.ui.view.state import ViewState
 
 SMALL_TURN = 0.03
 """rad, with which it is tried whether a machine turns."""
@@ -45,14 +45,14 @@ def drawn_box(machine: Machine) -> tuple[Floats, Floats]:
     return low, high
 
 
-def orientation(state: State) -> Floats | None:
+def orientation(state: ViewState) -> Floats | None:
     """(3, 3) of a state; None: as at home."""
     return None if state.rotation is None else np.asarray(Rotation.from_rotvec(state.rotation).as_matrix())
 
 
 def solved(
     machine: Machine,
-    state: State,
+    state: ViewState,
     position: ArrayLike | None = None,
     *,
     stiffness: bool = True,
@@ -65,7 +65,7 @@ def solved(
     )  # fmt: skip
 
 
-def rotation_of(machine: Machine, state: State) -> Floats:
+def rotation_of(machine: Machine, state: ViewState) -> Floats:
     """(3, 3) commanded orientation."""
     turned = orientation(state)
     return np.asarray(machine.compiled.home_rotation if turned is None else turned)

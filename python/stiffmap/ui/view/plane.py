@@ -16,7 +16,7 @@ from stiffmap.ui.plot.planes import levels
 from stiffmap.ui.plot.scene import box_corners
 from stiffmap.ui.view.place import drawn_box, orientation, solved
 from stiffmap.ui.view.quantities import QUANTITIES, Mask, tolerance_level
-from stiffmap.ui.view.state import State
+from stiffmap.ui.view.state import ViewState
 from stiffmap.workspace.performance.motion.inertia import NaturalFrequencies, natural_frequencies
 from stiffmap.workspace.vibration import frequency_response
 
@@ -68,7 +68,7 @@ class Frame:
         return point if t > 0 and inside else None
 
 
-def plane_frame(machine: Machine, state: State) -> Frame:
+def plane_frame(machine: Machine, state: ViewState) -> Frame:
     """The rectangle across the workspace box that holds the tool."""
     low, high = drawn_box(machine)
     p = np.array(state.position)
@@ -159,7 +159,7 @@ class PlaneMap:
         return NO_LINES if level is None else self.lines_at(level)
 
 
-def values_at(machine: Machine, state: State, position: Floats) -> tuple[Floats, Floats]:
+def values_at(machine: Machine, state: ViewState, position: Floats) -> tuple[Floats, Floats]:
     """(...) of the state's quantity with the tool at (..., 3) m, SI, and statuses."""
     quantity = QUANTITIES[state.quantity]
     if quantity.of is None:
@@ -170,7 +170,7 @@ def values_at(machine: Machine, state: State, position: Floats) -> tuple[Floats,
     return quantity.of(s, size, state.tolerance), np.asarray(s.status, dtype=float)
 
 
-def plane_map(machine: Machine, state: State, count: int = FINE) -> PlaneMap:
+def plane_map(machine: Machine, state: ViewState, count: int = FINE) -> PlaneMap:
     """Solve the poses of the plane; outside the box they are solved as well and hidden."""
     begun = time.perf_counter()
     frame = plane_frame(machine, state)
@@ -186,7 +186,7 @@ def plane_map(machine: Machine, state: State, count: int = FINE) -> PlaneMap:
 
 
 def modes_at(
-    machine: Machine, state: State, position: Floats, modes: int, threads: int | None = None
+    machine: Machine, state: ViewState, position: Floats, modes: int, threads: int | None = None
 ) -> NaturalFrequencies:
     """The lowest modes at (..., 3) m under the load of a state; StiffmapError where bodies lack masses."""
     return natural_frequencies(
@@ -195,13 +195,13 @@ def modes_at(
     )  # fmt: skip
 
 
-def lowest_frequency(machine: Machine, state: State, position: Floats) -> tuple[Floats, Floats]:
+def lowest_frequency(machine: Machine, state: ViewState, position: Floats) -> tuple[Floats, Floats]:
     """(...) Hz and statuses."""
     w = modes_at(machine, state, position, 1)
     return np.asarray(w.frequency[..., 0]), np.asarray(w.status, dtype=float)
 
 
-def dynamic_stiffness(machine: Machine, state: State, position: Floats) -> tuple[Floats, Floats]:
+def dynamic_stiffness(machine: Machine, state: ViewState, position: Floats) -> tuple[Floats, Floats]:
     """(...) N/m of the softest direction at the state's frequency, and statuses; modes beyond the lowest count as statics."""
     found = frequency_response(
         machine, position, [state.frequency], state.wrench, rotation=orientation(state), gravity=state.gravity,

@@ -14,7 +14,7 @@ from stiffmap.solve.solution import Solution
 
 
 @dataclass(frozen=True)
-class Quantity:
+class ShownQuantity:
     """A name, its unit on the screen, and how it is read off a solution."""
 
     title: str
@@ -86,18 +86,20 @@ def _largest_eigenvalue(a: Floats) -> Floats:
     return np.asarray(mean + 2 * p * np.cos(np.arccos(np.clip(half_det, -1.0, 1.0)) / 3))
 
 
-QUANTITIES: dict[str, Quantity] = {
-    "deflection": Quantity("deflection under this load", "µm", 1e6, deflection),
-    "worst": Quantity(
+QUANTITIES: dict[str, ShownQuantity] = {
+    "deflection": ShownQuantity("deflection under this load", "µm", 1e6, deflection),
+    "worst": ShownQuantity(
         "worst deflection by a force of this size", "µm", 1e6, worst_deflection, stiffness=True
     ),
-    "stiffness": Quantity(
+    "stiffness": ShownQuantity(
         "stiffness of the softest direction", "N/µm", 1e-6, weakest_stiffness, stiffness=True
     ),
-    "margin": Quantity("margin to the tolerance", "µm", 1e6, margin),
-    "status": Quantity("status", "", 1.0, status),
-    "frequency": Quantity("lowest natural frequency", "Hz", 1.0, None),
-    "dynamic": Quantity("dynamic stiffness of the softest direction", "N/µm", 1e-6, None, stiffness=True),
+    "margin": ShownQuantity("margin to the tolerance", "µm", 1e6, margin),
+    "status": ShownQuantity("status", "", 1.0, status),
+    "frequency": ShownQuantity("lowest natural frequency", "Hz", 1.0, None),
+    "dynamic": ShownQuantity(
+        "dynamic stiffness of the softest direction", "N/µm", 1e-6, None, stiffness=True
+    ),
 }
 """By the word that names it in a state."""
 

@@ -26,7 +26,7 @@ Vector = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
-class State:
+class ViewState:
     """Pose, load, plane and what is changed in the machine; `position` alone has no default."""
 
     position: Vector
@@ -66,27 +66,27 @@ class State:
         return None if self.start is None else np.array(self.start)
 
 
-def as_plain(state: State) -> dict[str, Any]:
+def as_plain(state: ViewState) -> dict[str, Any]:
     """JSON data, without what is as by default."""
-    default = State(state.position)
+    default = ViewState(state.position)
     plain = asdict(state)
     return {k: v for k, v in plain.items() if k == "position" or v != getattr(default, k)}
 
 
-def from_plain(data: Any) -> State:
+def from_plain(data: Any) -> ViewState:
     """The state that JSON data say; StiffmapError naming the key for anything else."""
     if not isinstance(data, Mapping):
         raise StiffmapError(f"view: expected a mapping of the state, got {type(data).__name__}")
-    known = {f.name for f in fields(State)}
+    known = {f.name for f in fields(ViewState)}
     unknown = [k for k in data if k not in known]
     if unknown:
         raise StiffmapError(f"view: unknown key {unknown[0]!r}; expected {', '.join(sorted(known))}")
     if "position" not in data:
         raise StiffmapError("view: expected a position")
-    return checked(State(**{k: _value(k, v) for k, v in data.items()}))
+    return checked(ViewState(**{k: _value(k, v) for k, v in data.items()}))
 
 
-def checked(state: State) -> State:
+def checked(state: ViewState) -> ViewState:
     """The state itself; StiffmapError naming what in it cannot be."""
     for name in ("position", "rotation", "force", "moment", "gravity", "normal"):
         value = getattr(state, name)
@@ -135,13 +135,13 @@ def _number(name: str, value: Any) -> float:
     return float(bounded(value))
 
 
-def permalink(machine: str, state: State) -> str:
+def permalink(machine: str, state: ViewState) -> str:
     """Machine and state as one word of letters, digits, - and _."""
     text = json.dumps({"machine": machine, **as_plain(state)}, separators=(",", ":"))
     return base64.urlsafe_b64encode(zlib.compress(text.encode(), 9)).decode().rstrip("=")
 
 
-def from_permalink(word: str) -> tuple[str, State]:
+def from_permalink(word: str) -> tuple[str, ViewState]:
     """Machine and state of a permalink; StiffmapError for a damaged one."""
     try:
         if len(word) > MOST_LINK:
@@ -161,12 +161,12 @@ def from_permalink(word: str) -> tuple[str, State]:
 class History:
     """States that were on the screen; the last one is."""
 
-    def __init__(self, first: State) -> None:
+    def __init__(self, first: ViewState) -> None:
         self.first = first
-        self._past: list[State] = []
+        self._past: list[ViewState] = []
         self.now = first
 
-    def put(self, state: State, *, keep: bool = True) -> None:
+    def put(self, state: ViewState, *, keep: bool = True) -> None:
         """A new state; without `keep` it replaces the present one, as while something is dragged."""
         if state == self.now:
             return
@@ -179,7 +179,7 @@ class History:
         if not self._past or self._past[-1] != self.now:
             self._past = [*self._past, self.now][-MOST_STATES:]
 
-    def undo(self) -> State:
+    def undo(self) -> ViewState:
         """Back to the last state that differs."""
         while self._past:
             self.now, before = self._past.pop(), self.now
@@ -187,13 +187,13 @@ class History:
                 break
         return self.now
 
-    def reset(self) -> State:
+    def reset(self) -> ViewState:
         """As at the start; an undo leads back."""
         self.put(self.first)
         return self.now
 
 
-def with_change(state: State, address: str, value: float | None) -> State:
+def with_change(state: ViewState, address: str, value: float | None) -> ViewState:
     """A number of the machine changed; None: as in the file."""
     others = {a: v for a, v in state.changes if a != address}
     if value is not None:

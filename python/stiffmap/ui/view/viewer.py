@@ -17,8 +17,8 @@ from stiffmap.ui.view.animation import Swing
 from stiffmap.ui.view.colours import colours_of
 from stiffmap.ui.view.controls import Controls
 from stiffmap.ui.view.data import Data
-from stiffmap.ui.view.hands import Probe, listen, listen_to_nodes
-from stiffmap.ui.view.model import Model
+from stiffmap.ui.view.hands import ProbePoint, listen, listen_to_nodes
+from stiffmap.ui.view.model import ViewModel
 from stiffmap.ui.view.moment import Moment
 from stiffmap.ui.view.panels import (
     colour_bar,
@@ -33,7 +33,7 @@ from stiffmap.ui.view.plane import COARSE, FINE, PlaneMap
 from stiffmap.ui.view.quantities import QUANTITIES
 from stiffmap.ui.view.scene import Scene, look_at_machine
 from stiffmap.ui.view.serving import silent
-from stiffmap.ui.view.state import State
+from stiffmap.ui.view.state import ViewState
 from stiffmap.ui.view.worker import Worker
 
 BUDGET = 0.018
@@ -44,7 +44,7 @@ COUNTS = (FINE, COARSE, 35, 25, 17, 11)
 class Viewer:
     """Everything behind one address; all browsers that open it see the same."""
 
-    def __init__(self, model: Model, server: Any, data: Data | None = None) -> None:
+    def __init__(self, model: ViewModel, server: Any, data: Data | None = None) -> None:
         self.model, self.server, self._data = model, server, data
         self.lock = threading.RLock()
         self.error = ""
@@ -63,7 +63,7 @@ class Viewer:
         self.controls = Controls(self)
         self.swing = Swing(self)
         self.worker = Worker([self.quick, self.fine, self.panels, self.cloud], self._fail)
-        self.probe = Probe(self)
+        self.probe = ProbePoint(self)
         listen(self)
         listen_to_nodes(self)
         if data is not None:
@@ -73,7 +73,7 @@ class Viewer:
 
     # -- what hands do ------------------------------------------------------------------------------------------
 
-    def act(self, deed: Callable[[Model], object]) -> bool:
+    def act(self, deed: Callable[[ViewModel], object]) -> bool:
         """Change the model; what it refuses is shown and nothing has changed then."""
         with self.lock:
             try:
@@ -94,7 +94,7 @@ class Viewer:
     def drag(self, position: Any, wxyz: Any) -> None:
         """The gizmo was moved (m, quaternion)."""
 
-        def deed(model: Model) -> None:
+        def deed(model: ViewModel) -> None:
             turned = Rotation.from_quat(np.roll(wxyz, -1)).as_matrix()
             same = np.abs(turned - rotation_of(model.machine, model.state)).max() < 1e-9
             model.drag(position, None if same else turned)
@@ -164,7 +164,7 @@ class Viewer:
         self._plane, self._plane_key = found, key
         return found
 
-    def _show(self, found: PlaneMap, state: State) -> None:
+    def _show(self, found: PlaneMap, state: ViewState) -> None:
         if not self.controls.hold or self._held is None or found.quantity != self._held_quantity:
             self._held, self._held_quantity = found.range, found.quantity
         self.scene.plane(found, self._held, state.tolerance, self.controls.isolines)

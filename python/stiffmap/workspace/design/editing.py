@@ -22,7 +22,7 @@ from stiffmap.model.files.build_elements import build_element
 from stiffmap.model.files.context import Context, Gathered
 from stiffmap.model.files.load import describe_document, validate
 from stiffmap.model.files.schema.elements import ElementModel
-from stiffmap.model.files.schema.geometry import Box
+from stiffmap.model.files.schema.geometry import BoxModel
 
 _STEP = re.compile(r"^([^\[\]]+)?((?:\[[^\[\]]+\])*)$")
 
@@ -194,7 +194,7 @@ class Editor:
     def _workspace(self, values: dict[str, float]) -> tuple[Vector, Vector] | None:
         if not self.space:
             return self.base.workspace
-        box = Box.model_validate(self._raw(("workspace",), self.space, values))
+        box = BoxModel.model_validate(self._raw(("workspace",), self.space, values))
         return build_workspace(box, self.context.at("workspace"), self.base.task, self.base.home)
 
 

@@ -11,7 +11,7 @@ from scipy.optimize import minimize
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.machine import Machine
-from stiffmap.workspace.design.problem import Design
+from stiffmap.workspace.design.problem import DesignProblem
 from stiffmap.workspace.performance.poses import read_box
 from stiffmap.workspace.performance.registry import Case, Measure, get_measure
 from stiffmap.workspace.performance.requirements import Bound
@@ -31,7 +31,7 @@ class Judged:
     reason: str = ""
 
 
-def judge(design: Design, x: Floats) -> Judged:
+def judge(design: DesignProblem, x: Floats) -> Judged:
     """Evaluate a vector of variables; a machine that cannot be is infeasible, never an error."""
     try:
         values = values_of(design, design.quick_machine(x))
@@ -47,7 +47,7 @@ def judge(design: Design, x: Floats) -> Judged:
     return Judged(objectives, violations, values)
 
 
-def values_of(design: Design, machine: Machine) -> dict[str, float]:
+def values_of(design: DesignProblem, machine: Machine) -> dict[str, float]:
     """Worst values of all measures that the design asks for, on the search's nodes, SI."""
     task = design.requirements
     low, high = read_box(machine, None)
@@ -96,7 +96,7 @@ TIGHT = 5e-4
 """Of each bound: how far inside constraints are asked to hold, so that they do when measured in full."""
 
 
-def refine(design: Design, x: Floats, weights: Floats, *, keep: bool = False) -> tuple[Floats, Judged]:
+def refine(design: DesignProblem, x: Floats, weights: Floats, *, keep: bool = False) -> tuple[Floats, Judged]:
     """The design (variables,) nearby with the least weighted sum of objectives (objectives,), and its judgement.
 
     Constraints hold; catalogue rows stay; `keep`: no objective may become worse. Where nothing better is found, the design itself.

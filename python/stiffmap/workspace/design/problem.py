@@ -79,7 +79,7 @@ class DesignFile(FileModel):
 
 
 @dataclass(frozen=True, eq=False)
-class Design:
+class DesignProblem:
     """A design problem, checked. Variables first, then one row number per catalogue."""
 
     file: str
@@ -161,7 +161,7 @@ class Design:
         return settled(base.declared or base)
 
 
-def load_design(path: str | PathLike[str]) -> Design:
+def load_design(path: str | PathLike[str]) -> DesignProblem:
     """A design problem from a file, or a shipped one by name (``redesign``).
 
     Raises FileError naming file, line, key, what was expected and what was found.
@@ -211,12 +211,12 @@ def load_design(path: str | PathLike[str]) -> Design:
         (name, bound_in(document, file, bound, "constraints", name))
         for name, bound in model.constraints.items()
     )
-    design = Design(file, model, read(machine), str(machine), task, (*task.bounds, *own))
+    design = DesignProblem(file, model, read(machine), str(machine), task, (*task.bounds, *own))
     _try(design, fail)
     return design
 
 
-def _try(design: Design, fail: Any) -> None:
+def _try(design: DesignProblem, fail: Any) -> None:
     """Every expression and place is tried once, in the middle of the bounds."""
     low, high = design.bounds
     try:

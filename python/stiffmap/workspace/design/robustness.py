@@ -14,7 +14,7 @@ from stiffmap.model.files.templates import expanded
 from stiffmap.solve.machine import Machine
 from stiffmap.workspace.design.editing import Editor
 from stiffmap.workspace.design.judging import values_of, violation
-from stiffmap.workspace.design.problem import Design
+from stiffmap.workspace.design.problem import DesignProblem
 
 SHARE = 0.1
 """Of a tolerance: how far each number is moved for its slope."""
@@ -36,7 +36,7 @@ class Robustness:
     draws: int
 
 
-def robustness(design: Design, x: Floats, *, draws: int = DRAWS, seed: int = 0) -> Robustness | None:
+def robustness(design: DesignProblem, x: Floats, *, draws: int = DRAWS, seed: int = 0) -> Robustness | None:
     """Of a vector of variables; None where no number of the machine file has a tolerance.
 
     A tolerance is the standard deviation of a normal distribution. A number of a template is another one in every

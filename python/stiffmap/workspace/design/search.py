@@ -17,7 +17,7 @@ from stiffmap.common.errors import MissingPartError, StiffmapError
 from stiffmap.common.outputs import make_folder, only_job
 from stiffmap.common.tasks import workers
 from stiffmap.workspace.design.judging import IMPOSSIBLE, Judged, judge
-from stiffmap.workspace.design.problem import Design, load_design
+from stiffmap.workspace.design.problem import DesignProblem, load_design
 from stiffmap.workspace.design.store import Evaluations
 from stiffmap.workspace.performance.registry import get_measure
 
@@ -26,7 +26,7 @@ from stiffmap.workspace.performance.registry import get_measure
 class ParetoSet:
     """Designs that no other one betters in everything."""
 
-    design: Design
+    design: DesignProblem
     x: Floats
     """(n, variables)."""
     judged: tuple[Judged, ...]
@@ -74,7 +74,7 @@ Progress = Callable[[int, int, float, int], None]
 
 
 def optimize(
-    design: Design | str | PathLike[str],
+    design: DesignProblem | str | PathLike[str],
     *,
     folder: str | PathLike[str] | None = None,
     generations: int | None = None,
@@ -98,7 +98,7 @@ def optimize(
 
     Raises StiffmapError where no design meets all constraints: which one is missed, by how much at least.
     """
-    problem = design if isinstance(design, Design) else load_design(design)
+    problem = design if isinstance(design, DesignProblem) else load_design(design)
     place = None if folder is None else Path(folder)
     with nullcontext() if place is None else only_job(make_folder(place)):
         kept = Evaluations(problem, None if place is None else place / "evaluations.jsonl")
@@ -136,7 +136,7 @@ def feasible(judged: Judged) -> bool:
 
 
 def _front(
-    problem: Design, x: Floats, kept: Evaluations, history: list[tuple[int, int, float]], count: int
+    problem: DesignProblem, x: Floats, kept: Evaluations, history: list[tuple[int, int, float]], count: int
 ) -> ParetoSet:
     good = [row for row in x if feasible(kept.get(row))]
     if not good:
@@ -150,7 +150,7 @@ def _front(
     return ParetoSet(problem, rows, tuple(kept.get(r) for r in rows), tuple(history), count)
 
 
-def _shortfall(problem: Design, judged: list[Judged]) -> str:
+def _shortfall(problem: DesignProblem, judged: list[Judged]) -> str:
     """Which constraint the least bad design misses, and by how much."""
     built = [j for j in judged if not j.reason]
     if not built:
@@ -179,7 +179,7 @@ def _hypervolume(judged: list[Judged]) -> Any:
     return lambda values: indicator((values - low) / span)
 
 
-def _algorithm(problem: Design, generations: int) -> Any:
+def _algorithm(problem: DesignProblem, generations: int) -> Any:
     try:
         from pymoo.algorithms.moo.nsga2 import NSGA2
         from pymoo.algorithms.moo.nsga3 import NSGA3

@@ -15,7 +15,7 @@ from stiffmap.common.json_text import parse_json
 from stiffmap.common.outputs import add_lines
 from stiffmap.model.files.shipped import find
 from stiffmap.workspace.design.judging import Judged
-from stiffmap.workspace.design.problem import Design
+from stiffmap.workspace.design.problem import DesignProblem
 
 
 class Evaluations:
@@ -25,7 +25,7 @@ class Evaluations:
     the same state without a single evaluation.
     """
 
-    def __init__(self, design: Design, path: Path | None) -> None:
+    def __init__(self, design: DesignProblem, path: Path | None) -> None:
         self.path, self.known = path, dict[bytes, Judged]()
         self.mark = fingerprint(design)
         self._sizes = (len(design.model.objectives),), (len(design.constraints),)
@@ -82,7 +82,7 @@ class Evaluations:
         return self.known[x.tobytes()]
 
 
-def fingerprint(design: Design) -> str:
+def fingerprint(design: DesignProblem) -> str:
     """Of everything that the answers depend on: the files as read, those that they name, code."""
     near, beside = Path(design.file).parent, Path(design.machine_file).parent
     return digest(

@@ -33,7 +33,7 @@ def positive_length(value: object) -> float:
 PositiveLength = Annotated[float, BeforeValidator(positive_length)]
 
 
-class BoxModel(FileModel):
+class RequiredBoxModel(FileModel):
     """Edges of the box in which the machine works, with units."""
 
     x: Length
@@ -61,7 +61,7 @@ class RequirementsFile(FileModel):
     name: Name
     title: str = ""
     source: str = ""
-    box: BoxModel | None = None
+    box: RequiredBoxModel | None = None
     plane: Literal["xy", "xz", "yz"] = "xy"
     force: Force | None = None
     toolpath: str | None = None

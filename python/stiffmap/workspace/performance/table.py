@@ -28,7 +28,7 @@ from stiffmap.workspace.performance.requirements import Bound, Requirements, loa
 
 
 @dataclass(frozen=True, eq=False)
-class Row:
+class MeasureRow:
     """One measure: SI values, the poses that decide, the requirement and the verdict."""
 
     measure: Measure
@@ -62,10 +62,10 @@ class MeasuresTable:
     machine: Machine
     case: Case
     requirements: Requirements
-    rows: tuple[Row, ...]
+    rows: tuple[MeasureRow, ...]
     notes: tuple[str, ...]
 
-    def __getitem__(self, name: str) -> Row:
+    def __getitem__(self, name: str) -> MeasureRow:
         for row in self.rows:
             if row.measure.name == name:
                 return row
@@ -187,7 +187,7 @@ def measures(
     return MeasuresTable(machine, case, task, found, notes)
 
 
-def _rows(chosen: Sequence[Measure], case: Case, task: Requirements) -> tuple[Row, ...]:
+def _rows(chosen: Sequence[Measure], case: Case, task: Requirements) -> tuple[MeasureRow, ...]:
     """In the order given; measures of their own run in parallel to those that share kinematics."""
     machine = case.machine
     beside = [m for m in chosen if m.apart] if thread_count(case.threads) > 1 else []
@@ -203,11 +203,11 @@ def _positive(name: str, value: float | None) -> float | None:
     return None if value is None else magnitude(value, name, "m")
 
 
-def _row(measure: Measure, case: Case, bound: Bound | None) -> Row:
+def _row(measure: Measure, case: Case, bound: Bound | None) -> MeasureRow:
     try:
-        return Row(measure, measure.compute(case), bound)
+        return MeasureRow(measure, measure.compute(case), bound)
     except StiffmapError as error:
-        return Row(measure, Found(float("nan")), bound, str(error))
+        return MeasureRow(measure, Found(float("nan")), bound, str(error))
 
 
 def _box(
@@ -247,7 +247,7 @@ class BoxMap(NamedTuple):
     values: Floats
 
 
-def box_map(row: Row) -> BoxMap | None:
+def box_map(row: MeasureRow) -> BoxMap | None:
     """Of a row of a table of measures; None where its poses are no grid."""
     if row.found.positions is None or row.found.values is None:
         return None

@@ -9,7 +9,7 @@ import pytest
 
 import stiffmap as sm
 from stiffmap.experiment import Predictor
-from stiffmap.experiment.noise.whitening import Problem, nuisance_part
+from stiffmap.experiment.noise.whitening import LinearProblem, nuisance_part
 from stiffmap.ui.cli import main
 
 UR10 = (
@@ -102,7 +102,7 @@ def left(machine: sm.Machine, folder: Path) -> float:
     p = Predictor(machine, sm.load_experiment(folder))
     e, base = p.experiment, p()
     rest = e.reading - base
-    rest = rest - nuisance_part(Problem.of(e, e.sigma, base), rest)
+    rest = rest - nuisance_part(LinearProblem.of(e, e.sigma, base), rest)
     return float(np.sqrt(np.nanmean(rest[:, :3] ** 2)))
 
 

@@ -13,7 +13,7 @@ import pytest
 import stiffmap as sm
 from stiffmap.experiment import Experiment, Predictor, random_plan, save_experiment
 from stiffmap.experiment.experiment import Floats
-from stiffmap.experiment.noise.whitening import Problem
+from stiffmap.experiment.noise.whitening import LinearProblem
 from stiffmap.identification.calibration import calibrate
 from stiffmap.identification.calibration.calibrate import independent
 from stiffmap.identification.inference.corrected import corrected
@@ -166,7 +166,7 @@ def test_columns_are_those_of_the_machine_that_is_found() -> None:
     s = sensitivity(predictor, wanted)
     values = np.array([np.log(2.0) / wanted[0].u])
     moved = sensitivity_at(predictor, s, values)
-    problem = Problem.of(plan, plan.sigma, s.base)
+    problem = LinearProblem.of(plan, plan.sigma, s.base)
     size = [float(np.linalg.norm(problem.white(c.columns))) for c in (s, moved)]
     assert size[1] / size[0] == pytest.approx(2.0, rel=0.05)
     assert bends(problem.white, s, values, predicted(predictor, s.unknowns, values))
@@ -182,7 +182,7 @@ def test_a_calibration_of_compliances_ends_at_their_most_likely_values() -> None
     exact = predicted(predictor, wanted, np.array([2.0, -1.5, 1.0]))
     twin = plan.with_readings(exact + np.random.default_rng(2).standard_normal(exact.shape) * plan.sigma)
     p = Predictor(machine, twin)
-    problem, s = Problem.of(twin, twin.sigma, p()), sensitivity(p, wanted)
+    problem, s = LinearProblem.of(twin, twin.sigma, p()), sensitivity(p, wanted)
     rows, channel = problem.index
     n, spread = len(rows), np.array([1.0, 2.0, 0.7])
     rest = Covariance(np.ones(n), np.zeros((n, 0)))

@@ -12,7 +12,7 @@ import stiffmap as sm
 from stiffmap.experiment import Experiment, Predictor
 from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.noise.held_out import unseen_nuisances
-from stiffmap.experiment.noise.whitening import Problem, best_fit
+from stiffmap.experiment.noise.whitening import LinearProblem, best_fit
 from stiffmap.experiment.virtual.plans import plan_of_joints
 from stiffmap.identification.calibration import Calibration, calibrate
 from stiffmap.identification.calibration.result import in_display_units
@@ -76,7 +76,7 @@ def test_frames_are_not_fitted_to_what_is_held_out() -> None:
     shown: Floats = rng.standard_normal(base.shape) * 1e-4
     e = plan.with_readings(base + shown)
     test = np.arange(12) % 3 == 0
-    others, own = (Problem.of(e, e.sigma, base, keep) for keep in (~test, test))
+    others, own = (LinearProblem.of(e, e.sigma, base, keep) for keep in (~test, test))
     said = unseen_nuisances(others, own, shown)
     changed = shown.copy()
     changed[test] += 1.0  # what is held out has no say

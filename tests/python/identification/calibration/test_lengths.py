@@ -9,7 +9,7 @@ import pytest
 
 import stiffmap as sm
 from stiffmap.experiment import Experiment, Predictor, load_experiment
-from stiffmap.experiment.noise.whitening import Problem
+from stiffmap.experiment.noise.whitening import LinearProblem
 
 JOINTS = ("base", "shoulder", "elbow", "wrist_1", "wrist_2", "wrist_3")
 NOISE = 5e-5
@@ -35,7 +35,7 @@ def measured(folder: Path, machine: sm.Machine, off: np.ndarray) -> Experiment:
 def unseen(machine: sm.Machine, e: Experiment) -> float:
     """m, rms per degree of freedom, anchor and tool point fitted."""
     p = Predictor(machine, e)
-    problem = Problem.of(p.experiment, p.experiment.sigma, p())
+    problem = LinearProblem.of(p.experiment, p.experiment.sigma, p())
     left = problem.residual(p())
     return NOISE * float(np.sqrt(left @ left / problem.freedom))
 

@@ -14,7 +14,7 @@ from stiffmap.experiment import Experiment, Predictor, random_plan
 from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.virtual.plans import plan_of_joints
 from stiffmap.identification.calibration import Calibration, calibrate
-from stiffmap.identification.inference.travel import Drive, apart, hats
+from stiffmap.identification.inference.travel import DriveErrors, apart, hats
 from stiffmap.ui.cli.calibrate import write
 
 POSES = 250
@@ -89,7 +89,7 @@ def test_errors_that_follow_no_drive_make_no_profile() -> None:
 def test_a_profile_has_no_mean_and_no_slope() -> None:
     """Those are the drive's zero and gain."""
     knots = np.array([0.0, 0.1, 0.4, 0.5, 0.9, 1.4])
-    drive = Drive("a", "rad", np.ones((3, 6)), np.array([0.0, 0.7, 1.4]), knots)
+    drive = DriveErrors("a", "rad", np.ones((3, 6)), np.array([0.0, 0.7, 1.4]), knots)
     root = drive.root({name: 2.0 for name, _ in drive.names()})
     assert np.abs(np.stack([np.ones(6), knots]) @ root).max() < 1e-12
     assert np.linalg.matrix_rank(root) == 4

@@ -12,7 +12,7 @@ import stiffmap as sm
 from stiffmap.experiment import Experiment, Predictor, random_plan, residual
 from stiffmap.experiment.noise.level import noise_of
 from stiffmap.experiment.noise.over_time import OverTime, over_time
-from stiffmap.experiment.noise.whitening import Problem
+from stiffmap.experiment.noise.whitening import LinearProblem
 
 CREEP = np.array([0.5, -1.0, 0.7])
 
@@ -33,7 +33,7 @@ def session(course: str, seed: int = 0) -> tuple[sm.Machine, Experiment]:
 
 def course_of(machine: sm.Machine, e: Experiment) -> OverTime | None:
     base = Predictor(machine, e)()
-    problem = Problem.of(e, noise_of(e).sigma, base)
+    problem = LinearProblem.of(e, noise_of(e).sigma, base)
     return over_time(problem, problem.residual(base))
 
 

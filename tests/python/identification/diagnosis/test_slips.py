@@ -19,7 +19,7 @@ from stiffmap.identification.diagnosis.report.findings import Effect
 from stiffmap.identification.diagnosis.report.sentences import aliases, measured, next_step, opening
 from stiffmap.identification.diagnosis.report.wording import effect_text
 from stiffmap.identification.diagnosis.slips import find
-from stiffmap.identification.diagnosis.slips.find import Found, find_slip
+from stiffmap.identification.diagnosis.slips.find import FoundSlip, find_slip
 from stiffmap.identification.diagnosis.slips.slip import Slip
 from stiffmap.identification.diagnosis.stages import by_gain
 from stiffmap.model import effects
@@ -40,7 +40,7 @@ def readings(name: str, soft: bool = False) -> Experiment:
     return simulate(machine, random_plan(machine, "deflection", poses=12, seed=7), terms, seed=5)
 
 
-def found(name: str, e: Experiment) -> Found | None:
+def found(name: str, e: Experiment) -> FoundSlip | None:
     predictor = Predictor(sm.load_machine(name), e)
     return find_slip(predictor, plan_of(predictor))
 

@@ -11,7 +11,7 @@ import pytest
 
 from stiffmap.experiment import Experiment
 from stiffmap.experiment.experiment import Floats
-from stiffmap.experiment.noise.whitening import Problem
+from stiffmap.experiment.noise.whitening import LinearProblem
 from stiffmap.identification.candidates.candidates import Candidate
 from stiffmap.identification.candidates.sensitivity import Variant
 from stiffmap.identification.diagnosis.report import separation as stage
@@ -42,9 +42,9 @@ def readings_of_dx(values: Floats, **more: Any) -> Experiment:
     return Experiment("hand", "none", "position", ids, position, np.zeros((n, 6)), reading, sigma, **more)
 
 
-def problem_of(values: Floats) -> Problem:
+def problem_of(values: Floats) -> LinearProblem:
     e = readings_of_dx(values)
-    return Problem.of(e, e.sigma, np.zeros((len(e), 6)))
+    return LinearProblem.of(e, e.sigma, np.zeros((len(e), 6)))
 
 
 E = np.eye(5)

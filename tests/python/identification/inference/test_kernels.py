@@ -26,7 +26,7 @@ from stiffmap.identification.inference.covariance import covariance
 )
 def test_what_readings_share_is_asked_for_once_and_where_it_is_not_the_noise(pose, condition, expected):
     e: Any = SimpleNamespace(groups=np.array(pose), conditions=np.array(condition), channels=(0, 0, 0))
-    points = kernels.Points(np.repeat(np.arange(3), 3), np.tile(np.arange(3), 3), np.ones(9))
+    points = kernels.ReadingPoints(np.repeat(np.arange(3), 3), np.tile(np.arange(3), 3), np.ones(9))
     found = list(kernels.shared(e, points))
     assert [k.name for k in found] == expected
     apart = points.channel[:, None] != points.channel
@@ -34,16 +34,16 @@ def test_what_readings_share_is_asked_for_once_and_where_it_is_not_the_noise(pos
 
 
 @pytest.fixture(scope="module")
-def read() -> tuple[sm.Machine, Experiment, kernels.Points]:
+def read() -> tuple[sm.Machine, Experiment, kernels.ReadingPoints]:
     machine = sm.load_machine("linear-delta")
     plan = random_plan(machine, "deflection", poses=8, loads=4, repeats=2, seed=1)
     e = Predictor(machine, replace(plan, order=np.arange(len(plan), dtype=float))).experiment
     rows, channel = np.nonzero(e.read)
-    return machine, e, kernels.Points(rows, channel, 1e-5 * (1.0 + 0.1 * channel))
+    return machine, e, kernels.ReadingPoints(rows, channel, 1e-5 * (1.0 + 0.1 * channel))
 
 
 def test_variances_of_kernels_are_their_diagonals(
-    read: tuple[sm.Machine, Experiment, kernels.Points],
+    read: tuple[sm.Machine, Experiment, kernels.ReadingPoints],
 ) -> None:
     machine, e, points = read
     found = list(kernels.gaps(machine, e, points))
@@ -58,7 +58,7 @@ def test_variances_of_kernels_are_their_diagonals(
 
 
 def test_a_covariance_of_low_rank_is_the_whole_one(
-    read: tuple[sm.Machine, Experiment, kernels.Points],
+    read: tuple[sm.Machine, Experiment, kernels.ReadingPoints],
 ) -> None:
     """Known by all readings it is exact; by some, smooth parts and blocks nearly, and each reading's own variance exactly."""
     machine, e, points = read
@@ -80,7 +80,7 @@ def test_a_covariance_of_low_rank_is_the_whole_one(
     part = found.only(keep)
     assert np.diag(part.noise) + part.factor @ part.factor.T == pytest.approx(whole[np.ix_(keep, keep)])
     half = rng.permutation(n)[: n // 2]
-    few = kernels.Points(points.rows[half], points.channel[half], points.sigma[half])
+    few = kernels.ReadingPoints(points.rows[half], points.channel[half], points.sigma[half])
     smooth = [(k, v) for k, v in kinds if k.kind == "field"]
     near = covariance(points, few, smooth, noise, more)
     made = np.diag(near.noise) + near.factor @ near.factor.T

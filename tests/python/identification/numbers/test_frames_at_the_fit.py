@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 import stiffmap as sm
 from stiffmap.experiment import Experiment, Predictor, random_plan
 from stiffmap.experiment.channels import AXES
-from stiffmap.experiment.noise.whitening import Problem
+from stiffmap.experiment.noise.whitening import LinearProblem
 from stiffmap.experiment.poses.handeye import Sighting, find_frames
 from stiffmap.experiment.virtual.plans import plan_of_joints
 from stiffmap.identification.calibration import calibrate
@@ -52,7 +52,7 @@ def test_a_tool_that_is_unknown_hides_its_own_errors_at_the_fit(name: str) -> No
     moved[which] += 0.1
     change = predicted(predictor, wanted, moved) - here
     e = predictor.experiment
-    problem = Problem.of(e, e.sigma, here)
+    problem = LinearProblem.of(e, e.sigma, here)
     left = np.linalg.norm(problem.white(change)) / np.linalg.norm(
         change[problem.index] / problem.sigma[problem.index]
     )

@@ -11,7 +11,7 @@ import pytest
 import stiffmap as sm
 from stiffmap.experiment import random_plan, save_experiment, simulate
 from stiffmap.experiment.calls import placed
-from stiffmap.identification.planning.budget import Budget, Line, budgets, iso_230_2, iso_9283
+from stiffmap.identification.planning.budget import BudgetLine, NumberBudget, budgets, iso_230_2, iso_9283
 from stiffmap.identification.planning.changes import monitor as compare
 from stiffmap.identification.planning.estimate import estimate
 from stiffmap.ui.cli.app import main
@@ -83,7 +83,9 @@ def test_an_unfitted_dimension_moves_the_number_as_the_budget_says(
 
 def test_welch_and_satterthwaite() -> None:
     """Example H.1 of JCGM 100 in outline: 25 nm of 18, 9.7 of 25.6, the rest taken as exact."""
-    b = Budget("length", "m", 0.05, (Line("standard", "B", 25.0, 18.0), Line("repeats", "A", 9.7, 25.6)))
+    b = NumberBudget(
+        "length", "m", 0.05, (BudgetLine("standard", "B", 25.0, 18.0), BudgetLine("repeats", "A", 9.7, 25.6))
+    )
     assert b.u == pytest.approx(np.hypot(25.0, 9.7))
     assert b.freedom == pytest.approx(b.u**4 / (25.0**4 / 18 + 9.7**4 / 25.6))
     assert b.expanded == pytest.approx(2 * b.u)

@@ -181,12 +181,12 @@ def test_information_of_a_pose_is_that_of_its_own_modes(arm, monkeypatch):
 @pytest.mark.parametrize("factor", [0.4, 3.0])
 def test_assumed_damping_is_off_as_a_whole_and_from_mode_to_mode(arm, factor):
     """Where none is declared the level is uncertain by a factor e and each mode by e^0.5: generalised least squares by hand."""
-    from stiffmap.identification.taps.problem import Problem
+    from stiffmap.identification.taps.problem import TapsProblem
     from stiffmap.workspace.vibration.modes import ASSUMED
 
     plain = tapped(arm)
     ratio = np.full(len(plain), factor * ASSUMED)
-    problem = Problem(arm, replace(plain, ratio=ratio, u_ratio=0.2 * ratio), None, 0.05)
+    problem = TapsProblem(arm, replace(plain, ratio=ratio, u_ratio=0.2 * ratio), None, 0.05)
     each, n = 0.2**2 + 0.5**2 + ratio[0] ** 2, len(plain)
     assert problem.settled().chi2 == pytest.approx(np.log(factor) ** 2 / (each / n + 1.0), rel=1e-3)
 

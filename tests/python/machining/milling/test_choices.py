@@ -16,7 +16,7 @@ from stiffmap.machining.milling import mill, mill_job
 from stiffmap.machining.milling.choices import choices, part_lies
 from stiffmap.machining.milling.equilibrium import equilibrium
 from stiffmap.machining.milling.limits import drive_speeds
-from stiffmap.machining.milling.placement import Search, placements
+from stiffmap.machining.milling.placement import PlacementSearch, placements
 from stiffmap.machining.milling.plant import Plant
 from stiffmap.machining.milling.redundancy import Steps, best_sequence, redundancy
 from stiffmap.machining.milling.setting import Setting, setting
@@ -144,7 +144,7 @@ def test_placement_beats_the_naive_one_and_holds_the_path() -> None:
     assert np.abs(found.best_along).max() == pytest.approx(found.best_error)
     assert found.three_times == pytest.approx((found.largest > 3 * found.best_error).mean())
     # the many are judged as one by one
-    search = Search(machine, path, PROCESS, 60, None)
+    search = PlacementSearch(machine, path, PROCESS, 60, None)
     from stiffmap.machining.toolpath import Placement
 
     exact = [search.exact(Placement(found.at[k], float(found.turn[k]))) for k in range(5)]

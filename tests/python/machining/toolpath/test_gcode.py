@@ -11,7 +11,7 @@ import pytest
 from stiffmap.common.errors import FileError
 from stiffmap.machining.toolpath import load_path
 from stiffmap.machining.toolpath.gcode.load import load_gcode
-from stiffmap.machining.toolpath.gcode.read import Reader, read_moves
+from stiffmap.machining.toolpath.gcode.read import ProgramReader, read_moves
 from stiffmap.machining.toolpath.gcode.words import read_block
 from stiffmap.machining.toolpath.path import Kind, Toolpath
 
@@ -314,7 +314,7 @@ def test_the_quick_way_reads_the_same(line: str, before: str) -> None:
     """A space ahead sends a line the long way."""
     found: list[object] = []
     for ahead in ("", " "):
-        reader = Reader("p", {"G54": (0.1, 0, 0)})
+        reader = ProgramReader("p", {"G54": (0.1, 0, 0)})
         try:
             moves = list(
                 read_moves(

@@ -13,7 +13,7 @@ import pytest
 from rich.console import Console
 
 import stiffmap as sm
-from stiffmap.ui.paper import Results, Statement, Verdict, all_statements, compute
+from stiffmap.ui.paper import Results, Statement, StatementVerdict, all_statements, compute
 from stiffmap.ui.paper.directions import over_fx, ratio_of, varied
 from stiffmap.ui.paper.machine import diagonal_limits, factors
 from stiffmap.ui.paper.statement import rounds_to
@@ -69,7 +69,7 @@ def test_transmission_factors_against_the_closed_form(name: str) -> None:
 def test_near_misses_are_reported(statements: list[Statement]) -> None:
     original = find(statements, "cubic Cartesian workspace")
     assert original.numbers["edge_mm"] == pytest.approx(199.62, abs=0.005)
-    assert original.verdict is Verdict.DIFFERS
+    assert original.verdict is StatementVerdict.DIFFERS
     assert find(statements, "required workspace").numbers["edge_mm"] == pytest.approx(499.06, abs=0.005)
     assert find(statements, "transmission factor range").numbers["largest_factor"] == pytest.approx(
         2.244, abs=5e-4
@@ -125,8 +125,8 @@ def test_every_quantity_of_the_text_is_there(statements: list[Statement]) -> Non
         "more than 3 times",
     ):
         assert quantity in text, quantity
-    assert all(s.because or s.verdict is Verdict.AGREES for s in statements)
-    assert {s.verdict for s in statements} == set(Verdict)
+    assert all(s.because or s.verdict is StatementVerdict.AGREES for s in statements)
+    assert {s.verdict for s in statements} == set(StatementVerdict)
 
 
 def test_rigid_foot_and_drives_stiffen_the_machine(results: Results) -> None:
@@ -158,7 +158,7 @@ def test_own_inputs_are_no_agreement(statements: list[Statement]) -> None:
         "the length a",
         "new stiffnes",
     }
-    agree = sum(s.verdict is Verdict.AGREES for s in statements)
+    agree = sum(s.verdict is StatementVerdict.AGREES for s in statements)
     assert f"{agree} agree (6 of them are inputs of our model, {agree - 6} are results)" in count_text(
         statements
     )

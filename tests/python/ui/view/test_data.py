@@ -11,7 +11,7 @@ import pytest
 import stiffmap as sm
 from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.ui.cli import main
-from stiffmap.ui.view.data import Findings, Named, findings, ribbon
+from stiffmap.ui.view.data import ShownEffect, ShownFindings, findings, ribbon
 from stiffmap.ui.view.open import View, data_of, model_of
 
 pytest.importorskip("viser", reason="viser is not installed (pip install stiffmap[view])")
@@ -82,10 +82,10 @@ def test_texts_of_files_are_escaped(machine: sm.Machine, tmp_path: Path) -> None
 
 def test_elements_of_both_branches_are_found(machine: sm.Machine) -> None:
     links = model_of(machine).moment.rest()
-    of_bar = Named("compliance", "bar.k33", ("y",), "").links(machine)
+    of_bar = ShownEffect("compliance", "bar.k33", ("y",), "").links(machine)
     assert len(of_bar) == 2 and {links.legs[i] for i in of_bar} == {"y"}
-    assert {links.legs[i] for i in Named("compliance", "bar", (), "").links(machine)} == {"x", "y", "z"}
-    assert Named("sensor_gain", "gauge", (), "").links(machine) == []
+    assert {links.legs[i] for i in ShownEffect("compliance", "bar", (), "").links(machine)} == {"x", "y", "z"}
+    assert ShownEffect("sensor_gain", "gauge", (), "").links(machine) == []
 
 
 def test_what_cannot_be_read_is_one_error(machine: sm.Machine, tmp_path: Path) -> None:
@@ -122,7 +122,7 @@ def test_a_path_says_how_much_it_errs(machine: sm.Machine) -> None:
 
 def test_machine_view_takes_data(machine: sm.Machine) -> None:
     e = sm.load_experiment(ROWS)
-    found = Findings("none", (), machine)
+    found = ShownFindings("none", (), machine)
     data = data_of(machine, e, None, np.zeros((2, 3)) + [[0.0], [0.01]])
     assert data is not None and data.experiment is e and found.effects == ()
     v = machine.view(browser=False, experiment=ROWS)

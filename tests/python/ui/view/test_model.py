@@ -13,7 +13,7 @@ from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.model.files.shipped import find
 from stiffmap.ui.plot.elements import THICK, THIN, element_links, thicknesses
 from stiffmap.ui.plot.skeleton import skeleton
-from stiffmap.ui.view.model import Model, addresses, changed
+from stiffmap.ui.view.model import ViewModel, addresses, changed
 from stiffmap.ui.view.panels import principal
 from stiffmap.ui.view.place import first_plane, moves, turns
 from stiffmap.ui.view.scene import ellipsoid, polar_surface, sphere
@@ -25,13 +25,13 @@ def machine() -> sm.Machine:
 
 
 def test_a_drag_inside_goes_where_the_hand_goes(machine: sm.Machine) -> None:
-    model = Model(machine)
+    model = ViewModel(machine)
     model.drag(np.array([0.05, -0.1, 0.2]))
     assert model.state.position == (0.05, -0.1, 0.2) and model.message == ""
 
 
 def test_a_drag_stops_at_the_limit_and_names_it(machine: sm.Machine) -> None:
-    model = Model(machine)
+    model = ViewModel(machine)
     model.drag(np.array([0.9, 0.0, 0.0]))
     x = model.state.position
     assert model.message == "stopped: x.actuator is at its limit, -390 mm"
@@ -46,21 +46,21 @@ def test_a_drag_stops_at_the_limit_and_names_it(machine: sm.Machine) -> None:
 
 def test_a_drag_out_of_reach_stops_before() -> None:
     machine = sm.load_machine("ur10")
-    model = Model(machine)
+    model = ViewModel(machine)
     model.drag(np.array([-3.0, 0.0, 0.3]))
     assert model.message == "stopped: the machine cannot reach further"
     assert bool(machine.solve(model.state.position).ok) and model.state.position[0] < -0.95
 
 
 def test_coordinates_that_are_not_commanded_stay() -> None:
-    model = Model(sm.load_machine("five-bar"))
+    model = ViewModel(sm.load_machine("five-bar"))
     model.drag(np.array([0.05, 0.45, 0.3]))
     assert model.state.position == (0.05, 0.45, 0.0)
 
 
 def test_a_turn_of_the_gizmo_turns_the_tool() -> None:
     machine = sm.load_machine("hexapod")
-    model = Model(machine)
+    model = ViewModel(machine)
     home = machine.description.home
     turned = home.r @ Rotation.from_rotvec([0.05, 0.0, 0.0]).as_matrix()
     model.drag(home.p, turned)
@@ -80,7 +80,7 @@ def test_first_plane_shows_what_is_commanded(name: str, plane: str, free: tuple[
 
 
 def test_a_number_changed_by_its_address_is_the_machine_so_built(machine: sm.Machine) -> None:
-    model = Model(machine)
+    model = ViewModel(machine)
     address = "x.foot/beam.EIx"
     value = addresses(machine.description)[address]
     model.change(address, 4 * value)
@@ -105,7 +105,7 @@ def test_every_address_can_be_changed(machine: sm.Machine) -> None:
 def test_effects_have_addresses_too(machine: sm.Machine) -> None:
     m = machine.with_effect("dead_zone", element="actuator", legs=["x"], half_width=1e-5)
     assert addresses(m.description)["effects/0/half_width"] == 1e-5
-    model = Model(m)
+    model = ViewModel(m)
     model.change("effects/0/half_width", 5e-5)
     want = machine.with_effect("dead_zone", element="actuator", legs=["x"], half_width=5e-5)
     load = (300.0, 0, 0, 0, 0, 0)
@@ -122,7 +122,7 @@ def test_effects_have_addresses_too(machine: sm.Machine) -> None:
     "address", ["x.foot/compliance.c99x", "nothing/at.x", "x.foot", "", "x.frame/translation.q"]
 )
 def test_an_unknown_address_is_refused_and_nothing_changes(machine: sm.Machine, address: str) -> None:
-    model = Model(machine)
+    model = ViewModel(machine)
     before = model.state
     with pytest.raises(StiffmapError, match=r"has no number|expected"):
         model.change(address, 1.0)
@@ -130,7 +130,7 @@ def test_an_unknown_address_is_refused_and_nothing_changes(machine: sm.Machine, 
 
 
 def test_numbers_that_cannot_be_are_refused_and_nothing_changes(machine: sm.Machine) -> None:
-    model = Model(machine)
+    model = ViewModel(machine)
     for deed in (
         lambda: model.put(position=(9.0, 0.0, 0.0)),
         lambda: model.put(force=(float("nan"), 0.0, 0.0)),
@@ -144,7 +144,7 @@ def test_numbers_that_cannot_be_are_refused_and_nothing_changes(machine: sm.Mach
 
 def test_assembly_modes_are_other_ways_to_the_same_pose() -> None:
     machine = sm.load_machine("five-bar")
-    model = Model(machine)
+    model = ViewModel(machine)
     modes = model.moment.assembly_modes()
     assert len(modes) == 4
     model.put(start=modes[1])
@@ -159,7 +159,7 @@ def test_a_file_that_is_edited_is_read_again_or_its_error_is_named(tmp_path: Pat
     file = tmp_path / "mine.yaml"
     text = find("five-bar").read_text(encoding="utf-8")
     file.write_text(text, encoding="utf-8")
-    model = Model(sm.load_machine(file), file=file)
+    model = ViewModel(sm.load_machine(file), file=file)
     file.write_text(text.replace("name: five-bar", "name: seven-bar"), encoding="utf-8")
     model.reload()
     assert model.machine.name == "seven-bar"
@@ -171,7 +171,7 @@ def test_a_file_that_is_edited_is_read_again_or_its_error_is_named(tmp_path: Pat
 
 
 def test_links_keep_their_place_and_have_the_thickness_of_their_springs(machine: sm.Machine) -> None:
-    rest = Model(machine).moment.rest()
+    rest = ViewModel(machine).moment.rest()
     there = skeleton(machine, sm.inverse_kinematics(machine, (0.1, 0.1, 0.1)).coordinates)
     assert rest.legs == there.legs and rest.links.shape == there.links.shape
     thick = thicknesses(machine, rest)
@@ -199,7 +199,7 @@ def test_thickness_is_that_of_the_round_bar(tmp_path: Path) -> None:
     file = tmp_path / "bar.yaml"
     file.write_text(BAR, encoding="utf-8")
     machine = sm.load_machine(file)
-    rest = Model(machine).moment.rest()
+    rest = ViewModel(machine).moment.rest()
     lengths = np.linalg.norm(rest.links[:, 1] - rest.links[:, 0], axis=1)
     i = int(np.argmax(lengths))
     assert lengths[i] == pytest.approx(4.0)
@@ -227,7 +227,7 @@ legs:
 
 
 def test_an_element_of_a_leg_lights_a_link_of_this_leg(machine: sm.Machine) -> None:
-    rest = Model(machine).moment.rest()
+    rest = ViewModel(machine).moment.rest()
     for leg in "xyz":
         lit = element_links(machine, f"{leg}.foot")
         assert [rest.legs[i] for i in lit] == [leg]

@@ -16,7 +16,7 @@ from stiffmap.ui.cli.view import _change, _state
 from stiffmap.ui.plot.elements import element_links
 from stiffmap.ui.plot.skeleton import skeleton
 from stiffmap.ui.view import model_of
-from stiffmap.ui.view.model import Model
+from stiffmap.ui.view.model import ViewModel
 from stiffmap.ui.view.outputs import command_line, python_lines, view_figure
 from stiffmap.ui.view.panels import (
     bars,
@@ -29,13 +29,13 @@ from stiffmap.ui.view.panels import (
     status_line,
 )
 from stiffmap.ui.view.plane import plane_map
-from stiffmap.ui.view.state import State
+from stiffmap.ui.view.state import ViewState
 
 EVIL = '<img src=x onerror="alert(1)">&'
 
 
 @pytest.fixture(scope="module")
-def model() -> Model:
+def model() -> ViewModel:
     return model_of(sm.load_machine("orthoglide-revised"), (0.2, 0.1, 0.1), force=(100.0, 50.0, -200.0))
 
 
@@ -43,7 +43,7 @@ def well_formed(html: str) -> ElementTree.Element:
     return ElementTree.fromstring(f"<all>{html.replace('&nbsp;', ' ')}</all>")
 
 
-def test_texts_of_people_and_files_are_escaped(model: Model) -> None:
+def test_texts_of_people_and_files_are_escaped(model: ViewModel) -> None:
     moment, s = model.moment, model.moment.solve()
     evil = replace(moment, machine=sm.Machine(replace(moment.machine.description, name=EVIL)))
     for html in (status_line(evil, s, EVIL, EVIL), bars(EVIL, [(EVIL, 0.5, "red", EVIL)])):
@@ -51,14 +51,14 @@ def test_texts_of_people_and_files_are_escaped(model: Model) -> None:
         assert not well_formed(html).findall(".//img")
 
 
-def test_the_status_says_what_was_solved(model: Model) -> None:
+def test_the_status_says_what_was_solved(model: ViewModel) -> None:
     moment, s = model.moment, model.moment.solve()
     html = status_line(moment, s, "", "")
     assert f"{1e6 * np.linalg.norm(s.displacement[:3]):.1f} µm" in html and 'role="status"' in html
     assert 'role="alert"' in status_line(moment, s, "", "file.yaml, line 3: wrong")
 
 
-def test_panels_hold_the_numbers(model: Model) -> None:
+def test_panels_hold_the_numbers(model: ViewModel) -> None:
     moment, s = model.moment, model.moment.solve()
     budget = moment.shares()
     first, _, share = budget.ranked()[0]
@@ -74,7 +74,7 @@ def test_panels_hold_the_numbers(model: Model) -> None:
     )
 
 
-def test_the_colour_bar_shows_scale_and_tolerance(model: Model) -> None:
+def test_the_colour_bar_shows_scale_and_tolerance(model: ViewModel) -> None:
     found = plane_map(model.machine, model.state, 9)
     html = colour_bar(found, found.range, 1e-6 * float(np.mean(found.range)))
     svg = well_formed(html)[0]
@@ -85,12 +85,12 @@ def test_the_colour_bar_shows_scale_and_tolerance(model: Model) -> None:
 
 
 def test_machine_without_limits_says_so() -> None:
-    m = Model(sm.load_machine("tripteron"))
+    m = ViewModel(sm.load_machine("tripteron"))
     assert "no limit declared" in efforts_panel(m.moment, m.moment.solve())
 
 
-def test_the_command_makes_the_same_state(model: Model) -> None:
-    full = State(
+def test_the_command_makes_the_same_state(model: ViewModel) -> None:
+    full = ViewState(
         (0.11, -0.05, 0.07), force=(10.0, 20.5, -30.0), moment=(1.0, 0.0, 0.0), gravity=(0.0, 0.0, -9.81), plane="free",
         normal=(1.0, 2.0, 2.0), quantity="worst", tolerance=1.25e-4, magnification=150.0, frequency=33.0,
         changes=(("x.foot/beam.EIx", 2500.0),),
@@ -119,7 +119,7 @@ def test_the_command_makes_the_same_state(model: Model) -> None:
 
 
 def test_python_lines_run(
-    model: Model, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    model: ViewModel, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     seen = {}
     monkeypatch.setattr(sm.Machine, "view", lambda self, p, **state: seen.update(position=p, **state))
@@ -135,7 +135,7 @@ def test_a_change_on_the_command_line_is_explained(text: str) -> None:
         _change(text)
 
 
-def test_the_picture_says_where_and_how_much(model: Model) -> None:
+def test_the_picture_says_where_and_how_much(model: ViewModel) -> None:
     figure = view_figure(model.moment)
     d = 1e6 * np.linalg.norm(model.moment.solve().displacement[:3])
     words = figure.get_suptitle().replace("\n", " ")
@@ -146,7 +146,7 @@ def test_the_picture_says_where_and_how_much(model: Model) -> None:
 @pytest.mark.parametrize("name", ["orthoglide-revised", "hexapod", "3-rps", "swing-table", "ur10"])
 def test_every_share_is_lit_on_a_link_of_its_own_leg(name: str) -> None:
     machine = sm.load_machine(name)
-    drawn = Model(machine).moment.rest()
+    drawn = ViewModel(machine).moment.rest()
     for element in sm.deflection_budget(machine).elements:
         links = element_links(machine, element)
         assert links, element
@@ -156,7 +156,7 @@ def test_every_share_is_lit_on_a_link_of_its_own_leg(name: str) -> None:
 
 def test_the_rim_of_a_platform_moves_with_it() -> None:
     machine = sm.load_machine("hexapod")
-    model = Model(machine)
+    model = ViewModel(machine)
     rest, s = model.moment.rest(), model.moment.solve()
     loaded = skeleton(machine, s.coordinates)
     assert len(rest.plate) == 6
@@ -168,16 +168,16 @@ def test_the_rim_of_a_platform_moves_with_it() -> None:
     np.testing.assert_array_equal(rim[6, 1], rest.tcp)
 
 
-def test_lengths_from_a_millimetre_on_are_in_millimetres(model: Model) -> None:
+def test_lengths_from_a_millimetre_on_are_in_millimetres(model: ViewModel) -> None:
     found = model.moment.plane(11)
     assert "deflection under this load, mm: 0.5 to 2.5 mm" in colour_bar(found, (500.0, 2500.0), 1e-3)
     assert ">1.5</text>" in colour_bar(found, (500.0, 2500.0), 1e-3)
-    soft = Model(model.declared, replace(model.state, force=(0.0, 0.0, -3000.0)))
+    soft = ViewModel(model.declared, replace(model.state, force=(0.0, 0.0, -3000.0)))
     d = 1e3 * float(np.linalg.norm(soft.moment.solve().displacement[:3]))
     assert d > 1 and probe_text(soft.moment, soft.state.position).endswith(f": {d:.5g} mm")
 
 
-def test_the_colour_bar_says_how_many_poses_are_hatched(model: Model) -> None:
+def test_the_colour_bar_says_how_many_poses_are_hatched(model: ViewModel) -> None:
     found = plane_map(model.machine, model.state, 5)
     assert "hatched" not in colour_bar(found, found.range, 1.0)
     status = found.status.copy()

@@ -11,10 +11,10 @@ import stiffmap as sm
 from stiffmap.solve.status import Status
 from stiffmap.ui.plot.planes import levels
 from stiffmap.ui.view.colours import DARK, GREY, colours_of, plane_image, table
-from stiffmap.ui.view.model import Model
+from stiffmap.ui.view.model import ViewModel
 from stiffmap.ui.view.plane import dynamic_stiffness, plane_frame, plane_map
 from stiffmap.ui.view.quantities import QUANTITIES, greatest
-from stiffmap.ui.view.state import State
+from stiffmap.ui.view.state import ViewState
 
 FORCE = (120.0, -80.0, -200.0)
 OF_SOLUTION = [n for n, q in QUANTITIES.items() if q.of is not None]
@@ -27,7 +27,7 @@ def machine() -> sm.Machine:
 
 @pytest.mark.parametrize("quantity", OF_SOLUTION)
 def test_values_are_those_of_solve(machine: sm.Machine, quantity: str) -> None:
-    s = State((0.05, 0.0, 0.1), force=FORCE, quantity=quantity, gravity=(0.0, 0.0, -9.81), tolerance=2e-4)
+    s = ViewState((0.05, 0.0, 0.1), force=FORCE, quantity=quantity, gravity=(0.0, 0.0, -9.81), tolerance=2e-4)
     found = plane_map(machine, s, 7)
     p = found.frame.poses(7)
     for i, j in ((0, 0), (3, 5), (6, 2)):
@@ -45,14 +45,14 @@ def test_values_are_those_of_solve(machine: sm.Machine, quantity: str) -> None:
         assert replace_moment(machine, s).at(p[i, j])[0] == pytest.approx(want, rel=1e-9)
 
 
-def replace_moment(machine: sm.Machine, s: State) -> object:
-    return Model(machine, s).moment
+def replace_moment(machine: sm.Machine, s: ViewState) -> object:
+    return ViewModel(machine, s).moment
 
 
 def test_plane_lies_through_the_tool_and_across_the_box(machine: sm.Machine) -> None:
     low, high = machine.workspace
     for axis in "xyz":
-        f = plane_frame(machine, State((0.05, -0.1, 0.2), plane=axis))
+        f = plane_frame(machine, ViewState((0.05, -0.1, 0.2), plane=axis))
         i = "xyz".index(axis)
         p = f.poses(3)
         assert np.ptp(p[..., i]) == 0 and p[0, 0, i] == (0.05, -0.1, 0.2)[i]
@@ -62,7 +62,7 @@ def test_plane_lies_through_the_tool_and_across_the_box(machine: sm.Machine) -> 
 
 
 def test_free_plane_holds_the_tool_and_hides_what_is_outside(machine: sm.Machine) -> None:
-    s = State((0.05, -0.1, 0.2), plane="free", normal=(1.0, 1.0, 1.0))
+    s = ViewState((0.05, -0.1, 0.2), plane="free", normal=(1.0, 1.0, 1.0))
     found = plane_map(machine, s, 21)
     f = found.frame
     assert abs((f.centre - np.array(s.position)) @ f.normal) < 1e-12
@@ -76,7 +76,7 @@ def test_free_plane_holds_the_tool_and_hides_what_is_outside(machine: sm.Machine
 
 
 def test_colours_are_those_of_the_values(machine: sm.Machine) -> None:
-    found = plane_map(machine, State((0.0, 0.0, 0.1), force=FORCE), 9)
+    found = plane_map(machine, ViewState((0.0, 0.0, 0.1), force=FORCE), 9)
     low, high = found.range
     image = plane_image(found, (low, high))
     assert image.shape == (9, 9, 4)
@@ -92,7 +92,7 @@ def test_not_a_number_is_grey_and_beyond_the_scale_is_its_end() -> None:
 
 def test_failed_poses_are_hatched() -> None:
     machine = sm.load_machine("tripteron")
-    s = State(tuple(machine.description.home.p))  # type: ignore[arg-type]
+    s = ViewState(tuple(machine.description.home.p))  # type: ignore[arg-type]
     found = plane_map(machine, s, 21)
     assert found.failed.any() and not found.failed.all()
     image = plane_image(found, found.range)
@@ -104,7 +104,7 @@ def test_failed_poses_are_hatched() -> None:
 
 
 def test_isolines_lie_at_their_values(machine: sm.Machine) -> None:
-    found = plane_map(machine, State((0.0, 0.0, 0.1), force=FORCE), 41)
+    found = plane_map(machine, ViewState((0.0, 0.0, 0.1), force=FORCE), 41)
     for level in levels(*found.range)[:3]:
         for a, _ in found.lines_at(level)[::40]:
             s = machine.solve(a, (*FORCE, 0, 0, 0))
@@ -126,7 +126,7 @@ def test_greatest_singular_value_is_that_of_lapack() -> None:
 
 def test_dynamic_stiffness_begins_at_the_static_one(machine: sm.Machine) -> None:
     p = np.array([0.1, 0.0, 0.05])
-    s = State(tuple(p), force=(0.0, 0.0, -1.0))  # type: ignore[arg-type]
+    s = ViewState(tuple(p), force=(0.0, 0.0, -1.0))  # type: ignore[arg-type]
     static = 1 / np.linalg.svd(machine.solve(p, s.wrench).compliance[:3, :3], compute_uv=False)[0]
     assert float(dynamic_stiffness(machine, s, p)[0]) == pytest.approx(static, rel=1e-9)
     turned = replace(s, moment=(3.0, -2.0, 1.0))  # under a moment the compliance is no longer symmetric
@@ -136,14 +136,14 @@ def test_dynamic_stiffness_begins_at_the_static_one(machine: sm.Machine) -> None
         1 / np.linalg.norm(c, 2), rel=1e-6
     )
     first = float(sm.natural_frequencies(machine, p, s.wrench).frequency[0])
-    value, status = Model(machine, replace(s, quantity="frequency")).moment.at(p)
+    value, status = ViewModel(machine, replace(s, quantity="frequency")).moment.at(p)
     assert value == pytest.approx(first) and status == Status.CONVERGED
 
 
 def test_dynamic_stiffness_is_the_sum_over_all_modes(machine: sm.Machine) -> None:
     """All modes of the Orthoglide's tool together are its static compliance; so they are at every frequency."""
     p = np.array([0.1, 0.0, 0.05])
-    s = State(tuple(p), force=(0.0, 0.0, -1.0))  # type: ignore[arg-type]
+    s = ViewState(tuple(p), force=(0.0, 0.0, -1.0))  # type: ignore[arg-type]
     w = sm.natural_frequencies(machine, p, s.wrench, modes=100)
     k = 2 * np.pi * w.frequency[np.isfinite(w.frequency)]
     x, h = w.coordinates, 1e-6
@@ -163,12 +163,12 @@ def test_dynamic_stiffness_is_the_sum_over_all_modes(machine: sm.Machine) -> Non
 
 
 def test_quantities_of_modes_are_mapped_coarsely(machine: sm.Machine) -> None:
-    found = plane_map(machine, State((0.0, 0.0, 0.0), quantity="frequency"), 3)
+    found = plane_map(machine, ViewState((0.0, 0.0, 0.0), quantity="frequency"), 3)
     assert found.count == 3 and (found.values > 1).all()
 
 
 def test_a_ray_meets_the_plane(machine: sm.Machine) -> None:
-    f = plane_frame(machine, State((0.0, 0.0, 0.1)))
+    f = plane_frame(machine, ViewState((0.0, 0.0, 0.1)))
     hit = f.under_ray(np.array([0.1, 0.2, 5.0]), np.array([0.0, 0.0, -1.0]))
     assert hit is not None
     np.testing.assert_allclose(hit, [0.1, 0.2, 0.1], atol=1e-12)

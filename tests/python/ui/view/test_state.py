@@ -11,7 +11,7 @@ import pytest
 from stiffmap.common.errors import StiffmapError
 from stiffmap.ui.view.state import (
     History,
-    State,
+    ViewState,
     as_plain,
     from_permalink,
     from_plain,
@@ -19,15 +19,15 @@ from stiffmap.ui.view.state import (
     with_change,
 )
 
-FULL = State(
+FULL = ViewState(
     (0.1, -0.2, 0.3), rotation=(0.0, 0.1, 0.0), force=(1.0, 2.0, 3.0), moment=(0.5, 0.0, 0.0), gravity=(0.0, 0.0, -9.81),
     plane="free", normal=(1.0, 1.0, 0.0), quantity="worst", tolerance=1e-4, magnification=200.0, frequency=12.0,
     start=(0.1, 0.2), changes=(("x.foot/beam.EIx", 4000.0),),
 )  # fmt: skip
 
 
-@pytest.mark.parametrize("state", [FULL, State((0.0, 0.0, 0.0))])
-def test_a_link_restores_machine_and_state(state: State) -> None:
+@pytest.mark.parametrize("state", [FULL, ViewState((0.0, 0.0, 0.0))])
+def test_a_link_restores_machine_and_state(state: ViewState) -> None:
     word = permalink("my machine.yaml", state)
     assert word.replace("-", "").replace("_", "").isalnum()
     assert from_permalink(word) == ("my machine.yaml", state)
@@ -35,7 +35,7 @@ def test_a_link_restores_machine_and_state(state: State) -> None:
 
 
 def test_a_plain_state_is_short() -> None:
-    assert as_plain(State((0.0, 0.0, 0.0))) == {"position": (0.0, 0.0, 0.0)}
+    assert as_plain(ViewState((0.0, 0.0, 0.0))) == {"position": (0.0, 0.0, 0.0)}
 
 
 def bomb() -> str:
@@ -75,11 +75,11 @@ def test_a_wrong_state_is_named(data: object, words: str) -> None:
 
 
 def test_undo_skips_what_was_dragged_over() -> None:
-    h = History(State((0.0, 0.0, 0.0)))
-    h.put(State((0.1, 0.0, 0.0)))
+    h = History(ViewState((0.0, 0.0, 0.0)))
+    h.put(ViewState((0.1, 0.0, 0.0)))
     h.mark()
     for i in range(5):
-        h.put(State((0.1, 0.1 * i, 0.0)), keep=False)
+        h.put(ViewState((0.1, 0.1 * i, 0.0)), keep=False)
     assert h.now.position == (0.1, 0.4, 0.0)
     assert h.undo().position == (0.1, 0.0, 0.0)
     assert h.undo().position == (0.0, 0.0, 0.0)
@@ -87,9 +87,9 @@ def test_undo_skips_what_was_dragged_over() -> None:
 
 
 def test_reset_can_be_undone() -> None:
-    h = History(State((0.0, 0.0, 0.0)))
+    h = History(ViewState((0.0, 0.0, 0.0)))
     h.put(FULL)
-    assert h.reset() == State((0.0, 0.0, 0.0))
+    assert h.reset() == ViewState((0.0, 0.0, 0.0))
     assert h.undo() == FULL
 
 

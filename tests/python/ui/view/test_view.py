@@ -27,7 +27,7 @@ from stiffmap.ui.view.colours import plane_image
 from stiffmap.ui.view.data import Data, path_errors, residual_arrows, thinned
 from stiffmap.ui.view.open import View, model_of
 from stiffmap.ui.view.outputs import write_page
-from stiffmap.ui.view.state import State, permalink
+from stiffmap.ui.view.state import ViewState, permalink
 
 pytest.importorskip("viser", reason="viser is not installed (pip install stiffmap[view])")
 EXAMPLES = Path(__file__).parents[4] / "examples"
@@ -89,7 +89,7 @@ def test_a_hundred_drags_leave_nothing_behind(view: View) -> None:
         assert viewer.worker.idle()
         time.sleep(0.2)
         gc.collect()
-        states = sum(isinstance(o, State) for o in gc.get_objects())
+        states = sum(isinstance(o, ViewState) for o in gc.get_objects())
         return len(buffer.message_from_id), threading.active_count(), states
 
     before, after = drags(20), drags(100)
@@ -120,7 +120,7 @@ def test_a_fault_of_ours_is_shown_and_the_view_goes_on(view: View, monkeypatch: 
 
 
 def test_links_restore_the_state_over_http(view: View) -> None:
-    wanted = State((0.1, 0.0, 0.05), force=(5.0, 0.0, 0.0), plane="x", quantity="worst")
+    wanted = ViewState((0.1, 0.0, 0.05), force=(5.0, 0.0, 0.0), plane="x", quantity="worst")
     with urllib.request.urlopen(f"{view.url}/?state={permalink('orthoglide-revised', wanted)}") as answer:
         assert answer.status == 200 and b"<html" in answer.read()
     assert view.state == wanted
@@ -207,7 +207,7 @@ def test_without_viser_there_is_one_clear_error(machine: sm.Machine, monkeypatch
 
 def test_machine_view_opens_and_closes(machine: sm.Machine) -> None:
     v = machine.view((0.1, 0.0, 0.0), browser=False, force=(0.0, 0.0, -50.0), plane="y")
-    assert v.state == State((0.1, 0.0, 0.0), force=(0.0, 0.0, -50.0), plane="y")
+    assert v.state == ViewState((0.1, 0.0, 0.0), force=(0.0, 0.0, -50.0), plane="y")
     assert v.url.startswith("http://127.0.0.1:") and v.url in v._repr_html_()
     with pytest.raises(StiffmapError, match="plane: expected one of"):
         v.set(plane="w")

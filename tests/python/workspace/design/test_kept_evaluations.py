@@ -12,13 +12,13 @@ import pytest
 from stiffmap.common.errors import FileError
 from stiffmap.workspace.design import load_design
 from stiffmap.workspace.design.judging import Judged
-from stiffmap.workspace.design.problem import Design
+from stiffmap.workspace.design.problem import DesignProblem
 from stiffmap.workspace.design.store import Evaluations, fingerprint
 from stiffmap.workspace.performance.requirements import Bound
 
 
 @pytest.fixture
-def design(tmp_path: Path) -> Design:
+def design(tmp_path: Path) -> DesignProblem:
     path = tmp_path / "small.yaml"
     path.write_text(
         "name: small\nmachine: orthoglide-revised\nvariables: {carriage: {low: 1, high: 9}}\n"
@@ -41,7 +41,7 @@ def design(tmp_path: Path) -> Design:
     ids=lambda change: next(iter(change)),
 )
 def test_another_requirement_is_another_design(
-    design: Design, tmp_path: Path, change: dict[str, Any]
+    design: DesignProblem, tmp_path: Path, change: dict[str, Any]
 ) -> None:
     other = replace(design, requirements=replace(design.requirements, **change))
     assert fingerprint(other) != fingerprint(design) == fingerprint(replace(design))

@@ -65,7 +65,7 @@ class Rest:
 
 
 @dataclass(frozen=True)
-class Number:
+class FoundNumber:
     """A declared number as the readings have it, SI."""
 
     name: str
@@ -83,14 +83,14 @@ class Number:
 
 
 @dataclass(frozen=True)
-class Numbers:
+class FoundNumbers:
     """What the readings say of all declared numbers together."""
 
     verdict: str
     """``adjusted within tolerance`` or ``beyond tolerance: NAME, ...``."""
-    beyond: tuple[Number, ...]
+    beyond: tuple[FoundNumber, ...]
     """Those that no tolerance allows, the largest share first."""
-    table: tuple[Number, ...]
+    table: tuple[FoundNumber, ...]
     """All that the readings show."""
 
 
@@ -158,7 +158,7 @@ class Findings:
     set_aside: Mask = field(repr=False)
     gap: Floats | None = field(repr=False, default=None)
     """(n, c) m, rad: what nobody can name, at the readings that were compared; NaN elsewhere."""
-    calibration: Numbers | None = None
+    calibration: FoundNumbers | None = None
     """Declared numbers, where the readings say that they are off; None where they are as declared."""
     seconds: dict[str, float] = field(default_factory=dict)
     """What each step took."""

@@ -6,7 +6,7 @@ import numpy as np
 
 from stiffmap.common.number_text import percent, with_uncertainty, within
 from stiffmap.identification.candidates.candidates import words
-from stiffmap.identification.diagnosis.report.findings import Effect, Findings, Number, Rest
+from stiffmap.identification.diagnosis.report.findings import Effect, Findings, FoundNumber, Rest
 from stiffmap.identification.diagnosis.report.separation import Separation
 from stiffmap.identification.diagnosis.slips.slip import Slip
 from stiffmap.identification.inference.shares import largest
@@ -86,7 +86,7 @@ def _promise(d: Findings) -> str:
     return f"; machine.yaml ({d.which}) promises {with_uncertainty(1e3 * v.error, 1e3 * v.error_u)} m{v.unit}"
 
 
-def number_text(n: Number) -> str:
+def number_text(n: FoundNumber) -> str:
     """``zero of j4: 0.81 ± 0.02 mrad off (8.1 standard uncertainties)``."""
     factor, label = DISPLAY_UNITS.get(n.unit, (1.0, n.unit))
     off = with_uncertainty(factor * n.value, factor * n.u)

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from stiffmap.experiment.experiment import Experiment, Floats
-from stiffmap.experiment.noise.whitening import Problem
+from stiffmap.experiment.noise.whitening import LinearProblem
 from stiffmap.identification.diagnosis.slips.axes import times
 from stiffmap.identification.diagnosis.slips.slip import Hypothesis
 
@@ -49,7 +49,7 @@ Left = Callable[[float, tuple[int, ...]], float]
 """Chi-square that the best part of the machine leaves together with a factor of some channels."""
 
 
-def factors(e: Experiment, problem: Problem, base: Floats, left: Left) -> Iterator[Hypothesis]:
+def factors(e: Experiment, problem: LinearProblem, base: Floats, left: Left) -> Iterator[Hypothesis]:
     """One factor of all readings, of one gauge, of all rotations."""
     linear = [int(a) for a in np.flatnonzero(e.axis_read[:3])]
     angular = [i for i in range(3, 6) if e.axis_read[i]]
@@ -70,7 +70,7 @@ def factors(e: Experiment, problem: Problem, base: Floats, left: Left) -> Iterat
             yield h
 
 
-def _factor(problem: Problem, base: Floats, axes: tuple[int, ...]) -> tuple[float, float] | None:
+def _factor(problem: LinearProblem, base: Floats, axes: tuple[int, ...]) -> tuple[float, float] | None:
     """Reading over prediction in some channels by least squares, and its standard uncertainty."""
     here = np.zeros_like(base)
     here[:, axes] = base[:, axes]

@@ -17,9 +17,9 @@ from stiffmap.experiment.experiment import Experiment, Floats, Integers
 from stiffmap.experiment.noise.checks import checks
 from stiffmap.experiment.noise.level import Noise, noise_of
 from stiffmap.experiment.noise.outliers import without_suspects
-from stiffmap.experiment.noise.whitening import Problem, readings_of
+from stiffmap.experiment.noise.whitening import LinearProblem, readings_of
 from stiffmap.experiment.prediction.predict import Predictor
-from stiffmap.identification.candidates.plan import Plan
+from stiffmap.identification.candidates.plan import CandidatePlan
 from stiffmap.identification.candidates.sensitivity import Variant
 from stiffmap.identification.diagnosis.slips.axes import gauges, loads, moved, shifts, steps
 from stiffmap.identification.diagnosis.slips.factors import factors
@@ -42,7 +42,7 @@ ROWS = 400
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class FoundSlip:
     """A mistake and the experiment without it."""
 
     slip: Slip
@@ -50,7 +50,7 @@ class Found:
 
 
 @dataclass(frozen=True, eq=False)
-class Judged:
+class JudgedSlip:
     """A mistake, and shares of the misfit beyond noise."""
 
     hypothesis: Hypothesis
@@ -64,13 +64,13 @@ class Judged:
 class Screen:
     """The directions of all parts of the machine in whitened readings (N,)."""
 
-    problem: Problem
+    problem: LinearProblem
     use: Integers
     """(R,) the problem's readings among those of the variants."""
     shapes: tuple[Shape, ...]
 
     @staticmethod
-    def of(problem: Problem, use: Integers, variants: Sequence[Variant]) -> Screen:
+    def of(problem: LinearProblem, use: Integers, variants: Sequence[Variant]) -> Screen:
         """Of variants that are no fault of the measurement."""
         parts = [v for v in variants if not get(v.candidate.kind).measurement]
         found = (shape_of(v, problem.white_lines(v.lines(use))) for v in parts)
@@ -96,14 +96,14 @@ class Screen:
         return all(p.lower <= x <= p.upper for p, x in v.candidate.strengths(np.asarray(strengths)))
 
 
-class Readings:
+class SlipReadings:
     """The first rows of an experiment, at most `ROWS`, and what each single part of the machine would change in them.
 
     base (n, c) is the prediction of the declared machine, sigma (n, c) the noise of readings that do not stand alone, least (n, c)
     that of rows that may be shifted, all in m or rad; problem: the readings in noise sigma.
     """
 
-    def __init__(self, predictor: Predictor, plan: Plan) -> None:
+    def __init__(self, predictor: Predictor, plan: CandidatePlan) -> None:
         e = predictor.experiment
         noise, _ = without_suspects(e, plan.base)
         if len(e) > ROWS:
@@ -111,7 +111,7 @@ class Readings:
             predictor = Predictor(predictor.machine, part, threads=predictor.threads)
         self.predictor, self.plan, self.experiment = predictor, plan, predictor.experiment
         self.base, self.sigma, self.least = plan.base[:ROWS], noise.sigma[:ROWS], quiet(e, noise)[:ROWS]
-        self.problem = Problem.of(self.experiment, self.sigma, self.base)
+        self.problem = LinearProblem.of(self.experiment, self.sigma, self.base)
 
     @cached_property
     def screen(self) -> Screen:
@@ -120,15 +120,15 @@ class Readings:
         return Screen.of(self.problem, use, self.plan.variants)
 
 
-def find_slip(predictor: Predictor, plan: Plan) -> Found | None:
+def find_slip(predictor: Predictor, plan: CandidatePlan) -> FoundSlip | None:
     """The mistake in the readings of an experiment, or nothing."""
     whole = predictor.experiment
     plain = whole.frame != "unknown" and whole.tool != "unknown" and whole.seen is None and not whole.absolute
     if not plain or not np.isfinite(plan.base[whole.read]).any():
         return None
-    s = Readings(predictor, plan)
+    s = SlipReadings(predictor, plan)
     e, sigma = s.experiment, s.least
-    problem = Problem.of(e, sigma, s.base)
+    problem = LinearProblem.of(e, sigma, s.base)
     misfit = problem.residual(s.base)
     of = float(misfit @ misfit)
     if len(problem) < FEWEST or of < MISFIT * problem.freedom:
@@ -150,18 +150,18 @@ def find_slip(predictor: Predictor, plan: Plan) -> Found | None:
     same = tuple(dict.fromkeys(check for check in also if check != h.check))[:3]
     after = h.undo(whole) if h.undo else whole
     undone, evidence = h.undo is not None, _evidence(whole, after)
-    return Found(Slip(h.kind, h.seen, h.check, same, first.left, undone, evidence, h.factor), after)
+    return FoundSlip(Slip(h.kind, h.seen, h.check, same, first.left, undone, evidence, h.factor), after)
 
 
-def _judged(s: Readings, problem: Problem) -> Iterator[Judged]:
+def _judged(s: SlipReadings, problem: LinearProblem) -> Iterator[JudgedSlip]:
     """Mistakes that take away enough to be one, jointly with a fault that the machine may have as well."""
     for h in _hypotheses(s, problem):
         left = _left(h, problem)
         if left < MOST:
-            yield Judged(h, left, min(left, _beside(s, h)))
+            yield JudgedSlip(h, left, min(left, _beside(s, h)))
 
 
-def _beside(s: Readings, h: Hypothesis) -> float:
+def _beside(s: SlipReadings, h: Hypothesis) -> float:
     """Share of the misfit beyond noise that stays with a mistake in the readings and the best part of the machine."""
     problem, e = s.problem, s.experiment
     if h.kind == "factor" and h.factor is not None and h.undo is None:
@@ -195,7 +195,7 @@ def quiet(e: Experiment, noise: Noise) -> Floats:
     return np.asarray(noise.sigma * np.where(noise.floor > 0, least / noise.floor, 1.0))
 
 
-def _hypotheses(s: Readings, problem: Problem) -> Iterator[Hypothesis]:
+def _hypotheses(s: SlipReadings, problem: LinearProblem) -> Iterator[Hypothesis]:
     """All mistakes that are tried; of positions only where rows have poses of their own."""
     e = s.experiment
     if e.quantity == "deflection" or (e.command is None and int(e.groups.max()) > 0):
@@ -207,10 +207,10 @@ def _hypotheses(s: Readings, problem: Problem) -> Iterator[Hypothesis]:
             yield from loads(s.predictor)
 
 
-def _left(h: Hypothesis, problem: Problem) -> float:
+def _left(h: Hypothesis, problem: LinearProblem) -> float:
     """Share of the misfit beyond noise that stays with a mistake, on the rows that it speaks of."""
     e, base = problem.experiment, problem.base
-    own = problem if h.keep is None else Problem.of(e, problem.sigma, base, h.keep)
+    own = problem if h.keep is None else LinearProblem.of(e, problem.sigma, base, h.keep)
     values = []
     for prediction in (h.prediction, base):
         gap = own.white(e.reading - np.where(np.isfinite(prediction), prediction, e.reading))
@@ -218,13 +218,13 @@ def _left(h: Hypothesis, problem: Problem) -> float:
     return _excess(values[0], values[1], own.freedom)
 
 
-def best_part(s: Readings, freedom: float) -> float:
+def best_part(s: SlipReadings, freedom: float) -> float:
     """Share of the misfit beyond noise that the best single part of the machine leaves."""
     residual = s.problem.residual(s.base)
     return _excess(s.screen.left(residual), float(residual @ residual), freedom)
 
 
-def left_beside(s: Readings, factor: float, axes: tuple[int, ...]) -> float:
+def left_beside(s: SlipReadings, factor: float, axes: tuple[int, ...]) -> float:
     """Chi-square that the best single part of the machine leaves where some channels read `factor` times too much."""
     prediction = s.base.copy()
     prediction[:, axes] *= factor

@@ -31,7 +31,7 @@ PER_TOOTH = re.compile(r"(/|_per_|_)tooth$")
 PER_EDGE = ("feed_per_tooth", "c", "chip")
 
 
-class Columns(NamedTable):
+class ForceColumns(NamedTable):
     """Numbers by the names of `COLUMNS`, SI."""
 
     def above_zero(self, name: str, row: int, default: float = 0.0) -> float:
@@ -65,7 +65,7 @@ KNOWN = Known(
 
 def columns_of(
     table: str | PathLike[str] | Mapping[str, Any], defaults: Mapping[str, Any], sheet: str | None
-) -> Columns:
+) -> ForceColumns:
     """The columns of a file or a mapping; `defaults`, SI, where it has none of that name. Raises FileError."""
     file = "table" if isinstance(table, Mapping) else str(table)
     if isinstance(table, Mapping):
@@ -73,7 +73,7 @@ def columns_of(
     else:
         rows = rows_of(given_path(table, "table", "a file or a mapping of columns"), sheet)
     found = named(rows, KNOWN, file)
-    out = Columns(**vars(found))
+    out = ForceColumns(**vars(found))
     if "side" in out.values:
         out.values["side"] = np.array(out.values["side"])
     if {"feed", "feed_per_tooth"} <= set(out.values):

@@ -27,7 +27,7 @@ from stiffmap.machining.process.identify.models import (
     RUNOUT,
     STRAIGHT,
     Fitted,
-    Model,
+    ForceModel,
     Number,
     fit,
 )
@@ -278,7 +278,7 @@ def identify_process(
     )
 
 
-def _left_out(model: Model, t: ForceTable, known: Floats | None) -> Floats:
+def _left_out(model: ForceModel, t: ForceTable, known: Floats | None) -> Floats:
     out = np.full_like(t.force, np.nan)
     for c in np.unique(t.feeds):
         law = fit(model, t.rows(t.feeds != c), known)

@@ -61,7 +61,7 @@ Number = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True)
-class Model:
+class ForceModel:
     """A law: its basis at values of its own parameters, and what it says."""
 
     name: str
@@ -71,19 +71,19 @@ class Model:
     exponents: tuple[str, ...] = ()
 
 
-STRAIGHT = Model("straight", "force grows in proportion to the chip", lambda p, _: straight_basis(p))
-KIENZLE = Model(
+STRAIGHT = ForceModel("straight", "force grows in proportion to the chip", lambda p, _: straight_basis(p))
+KIENZLE = ForceModel(
     "Kienzle", "the chip pressure falls as a power of the chip's thickness", power_basis, ("Kt", "Kr", "Ka"), ("mt", "mr", "ma")
 )  # fmt: skip
-RUNOUT = Model("run-out", "a tooth leaves the cut at the small feeds", runout_basis)
-BEND = Model("bend", "a square of the feed in each axis, with no cause stated", bent_basis)
+RUNOUT = ForceModel("run-out", "a tooth leaves the cut at the small feeds", runout_basis)
+BEND = ForceModel("bend", "a square of the feed in each axis, with no cause stated", bent_basis)
 
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
     """A law fitted to a table."""
 
-    model: Model
+    model: ForceModel
     values: Floats
     """(k,) coefficients: N/m² of chip (of Kienzle's law at a chip of `REFERENCE`), N/m of edge."""
     parameter: Floats
@@ -143,7 +143,7 @@ def stated(
     return {n: (row[0], row[1], row[2], row[3]) for n, row in zip(names, each, strict=True)}
 
 
-def fit(model: Model, table: ForceTable, known: Floats | None = None) -> Fitted:
+def fit(model: ForceModel, table: ForceTable, known: Floats | None = None) -> Fitted:
     """Least squares with a variance of its own for each axis; `known`: the run-out that signals show, m."""
     if not model.exponents:
         return _linear(model, table, np.zeros(0) if known is None else known)
@@ -156,7 +156,7 @@ def fit(model: Model, table: ForceTable, known: Floats | None = None) -> Fitted:
     return _linear(model, table, at)
 
 
-def _linear(model: Model, table: ForceTable, parameter: Floats, sigma: Floats | None = None) -> Fitted:
+def _linear(model: ForceModel, table: ForceTable, parameter: Floats, sigma: Floats | None = None) -> Fitted:
     """The coefficients at values of the parameters, and what is known of both; `sigma` where it is known."""
     basis = np.stack([model.basis(p, parameter) for p in table.cuts])  # (n, 3, k)
     n, _, k = basis.shape

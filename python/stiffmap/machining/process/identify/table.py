@@ -12,7 +12,7 @@ import numpy as np
 
 from stiffmap.common.broadcasting import Floats, instance_of
 from stiffmap.machining.process.description import SIDES, Cut, EndMill, Process, Tool
-from stiffmap.machining.process.identify.columns import Columns, columns_of
+from stiffmap.machining.process.identify.columns import ForceColumns, columns_of
 
 FORCES = ("fx", "fy", "fz")
 SLOT_SIGNS = (-1.0, 1.0, 1.0)
@@ -89,7 +89,7 @@ def read_table(
     return _slot_signs(ForceTable(tuple(cuts_of), np.array(means), tuple(signals), (), c.file, given))
 
 
-def _whole_turns(c: Columns, here: Any, force: Floats) -> Signals:
+def _whole_turns(c: ForceColumns, here: Any, force: Floats) -> Signals:
     time, turn = c.values["time"][here], 2 * pi / c.above_zero("spindle", int(here[0]))
     for i in np.flatnonzero(np.diff(time) <= 0)[:1]:
         what = f"expected rising times in a cut, found {time[i + 1]:g} s behind {time[i]:g} s"
@@ -132,7 +132,7 @@ def _defaults(process: Process) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _cut(c: Columns, i: int) -> Process:
+def _cut(c: ForceColumns, i: int) -> Process:
     """One row's tool and engagement; its law is to be found."""
     way = str(c.values["side"][i]) if "side" in c.values else "slot"
     if way not in SIDES:

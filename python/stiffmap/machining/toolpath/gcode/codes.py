@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import NoReturn
 
 from stiffmap.machining.toolpath.gcode import state as meaning
-from stiffmap.machining.toolpath.gcode.state import AXES, INCH, MM, State
+from stiffmap.machining.toolpath.gcode.state import AXES, INCH, MM, ModalState
 from stiffmap.machining.toolpath.gcode.words import fail
 
 LETTERS = frozenset("XYZCIJKRFSTHPQN")
@@ -19,7 +19,7 @@ class Codes:
 
     def __init__(self, file: str, offsets: Mapping[str, Sequence[float]] | None = None) -> None:
         """`offsets`: work offsets by name (``G54``), m."""
-        self.file, self.state, self.notes, self.optional = file, State(), dict[str, int](), False
+        self.file, self.state, self.notes, self.optional = file, ModalState(), dict[str, int](), False
         self.begun, self.moves, self.number, self._stops = False, 0, 0, list[str]()
         self.actions: list[tuple[str, int]] = []
         """Words that act but do not move, each with the number of moves before it."""

@@ -10,8 +10,8 @@ import numpy as np
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError
-from stiffmap.machining.toolpath.gcode.read import Reader, read_moves
-from stiffmap.machining.toolpath.gcode.state import NEVER, State
+from stiffmap.machining.toolpath.gcode.read import ProgramReader, read_moves
+from stiffmap.machining.toolpath.gcode.state import NEVER, ModalState
 from stiffmap.machining.toolpath.path import Kind, Toolpath
 
 NUMBERS = 10
@@ -45,9 +45,9 @@ def load_gcode(
     Raises FileError naming file and line.
     """
     file = str(source) if isinstance(source, Path) else name or "program"
-    reader = Reader(file, offsets)
+    reader = ProgramReader(file, offsets)
     if start is not None:
-        reader.state = State.unknown(start)
+        reader.state = ModalState.unknown(start)
     text: list[str] = []
     lines: Iterable[str] = lines_of(source, "\n") if isinstance(source, Path) else source
     if keep_text:

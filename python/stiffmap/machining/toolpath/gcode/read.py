@@ -44,7 +44,7 @@ class Move(NamedTuple):
     """rad of the tool about its axis; NaN where never given."""
 
 
-class Reader(Codes):
+class ProgramReader(Codes):
     """Reads blocks one after the other."""
 
     def block(self, text: str, number: int) -> Move | None:
@@ -221,7 +221,7 @@ class Reader(Codes):
 
 
 def read_moves(
-    lines: Iterable[str], reader: Reader, progress: Callable[[int], None] | None = None
+    lines: Iterable[str], reader: ProgramReader, progress: Callable[[int], None] | None = None
 ) -> Iterator[Move]:
     """Moves of a program, one after the other; raises FileError with the line of what is not understood."""
     for number, text in enumerate(lines, 1):

@@ -47,7 +47,7 @@ REFUSED_M = {98.0: "subprograms", 99.0: "subprograms", 97.0: "subprograms"}
 
 
 @dataclass
-class State:
+class ModalState:
     """Modal words; lengths of the program become m by `unit`."""
 
     unit: float = 0.0
@@ -80,7 +80,7 @@ class State:
     ended: bool = False
 
     @classmethod
-    def unknown(cls, start: Sequence[float]) -> State:
+    def unknown(cls, start: Sequence[float]) -> ModalState:
         """A controller that stands where nobody knows (NaN in `start`, m) and otherwise than programs take for granted."""
         return cls(0.0, "", 0, False, True, True, offset="", position=list(start))
 

@@ -22,7 +22,7 @@ LONGEST = 10_000
 """Characters of a line."""
 
 
-class Block(NamedTuple):
+class ProgramBlock(NamedTuple):
     """Words of a line in their order, and whether a slash stood ahead (block delete)."""
 
     words: tuple[tuple[str, float], ...]
@@ -63,13 +63,13 @@ def fail(file: str, number: int, message: str) -> NoReturn:
     raise FileError(message, file=file, line=number)
 
 
-def read_block(text: str, file: str, number: int) -> Block:
+def read_block(text: str, file: str, number: int) -> ProgramBlock:
     """Words of a line; blanks do not count, nor does case. Raises `FileError` for what is no word."""
     if len(text) > LONGEST:
         fail(file, number, f"expected at most {LONGEST} characters, found {len(text)}")
     line = bare(text)
     if not line or line == "%":
-        return Block((), False)
+        return ProgramBlock((), False)
     if "(" in line or ")" in line:
         fail(file, number, "a comment is not closed, or closed twice")
     for sign, message in _REFUSED:
@@ -79,7 +79,7 @@ def read_block(text: str, file: str, number: int) -> Block:
     line = line[1:] if optional else line
     if line[:1] == "O":
         if line[1:].isdecimal():  # the number of the program
-            return Block((), optional)
+            return ProgramBlock((), optional)
         fail(file, number, f"subprograms and loops (O words) are not read: {text.strip()[:40]!r}")
     parts = _WORD.split(line)
     if any(parts[::3]):
@@ -91,4 +91,4 @@ def read_block(text: str, file: str, number: int) -> Block:
     for letter, value in words:
         if not -LARGEST <= value <= LARGEST:
             fail(file, number, f"the number of {letter} is too large")
-    return Block(words, optional)
+    return ProgramBlock(words, optional)

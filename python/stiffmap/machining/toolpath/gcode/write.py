@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiffmap.common.broadcasting import Floats
-from stiffmap.machining.toolpath.gcode.read import Reader, read_moves
-from stiffmap.machining.toolpath.gcode.state import AXES, CENTRES, INCH, STARTS, State
+from stiffmap.machining.toolpath.gcode.read import ProgramReader, read_moves
+from stiffmap.machining.toolpath.gcode.state import AXES, CENTRES, INCH, STARTS, ModalState
 from stiffmap.machining.toolpath.gcode.words import bare, decimal, plain, tokens_of
 from stiffmap.machining.toolpath.path import Kind, Toolpath
 from stiffmap.machining.toolpath.pieces import MovedPiece
@@ -33,7 +33,7 @@ def rewritten(
     pieces: what each move (by number) becomes, m in the axes of the part; moves without pieces stay as they are
     but for the place where they start. feeds: (n,) m/s of the moves; None: as they are.
     """
-    reader = Reader(path.name, path.offsets)
+    reader = ProgramReader(path.name, path.offsets)
     speed = path.feed if feeds is None else feeds
     starts = _starts(path)
     turned, driven = nan, (nan, 0.0)
@@ -102,7 +102,7 @@ def rewritten(
 
 def _starts(path: Toolpath) -> str:
     """What is taken without being said before the first move and matters: a controller may hold something else."""
-    reader = Reader(path.name, path.offsets)
+    reader = ProgramReader(path.name, path.offsets)
     next(read_moves(path.text, reader), None)
     silent = [w for group, w in STARTS.items() if group not in reader.state.said]
     if not (path.kind == Kind.ARC).any():
@@ -127,7 +127,7 @@ def _as_it_was(path: Toolpath, i: int, written: Floats) -> MovedPiece:
 
 
 def _words(
-    state: State,
+    state: ModalState,
     path: Toolpath,
     i: int,
     piece: MovedPiece,

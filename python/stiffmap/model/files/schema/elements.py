@@ -9,7 +9,7 @@ from pydantic import Discriminator, Field, Tag, create_model, model_validator
 from stiffmap.model.description import Body, Cable, CommandError, Drive, Joint, Point, Spring
 from stiffmap.model.description.numbers import DIRECTIONS, DeclaredNumber, numbers_of
 from stiffmap.model.files.schema.base import FileModel, Name, Noted, Number, Numbers, Pair, Vector3
-from stiffmap.model.files.schema.geometry import Axis, Frame
+from stiffmap.model.files.schema.geometry import Axis, FrameModel
 from stiffmap.model.files.schema.springs import Beam, LawModel, Matrix, Stroke
 
 SORTS = ("offset", "joint", "actuator", "spring", "body", "point", "block", "cable")
@@ -46,11 +46,11 @@ def _numbers(*holders: type, passive: bool = False, base: type[FileModel] = Note
     return _keys("Numbers", {n.key: n for n in found if not n.needed and n.shape != "axes"}, base)
 
 
-class OffsetModel(Frame, Noted):
+class OffsetModel(FrameModel, Noted):
     """Constant transform; ``actual`` is what the machine was built with, if not the nominal."""
 
     offset: Name
-    actual: Frame | None = None
+    actual: FrameModel | None = None
 
 
 class JointModel(_numbers(Joint, passive=True)):  # type: ignore[misc]

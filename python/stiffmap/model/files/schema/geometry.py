@@ -76,7 +76,7 @@ class Turn(FileModel):
     by: Annotated[Number, Field(description="Angle, in the file's angle unit.")]
 
 
-class Frame(FileModel):
+class FrameModel(FileModel):
     """A frame seen from another one: translation, and at most one way to say the rotation."""
 
     translation: Vector3 | None = None
@@ -85,21 +85,21 @@ class Frame(FileModel):
     turns: list[Turn] | None = None
 
     @model_validator(mode="after")
-    def _one_rotation(self) -> Frame:
+    def _one_rotation(self) -> FrameModel:
         given = [k for k in ("rotation", "axes", "turns") if getattr(self, k) is not None]
         if len(given) > 1:
             raise ValueError(f"give only one of {', '.join(given)}")
         return self
 
 
-class HomeModel(Frame):
+class HomeModel(FrameModel):
     """TCP pose of the home configuration. With ``solve`` the joints' home coordinates are a first guess,
     and `stiffmap check` prints those that have been found."""
 
     solve: bool = False
 
 
-class Box(FileModel):
+class BoxModel(FileModel):
     """Axis-aligned box of TCP positions; an axis that is not commanded may be left out: the box is flat there."""
 
     x: Pair | None = None

@@ -9,8 +9,8 @@ from pydantic import Discriminator, Field, Tag, model_validator
 from stiffmap.model.description import TASK
 from stiffmap.model.files.schema.base import FileModel, Name, Noted, Number, Numbers, Source, Vector3
 from stiffmap.model.files.schema.elements import BodyModel, CableModel, ElementModel, OffsetModel, PointModel
-from stiffmap.model.files.schema.geometry import Box, Frame, HomeModel
-from stiffmap.model.files.schema.springs import Material
+from stiffmap.model.files.schema.geometry import BoxModel, FrameModel, HomeModel
+from stiffmap.model.files.schema.springs import MaterialModel
 
 Components = Annotated[list[Literal[TASK]], Field(min_length=1)]  # type: ignore[valid-type]
 
@@ -35,8 +35,8 @@ class LegModel(Noted):
 
     template: Name | None = None
     elements: list[ElementModel] | None = None
-    frame: Frame | None = None
-    attach: Literal["base_axes"] | Frame | None = None
+    frame: FrameModel | None = None
+    attach: Literal["base_axes"] | FrameModel | None = None
     home: dict[str, Number | Numbers] | None = None
     parameters: dict[str, Number] | None = Field(
         default=None, alias="with", description="Parameters of the template."
@@ -100,8 +100,8 @@ class MachineFile(FileModel):
         description="Pose components that are commanded; left out: all. Translations along base axes, "
         "rotations about the axes of the commanded TCP frame.",
     )
-    workspace: Box | None = None
-    materials: dict[Name, Material] = Field(default_factory=dict)
+    workspace: BoxModel | None = None
+    materials: dict[Name, MaterialModel] = Field(default_factory=dict)
     templates: dict[Name, AnyTemplate] = Field(default_factory=dict)
     base: list[ElementModel] = Field(default_factory=list)
     legs: dict[Name, LegModel] = Field(default_factory=dict)

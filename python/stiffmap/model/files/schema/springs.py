@@ -59,7 +59,7 @@ def _upper(entries: dict[Any, Any]) -> dict[str, Any]:
     return out
 
 
-class Material(FileModel):
+class MaterialModel(FileModel):
     """Young's modulus ``E`` with the shear modulus ``G`` or Poisson's ratio ``nu``; ``density`` (mass/length³) where
     masses follow from sections."""
 
@@ -69,7 +69,7 @@ class Material(FileModel):
     density: Number | None = None
 
     @model_validator(mode="after")
-    def _one_shear(self) -> Material:
+    def _one_shear(self) -> MaterialModel:
         if (self.G is None) == (self.nu is None):
             raise ValueError("give exactly one of G and nu")
         return self
@@ -116,7 +116,7 @@ class Beam(FileModel):
 
     length: Number
     along: Along = "x"
-    material: Material | Name | None = None
+    material: MaterialModel | Name | None = None
     round: Round | None = None
     tube: Tube | None = None
     rectangle: Rectangle | None = None

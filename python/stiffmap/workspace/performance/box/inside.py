@@ -29,7 +29,7 @@ SINGULAR = "singularity"
 
 
 @dataclass(frozen=True, eq=False)
-class Judged:
+class JudgedPoses:
     """Poses, and what was found of them."""
 
     position: Floats
@@ -67,11 +67,11 @@ class Inside:
     bounds: Bounds
     singularity: float | None
 
-    def __call__(self, position: Floats, known: Judged | None = None) -> Judged:
+    def __call__(self, position: Floats, known: JudgedPoses | None = None) -> JudgedPoses:
         """Judges poses (n, 3): each begins at a neighbour that closed, the first ones at the middle of the workspace;
         or all of them at the nearest one of poses that are known."""
         n, size = len(position), len(self.bounds.machine.compiled.names.coordinates)
-        out = Judged(
+        out = JudgedPoses(
             position, np.zeros(n, dtype=bool), np.zeros(n, dtype=bool), np.full((n, size), np.nan), {}
         )
         if known is not None:
@@ -114,11 +114,11 @@ class Inside:
         return out
 
     @staticmethod
-    def _nearest(out: Judged, near: NDArray[np.int64], rows: NDArray[np.int64]) -> NDArray[np.int64]:
+    def _nearest(out: JudgedPoses, near: NDArray[np.int64], rows: NDArray[np.int64]) -> NDArray[np.int64]:
         """The nearest closed neighbour of each."""
         return np.asarray(near[rows, out.closed[near[rows]].argmax(axis=1)])
 
-    def _sound(self, out: Judged, neighbour: NDArray[np.int64], k: DriveKinematics) -> NDArray[np.bool_]:
+    def _sound(self, out: JudgedPoses, neighbour: NDArray[np.int64], k: DriveKinematics) -> NDArray[np.bool_]:
         """Whether the way back to closed neighbours ends where it began: else Newton's method has fallen into another
         working mode."""
         start, same = out.coordinates[neighbour], np.zeros(len(neighbour), dtype=bool)
@@ -128,7 +128,7 @@ class Inside:
             same[rows] = (np.abs(back.coordinates - start[rows]) < SAME).all(axis=1)
         return same
 
-    def _in_steps(self, out: Judged, neighbour: NDArray[np.int64], p: Floats) -> DriveKinematics:
+    def _in_steps(self, out: JudgedPoses, neighbour: NDArray[np.int64], p: Floats) -> DriveKinematics:
         """From closed neighbours in several steps, each begun at the last one that closed."""
         begin, x = out.position[neighbour], out.coordinates[neighbour]
         for share in STEPS:
@@ -150,7 +150,7 @@ class Inside:
 
     def _judge(
         self,
-        out: Judged,
+        out: JudgedPoses,
         rows: NDArray[np.int64],
         k: DriveKinematics,
         sound: NDArray[np.bool_] | None = None,

@@ -24,7 +24,7 @@ BOX = np.array(list(product((-1.0, 1.0), repeat=3)))
 
 
 @dataclass(frozen=True, eq=False)
-class Cells:
+class ProvenCells:
     """What was proven of cells of positions (n)."""
 
     inside: NDArray[np.bool_]
@@ -40,7 +40,7 @@ class Cells:
     """(n, 3) share of each axis in the curvature; NaN: unknown."""
 
 
-Judge = Callable[[Floats, Floats, Floats], Cells]
+Judge = Callable[[Floats, Floats, Floats], ProvenCells]
 """Of cells with centres (n, 3) m, half lengths (n, 3) m along the columns of axes (3, 3)."""
 PER_TASK = 500
 """Cells of one task on a cluster; twice as many at least, or they are decided here."""
@@ -60,7 +60,7 @@ def judge_on(bounds: Bounds, scheduler: Any = None) -> Iterator[Judge]:
     alone = replace(bounds, threads=1, counter=[0], known=[])
     with workers(_some_cells, alone, scheduler=scheduler) as hands:
 
-        def judge(centre: Floats, half: Floats, axes: Floats) -> Cells:
+        def judge(centre: Floats, half: Floats, axes: Floats) -> ProvenCells:
             n = len(centre)
             if n < 2 * PER_TASK:
                 return enclose(bounds, centre, half, axes)
@@ -71,12 +71,12 @@ def judge_on(bounds: Bounds, scheduler: Any = None) -> Iterator[Judge]:
                 np.concatenate([getattr(cells, name) for cells in found])
                 for name in ("inside", "broken", "where", "limit", "bend")
             )
-            return Cells(inside, broken, where, limit, found[0].names, bend)
+            return ProvenCells(inside, broken, where, limit, found[0].names, bend)
 
         yield judge
 
 
-def _some_cells(bounds: Bounds, cells: tuple[Floats, Floats, Floats]) -> Cells:
+def _some_cells(bounds: Bounds, cells: tuple[Floats, Floats, Floats]) -> ProvenCells:
     """Enclosures, as a task."""
     return enclose(bounds, *cells)
 
@@ -87,7 +87,7 @@ _NODES = np.array(list(product((-1.0, 0.0, 1.0), repeat=3)))
 _MIDDLE = 13
 
 
-def sample(bounds: Bounds, centre: Floats, half: Floats, axes: Floats) -> Cells:
+def sample(bounds: Bounds, centre: Floats, half: Floats, axes: Floats) -> ProvenCells:
     """As `Bounds.over`, from nodes: an array differs from its interpolant by its second differences."""
     n = len(centre)
     local = _NODES[None] * half[:, None]
@@ -114,11 +114,11 @@ def sample(bounds: Bounds, centre: Floats, half: Floats, axes: Floats) -> Cells:
     with np.errstate(invalid="ignore"):
         broken = np.asarray(~(centres <= 0).all(axis=0))
         inside = np.asarray((table <= 0).all(axis=0))
-        return Cells(inside, broken, np.zeros_like(half),
+        return ProvenCells(inside, broken, np.zeros_like(half),
                      np.argmax(np.where(np.isnan(table), np.inf, table), axis=0), tuple(names), bend)  # fmt: skip
 
 
-def enclose(bounds: Bounds, centre: Floats, half: Floats, axes: Floats) -> Cells:
+def enclose(bounds: Bounds, centre: Floats, half: Floats, axes: Floats) -> ProvenCells:
     """Cells (n, 3) of positions, base axes, with half lengths (n, 3) along the columns of `axes`."""
     bounds.counter[0] += len(centre)
     compiled = bounds.machine.compiled
@@ -172,7 +172,7 @@ def enclose(bounds: Bounds, centre: Floats, half: Floats, axes: Floats) -> Cells
     limit = np.where(broken, worst, np.argmax(table, axis=0))
     where = np.stack(places)[worst, np.arange(len(centre))]
     inside = np.asarray((table <= 0).all(axis=0))
-    return Cells(inside, np.asarray(broken), where, limit, tuple(names), np.asarray(e["bend"]))
+    return ProvenCells(inside, np.asarray(broken), where, limit, tuple(names), np.asarray(e["bend"]))
 
 
 def _factors_over(

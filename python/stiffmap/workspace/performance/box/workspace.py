@@ -16,7 +16,7 @@ from stiffmap.model.files.load import Source
 from stiffmap.solve.machine import Machine, as_machine
 from stiffmap.solve.options import keywords_of
 from stiffmap.workspace.performance.box.cells import halved
-from stiffmap.workspace.performance.box.inside import Inside, Judged
+from stiffmap.workspace.performance.box.inside import Inside, JudgedPoses
 from stiffmap.workspace.performance.box.proof import Judge, judge_on
 from stiffmap.workspace.performance.limits.limits import bounds_of
 from stiffmap.workspace.performance.poses import read_region
@@ -51,12 +51,12 @@ class Workspace:
     limited_by: tuple[tuple[str, float], ...]
     """What ends it: limit, and the share of the poses next to the border (of all where none is inside) that break it;
     the largest first."""
-    drawn: Judged = field(repr=False)
+    drawn: JudgedPoses = field(repr=False)
     """All poses drawn."""
     ask: Inside = field(repr=False)
     """Judges more poses."""
 
-    def at(self, position: ArrayLike) -> Judged:
+    def at(self, position: ArrayLike) -> JudgedPoses:
         """Poses (n, 3) m judged likewise, each begun at the nearest one drawn."""
         return self.ask(real_array(position, "position").reshape(-1, 3), self.drawn)
 
@@ -152,7 +152,7 @@ def _begun(machine: Machine, region: ArrayLike | None, axes: list[int]) -> tuple
 
 def _grown(
     ask: Inside, low: Floats, high: Floats, axes: list[int], cells: int, rng: np.random.Generator, more: int, by: float
-) -> tuple[Judged, NDArray[np.bool_], Floats, Floats, int]:  # fmt: skip
+) -> tuple[JudgedPoses, NDArray[np.bool_], Floats, Floats, int]:  # fmt: skip
     """Poses as of `_draw`, where the region's border is reached in one larger by this share, and so on `more` times; the
     region, and how many times are left."""
     while True:
@@ -165,7 +165,7 @@ def _grown(
 
 def _draw(
     ask: Inside, low: Floats, high: Floats, axes: list[int], cells: int, rng: np.random.Generator
-) -> tuple[Judged, NDArray[np.bool_]]:
+) -> tuple[JudgedPoses, NDArray[np.bool_]]:
     """Two random poses in each of cells^axes cells, neighbours in memory; (2, 3) at which end of each axis a cell of
     the region's border holds a pose inside."""
     grid = np.stack(np.meshgrid(*[np.arange(cells)] * len(axes), indexing="ij"), axis=-1)
@@ -181,7 +181,7 @@ def _draw(
     return judged, touched
 
 
-def _limiting(drawn: Judged) -> tuple[tuple[str, float], ...]:
+def _limiting(drawn: JudgedPoses) -> tuple[tuple[str, float], ...]:
     """What the poses break that are outside but have one inside for a neighbour; all poses where none is inside."""
     border = ~drawn.inside
     if drawn.inside.any():
@@ -194,7 +194,7 @@ def _limiting(drawn: Judged) -> tuple[tuple[str, float], ...]:
     return tuple(sorted(found, key=lambda f: -f[1]))
 
 
-def _proven(judge: Judge, drawn: Judged, low: Floats, step: Floats, cells: int, work: int) -> float:
+def _proven(judge: Judge, drawn: JudgedPoses, low: Floats, step: Floats, cells: int, work: int) -> float:
     """Volume of the cells (halved where that decides) every pose of which was proven to keep the limits."""
     number = np.flatnonzero(drawn.inside.reshape(-1, 2).all(axis=1))
     corner = np.stack(np.unravel_index(number, (cells,) * 3), axis=1)
