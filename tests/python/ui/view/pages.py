@@ -43,6 +43,22 @@ def pull(page: Any, a: tuple[float, float], b: tuple[float, float]) -> None:
     page.mouse.up()
 
 
+def works(page: Any, act: Callable[[], None], done: Callable[[], object]) -> bool:
+    """Whether something is done by an act with the mouse. A page that is still drawing has no handle to take and no place to click on
+    (it turns its camera instead), so it is tried again."""
+    for _ in range(4):
+        page.wait_for_timeout(2000)
+        act()
+        if until(done, 15.0):
+            return True
+    return False
+
+
+def pulled(view: View, page: Any, a: Any, b: Any, moved: Callable[[], object]) -> bool:
+    """Whether something moves that is pulled from one place of the scene (m) to another."""
+    return works(page, lambda: pull(page, on_screen(view, page, a), on_screen(view, page, b)), moved)
+
+
 def pixels(page: Any) -> np.ndarray[Any, Any]:
     import io
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.python.ui.view.pages import client_of, on_screen, opened, pixels, pull, until
+from tests.python.ui.view.pages import client_of, on_screen, opened, pixels, pulled, until, works
 
 import stiffmap as sm
 from stiffmap.ui.cli import main
@@ -33,12 +33,10 @@ def test_drag_probe_and_colours_equal_solve(browser: Any) -> None:
         camera = client_of(view).camera
         camera.position = (0.6, -0.8, 0.9)  # this moves what is looked at as well
         camera.look_at = (0.05, 0.05, 0.0)
-        page.wait_for_timeout(2000)
         # the gizmo is dragged with the mouse by the handle of its z axis
         length = 0.14 * view._viewer.scene.extent
-        a, b = (on_screen(view, page, (0, 0, z)) for z in (0.8 * length, 0.8 * length + 0.1))
-        pull(page, a, b)
-        assert until(lambda: view.state.position[2] > 0.05), view.state.position
+        a, b = ((0, 0, z) for z in (0.8 * length, 0.8 * length + 0.1))
+        assert pulled(view, page, a, b, lambda: view.state.position[2] > 0.05), view.state.position
         x, y, z = view.state.position
         assert abs(x) < 1e-9 and abs(y) < 1e-9 and 0.05 < z < 0.2
         assert view._viewer.worker.idle(60)
@@ -47,9 +45,12 @@ def test_drag_probe_and_colours_equal_solve(browser: Any) -> None:
         page.get_by_text(f"{d:.1f} µm").first.wait_for()
         # the probe: a click on the plane
         spot = (-0.13, -0.13, z)  # clear of the gizmo
-        page.mouse.click(*on_screen(view, page, spot))
         probe = page.get_by_role("textbox", name="Probe")
-        assert until(lambda: probe.input_value().startswith("probe at"))
+        assert works(
+            page,
+            lambda: page.mouse.click(*on_screen(view, page, spot)),
+            lambda: probe.input_value().startswith("probe at"),
+        )
         found = re.match(r"probe at \((.*), (.*), (.*)\) mm: (.*) µm", probe.input_value())
         assert found is not None
         at = [1e-3 * float(v) for v in found.groups()[:3]]
@@ -104,7 +105,7 @@ FIELDS: dict[str, list[tuple[str, str, Callable[[View], float], float]]] = {
         ("Force, N, z", "-0.001", lambda v: v.state.force[2], -0.001),
         ("Force around z, deg", "90.5", lambda v: float(np.rad2deg(np.arctan2(*v.state.force[1::-1]))), 90.5),
         ("Size of the force, N", "200.5", lambda v: float(np.linalg.norm(v.state.force)), 200.5),
-        ("Gravity downwards, m/s²", "9.806", lambda v: -v.state.gravity[2], 9.806),
+        ("Gravity downwards, m/s²", "9.806", lambda v: -(v.state.gravity or (0.0, 0.0, 0.0))[2], 9.806),
         ("Magnification", "37.5", lambda v: v.state.magnification or 0.0, 37.5),
     ],
     "Map": [

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.python.ui.view.pages import client_of, on_screen, opened, pull, until
+from tests.python.ui.view.pages import client_of, on_screen, opened, pull, pulled, until, works
 
 import stiffmap as sm
 from stiffmap.ui.view.colours import rgb
@@ -84,9 +84,8 @@ def test_the_force_is_dragged_by_its_tail_with_the_mouse(browser: Any) -> None:
         page, scene = opened(browser, view), view._viewer.scene
         before = view.state.force
         tail, length = np.array(scene.force_handle.position), 0.06 * scene.extent
-        a, b = (on_screen(view, page, tail + (0, 0, z)) for z in (0.8 * length, 0.8 * length + 0.1))
-        pull(page, a, b)
-        assert until(lambda: view.state.force != before)
+        a, b = (tail + (0, 0, z) for z in (0.8 * length, 0.8 * length + 0.1))
+        assert pulled(view, page, a, b, lambda: view.state.force != before)
         assert view._viewer.worker.idle(60)
         x, y, z = view.state.force
         wanted = -100 - np.linalg.norm(before) * 0.1 / scene.arrow_length
@@ -102,10 +101,11 @@ def test_the_probe_follows_the_mouse(browser: Any) -> None:
         page, probe = opened(browser, view), view._viewer.probe
         assert view._viewer.worker.idle(60)
         first, last = (0.1, 0.25, 0.0), (0.25, 0.15, 0.0)
-        page.mouse.click(*on_screen(view, page, first))
-        assert until(lambda: probe.point is not None)
+        assert works(
+            page, lambda: page.mouse.click(*on_screen(view, page, first)), lambda: probe.point is not None
+        )
         camera = np.array(client_of(view).camera.position)
-        page.wait_for_timeout(500)
+        page.wait_for_timeout(2000)
         pull(page, on_screen(view, page, first), on_screen(view, page, last))
         assert until(lambda: np.linalg.norm(probe.point - last) < 0.01), probe.point
         np.testing.assert_allclose(client_of(view).camera.position, camera)  # the view stays
