@@ -228,3 +228,26 @@ def test_missing_openpyxl(
 def test_units(text: str, name: str, factor: float) -> None:
     found = unit_of(text)
     assert found is not None and (found.name, found.factor) == (name, factor)
+
+
+def test_a_workbook_of_old_excel(tmp_path: Path) -> None:
+    """`tests/data/readings.xls`: title, blank line, header in line 3, the rows of `TRUTH`."""
+    pytest.importorskip("python_calamine")
+    sheet = Path(__file__).parents[3] / "data/readings.xls"
+    assert (
+        main(
+            [
+                "experiment",
+                "new",
+                str(sheet),
+                "--machine",
+                "five-bar",
+                "--set",
+                "z=0",
+                "-o",
+                str(tmp_path / "e"),
+            ]
+        )
+        == 0
+    )
+    matches(sm.load_experiment(tmp_path / "e"), Ugly(""))
