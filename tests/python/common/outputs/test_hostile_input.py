@@ -137,6 +137,16 @@ def test_cells_that_repeat_themselves_without_end_are_refused(row: str, tmp_path
         read_sheet(path)
 
 
+def test_a_cell_far_out_of_an_open_document_is_refused(tmp_path: Path) -> None:
+    pytest.importorskip("python_calamine")
+    below = '<table:table-row table:number-rows-repeated="1000000"><table:table-cell/></table:table-row>'
+    aside = '<table:table-cell table:number-columns-repeated="16000"/><table:table-cell office:value-type="float" office:value="1"/>'
+    rows = "{}" + below + f"<table:table-row>{aside}</table:table-row>"
+    path = open_document(tmp_path / "a.ods", [["x", "dx"], ["1", "0.5"]], rows)
+    with pytest.raises(FileError, match=r"a\.ods"):
+        read_sheet(path)
+
+
 def test_a_damaged_open_document(tmp_path: Path) -> None:
     pytest.importorskip("python_calamine")
     path = open_document(tmp_path / "a.ods", [["x", "dx"], ["1", "0.5"], ["2", "1"]])
