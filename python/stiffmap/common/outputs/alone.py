@@ -30,11 +30,11 @@ def only_job(path: str | os.PathLike[str]) -> Iterator[None]:
     if key in _AT_WORK.get():  # called from within
         raise _taken(path)
     with reserved(path):
-        before = _AT_WORK.set(_AT_WORK.get() | {key})
+        _AT_WORK.set(_AT_WORK.get() | {key})
         try:
             yield
-        finally:
-            _AT_WORK.reset(before)
+        finally:  # takes off its own alone: it may be closed late, by the garbage collector
+            _AT_WORK.set(_AT_WORK.get() - {key})
 
 
 @contextmanager
@@ -57,11 +57,11 @@ def reserved(path: str | os.PathLike[str]) -> Iterator[None]:
         raise _taken(path) from None
     except OSError as error:
         raise refused(path, error, place) from error
-    before = _RESERVED.set(_RESERVED.get() | {str(target)})
+    _RESERVED.set(_RESERVED.get() | {str(target)})
     try:
         yield
     finally:
-        _RESERVED.reset(before)
+        _RESERVED.set(_RESERVED.get() - {str(target)})
         place.unlink(missing_ok=True)  # while it is held: whoever waits sees that this lock guards no name
         lock.release()
 

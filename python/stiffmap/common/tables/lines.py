@@ -16,6 +16,7 @@ from stiffmap.common.errors import FileError
 from stiffmap.common.number_text import number_in
 from stiffmap.common.tables.cells import BETWEEN, BLOCK, Cells, filled
 from stiffmap.common.tables.workbook import WORKBOOKS, workbook_lines
+from stiffmap.common.units import unit_of
 
 Lines = Callable[[], Iterable[tuple[int, list[str]]]]
 """Number and cells of each line, from the first one whenever it is called."""
@@ -23,14 +24,19 @@ COMMENTS = ("#", "%", "//")
 SEPARATORS = ";\t|, "
 BLANKS = re.compile(r"[ \t]+(?![\[(])")
 """Between cells, but not before a unit in brackets."""
+MARKED = re.compile(r"^(#|%|//)\s+")
+"""The mark of a comment, which is no cell."""
 THOUSANDS = re.compile(r"[+-]?\d{1,3}(\.\d{3})+")
 """``1.000`` is a thousand in a table with decimal commas."""
 COMMA = re.compile(r"^[ \t]*[+-]?[\d.]*,\d+[ \t]*$", re.M)
 POINT = re.compile(r"^[ \t]*[+-]?\d*\.\d+[ \t]*$", re.M)
 SAMPLE = 2_000
 """Lines by which the separator is found."""
-NUMBER = re.compile(r"\s*[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?\s*")
-
+NUMBER = re.compile(r"\s*[+-]?(\d+[.,]?\d*|[.,]\d+)([eEdD][+-]?\d+)?\s*")
+GROUPED = re.compile(r"[+-]?\d{1,3}(?:(['’ ])\d{3}(?:\1\d{3})*(?:\.\d+)?|(?:,\d{3})+\.\d+)")
+"""``1'000``, ``1 000.5``, ``1,000.5``."""
+FORTRAN = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)[dD][+-]?\d+")
+WITH_UNIT = re.compile(r"([+-−]?\d[\d.,'’ ]*(?:[eE][+-]?\d+)?)(\D.*)", re.DOTALL)
 
 NOTHING = {
     "", *["na", "n/a", "n.a.", "nan", "none", "null", "#n/a", "#nv", "n.m.", "k.a.", "ka", "?", "x", "./.", "*", "out", "off", "leer", "empty", "fehlt", "missing", "entfällt", "ausreißer"],
@@ -47,6 +53,15 @@ class Source(NamedTuple):
     lines: Lines
     separator: str
     """Empty for a workbook."""
+
+
+class Spelling(NamedTuple):
+    """How a table writes numbers."""
+
+    comma: bool = False
+    """With decimal commas."""
+    units: bool = False
+    """A unit may follow in the cell, as in ``12.5 µm``."""
 
 
 def lines_of(path: Path, sheet: str | None = None) -> Source:
@@ -138,13 +153,25 @@ def decimal_comma(rows: Iterable[list[str]]) -> bool:
     return commas
 
 
-def number(cell: str, decimal_comma: bool) -> float | None:
+def parted(cell: str) -> tuple[str, str]:
+    """A number and the unit that stands next to it in a cell; a cell without a unit is left as it is."""
+    match = WITH_UNIT.fullmatch(cell.strip())
+    return (match[1].strip(), match[2].strip()) if match and unit_of(match[2]) else (cell, "")
+
+
+def number(cell: str, spelling: Spelling) -> float | None:
     """The number in a cell; NaN for nothing, None for text."""
     text = plain(cell.strip())
-    if text.lower() in NOTHING or DASHES.fullmatch(text):
+    if spelling.units:
+        text = parted(text)[0]
+    if is_nothing(text):
         return math.nan
-    if decimal_comma:
+    if spelling.comma:
         text = with_point(text)
+    if GROUPED.fullmatch(text):
+        text = re.sub(r"[^\d.+-]", "", text)
+    elif FORTRAN.fullmatch(text):
+        text = re.sub("[dD]", "e", text)
     try:
         value = number_in(text)
     except ValueError:
@@ -152,15 +179,20 @@ def number(cell: str, decimal_comma: bool) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def is_finite(cell: str, comma: bool) -> bool:
+def is_nothing(text: str) -> bool:
+    """Whether a cell says that nothing was read."""
+    return text.lower() in NOTHING or DASHES.fullmatch(text) is not None
+
+
+def is_finite(cell: str, spelling: Spelling) -> bool:
     """Whether a cell holds a number."""
-    value = number(cell, comma)
+    value = number(cell, spelling)
     return value is not None and math.isfinite(value)
 
 
-def is_data(cells: list[str], comma: bool) -> bool:
+def is_data(cells: list[str], spelling: Spelling) -> bool:
     """Whether at least half of the cells that are filled are numbers, two of them or more."""
-    numeric = sum(is_finite(c, comma) for c in cells)
+    numeric = sum(is_finite(c, spelling) for c in cells)
     return numeric >= 2 and 2 * numeric >= sum(bool(c.strip()) for c in cells)
 
 
@@ -194,14 +226,15 @@ def _numbers_between(separator: str, lines: Sequence[str]) -> tuple[int, int]:
     with suppress(csv.Error):  # the reader of the whole says where
         rows = map(_cut, lines) if separator == " " else csv.reader(lines, delimiter=separator)
         cells = list(chain.from_iterable(rows))
-        return -sum('"' in c for c in cells), sum(NUMBER.fullmatch(c) is not None for c in cells)
+        numbers = sum(NUMBER.fullmatch(c) is not None or parted(c)[1] != "" for c in cells)
+        return -sum('"' in c for c in cells), numbers
     return -len(lines), 0
 
 
 def _cut(line: str) -> list[str]:
     if len(line) > csv.field_size_limit():
         raise csv.Error("field larger than field limit")
-    return BLANKS.split(line.strip())
+    return BLANKS.split(MARKED.sub(r"\1", line.strip()))
 
 
 def _decoded(raw: bytes, path: Path) -> str:

@@ -15,15 +15,26 @@ from numpy.typing import ArrayLike
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.tables.cells import Cells, filled, numbered, packed, row_numbers
-from stiffmap.common.tables.header import Line, fits, header_of, record_of, refuse_twice, split_unit
+from stiffmap.common.tables.header import (
+    Line,
+    fits,
+    header_of,
+    record_of,
+    refuse_twice,
+    split_unit,
+    with_unit,
+)
 from stiffmap.common.tables.lines import (
     COMMENTS,
+    Spelling,
     decimal_comma,
     is_data,
     is_finite,
+    is_nothing,
     kept,
     lines_of,
     number,
+    parted,
     with_points,
 )
 from stiffmap.common.units import known, unit_of
@@ -95,7 +106,7 @@ class Sheet:
         return unit.size
 
     def _number(self, cell: str, column: int, line: int) -> float:
-        value = number(cell, False)
+        value = number(cell, Spelling())
         if value is None:
             raise FileError(
                 f"column '{self.header[column]}': expected a number; found {cell!r} "
@@ -139,10 +150,14 @@ def read_sheet(path: Path, sheet: str | None = None, layout: Layout = PLAIN) -> 
     several tables are on a sheet and `layout` does not say which.
     """
     page, lines, _ = lines_of(path, sheet)
-    comma = decimal_comma(c for _, c in kept(lines()))
-    above: list[Line] = []
-    rows = iter(lines() if layout.table is None else _one_table(lines(), comma, layout, str(path)))
-    first = next(_above(rows, comma, above), None)
+    for units in (False, True):  # cells such as 12.5 µm only where no row is plain: 100 N may head a column
+        cells_only = (c for _, c in kept(lines()))
+        comma = decimal_comma([parted(c)[0] for c in row] if units else row for row in cells_only)
+        spelling, above = Spelling(comma, units), list[Line]()
+        rows = iter(lines() if layout.table is None else _one_table(lines(), spelling, layout, str(path)))
+        first = next(_above(rows, spelling, above), None)
+        if first is not None:
+            break
     found = None if first is None else header_of(above, first[1], layout.known)
     if first is not None and (layout.header or (found is None and layout.numbered)):
         found = first[0], _names(first[1], layout.header, str(path), first[0])
@@ -159,11 +174,31 @@ def read_sheet(path: Path, sheet: str | None = None, layout: Layout = PLAIN) -> 
     width = len(names)
     said = [*header, *(c.strip() for _, cells in above for c in cells)]
     lines_, aside = row_numbers(), list[str]()
-    data = _data(chain([first], kept(rows)), header, said, comma, aside, layout, str(path))
+    data = _data(chain([first], kept(rows)), header, said, spelling, aside, layout, str(path))
     even = ((n, [*cells, *[""] * width][:width]) for n, cells in data)
-    columns = packed(numbered(even, lines_), width)
+    columns = list(packed(numbered(even, lines_), width))
     file = f"{path}, sheet '{page}'" if page else str(path)
-    return Sheet(file, tuple(names), columns, lines_, comma, record_of(above), tuple(aside))
+    for i in range(width):
+        names[i], columns[i] = _united(names[i], columns[i], file, lines_)
+    return Sheet(file, tuple(names), tuple(columns), lines_, comma, record_of(above), tuple(aside))
+
+
+def _united(name: str, cells: Cells, file: str, lines: Sequence[int]) -> tuple[str, Cells]:
+    """A column without the units of its cells, which its name has instead; the column as it is where a cell is none.
+    Raises FileError for a second unit."""
+    sample = next((c for c in cells if not is_nothing(c)), "")
+    if not parted(sample)[1]:
+        return name, cells
+    pairs = [("", "") if is_nothing(c) else parted(c) for c in cells]
+    if any(number and not unit for number, unit in pairs):
+        return name, cells
+    own = split_unit(name)[1]
+    first = own or parted(sample)[1]
+    for line, (_, unit) in zip(lines, pairs, strict=True):
+        if unit and unit_of(unit) != unit_of(first):
+            message = f"column '{name}': expected {first} in {'its cells' if own else 'all of its cells'}; found {unit}"
+            raise FileError(message, file=file, line=line)
+    return name if own else with_unit(name, first), Cells.of(number for number, _ in pairs)
 
 
 def _checked(header: Sequence[str], file: str, line: int) -> list[str]:
@@ -195,7 +230,7 @@ def _names(first: Sequence[str], given: Sequence[str], file: str, line: int) -> 
 
 
 def _begins_table(
-    cells: Sequence[str], names: Sequence[str], width: int, comma: bool, layout: Layout
+    cells: Sequence[str], names: Sequence[str], width: int, spelling: Spelling, layout: Layout
 ) -> bool:
     """Whether a line within a table is the header of another one: it has a known name that is none of this one's."""
     here = [c.strip() for c in cells if c.strip()]
@@ -204,18 +239,18 @@ def _begins_table(
         fits(cells, width)
         and len(known) >= 2
         and not set(known) <= set(names)
-        and not any(is_finite(c, comma) for c in cells)
+        and not any(is_finite(c, spelling) for c in cells)
     )
 
 
-def _one_table(lines: Iterable[Line], comma: bool, layout: Layout, file: str) -> list[Line]:
+def _one_table(lines: Iterable[Line], spelling: Spelling, layout: Layout, file: str) -> list[Line]:
     """Lines of one of the tables of a sheet; a table begins with its header."""
     tables: list[list[Line]] = [[]]
     names: list[str] = []
     width = 0
     for n, cells in kept(lines):
-        data = is_data(cells, comma)
-        if width and not data and _begins_table(cells, names, width, comma, layout):
+        data = is_data(cells, spelling)
+        if width and not data and _begins_table(cells, names, width, spelling, layout):
             tables.append([])
             names, width = [], 0
         if data:
@@ -231,12 +266,12 @@ def _one_table(lines: Iterable[Line], comma: bool, layout: Layout, file: str) ->
     return tables[layout.table - 1]
 
 
-def _above(rows: Iterator[Line], comma: bool, above: list[Line]) -> Iterator[Line]:
+def _above(rows: Iterator[Line], spelling: Spelling, above: list[Line]) -> Iterator[Line]:
     """The rows of data; `above` gathers the last lines before the first one."""
     for n, cells in rows:
         if not filled(cells):
             continue
-        data = is_data(cells, comma)
+        data = is_data(cells, spelling)
         if data and not cells[0].strip().startswith(COMMENTS):
             yield n, cells
         elif not data:
@@ -248,7 +283,7 @@ def _data(
     rows: Iterable[Line],
     header: Sequence[str],
     names: Sequence[str],
-    comma: bool,
+    spelling: Spelling,
     aside: list[str],
     layout: Layout,
     file: str,
@@ -259,10 +294,10 @@ def _data(
     """
     for n, cells in rows:
         first = next(c.strip() for c in cells if c.strip())
-        if STATISTICS.fullmatch(first) and number(first, comma) is None:
+        if STATISTICS.fullmatch(first) and number(first, spelling) is None:
             aside.append(f"row {n}, '{first}', is no reading")
-        elif not any(is_finite(c, comma) for c in cells):
-            if _begins_table(cells, names, len(header), comma, layout):
+        elif not any(is_finite(c, spelling) for c in cells):
+            if _begins_table(cells, names, len(header), spelling, layout):
                 raise FileError(
                     "another table begins here: say --table 1 for the one above, --table 2 for this one",
                     file=file,

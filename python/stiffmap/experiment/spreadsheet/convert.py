@@ -255,6 +255,9 @@ def write_folder(
         head["rows"] = write_rows(
             folder / "data.csv", [ABSOLUTE.get(h, h) for h in found.rows.header], found.rows
         )
+        if not head["rows"]:
+            read = ", ".join(f"'{c.name}'" for c in found.columns if c.meaning in READINGS)
+            raise StiffmapError(f"{sheet.file}: no row has a reading: {read} hold no number")
         notes = [c.index for c in found.columns if c.meaning == "note"]
         if notes:
             kept = ([row[i] for i in notes] for row in sheet.rows)

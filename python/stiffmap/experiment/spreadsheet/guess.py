@@ -11,16 +11,22 @@ from stiffmap.common.tables.header import split_unit
 from stiffmap.experiment.channels import AXES
 from stiffmap.experiment.files.fields import SEEN
 
+FORCE = "force|kraft|last|load|effort|charge|forza|carico|fuerza|carga"
+MOMENT = "moment|torque|drehmoment|momento|couple"
+DEFLECTION = (
+    "defl|deflection|displ\\.?|displacement|déplacement|flèche|verschiebung|verlagerung|verformung|durchbiegung|"
+    "spostamento|freccia|desplazamiento|deflexión|flecha"
+)
 PATTERNS: tuple[tuple[str, str], ...] = (
     ("id", r"#|id|nr\.?|no\.?|lfd\.? ?nr\.?|number|nummer|row|zeile|punkt|messpunkt|point|messpunkt nr\.?|point no\.?"),
     ("temperature", r"t|temp|temperature|temperatur"),
     ("order", r"order|reihenfolge|sequence"),
     ("setup", r"set-?up|aufbau|aufspannung"),
     ("branch", r"branch|richtung der last|loading"),
-    *((f"f{a}", rf"f ?_?{a}|force ?_?(in )?{a}|{a} ?(force|kraft|load|last)|kraft ?_?{a}|last ?_?(in )?{a}|(load|effort) ?_?(in )?{a}") for a in "xyz"),
-    *((f"m{a}", rf"m ?_?{a}|moment ?_?{a}|torque ?_?{a}") for a in "xyz"),
-    *((f"u_d{a}", rf"u ?_?d?{a}|sigma ?_?d?{a}|std ?_?d?{a}") for a in "xyz"),
-    *((f"d{a}", rf"(d|delta|δ|defl|deflection|displ\.?|displacement|déplacement|verschiebung|verlagerung|verformung|durchbiegung|flèche|abweichung|error|dev|(dial )?gau?ge|dial|indicator|(mess)?uhr|reading|auslenkung|weg|dehnung) ?_?(in )?{a}|{a} ?_?(dif|diff|difference|dev|deviation|err|error|abweichung)|{a} ?(deflection|displ\.?|displacement|verschiebung|verlagerung|verformung|abweichung|dial|gau?ge|uhr|reading)") for a in "xyz"),
+    *((f"f{a}", rf"f ?_?{a}|({FORCE})[ _.]?(in |en |f[ _]?)?{a}|{a} ?({FORCE})") for a in "xyz"),
+    *((f"m{a}", rf"m ?_?{a}|({MOMENT})[ _.]?(in |en |m[ _]?)?{a}") for a in "xyz"),
+    *((f"u_d{a}", rf"(u|±|sigma|std|uncertainty) ?_?d?{a}") for a in "xyz"),
+    *((f"d{a}", rf"(d|delta|δ|{DEFLECTION}|abweichung|error|dev|(dial )?gau?ge|dial|indicator|(mess)?uhr|reading|auslenkung|weg|dehnung)[ _.]?(in |en |[dδ][ _]?)?{a}|{a} ?_?(dif|diff|difference|dev|deviation|err|error|abweichung)|{a} ?({DEFLECTION}|dial|gau?ge|uhr|reading)") for a in "xyz"),
     *((f"p{a}", rf"p_?{a}") for a in "xyz"),
     ("ll", r"l|ll|(measured |gemessene )?(length|länge|laenge)|(draw[ -]?)?wire( ?length)?|(cable|string|ball-?bar|bar) ?length|seil(zug)?(länge)?|distance|abstand"),
     *((f"r{a}", rf"r ?_?{a}|rotation ?_?{a}") for a in "xyz"),

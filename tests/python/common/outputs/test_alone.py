@@ -67,6 +67,17 @@ def test_a_job_writes_what_it_holds_but_not_within_itself(tmp_path: Path) -> Non
     assert [p.name for p in tmp_path.iterdir()] == ["a"]
 
 
+def test_a_job_that_is_closed_late_takes_nothing_from_the_next(tmp_path: Path) -> None:
+    """A command that failed is closed when its traceback is, perhaps in the midst of the next command."""
+    first = only_job(tmp_path / "a")
+    first.__enter__()
+    with only_job(tmp_path / "b"):
+        first.__exit__(None, None, None)
+        write_text(tmp_path / "b", "still mine")
+    with only_job(tmp_path / "a"):
+        pass
+
+
 def test_a_planted_link_is_not_followed(tmp_path: Path) -> None:
     victim = tmp_path / "victim"
     victim.write_text("precious")

@@ -10,7 +10,8 @@ import pytest
 
 import stiffmap as sm
 from stiffmap.common.tables.header import split_unit
-from stiffmap.common.tables.sheet import number, read_sheet
+from stiffmap.common.tables.lines import Spelling, number
+from stiffmap.common.tables.sheet import read_sheet
 from stiffmap.experiment.spreadsheet.guess import guess
 from stiffmap.ui.cli import main
 
@@ -149,9 +150,9 @@ def test_pieces() -> None:
     meant = [(c.meaning, c.repeat, c.unit) for c in guess(["Force x, kN", "gauge x 1 [µm]", "Messuhr y"], {})]
     assert meant == [("fx", 0, "kN"), ("dx", 1, "µm"), ("dy", 0, "")]
     assert (
-        number("1.234,5", True) == 1234.5
-        and number("1,5", False) is None
-        and np.isnan(number("n/a", True) or 0)
+        number("1.234,5", Spelling(comma=True)) == 1234.5
+        and number("1,5", Spelling()) is None
+        and np.isnan(number("n/a", Spelling()) or 0)
     )
     assert [c.meaning for c in guess(["X", "Kraft z [N]", "Abweichung y", "Foo"], {})] == [
         "x",

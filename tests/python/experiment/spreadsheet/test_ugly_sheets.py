@@ -46,7 +46,7 @@ def test_twenty_ugly_sheets(name: str, tmp_path: Path, capsys: pytest.CaptureFix
 
 
 @pytest.mark.parametrize("name", LATER)
-def test_ten_and_five_more(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_twenty_more(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     code, e = imported(LATER[name], tmp_path)
     out = capsys.readouterr()
     if name in STILL:

@@ -199,7 +199,12 @@ LATER: dict[str, Ugly] = {
 "13 French":Ugly("X (mm);Y (mm);Effort X (daN);Flèche X (µm);Flèche Y (µm)\n0;400;10;12,5;-3,0\n50;400;10;14,0;-2,5\n0;450;-10;-13,0;3,5\n",encoding="latin-1"),
 "14 before and after, and the commanded place":Ugly("x [mm];y [mm];Fx [N];X before [mm];Y before [mm];X after [mm];Y after [mm]\n0;400;100;1;401;1.0125;400.997\n50;400;100;51;401;51.014;400.9975\n0;450;-100;1;451;0.987;451.0035\n"),
 "15 OpenDocument":Ugly("Test of 12 March\n\nx [mm];y [mm];Fx [N];dx [µm];dy [µm]\n0;400;100;12.5;-3.0\n50;400;100;14.0;-2.5\n0;450;-100;-13.0;3.5\n",name="sheet.ods"),
+"16 units in cells with decimal commas":Ugly("X;Y;Last Fx;dX;dY\n0 mm;400 mm;100 N;12,5 µm;-3,0µm\n50 mm;400 mm;100 N;14 µm;-2,5 µm\n0 mm;450 mm;-100 N;-13,0 µm;3,5 µm\n"),
+"17 numpy.savetxt":Ugly("# x[mm] y[mm] fx[N] dx[um] dy[um]\n0.0e+00 4.0e+02 1.0e+02 1.25e+01 -3.0e+00\n5.0e+01 4.0e+02 1.0e+02 1.4e+01 -2.5e+00\n0.0e+00 4.5e+02 -1.0e+02 -1.3e+01 3.5e+00\n"),
+"18 Fortran":Ugly("x [mm],y [mm],fx [N],dx [um],dy [um]\n0.0D+00,4.0D+02,1.0D+02,1.25D+01,-3.0D+00\n5.0D+01,4.0D+02,1.0D+02,1.4D+01,-2.5D+00\n0.0D+00,4.5D+02,-1.0D+02,-1.3D+01,3.5D+00\n"),
+"19 Italian, thousands apart":Ugly("Punto;X [µm];Y [µm];Forza X [N];Spostamento X [µm];Spostamento Y [µm]\nP1;0;400 000;100;12,5;-3,0\nP2;50'000;400 000;100;14,0;-2,5\nP3;0;450’000;-100;-13,0;3,5\n"),
+"20 units in cells of two columns":Ugly("x [mm];y [mm];Load;Direction;dx;dy [um]\n0;400;100 N;+x;12.5 um;-3.0\n50;400;100 N;+x;14.0 um;-2.5\n0;450;100 N;-x;-13.0 um;3.5\n"),
 }  # fmt: skip
-"""Ten that were made when the reader was done: at the first try it read four (4 to 7); `STILL` are not read yet. Five from a later day (from 11),
+"""Ten that were made when the reader was done: at the first try it read four (4 to 7); `STILL` are not read yet. Ten from later days (from 11),
 of which none was read right at once."""
-STILL = {"3 three header rows in workbook", "8 units glued to values"}
+STILL = {"3 three header rows in workbook"}
