@@ -22,6 +22,11 @@ SPELLINGS = {
     "blanks": ("x [mm] y [mm]  z [mm]\n50.5 0   700\n0 -20.25 700\n", "utf-8"),
     "UTF-16": ("x [mm],y [mm],z [mm]\n50.5,0,700\n0,-20.25,700\n", "utf-16"),
     "Latin-1 with a remark": ("# gemessen in Köln\nx [µm],y [cm],z [m]\n50500,0,0.7\n0,-2.025,0.7\n", "latin-1"),
+    "numpy.savetxt": ("# x[mm] y[mm] z[mm]\n5.05e+01 0.0e+00 7.0e+02\n0.0e+00 -2.025e+01 7.0e+02\n", "utf-8"),
+    "units in a line of their own": ("X;Y;Z\nmm;mm;mm\n50.5;0;700\n0;-20.25;700\n", "utf-8"),
+    "units in the cells": ("x;y;z\n50,5 mm;0 mm;700 mm\n0 mm;-20,25mm;700 mm\n", "utf-8"),
+    "units behind a word": ("x in mm;y, mm;z / mm\n50.5;0;700\n0;-20.25;700\n", "utf-8"),
+    "lines above, and names of rows": ("Points of 12 March\n\nNr;Pos X [mm];Pos Y [mm];TCP Z [mm]\nP1;50,5;0;700\nP2;0;-20,25;700\n", "utf-8"),
     "inches and thou": (f"x [thou],y [in],z [inch]\n{50.5 / 0.0254},0,{700 / 25.4}\n0,{-20.25 / 25.4},{700 / 25.4}\n", "utf-8"),
 }  # fmt: skip
 POINTS = [[0.0505, 0.0, 0.7], [0.0, -0.02025, 0.7]]
@@ -43,6 +48,10 @@ def test_a_table_is_the_same_in_every_spelling_and_command(name: str, tmp_path: 
         ("x [mm];y [mm];z [mm]\n1;2;3\n1;zwei;3\n", r"line 3: y \[mm\]: expected a number, found 'zwei'"),
         ("x [kg],y [mm],z [mm]\n1,2,3\n1,2,4\n", r"line 1: x \[kg\]: expected a unit such as in x.*, found kg"),
         ("# one\n\nx [mm],y [mm],z [mm]\n1,2,3\n\n1,2\n", "line 6: expected 3 values, found 2"),
+        ("x [mm],y [mm],z [mm]\n1,2,3\n1,2,3,4\n", "line 3: expected 3 values, found 4"),
+        ("x [mm],y [mm],z [mm]\n1,2,3\nsigned: A. Smith,,\n", "expected rows of numbers alone below the header; row 3 is a remark"),
+        ("x [mm],y [mm],z [mm],w\n1,2,3,4\n1,2,4,4\n", "line 1: unknown column 'w'"),
+        ("1,2,3\n1,2,4\n", "no header line with rows of numbers below it was found$"),
         ("x [mm],y [mm],X (mm)\n1,2,3\n1,2,4\n", r"line 1: a column is given twice, as 'x \[mm\]' and 'X \(mm\)'"),
     ],
 )  # fmt: skip

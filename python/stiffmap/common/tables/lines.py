@@ -77,15 +77,15 @@ def kept(lines: Iterable[tuple[int, list[str]]]) -> Iterator[tuple[int, list[str
     return ((n, c) for n, c in lines if filled(c) and not c[0].strip().startswith(COMMENTS))
 
 
-def rows_of(path: Path, sheet: str | None = None, *, remarks: bool = True) -> Iterator[tuple[int, list[str]]]:
+def rows_of(path: Path) -> Iterator[tuple[int, list[str]]]:
     """Lines of a table with something in them, the header first, with their cells: as many as the header has, with decimal points.
 
-    `remarks`: lines that begin with # are left out. Raises FileError.
+    Raises FileError.
     """
-    source = lines_of(path, sheet)
+    source = lines_of(path)
 
     def lines() -> Iterator[tuple[int, list[str]]]:
-        return kept(source.lines()) if remarks else ((n, c) for n, c in source.lines() if filled(c))
+        return ((n, c) for n, c in source.lines() if filled(c))
 
     comma = source.separator not in ("", ",") and decimal_comma(c for _, c in islice(lines(), 1, None))
     rows = lines()
@@ -98,8 +98,7 @@ def rows_of(path: Path, sheet: str | None = None, *, remarks: bool = True) -> It
         if not source.separator:  # a row of a workbook ends at its last cell
             yield n, [*row, *[""] * width][:width]
         elif len(row) != width:
-            found = f"values, found {len(row)}" if remarks else f"cells; found {len(row)}"
-            raise FileError(f"expected {width} {found}", file=str(path), line=n)
+            raise FileError(f"expected {width} cells; found {len(row)}", file=str(path), line=n)
         else:
             yield n, [with_point(plain(c.strip())) for c in row] if comma else row
 

@@ -1,14 +1,14 @@
 """Tables whose columns have known names, each with its unit, for all commands that take points, forces or frequencies.
 
-``x [mm]``, ``x (mm)`` or ``x_mm``; order and case are free. Cells are separated by ; tab | , or blanks, with decimal points or
-commas; lines that begin with # are remarks. The first line is the header.
+``x [mm]``, ``x (mm)``, ``x in mm`` or ``x_mm``; order and case are free, a column of names of rows is left out, and all that
+`read_sheet` understands is read: groups, units in a line of their own or in the cells, lines above the header.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn
@@ -17,12 +17,13 @@ import numpy as np
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError, StiffmapError
-from stiffmap.common.tables.lines import finite_number, rows_of
-from stiffmap.common.units import name_and_unit, unit_of
+from stiffmap.common.tables.header import split_unit
+from stiffmap.common.tables.lines import Spelling, finite_number, number, with_points
+from stiffmap.common.tables.meaning import meaning_of
+from stiffmap.common.tables.sheet import Layout, Sheet, read_sheet
+from stiffmap.common.units import unit_of
 from stiffmap.common.value_units import read_value
 
-Rows = Iterable[tuple[int, Sequence[str]]]
-"""Line and cells; the header comes first."""
 TURNING = {"rpm": math.pi / 30, "1/min": math.pi / 30, "rad/s": 1.0}
 PER = re.compile(r"_(?:per_)?(min|s|tooth)$")
 WORD = "word"
@@ -45,6 +46,10 @@ class Known:
     """Name -> unit of a column that names none; None: it must."""
     blank: bool = False
     """Whether cells may be empty, which are NaN then."""
+
+    def has(self, name: str) -> bool:
+        """Whether a table may have a column of this name, without its unit."""
+        return re.sub(r"\s+", "_", name.lower()) in {*self.units, *self.aliases}
 
 
 @dataclass(eq=False)
@@ -82,51 +87,62 @@ class NamedTable:
             self.fail(f"expected {expected}, found {found:.12g}", name, int(wrong[0]))
 
 
-def read_named(path: Path, known: Known) -> NamedTable:
+def read_named(path: Path, known: Known, sheet: str | None = None) -> NamedTable:
     """A text or a workbook. Raises FileError naming file, line and column, what was expected and what was found."""
-    return named(rows_of(path), known, str(path))
+    return named(read_sheet(path, sheet, Layout(known.has, strict=True)), known)
 
 
-def named(rows: Rows, known: Known, file: str) -> NamedTable:
-    """Columns of rows, the header first; raises FileError."""
-    (first, heads), *body = rows
-    out = NamedTable(file, [line for line, _ in body], first, {}, {}, {}, {})
-    if not body:
-        out.fail("expected a header and a line for each row below it")
-    for i, head in enumerate(heads):
-        name, unit, size = _meaning(head.strip(), known, out)
+def named(sheet: Sheet, known: Known) -> NamedTable:
+    """Columns of a sheet by their known names; raises FileError."""
+    out = NamedTable(sheet.file, list(sheet.lines), sheet.top, {}, {}, {}, {})
+    for i, head in enumerate(sheet.header):
+        if not known.has(head) and meaning_of(head) == "id":
+            continue
+        name, unit, size = _meaning(head, known, out)
         if name in out.header:
-            out.fail(f"a column is given twice, as '{out.header[name]}' and '{head.strip()}'")
-        out.header[name], out.units[name], out.size[name] = head.strip(), unit, size
-        cells = [row[i].strip() for _, row in body]
+            out.fail(f"a column is given twice, as '{out.header[name]}' and '{head}'")
+        out.header[name], out.units[name], out.size[name] = head, unit, size
         words = known.units[name] == WORD
-        out.values[name] = cells if words else size * _numbers(cells, name, out, known.blank)
+        out.values[name] = (
+            list(sheet.columns[i]) if words else size * _numbers(sheet, i, name, out, known.blank)
+        )
     return out
 
 
-def _numbers(cells: Sequence[str], name: str, table: NamedTable, blank: bool) -> Floats:
-    out = np.empty(len(cells))
-    for i, cell in enumerate(cells):
-        try:
-            out[i] = finite_number(cell, ("",) if blank else ())
-        except ValueError as problem:
-            expected, found = problem.args
-            table.fail(f"expected {expected}, found {found}", name, i)
+def _numbers(sheet: Sheet, column: int, name: str, table: NamedTable, blank: bool) -> Floats:
+    def one(cell: str, row: int) -> float:
+        value = number(cell, Spelling())
+        if value is None or (value != value and not blank):
+            try:
+                return finite_number(cell)
+            except ValueError as problem:
+                expected, found = problem.args
+                table.fail(f"expected {expected}, found {found}", name, row)
+        return value
+
+    cells = with_points(sheet.columns[column]) if sheet.decimal_comma else sheet.columns[column]
+    out = cells.numbers(one)
+    if not blank and np.isnan(out).any():
+        row = int(np.argmax(np.isnan(out)))
+        one(list(cells)[row], row)
     return out
 
 
 def _meaning(head: str, known: Known, table: NamedTable) -> tuple[str, str, float]:
     """Name of a column, its unit as written, and the SI size of that."""
-    text, unit = name_and_unit(head)
-    name = re.sub(r"\s+", "_", text.lower())
     names = {*known.units, *known.aliases}
-    if not unit and name not in names:
-        cuts = [m.start() for m in re.finditer("_", name) if name[: m.start()] in names]
+    text, unit = split_unit(head)
+    name = re.sub(r"\s+", "_", text.lower())
+    if name not in names:  # x_per_tooth_mm, real_m/N
+        whole = re.sub(r"\s", "_", head)
+        cuts = [m.start() for m in re.finditer("_", whole) if whole[: m.start()].lower() in names]
         if cuts:
-            name, unit = name[: cuts[-1]], PER.sub(r"/\1", text[cuts[-1] + 1 :])
+            name, unit = whole[: cuts[-1]].lower(), PER.sub(r"/\1", whole[cuts[-1] + 1 :])
             unit = {"N_m": "N*m"}.get(unit, unit)
     name, unit = known.renamed(name, unit)
     name = known.aliases.get(name, name)
+    if name not in known.units and meaning_of(text) in known.units:
+        name = meaning_of(text)
     usual = known.usual.get(name, name)
     if name not in known.units:
         shown = ", ".join(known.usual.get(n, n) for n in known.units)

@@ -62,6 +62,8 @@ class Sheet:
     """Operator, instrument and the like, from the lines above the table."""
     aside: tuple[str, ...] = ()
     """What was left out: rows of means, remarks below the table."""
+    top: int = 0
+    """Line of the names, from 1; 0: in no file."""
     _read: dict[int, Floats] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @property
@@ -137,6 +139,8 @@ class Layout:
     """Columns are given by their numbers: a table without a header is read."""
     table: int | None = None
     """Which of several tables on a sheet, from 1."""
+    strict: bool = False
+    """Whether all below the header are rows of numbers, with a cell for each column, in a command without --header and --table."""
 
 
 PLAIN = Layout()
@@ -149,7 +153,7 @@ def read_sheet(path: Path, sheet: str | None = None, layout: Layout = PLAIN) -> 
     Comment lines are skipped; the header is the line before the first row of mostly numbers. Raises FileError, also where
     several tables are on a sheet and `layout` does not say which.
     """
-    page, lines, _ = lines_of(path, sheet)
+    page, lines, separator = lines_of(path, sheet)
     for units in (False, True):  # cells such as 12.5 µm only where no row is plain: 100 N may head a column
         cells_only = (c for _, c in kept(lines()))
         comma = decimal_comma([parted(c)[0] for c in row] if units else row for row in cells_only)
@@ -158,6 +162,8 @@ def read_sheet(path: Path, sheet: str | None = None, layout: Layout = PLAIN) -> 
         first = next(_above(rows, spelling, above), None)
         if first is not None:
             break
+    if first is None and not above:
+        raise FileError("the file is empty", file=str(path))
     found = None if first is None else header_of(above, first[1], layout.known)
     if first is not None and (layout.header or (found is None and layout.numbered)):
         found = first[0], _names(first[1], layout.header, str(path), first[0])
@@ -167,7 +173,8 @@ def read_sheet(path: Path, sheet: str | None = None, layout: Layout = PLAIN) -> 
             "that is not used), or by their numbers, as in --map x=2"
         )
         raise FileError(
-            f"no header line with rows of numbers below it was found{way if first else ''}", file=str(path)
+            f"no header line with rows of numbers below it was found{way if first and not layout.strict else ''}",
+            file=str(path),
         )
     number_, header = found
     names = _checked(header, str(path), number_)
@@ -175,12 +182,25 @@ def read_sheet(path: Path, sheet: str | None = None, layout: Layout = PLAIN) -> 
     said = [*header, *(c.strip() for _, cells in above for c in cells)]
     lines_, aside = row_numbers(), list[str]()
     data = _data(chain([first], kept(rows)), header, said, spelling, aside, layout, str(path))
+    if layout.strict and separator:
+        data = _whole(data, width, str(path))
     even = ((n, [*cells, *[""] * width][:width]) for n, cells in data)
     columns = list(packed(numbered(even, lines_), width))
     file = f"{path}, sheet '{page}'" if page else str(path)
+    if aside and layout.strict:
+        raise FileError(f"expected rows of numbers alone below the header; {aside[0]}", file=file)
     for i in range(width):
         names[i], columns[i] = _united(names[i], columns[i], file, lines_)
-    return Sheet(file, tuple(names), tuple(columns), lines_, comma, record_of(above), tuple(aside))
+    return Sheet(file, tuple(names), tuple(columns), lines_, comma, record_of(above), tuple(aside), number_)
+
+
+def _whole(rows: Iterator[Line], width: int, file: str) -> Iterator[Line]:
+    """Rows with a cell for each column; FileError for one with fewer, or with more that are not empty."""
+    for n, cells in rows:
+        found = len(cells) if len(cells) < width else max(i for i, c in enumerate(cells, 1) if c.strip())
+        if len(cells) < width or found > width:
+            raise FileError(f"expected {width} values, found {found}", file=file, line=n)
+        yield n, cells
 
 
 def _united(name: str, cells: Cells, file: str, lines: Sequence[int]) -> tuple[str, Cells]:

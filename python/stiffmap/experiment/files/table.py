@@ -94,7 +94,7 @@ class Table:
 
 def read_table(path: Path, expected: int | None = None) -> Table:
     """Cells of a text or workbook with a header line and, where it is known, an expected number of rows; raises `FileError`."""
-    rows, lines = rows_of(path, remarks=False), row_numbers()
+    rows, lines = rows_of(path), row_numbers()
     header = tuple(c.strip() for c in next(rows)[1])
     refuse_twice(header, str(path), 1)
     columns = packed(numbered(rows, lines), len(header))

@@ -8,30 +8,10 @@ from dataclasses import dataclass, replace
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.tables.header import split_unit
+from stiffmap.common.tables.meaning import meaning_of
 from stiffmap.experiment.channels import AXES
 from stiffmap.experiment.files.fields import SEEN
 
-FORCE = "force|kraft|last|load|effort|charge|forza|carico|fuerza|carga"
-MOMENT = "moment|torque|drehmoment|momento|couple"
-DEFLECTION = (
-    "defl|deflection|displ\\.?|displacement|déplacement|flèche|verschiebung|verlagerung|verformung|durchbiegung|"
-    "spostamento|freccia|desplazamiento|deflexión|flecha"
-)
-PATTERNS: tuple[tuple[str, str], ...] = (
-    ("id", r"#|id|nr\.?|no\.?|lfd\.? ?nr\.?|number|nummer|row|zeile|punkt|messpunkt|point|messpunkt nr\.?|point no\.?"),
-    ("temperature", r"t|temp|temperature|temperatur"),
-    ("order", r"order|reihenfolge|sequence"),
-    ("setup", r"set-?up|aufbau|aufspannung"),
-    ("branch", r"branch|richtung der last|loading"),
-    *((f"f{a}", rf"f ?_?{a}|({FORCE})[ _.]?(in |en |f[ _]?)?{a}|{a} ?({FORCE})") for a in "xyz"),
-    *((f"m{a}", rf"m ?_?{a}|({MOMENT})[ _.]?(in |en |m[ _]?)?{a}") for a in "xyz"),
-    *((f"u_d{a}", rf"(u|±|sigma|std|uncertainty) ?_?d?{a}") for a in "xyz"),
-    *((f"d{a}", rf"(d|delta|δ|{DEFLECTION}|abweichung|error|dev|(dial )?gau?ge|dial|indicator|(mess)?uhr|reading|auslenkung|weg|dehnung)[ _.]?(in |en |[dδ][ _]?)?{a}|{a} ?_?(dif|diff|difference|dev|deviation|err|error|abweichung)|{a} ?({DEFLECTION}|dial|gau?ge|uhr|reading)") for a in "xyz"),
-    *((f"p{a}", rf"p_?{a}") for a in "xyz"),
-    ("ll", r"l|ll|(measured |gemessene )?(length|länge|laenge)|(draw[ -]?)?wire( ?length)?|(cable|string|ball-?bar|bar) ?length|seil(zug)?(länge)?|distance|abstand"),
-    *((f"r{a}", rf"r ?_?{a}|rotation ?_?{a}") for a in "xyz"),
-    *((a, rf"{a}|pos\.?[ _-]?{a}|{a}[ _-]?pos\.?|position ?_?{a}|(nominal|pose|punkt|messpunkt|tcp|ort|lage|koordinate|coordinate) ?_?{a}|soll ?_?{a}|{a} ?soll|{a}[ _-]?(t|target|cmd|nominal|command|commanded)|target[ _-]?{a}") for a in "xyz"),
-)  # fmt: skip
 REPEATED = re.compile(r"^(.*?)[ _.-]*(?:#|run|messung|wdh|rep|repeat)?[ _.-]*(\d+)$", re.IGNORECASE)
 READINGS = (*AXES, "dd", "ll", *SEEN)
 
@@ -107,13 +87,10 @@ def guessed(name: str) -> str:
 
 
 def _meaning(name: str) -> tuple[str, int]:
-    plain = re.sub(r"\s+", " ", name.strip().lower())
-    for meaning, pattern in PATTERNS:
-        if re.fullmatch(pattern, plain):
-            return meaning, 0
-    match = REPEATED.match(plain)
-    if match and match[1]:
-        for meaning, pattern in PATTERNS:
-            if meaning in READINGS and meaning != "ll" and re.fullmatch(pattern, match[1].strip()):
-                return meaning, int(match[2])
+    if found := meaning_of(name):
+        return found, 0
+    match = REPEATED.match(re.sub(r"\s+", " ", name.strip()))
+    repeated = meaning_of(match[1]) if match else ""
+    if match and repeated in READINGS and repeated != "ll":
+        return repeated, int(match[2])
     return "note", 0

@@ -123,7 +123,7 @@ GOOD = "x_mm,y_mm,z_mm,frequency_Hz,dir_x,dir_y,dir_z\n1980,-280,1225,8.5,0,0,1\
             r"line 3: x_mm, y_mm, z_mm: expected a pose in mm .*found 1.98.*metres",
         ),
         ("1980000,-280000,1225000,8.5,0,0,1", r"line 3: x_mm, y_mm, z_mm: .*which are micrometres"),
-        ("1980,nan,1225,8.5,0,0,1", r"line 3: y_mm: expected a finite number, found nan"),
+        ("1980,nan,1225,8.5,0,0,1", r"line 3: y_mm: expected a number, found an empty cell"),
         ("1980,,1225,8.5,0,0,1", r"line 3: y_mm: expected a number, found an empty cell"),
         ("1980,-280,1225,,0,0,1", r"line 3: frequency_Hz: expected a number, found an empty cell"),
         ("1980,-280,1225,8.5,0,,1", r"line 3: dir_y: expected a number, found an empty cell"),

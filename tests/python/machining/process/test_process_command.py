@@ -276,7 +276,7 @@ BAD = [
     ("\n".join(",".join(["0.05" if i else r[0], *r[1:]]) for i, r in enumerate(ROWS)), r"feed_per_tooth_mm: expected forces at 3 .*found 1"),
     ("\n".join(FORCES.splitlines()[:3]), r"3 or more feeds .*found 2"),
     ("\n".join(FORCES.splitlines()[:2]), r"3 or more feeds .*found 1"),
-    (FORCES.splitlines()[0], r"a line for each row"),
+    (FORCES.splitlines()[0], r"no header line with rows of numbers below it"),
     ("", r"empty"),
     *((FORCES.replace("Fx_N", n), r"Fx.*expected a unit such as in Fx_N, found") for n in ("Fx", "Fx [lbx]", "Fx [mm]")),
     *((FORCES.replace("feed_per_tooth_mm", n), r"mm/tooth or mm/min") for n in ("feed", "feed [mm]", "feed_per_tooth [mm/min]")),

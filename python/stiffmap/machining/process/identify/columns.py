@@ -12,8 +12,9 @@ import numpy as np
 
 from stiffmap.common.broadcasting import given_path
 from stiffmap.common.errors import FileError
-from stiffmap.common.tables.lines import rows_of
-from stiffmap.common.tables.named import WORD, Known, NamedTable, Rows, named
+from stiffmap.common.tables.cells import Cells
+from stiffmap.common.tables.named import WORD, Known, NamedTable, named, read_named
+from stiffmap.common.tables.sheet import Sheet
 
 COLUMNS = {
     "feed_per_tooth": ("feed_per_tooth_mm", "m"), "fx": ("Fx_N", "N"), "fy": ("Fy_N", "N"), "fz": ("Fz_N", "N"),
@@ -67,12 +68,10 @@ def columns_of(
     table: str | PathLike[str] | Mapping[str, Any], defaults: Mapping[str, Any], sheet: str | None
 ) -> ForceColumns:
     """The columns of a file or a mapping; `defaults`, SI, where it has none of that name. Raises FileError."""
-    file = "table" if isinstance(table, Mapping) else str(table)
     if isinstance(table, Mapping):
-        rows = _of_mapping(table)
+        found = named(_of_mapping(table), KNOWN)
     else:
-        rows = rows_of(given_path(table, "table", "a file or a mapping of columns"), sheet)
-    found = named(rows, KNOWN, file)
+        found = read_named(given_path(table, "table", "a file or a mapping of columns"), KNOWN, sheet)
     out = ForceColumns(**vars(found))
     if "side" in out.values:
         out.values["side"] = np.array(out.values["side"])
@@ -92,12 +91,12 @@ def columns_of(
     return out
 
 
-def _of_mapping(table: Mapping[str, Any]) -> Rows:
-    """Rows counted from 1, the header first; single values stand for all rows."""
+def _of_mapping(table: Mapping[str, Any]) -> Sheet:
+    """Rows counted from 1; single values stand for all rows."""
     columns = {str(k): [table[k]] if np.ndim(table[k]) == 0 else list(table[k]) for k in table}
     count = max((len(v) for v in columns.values()), default=0)
     for name, cells in columns.items():
         if len(cells) not in (1, count):
             raise FileError(f"expected {count} numbers or one, found {len(cells)}", file="table", key=name)
-    full = [[str(v) for v in (cells if len(cells) == count else cells * count)] for cells in columns.values()]
-    return [(0, list(columns)), *((i, list(row)) for i, row in enumerate(zip(*full, strict=True), 1))]
+    full = [Cells.of(map(str, cells if len(cells) == count else cells * count)) for cells in columns.values()]
+    return Sheet("table", tuple(columns), tuple(full), range(1, count + 1), False)
