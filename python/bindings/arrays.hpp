@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "stiffmap/answers.hpp"
-#include "stiffmap/check.hpp"
+#include "stiffmap/common/answers.hpp"
+#include "stiffmap/common/check.hpp"
 
 namespace stiffmap::bindings {
 

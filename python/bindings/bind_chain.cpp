@@ -4,7 +4,7 @@
 #include <pybind11/stl.h>
 
 #include "arrays.hpp"
-#include "stiffmap/chain.hpp"
+#include "stiffmap/model/chain.hpp"
 
 namespace stiffmap::bindings {
 namespace {

@@ -3,8 +3,8 @@
 #include <pybind11/stl.h>
 
 #include "arrays.hpp"
-#include "stiffmap/assemble.hpp"
-#include "stiffmap/fast_plan.hpp"
+#include "stiffmap/plan/fast_plan.hpp"
+#include "stiffmap/solve/assemble.hpp"
 
 namespace stiffmap::bindings {
 namespace {

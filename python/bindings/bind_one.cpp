@@ -6,7 +6,7 @@
 #include <optional>
 
 #include "arrays.hpp"
-#include "stiffmap/batch.hpp"
+#include "stiffmap/solve/batch.hpp"
 
 namespace stiffmap::bindings {
 namespace {

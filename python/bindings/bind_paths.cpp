@@ -3,7 +3,7 @@
 #include <pybind11/stl.h>
 
 #include "arrays.hpp"
-#include "stiffmap/path.hpp"
+#include "stiffmap/solve/path.hpp"
 
 namespace stiffmap::bindings {
 namespace {

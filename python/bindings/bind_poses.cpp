@@ -3,9 +3,9 @@
 #include <pybind11/stl.h>
 
 #include "arrays.hpp"
-#include "stiffmap/chatter.hpp"
-#include "stiffmap/enclosure.hpp"
-#include "stiffmap/poses.hpp"
+#include "stiffmap/kinematics/enclosure.hpp"
+#include "stiffmap/machining/chatter.hpp"
+#include "stiffmap/solve/poses.hpp"
 
 namespace stiffmap::bindings {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "../../cpp/kernels/dispatch.hpp"
 #include "machines.hpp"
-#include "stiffmap/batch.hpp"
+#include "stiffmap/solve/batch.hpp"
 
 #if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 namespace {

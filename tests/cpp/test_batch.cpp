@@ -9,8 +9,8 @@
 
 #include "machines.hpp"
 #include "numeric.hpp"
-#include "stiffmap/batch.hpp"
-#include "stiffmap/parallel.hpp"
+#include "stiffmap/common/parallel.hpp"
+#include "stiffmap/solve/batch.hpp"
 
 using namespace stiffmap;
 using namespace stiffmap::test;
