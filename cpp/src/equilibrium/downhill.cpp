@@ -7,7 +7,7 @@
 namespace stiffmap {
 namespace {
 
-constexpr int most_down = 150, trials = 6;
+constexpr int most_down = 150, line_trials = 6;
 constexpr double longest = 0.1;               // of a step, in multiples of the length
 constexpr double first_shift = 1e-4;          // added stiffness, in multiples of the machine's
 constexpr double more = 4, most_shift = 100;  // its growth, and where it ends
@@ -100,7 +100,7 @@ class Downhill {
     double share = most, end = slope(most);
     if (start < 0 && end > -flattened * start) {  // Illinois: a false position that does not stay on one side
       double low = 0, high = most, at_low = start, at_high = end;
-      for (int k = 0; k < trials && std::abs(end) > -flattened * start; ++k) {
+      for (int k = 0; k < line_trials && std::abs(end) > -flattened * start; ++k) {
         share = low - at_low * (high - low) / (at_high - at_low);
         end = slope(share);
         if (end > 0) {
