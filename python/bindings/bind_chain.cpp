@@ -1,8 +1,5 @@
 // SPDX-License-Identifier: MIT
 // Elements of chains, in the order of their members.
-#include <pybind11/eigen.h>
-#include <pybind11/stl.h>
-
 #include "arrays.hpp"
 #include "stiffmap/model/chain.hpp"
 

@@ -85,7 +85,7 @@ struct Batch {
     out.displacement = displacement.data();
     out.stiffness = stiffness.data();
     out.status = status.data();
-    const auto solve = [&] { solve_fast(machine, plan, in, {}, 1, out); };
+    const auto solve = [&] { solve_batch(machine, &plan, in, {}, 1, out); };
     solve();
     return counted(solve);
   }

@@ -176,6 +176,8 @@ VecX largest_multipliers(const ToolModes& modes, const std::vector<Chip>& chips,
 
 Answers largest_multipliers(const ToolModes& modes, const std::vector<Chip>& chips, const VecX& periods,
                             const VecX& depths, int threads) {
+  for (const Index given : {modes.ratio.size(), modes.mass.size(), modes.way.cols()})
+    require(given == modes.omega.size(), "modes", "as many of each number", given);
   Answers out(periods.size());
   const Blocks found = out.numbers("multipliers", {depths.size()});
   parallel_chunks(periods.size(), 1, threads, [&](int, long begin, long end) {

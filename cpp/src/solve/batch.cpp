@@ -354,8 +354,26 @@ class FastBatch {
 
 }  // namespace
 
-void solve_reference(const Mechanism& m, const BatchInput& in, const SolveOptions& options, int threads,
-                     const BatchOutput& out) {
+void BatchInput::take(const Mechanism& m, const Rows& positions, const Rows& rotations, const Rows& wrenches,
+                      const Rows& known) {
+  one_rotation = rotations.rows() == 1;
+  one_wrench = wrenches.rows() == 1;
+  check_rows(positions, "position", count, 3);
+  check_rows(rotations, "rotation", one_rotation ? 1 : count, 9);
+  check_rows(wrenches, "wrench", one_wrench ? 1 : count, 6 * static_cast<Index>(load_points.size()));
+  check_rows(known, "closed coordinates", count, m.size(), true);
+  require(!read_points.empty(), "read_points", "at least one point", 0);
+  position = positions.data();
+  rotation = rotations.data();
+  wrench = wrenches.data();
+  closed = known.data();
+}
+
+void solve_batch(const Mechanism& m, const FastPlan* plan, const BatchInput& in, const SolveOptions& options,
+                 int threads, const BatchOutput& out) {
+  if (plan && takes(m, *plan, in, options)) return FastBatch(m, *plan, in, options, threads, out).run();
+  const Index n = in.count * 6 * static_cast<Index>(in.variants.size());
+  if (out.variants) Eigen::Map<VecX>(out.variants, n).setConstant(std::nan(""));
   std::vector<Reference> scratch(at(std::max(1, threads)));
   parallel_chunks(in.count, reference_chunk, threads, [&](int thread, long begin, long end) {
     for (long i = begin; i < end; ++i) {
@@ -363,18 +381,7 @@ void solve_reference(const Mechanism& m, const BatchInput& in, const SolveOption
       scratch[static_cast<std::size_t>(thread)].solve(m, in, options, i, out);
     }
   });
-}
-
-void solve_fast(const Mechanism& m, const FastPlan& plan, const BatchInput& in, const SolveOptions& options,
-                int threads, const BatchOutput& out) {
-  if (!takes(m, plan, in, options)) {
-    const Index n = in.count * 6 * static_cast<Index>(in.variants.size());
-    if (out.variants) Eigen::Map<VecX>(out.variants, n).setConstant(std::nan(""));
-    solve_reference(m, in, options, threads, out);
-    for (Index i = 0; out.flags && i < in.count; ++i) out.flags[i] |= flag::reference_path;
-    return;
-  }
-  FastBatch(m, plan, in, options, threads, out).run();
+  for (Index i = 0; plan && out.flags && i < in.count; ++i) out.flags[i] |= flag::reference_path;
 }
 
 }  // namespace stiffmap

@@ -21,27 +21,45 @@ void start_at(const Rows& start, Index i, VecX& x) {
   else x.setConstant(nan);
 }
 
-}  // namespace
+void check_poses(const Rows& position, const Rows& rotation) {
+  check_rows(position, "position", position.rows(), 3);
+  check_rows(rotation, "rotation", position.rows(), 9);
+}
 
-PoseInput LoadedPoses::input(const Mechanism& m, Index point, Index i) const {
-  const NodePoint& at_point = m.points[at(point)];
+void check_drives(const Mechanism& m, const VecX& weights) {
+  const Index drives = static_cast<Index>(m.drives.size());
+  require(weights.size() == 0 || weights.size() == drives, "weights", "one per drive, or none", weights.size());
+}
+
+void check_bodies(const Mechanism& m, const Inertias& inertias) {
+  require(inertias.size() == m.bodies.size(), "inertias", "one per body", inertias.size());
+}
+
+/// Pose i, loaded and read at a point.
+PoseInput loaded(const Mechanism& m, const Rows& position, const Rows& rotation, const Rows& wrench,
+                 const Vec3& gravity, Index point, Index i) {
   PoseInput in;
   in.commanded = pose_of(position, rotation, i);
   in.gravity = gravity;
-  in.load_points = {{at_point.node, at_point.offset, LoadType::dead}};
+  in.load_points = {load_at(m, point)};
   in.wrenches = {Vec6(wrench.row(i).transpose())};
   in.read_points = {point};
   return in;
 }
 
+}  // namespace
+
 Answers closures(const Mechanism& m, const FastPlan* plan, const Rows& given, const Rows& rotation, const Rows& start,
                  int threads) {
+  const bool inverse = rotation.rows() > 0, started = start.rows() > 0;
+  if (inverse) check_poses(given, rotation);
+  else check_rows(given, "actuators", given.rows(), static_cast<Index>(m.drives.size()));
+  check_rows(start, "start", given.rows(), m.size(), true);
   Answers out(given.rows());
   const Blocks coordinates = out.numbers("coordinates", {m.size()}), position = out.numbers("position", {3}),
                turned = out.numbers("rotation", {3, 3});
   Status* const status = out.each("status", Status::unreachable);
   std::uint32_t* const flags = out.each("flags", 0u);
-  const bool inverse = rotation.rows() > 0, started = start.rows() > 0;
   parallel_chunks(given.rows(), 64, threads, [&](int, long begin, long end) {
     ClosureWorkspace ws(m);
     VecX x = VecX::Zero(m.size()), from = x;
@@ -73,6 +91,9 @@ Answers closures(const Mechanism& m, const FastPlan* plan, const Rows& given, co
 Answers kinematics(const Mechanism& m, const Rows& position, const Rows& rotation, const Rows& start,
                    const VecX& weights, bool patient, bool only, int threads) {
   const Index n = position.rows(), size = m.size(), drives = static_cast<Index>(m.drives.size());
+  check_poses(position, rotation);
+  check_rows(start, "start", n, size, true);
+  check_drives(m, weights);
   Answers out(n);
   const Blocks coordinates = out.numbers("coordinates", {size}), tip = out.numbers("position", {3}),
                turned = out.numbers("rotation", {3, 3}), jacobian = out.numbers("jacobian", {6, drives}),
@@ -116,6 +137,9 @@ Answers kinematics(const Mechanism& m, const Rows& position, const Rows& rotatio
 Answers enclosures(const Mechanism& m, const Rows& centre, const Rows& half, const Mat3& axes, const Mat3& rotation,
                    const Rows& start, Index slopes, const std::vector<Index>& watched, int threads) {
   const Index n = centre.rows(), size = m.size(), nodes = static_cast<Index>(watched.size());
+  check_rows(centre, "centre", n, 3);
+  check_rows(half, "half", n, 3);
+  check_rows(start, "start", n, size, true);
   Answers out(n);
   std::uint8_t *const closed = out.each<std::uint8_t>("closed", 0), *const enclosed =
                                                                         out.each<std::uint8_t>("enclosed", 0);
@@ -153,6 +177,14 @@ Answers dynamics(const Mechanism& m, const Inertias& inertias, const Rows& coord
                  const Rows& twist_rate, const Rows& wrench, const Vec3& gravity, const Rows& rates,
                  const Rows& accelerations, const VecX& weights, int threads) {
   const Index n = coordinates.rows(), drives = static_cast<Index>(m.drives.size());
+  check_rows(coordinates, "coordinates", n, m.size());
+  check_rows(twist, "twist", n, 6);
+  check_rows(twist_rate, "twist_rate", n, 6);
+  check_rows(wrench, "wrench", n, 6);
+  check_rows(rates, "rates", n, drives, true);
+  check_rows(accelerations, "accelerations", rates.rows(), drives);
+  check_drives(m, weights);
+  check_bodies(m, inertias);
   Answers out(n);
   const Blocks effort = out.numbers("effort", {drives}), rate = out.numbers("rate", {drives}),
                acceleration = out.numbers("acceleration", {drives}), mass = out.numbers("mass", {drives, drives}),
@@ -189,29 +221,38 @@ Answers dynamics(const Mechanism& m, const Inertias& inertias, const Rows& coord
   return out;
 }
 
-Answers modes(const Mechanism& m, const Inertias& inertias, const Damping& damping, const LoadedPoses& poses,
-              const Rows& closed, Index point, Index count, bool whole, int threads) {
-  Answers out(poses.count());
+Answers modes(const Mechanism& m, const Inertias& inertias, const VecX& viscous, const VecX& loss, const Rows& position,
+              const Rows& rotation, const Rows& wrench, const Vec3& gravity, const Rows& closed,
+              const std::string& point, Index count, bool whole, int threads) {
+  const Index n = position.rows(), read = m.point(point);
+  check_poses(position, rotation);
+  check_rows(wrench, "wrench", n, 6);
+  check_rows(closed, "closed", n, m.size(), true);
+  check_bodies(m, inertias);
+  const Damping damping{viscous, loss};
+  for (const VecX* each : {&viscous, &loss})
+    require(each->size() == m.size(), "damping", "one number per coordinate", each->size());
+  Answers out(n);
   const Blocks square = out.numbers("square", {count}), tip = out.numbers("tip", {6, count}),
-               viscous = out.numbers("viscous", {count, count}), loss = out.numbers("loss", {count, count}),
+               dampers = out.numbers("viscous", {count, count}), losses = out.numbers("loss", {count, count}),
                rest = out.numbers("rest", {6, 6}), unsymmetric = out.numbers("unsymmetric", {}),
                shape = out.numbers("shape", {whole ? count : 0, m.size()}),
                coordinates = out.numbers("coordinates", {m.size()});
   Status* const status = out.each("status", Status::unreachable);
   std::uint32_t* const flags = out.each("flags", 0u);
-  parallel_chunks(poses.count(), 4, threads, [&](int, long begin, long end) {
+  parallel_chunks(n, 4, threads, [&](int, long begin, long end) {
     SolveWorkspace ws(m);
     ModesResult r;
     for (long i = begin; i < end; ++i) {
-      PoseInput in = poses.input(m, point, i);
+      PoseInput in = loaded(m, position, rotation, wrench, gravity, read, i);
       if (closed.rows() && std::isfinite(closed(i, 0))) in.closed = closed.data() + closed.cols() * i;
       lowest_modes(m, inertias, damping, in, count, whole, ws, r);
       status[i] = r.status;
       flags[i] = r.flags;
       square(i) = r.square;
       tip(i) = r.tip;
-      viscous(i) = r.viscous;
-      loss(i) = r.loss;
+      dampers(i) = r.viscous;
+      losses(i) = r.loss;
       rest(i) = r.rest;
       unsymmetric(i).setConstant(r.unsymmetric);
       if (whole) shape(i) = r.shape.transpose();
@@ -221,9 +262,12 @@ Answers modes(const Mechanism& m, const Inertias& inertias, const Damping& dampi
   return out;
 }
 
-Answers clamps(const Mechanism& m, const Rows& position, const Rows& rotation, const Rows& displacement, Index point,
-               const Vec3& gravity, int threads) {
-  const Index legs = static_cast<Index>(m.legs.size()), drives = static_cast<Index>(m.drives.size());
+Answers clamps(const Mechanism& m, const Rows& position, const Rows& rotation, const Rows& displacement,
+               const std::string& point, const Vec3& gravity, int threads) {
+  const Index legs = static_cast<Index>(m.legs.size()), drives = static_cast<Index>(m.drives.size()),
+              read = m.point(point);
+  check_poses(position, rotation);
+  check_rows(displacement, "displacement", position.rows(), 6);
   Answers out(position.rows());
   const Blocks wrench = out.numbers("wrench", {6}), leg_wrench = out.numbers("leg_wrench", {legs, 6}),
                stiffness = out.numbers("stiffness", {6, 6}), leg_stiffness = out.numbers("leg_stiffness", {legs, 6, 6}),
@@ -232,13 +276,13 @@ Answers clamps(const Mechanism& m, const Rows& position, const Rows& rotation, c
                                                                       out.each("force_status", Status::unreachable);
   std::uint32_t* const flags = out.each("flags", 0u);
   parallel_chunks(position.rows(), 8, threads, [&](int, long begin, long end) {
-    Clamp held(m, point);
+    Clamp held(m, read);
     ClampResult r;
     for (long i = begin; i < end; ++i) {
       PoseInput in;
       in.commanded = pose_of(position, rotation, i);
       in.gravity = gravity;
-      in.read_points = {point};
+      in.read_points = {read};
       held.solve(in, displacement.row(i).transpose(), r);
       wrench(i) = r.wrench;
       stiffness(i) = r.pose.point.stiffness;
@@ -254,14 +298,18 @@ Answers clamps(const Mechanism& m, const Rows& position, const Rows& rotation, c
   return out;
 }
 
-Answers reactions(const Mechanism& m, const LoadedPoses& poses, Index point, int threads) {
-  Answers out(poses.count());
+Answers reactions(const Mechanism& m, const Rows& position, const Rows& rotation, const Rows& wrench,
+                  const std::string& point, const Vec3& gravity, int threads) {
+  const Index n = position.rows(), read = m.point(point);
+  check_poses(position, rotation);
+  check_rows(wrench, "wrench", n, 6);
+  Answers out(n);
   const Blocks force = out.numbers("force", {m.size()});
-  parallel_chunks(poses.count(), 16, threads, [&](int, long begin, long end) {
+  parallel_chunks(n, 16, threads, [&](int, long begin, long end) {
     SolveWorkspace ws(m);
     PoseResult r;
     for (long i = begin; i < end; ++i) {
-      solve_pose(m, poses.input(m, point, i), {}, ws, r);
+      solve_pose(m, loaded(m, position, rotation, wrench, gravity, read, i), {}, ws, r);
       const Linearization& lin = ws.equilibrium.lin;
       if (r.status == Status::converged || r.status == Status::unstable) force(i) = lin.tau - lin.r;
     }
@@ -270,6 +318,7 @@ Answers reactions(const Mechanism& m, const LoadedPoses& poses, Index point, int
 }
 
 Answers node_frames(const Mechanism& m, const VecX& x) {
+  require(x.size() == m.size(), "coordinates", "one number each", x.size());
   Frames f(m);
   forward(m, Geometry::nominal, x, f);
   Answers out(static_cast<Index>(f.pose.size()));
@@ -281,8 +330,9 @@ Answers node_frames(const Mechanism& m, const VecX& x) {
   return out;
 }
 
-Answers point_positions(const Mechanism& m, Index point, const Rows& x) {
-  const NodePoint& named = m.points[at(point)];
+Answers point_positions(const Mechanism& m, const std::string& point, const Rows& x) {
+  const NodePoint& named = m.points[at(m.point(point))];
+  check_rows(x, "coordinates", x.rows(), m.size());
   Answers out(x.rows());
   const Blocks position = out.numbers("position", {3});
   Frames f(m);

@@ -8,12 +8,21 @@
 #include <vector>
 
 #include "stiffmap/algebra/types.hpp"
+#include "stiffmap/common/check.hpp"
 
 namespace stiffmap {
 
 using RowX = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 using Row3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 using Rows = Eigen::Map<const RowX>;  ///< a row for each pose; without rows where nothing is given
+
+/// Refuses what is not `width` numbers for each of `count` poses, or nothing where that is `enough`.
+inline void check_rows(const Rows& given, const std::string& name, Index count, Index width, bool enough = false) {
+  const bool nothing = given.rows() == 0 && (enough || count == 0);
+  const std::string wanted = std::to_string(count) + " rows of " + std::to_string(width) + " numbers";
+  require(nothing || (given.rows() == count && given.cols() == width), name, wanted,
+          std::to_string(given.rows()) + " of " + std::to_string(given.cols()));
+}
 
 /// A matrix for each pose, by rows; one column where an answer is a vector.
 class Blocks {

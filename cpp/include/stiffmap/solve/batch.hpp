@@ -2,6 +2,7 @@
 // Many poses at once: plain arrays in, plain arrays out, on all threads.
 #pragma once
 
+#include "stiffmap/common/answers.hpp"
 #include "stiffmap/plan/fast_plan.hpp"
 #include "stiffmap/solve/solve.hpp"
 
@@ -26,11 +27,13 @@ struct BatchInput {
   std::vector<const FastPlan*> variants;  ///< plans of the same machine with a parameter moved
   void (*poll)() = nullptr;               ///< called now and then on the calling thread; throws to stop the batch
 
+  /// Checks rows of numbers and points to them, after `count` and the points.
+  void take(const Mechanism& m, const Rows& positions, const Rows& rotations, const Rows& wrenches, const Rows& known);
+
   /// Of pose i: its commanded frame, and a load's wrench.
   Pose commanded(Index i) const {
     const double* const R = rotation + (one_rotation ? 0 : 9 * i);
-    return {Eigen::Map<const Vec3>(position + 3 * i),
-            Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(R)};
+    return {Eigen::Map<const Vec3>(position + 3 * i), Eigen::Map<const Row3>(R)};
   }
   Eigen::Map<const Vec6> load(Index i, Index k) const {
     const Index loads = static_cast<Index>(load_points.size());
@@ -55,13 +58,9 @@ struct BatchOutput {
   double* variants = nullptr;  ///< count x variants x 6; NaN where the reference path was taken
 };
 
-/// The dense reference path for every pose.
-void solve_reference(const Mechanism& m, const BatchInput& in, const SolveOptions& options, int threads,
-                     const BatchOutput& out);
-
-/// The SIMD kernels for every pose that they can do, the reference path for the rest; the result of a
-/// pose depends on nothing but the pose.
-void solve_fast(const Mechanism& m, const FastPlan& plan, const BatchInput& in, const SolveOptions& options,
-                int threads, const BatchOutput& out);
+/// The SIMD kernels for every pose that they can do, the dense reference path for the rest, and for all where there is
+/// no plan; the result of a pose depends on nothing but the pose.
+void solve_batch(const Mechanism& m, const FastPlan* plan, const BatchInput& in, const SolveOptions& options,
+                 int threads, const BatchOutput& out);
 
 }  // namespace stiffmap

@@ -8,16 +8,8 @@
 
 namespace stiffmap {
 
-/// Commanded poses, a wrench at each, dead; gravity is the same at all.
-struct LoadedPoses {
-  Rows position, rotation, wrench;  ///< poses x 3, 9, 6
-  Vec3 gravity;
-
-  Index count() const { return position.rows(); }
-  /// Pose i, loaded and read at a point.
-  PoseInput input(const Mechanism& m, Index point, Index i) const;
-};
-
+/// `position` and `rotation`: poses x 3 and 9, commanded, with a dead `wrench` at each; gravity is the same at all.
+///
 /// Coordinates and tip poses by closure: from poses where rotations are given, else from the actuators' coordinates; on
 /// the branch of `start` where it is given. The plan, which may be null, knows starts near by.
 Answers closures(const Mechanism& m, const FastPlan* plan, const Rows& given, const Rows& rotation, const Rows& start,
@@ -39,20 +31,22 @@ Answers dynamics(const Mechanism& m, const Inertias& inertias, const Rows& coord
 
 /// Modes at a point (modes.hpp); their shapes where the tangent is taken whole. `closed`: coordinates already closed at
 /// the poses, NaN where they are not.
-Answers modes(const Mechanism& m, const Inertias& inertias, const Damping& damping, const LoadedPoses& poses,
-              const Rows& closed, Index point, Index count, bool whole, int threads);
+Answers modes(const Mechanism& m, const Inertias& inertias, const VecX& viscous, const VecX& loss, const Rows& position,
+              const Rows& rotation, const Rows& wrench, const Vec3& gravity, const Rows& closed,
+              const std::string& point, Index count, bool whole, int threads);
 
 /// Wrenches that hold a point at displacements (poses x 6) from its commanded poses.
-Answers clamps(const Mechanism& m, const Rows& position, const Rows& rotation, const Rows& displacement, Index point,
-               const Vec3& gravity, int threads);
+Answers clamps(const Mechanism& m, const Rows& position, const Rows& rotation, const Rows& displacement,
+               const std::string& point, const Vec3& gravity, int threads);
 
 /// Generalised forces of all springs, drives and locked coordinates at loaded poses.
-Answers reactions(const Mechanism& m, const LoadedPoses& poses, Index point, int threads);
+Answers reactions(const Mechanism& m, const Rows& position, const Rows& rotation, const Rows& wrench,
+                  const std::string& point, const Vec3& gravity, int threads);
 
 /// Frames of all nodes, one after the other, at given coordinates, nominal geometry.
 Answers node_frames(const Mechanism& m, const VecX& x);
 
 /// A point at each row of coordinates, nominal geometry.
-Answers point_positions(const Mechanism& m, Index point, const Rows& x);
+Answers point_positions(const Mechanism& m, const std::string& point, const Rows& x);
 
 }  // namespace stiffmap

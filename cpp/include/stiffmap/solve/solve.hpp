@@ -17,6 +17,12 @@ struct PoseInput {
   const double* closed = nullptr;  ///< coordinates already closed at the commanded pose; null: found by closure
 };
 
+/// A load at a point of the mechanism.
+inline LoadPoint load_at(const Mechanism& m, Index point, LoadType type = LoadType::dead) {
+  const NodePoint& p = m.points[at(point)];
+  return {p.node, p.offset, type};
+}
+
 struct SolveOptions {
   EquilibriumOptions equilibrium;
   bool stiffness = true;  ///< false: displacements only
