@@ -8,7 +8,7 @@
 #include <string>
 
 #include "beam.hpp"
-#include "stiffmap/assemble.hpp"
+#include "stiffmap/solve/assemble.hpp"
 
 namespace stiffmap::bench {
 

@@ -41,8 +41,7 @@ Workload::Workload(Case machine, int n, double force)
 }
 
 void Workload::solve(bool fast, int threads) {
-  if (fast) solve_fast(mechanism(), plan(), in_, {}, threads, out_);
-  else solve_reference(mechanism(), in_, {}, threads, out_);
+  solve_batch(mechanism(), fast ? &plan() : nullptr, in_, {}, threads, out_);
 }
 
 Index Workload::failed() const {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "machines.hpp"
-#include "stiffmap/batch.hpp"
+#include "stiffmap/solve/batch.hpp"
 
 namespace stiffmap::bench {
 

@@ -3,7 +3,7 @@
 
 #include <cstdlib>
 
-#include "stiffmap/check.hpp"
+#include "stiffmap/common/check.hpp"
 
 extern "C" void stiffmap_kernel_base(stiffmap::KernelTable*);
 #ifdef STIFFMAP_X86_LEVELS

@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "arrays.hpp"
-#include "stiffmap/batch.hpp"
-#include "stiffmap/kept_memory.hpp"
+#include "stiffmap/common/kept_memory.hpp"
+#include "stiffmap/solve/batch.hpp"
 
 namespace stiffmap::bindings {
 

@@ -1,60 +1,21 @@
 // SPDX-License-Identifier: MIT
-// NumPy arrays at the border: C order, float64, shapes checked by name; and the answers of the core as a dict of
-// arrays.
+// NumPy arrays at the border: rows of numbers for the core, C order, float64; and its answers as a dict of arrays.
 #pragma once
 
+#include <pybind11/eigen.h>
 #include <pybind11/numpy.h>
-#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
 
-#include <string>
+#include <optional>
 #include <vector>
 
-#include "stiffmap/answers.hpp"
-#include "stiffmap/check.hpp"
+#include "stiffmap/common/answers.hpp"
 
 namespace stiffmap::bindings {
 
 namespace py = pybind11;
 using Array = py::array_t<double, py::array::c_style | py::array::forcecast>;
 using Shape = std::vector<py::ssize_t>;
-
-inline std::string shape_text(const py::array& a) {
-  std::string out = "(";
-  for (py::ssize_t i = 0; i < a.ndim(); ++i) out += (i ? ", " : "") + std::to_string(a.shape(i));
-  return out + ")";
-}
-
-/// Data of an array whose shape must be exactly `shape`.
-inline const double* data(const Array& a, const Shape& shape, const std::string& name) {
-  bool same = a.ndim() == static_cast<py::ssize_t>(shape.size());
-  std::string wanted = "shape (";
-  for (std::size_t i = 0; i < shape.size(); ++i) {
-    same = same && a.shape(static_cast<py::ssize_t>(i)) == shape[i];
-    wanted += (i ? ", " : "") + std::to_string(shape[i]);
-  }
-  require(same, name, wanted + ")", shape_text(a));
-  return a.data();
-}
-
-inline py::ssize_t count_of(const Array& a) { return a.ndim() ? a.shape(0) : 0; }
-
-/// One row for each pose, of `shape`, poses first.
-inline Rows rows(const Array& a, const Shape& shape, const std::string& name) {
-  Index width = 1;
-  for (std::size_t i = 1; i < shape.size(); ++i) width *= shape[i];
-  return {data(a, shape, name), shape[0], width};
-}
-
-/// The same, or no rows where the array has none.
-inline Rows rows_or_none(const Array& a, const Shape& shape, const std::string& name) {
-  return count_of(a) ? rows(a, shape, name) : Rows(nullptr, 0, 0);
-}
-
-inline Vec3 vec3(const Array& a, const char* name) { return Eigen::Map<const Vec3>(data(a, {3}, name)); }
-inline Mat3 mat3(const Array& a, const char* name) { return Eigen::Map<const Row3>(data(a, {3, 3}, name)); }
-inline VecX vector(const Array& a, py::ssize_t size, const char* name) {
-  return Eigen::Map<const VecX>(data(a, {size}, name), size);
-}
 
 /// What NumPy calls a value of the core.
 template <class T>
@@ -73,6 +34,30 @@ struct Plain<std::uint8_t> {
 }  // namespace stiffmap::bindings
 
 namespace pybind11::detail {
+
+/// Whatever the shape behind the poses; None: no rows. The array lives as long as the call.
+template <>
+struct type_caster<stiffmap::Rows> {
+  static constexpr auto name = type_caster<stiffmap::bindings::Array>::name + const_name(" | None");
+  template <class>
+  using cast_op_type = const stiffmap::Rows&;
+
+  operator const stiffmap::Rows&() const { return *rows_; }
+
+  bool load(handle given, bool) {
+    if (given.is_none()) return rows_.emplace(nullptr, 0, 0), true;
+    array_ = stiffmap::bindings::Array::ensure(given);
+    if (!array_ || array_.ndim() == 0) return false;
+    stiffmap::Index width = 1;
+    for (ssize_t i = 1; i < array_.ndim(); ++i) width *= array_.shape(i);
+    rows_.emplace(array_.data(), array_.shape(0), width);
+    return true;
+  }
+
+ private:
+  stiffmap::bindings::Array array_;
+  std::optional<stiffmap::Rows> rows_;
+};
 
 /// Each array keeps its own memory, which it takes over.
 template <>

@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Elements of chains, in the order of their members.
-#include <pybind11/eigen.h>
-#include <pybind11/stl.h>
-
 #include "arrays.hpp"
-#include "stiffmap/chain.hpp"
+#include "stiffmap/model/chain.hpp"
 
 namespace stiffmap::bindings {
 namespace {

@@ -1,21 +1,11 @@
 // SPDX-License-Identifier: MIT
 // Compiled mechanisms and plans: making them, and what they are made of.
-#include <pybind11/stl.h>
-
 #include "arrays.hpp"
-#include "stiffmap/assemble.hpp"
-#include "stiffmap/fast_plan.hpp"
+#include "stiffmap/plan/fast_plan.hpp"
+#include "stiffmap/solve/assemble.hpp"
 
 namespace stiffmap::bindings {
 namespace {
-
-using Nine = std::array<double, 9>;
-
-Nine by_rows(const Mat3& R) {
-  Nine out;
-  for (int i = 0; i < 9; ++i) out[static_cast<std::size_t>(i)] = R(i / 3, i % 3);
-  return out;
-}
 
 /// The list of one thing of every item that a mechanism has.
 template <class Item, class Get>
@@ -41,11 +31,7 @@ void bind_mechanism(py::module_& m) {
   using namespace py::literals;
   py::class_<Mechanism> mechanism(m, "Mechanism");  // before the signatures that name it
   py::class_<FastPlan>(m, "FastPlan")
-      .def(py::init([](const Mechanism& k, const Array& low, const Array& high, int grid_nodes) {
-             const Vec3 a = vec3(low, "low"), b = vec3(high, "high");
-             py::gil_scoped_release free;
-             return std::make_unique<FastPlan>(k, a, b, grid_nodes);
-           }),
+      .def(py::init<const Mechanism&, const Vec3&, const Vec3&, int>(), py::call_guard<py::gil_scoped_release>(),
            "mechanism"_a, "low"_a, "high"_a, "grid_nodes"_a = 8)
       .def_property_readonly("available", &FastPlan::available)
       .def_property_readonly("missing", &FastPlan::missing);
@@ -81,9 +67,8 @@ void bind_mechanism(py::module_& m) {
       .def_property_readonly("locked", each(&Mechanism::coordinates, [](const Coordinate& c) { return c.locked; }))
       .def_property_readonly(
           "limits", each(&Mechanism::coordinates, [](const Coordinate& c) { return std::pair(c.lower, c.upper); }))
-      .def_property_readonly(
-          "spun_balls", each(&Mechanism::spun_balls,
-                             [](const SpunBall& b) { return std::tuple(b.first, by_rows(b.turn), by_rows(b.axes)); }))
+      .def_property_readonly("spun_balls", each(&Mechanism::spun_balls,
+                                                [](const SpunBall& b) { return std::tuple(b.first, b.turn, b.axes); }))
       .def_property_readonly("springs",
                              each(&Mechanism::groups, [](const SpringGroup& g) { return std::pair(g.name, g.first); }))
       .def_property_readonly("actuators",
@@ -106,11 +91,7 @@ void bind_mechanism(py::module_& m) {
       .def_readonly("redundancy", &Mechanism::redundancy)
       .def_readonly("length", &Mechanism::length)
       .def_readonly("stiffness", &Mechanism::stiffness)
-      .def("home_coordinates", [](const Mechanism& k) {
-        py::array_t<double> out(k.size());
-        Eigen::Map<VecX>(out.mutable_data(), k.size()) = k.home_coordinates;
-        return out;
-      });
+      .def("home_coordinates", [](const Mechanism& k) { return k.home_coordinates; });
 }
 
 }  // namespace stiffmap::bindings

@@ -3,10 +3,9 @@
 // back. Whatever is not that simple is declined, and the general call checks it and says what is wrong.
 #include <array>
 #include <cmath>
-#include <optional>
 
 #include "arrays.hpp"
-#include "stiffmap/batch.hpp"
+#include "stiffmap/solve/batch.hpp"
 
 namespace stiffmap::bindings {
 namespace {
@@ -39,11 +38,11 @@ bool read(PyObject* given, std::array<double, N>& out) {
 class OneAnswer {
  public:
   explicit OneAnswer(const Mechanism& m)
-      : legs_(static_cast<py::ssize_t>(m.legs.size())),
-        drives_(static_cast<py::ssize_t>(m.drives.size())),
-        coordinates_(m.size()),
-        numbers_(new double[static_cast<std::size_t>(6 + 3 * 36 + drives_ + 6 * legs_ + coordinates_)]),
-        open_(new std::uint8_t[static_cast<std::size_t>(coordinates_)]) {}
+      : legs(static_cast<py::ssize_t>(m.legs.size())),
+        drives(static_cast<py::ssize_t>(m.drives.size())),
+        coordinates(m.size()),
+        numbers_(new double[at(6 + 3 * 36 + drives + 6 * legs + coordinates)]),
+        open_(new std::uint8_t[at(coordinates)]) {}
 
   BatchOutput output() {
     BatchOutput o;
@@ -52,8 +51,8 @@ class OneAnswer {
     o.compliance = o.stiffness + 36;
     o.free_twists = o.compliance + 36;
     o.effort = o.free_twists + 36;
-    o.leg_wrench = o.effort + drives_;
-    o.coordinates = o.leg_wrench + 6 * legs_;
+    o.leg_wrench = o.effort + drives;
+    o.coordinates = o.leg_wrench + 6 * legs;
     o.indeterminate = open_.get();
     o.status = &status_;
     o.flags = &flags_;
@@ -61,21 +60,9 @@ class OneAnswer {
     return o;
   }
 
-  template <class T>
-  using Get = T* BatchOutput::*;
-
-  /// The array of one member of BatchOutput, sharing the memory of `self`.
-  template <class T>
-  static py::array_t<T> view(const py::object& self, Get<T> member, Shape shape) {
-    return py::array_t<T>(std::move(shape), self.cast<OneAnswer&>().output().*member, self);
-  }
-
-  py::ssize_t legs() const { return legs_; }
-  py::ssize_t drives() const { return drives_; }
-  py::ssize_t coordinates() const { return coordinates_; }
+  const py::ssize_t legs, drives, coordinates;
 
  private:
-  py::ssize_t legs_, drives_, coordinates_;
   std::unique_ptr<double[]> numbers_;
   std::unique_ptr<std::uint8_t[]> open_;
   std::uint8_t status_ = 0;
@@ -86,15 +73,12 @@ class OneAnswer {
 /// A machine and what every such call on it shares.
 class OneCall {
  public:
-  OneCall(const Mechanism& m, const FastPlan& plan, const Array& rotation, const Array& gravity) : m_(m), plan_(plan) {
-    const double* R = data(rotation, {3, 3}, "rotation");
-    std::copy(R, R + 9, rotation_.begin());
-    const Index tcp = m.point("tcp");
-    const NodePoint& p = m.points[static_cast<std::size_t>(tcp)];
+  OneCall(const Mechanism& m, const FastPlan& plan, const Mat3& rotation, const Vec3& gravity)
+      : m_(m), plan_(plan), rotation_(rotation) {
     shared_.count = 1;
-    shared_.gravity = vec3(gravity, "gravity");
-    shared_.load_points = {{p.node, p.offset, LoadType::dead}};
-    shared_.read_points = {tcp};
+    shared_.gravity = gravity;
+    shared_.read_points = {m.point("tcp")};
+    shared_.load_points = {load_at(m, shared_.read_points.front())};
   }
 
   /// Empty where the call has options that only the general call handles.
@@ -108,21 +92,23 @@ class OneCall {
     in.position = p.data();
     in.rotation = rotation_.data();
     in.wrench = w.data();
-    solve_fast(m_, plan_, in, {}, 1, out->output());
+    solve_batch(m_, &plan_, in, {}, 1, out->output());
     return out;
   }
 
  private:
   const Mechanism& m_;
   const FastPlan& plan_;
-  std::array<double, 9> rotation_;
+  Row3 rotation_;
   BatchInput shared_;
 };
 
+/// The array of one member of BatchOutput, sharing the memory of its answer.
 template <class T>
 void field(py::class_<OneAnswer>& c, const char* name, T* BatchOutput::* member, Shape (*shape)(const OneAnswer&)) {
   c.def_property_readonly(name, [member, shape](const py::object& self) {
-    return OneAnswer::view(self, member, shape(self.cast<const OneAnswer&>()));
+    auto& answer = self.cast<OneAnswer&>();
+    return py::array_t<T>(shape(answer), answer.output().*member, self);
   });
 }
 
@@ -133,22 +119,20 @@ void bind_one(py::module_& m) {
   py::class_<OneAnswer> answer(m, "OneAnswer");
   const auto scalar = [](const OneAnswer&) { return Shape{1}; };
   const auto six = [](const OneAnswer&) { return Shape{1, 6, 6}; };
-  const auto coordinates = [](const OneAnswer& a) { return Shape{1, a.coordinates()}; };
+  const auto coordinates = [](const OneAnswer& a) { return Shape{1, a.coordinates}; };
   field<double>(answer, "displacement", &BatchOutput::displacement, [](const OneAnswer&) { return Shape{1, 1, 6}; });
   field<double>(answer, "stiffness", &BatchOutput::stiffness, six);
   field<double>(answer, "compliance", &BatchOutput::compliance, six);
   field<double>(answer, "free_twists", &BatchOutput::free_twists, six);
-  field<double>(answer, "actuator_effort", &BatchOutput::effort,
-                [](const OneAnswer& a) { return Shape{1, a.drives()}; });
-  field<double>(answer, "leg_wrench", &BatchOutput::leg_wrench,
-                [](const OneAnswer& a) { return Shape{1, a.legs(), 6}; });
+  field<double>(answer, "actuator_effort", &BatchOutput::effort, [](const OneAnswer& a) { return Shape{1, a.drives}; });
+  field<double>(answer, "leg_wrench", &BatchOutput::leg_wrench, [](const OneAnswer& a) { return Shape{1, a.legs, 6}; });
   field<double>(answer, "coordinates", &BatchOutput::coordinates, coordinates);
   field<std::uint8_t>(answer, "indeterminate", &BatchOutput::indeterminate, coordinates);
   field<std::uint8_t>(answer, "status", &BatchOutput::status, scalar);
   field<std::uint32_t>(answer, "flags", &BatchOutput::flags, scalar);
   field<std::int32_t>(answer, "iterations", &BatchOutput::iterations, scalar);
   py::class_<OneCall>(m, "OneCall")
-      .def(py::init<const Mechanism&, const FastPlan&, const Array&, const Array&>(), "mechanism"_a, "plan"_a,
+      .def(py::init<const Mechanism&, const FastPlan&, const Mat3&, const Vec3&>(), "mechanism"_a, "plan"_a,
            "rotation"_a, "gravity"_a, py::keep_alive<1, 2>(), py::keep_alive<1, 3>())
       .def("solve", &OneCall::solve, "position"_a, "wrench"_a);
 }

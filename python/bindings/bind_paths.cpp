@@ -1,39 +1,21 @@
 // SPDX-License-Identifier: MIT
 // Load paths.
-#include <pybind11/stl.h>
-
 #include "arrays.hpp"
-#include "stiffmap/path.hpp"
+#include "stiffmap/solve/path.hpp"
 
 namespace stiffmap::bindings {
 namespace {
 
-py::array_t<double> array(const VecX& v) {
-  py::array_t<double> out(v.size());
-  Eigen::Map<VecX>(out.mutable_data(), v.size()) = v;
-  return out;
-}
+using namespace py::literals;
 
 py::dict as_dict(const PathPoint& p) {
-  py::dict d;
-  d["load"] = p.load;
-  d["along"] = p.along;
-  d["displacement"] = array(p.displacement);
-  d["coordinates"] = array(p.x);
-  d["unstable"] = p.unstable;
-  return d;
+  return py::dict("load"_a = p.load, "along"_a = p.along, "displacement"_a = p.displacement, "coordinates"_a = p.x,
+                  "unstable"_a = p.unstable);
 }
 
 py::dict as_dict(const CriticalPoint& c) {
-  py::dict d;
-  d["load"] = c.load;
-  d["along"] = c.along;
-  d["limit"] = c.limit;
-  d["before"] = c.before;
-  d["after"] = c.after;
-  d["mode"] = array(c.mode);
-  d["coordinates"] = array(c.x);
-  return d;
+  return py::dict("load"_a = c.load, "along"_a = c.along, "limit"_a = c.limit, "before"_a = c.before,
+                  "after"_a = c.after, "mode"_a = c.mode, "coordinates"_a = c.x);
 }
 
 py::tuple as_tuple(const Branch& b) {
@@ -44,22 +26,21 @@ py::tuple as_tuple(const Branch& b) {
 }
 
 /// One path of equilibria, and the branch that crosses it.
-py::tuple path(const Mechanism& m, const Array& position, const Array& rotation, const Array& direction,
-               const std::string& point, const Array& gravity, int control, double limit, int steps, int cross) {
+py::tuple path(const Mechanism& m, const Vec3& position, const Mat3& rotation, const Vec3& direction,
+               const std::string& point, const Vec3& gravity, int control, double limit, int steps, int cross) {
   PoseInput in;
-  in.commanded = {vec3(position, "position"), mat3(rotation, "rotation")};
-  in.gravity = vec3(gravity, "gravity");
+  in.commanded = {position, rotation};
+  in.gravity = gravity;
   in.read_points = {m.point(point)};
-  const Vec3 d = vec3(direction, "direction");
+  PathOptions o;
+  o.control = static_cast<PathControl>(control);
+  o.limit = limit;
+  o.steps = steps;
+  o.cross = cross;
   PathResult r;
   {
     py::gil_scoped_release free;
-    PathOptions o;
-    o.control = static_cast<PathControl>(control);
-    o.limit = limit;
-    o.steps = steps;
-    o.cross = cross;
-    r = follow_path(m, in, d, o);
+    r = follow_path(m, in, direction, o);
   }
   return py::make_tuple(r.flags, as_tuple(r.path), as_tuple(r.crossing));
 }
@@ -67,7 +48,6 @@ py::tuple path(const Mechanism& m, const Array& position, const Array& rotation,
 }  // namespace
 
 void bind_paths(py::module_& m) {
-  using namespace py::literals;
   m.def("path", &path, "mechanism"_a, "position"_a, "rotation"_a, "direction"_a, "point"_a, "gravity"_a, "control"_a,
         "limit"_a, "steps"_a, "cross"_a);
 }

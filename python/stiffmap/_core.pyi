@@ -66,7 +66,7 @@ class ExternalSpring:
     def __init__(self, name: str, point: str, anchor: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], stiffness: typing.SupportsFloat | typing.SupportsIndex, length: typing.SupportsFloat | typing.SupportsIndex, tension_only: bool, winch: stiffmap._core.Winch | None = None) -> None:
         ...
 class FastPlan:
-    def __init__(self, mechanism: Mechanism, low: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], high: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], grid_nodes: typing.SupportsInt | typing.SupportsIndex = 8) -> None:
+    def __init__(self, mechanism: Mechanism, low: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], high: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], grid_nodes: typing.SupportsInt | typing.SupportsIndex = 8) -> None:
         ...
     @property
     def available(self) -> bool:
@@ -82,27 +82,27 @@ class Law:
 class Mechanism:
     def __init__(self, root: Chain, home: Pose, springs: collections.abc.Sequence[ExternalSpring], task: typing.Annotated[collections.abc.Sequence[bool], "FixedSize(6)"] = [True, True, True, True, True, True], search: bool = False, like: Mechanism = None) -> None:
         ...
-    def clamp(self, position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], rotation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], displacement: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], point: str, gravity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], threads: typing.SupportsInt | typing.SupportsIndex) -> dict[str, typing.Any]:
+    def clamp(self, position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None, rotation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None, displacement: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None, point: str, gravity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], threads: typing.SupportsInt | typing.SupportsIndex) -> dict[str, typing.Any]:
         ...
-    def closure(self, plan: FastPlan, given: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], rotation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], inverse: bool, threads: typing.SupportsInt | typing.SupportsIndex, start: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None) -> dict[str, typing.Any]:
+    def closure(self, plan: FastPlan, given: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None, rotation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None, start: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None, threads: typing.SupportsInt | typing.SupportsIndex) -> dict[str, typing.Any]:
         ...
-    def dynamics(self, inertias: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], coordinates: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], twist: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], twist_rate: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], wrench: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], gravity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], rates: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], accelerations: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], weights: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], threads: typing.SupportsInt | typing.SupportsIndex) -> dict[str, typing.Any]:
+    def dynamics(self, inertias: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"]], coordinates: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None, twist: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None, twist_rate: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None, wrench: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None, gravity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], rates: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None, accelerations: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None, weights: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], threads: typing.SupportsInt | typing.SupportsIndex) -> dict[str, typing.Any]:
         ...
-    def enclose(self, centre: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], half: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], axes: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], rotation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], start: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], slopes: typing.SupportsInt | typing.SupportsIndex, watched: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], threads: typing.SupportsInt | typing.SupportsIndex) -> dict[str, typing.Any]:
+    def enclose(self, centre: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None, half: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None, axes: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"], rotation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"], start: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None, slopes: typing.SupportsInt | typing.SupportsIndex, watched: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], threads: typing.SupportsInt | typing.SupportsIndex) -> dict[str, typing.Any]:
         ...
-    def frames(self, coordinates: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> dict[str, typing.Any]:
+    def frames(self, coordinates: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> dict[str, typing.Any]:
         ...
-    def home_coordinates(self) -> numpy.typing.NDArray[numpy.float64]:
+    def home_coordinates(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
         ...
-    def kinematics(self, position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], rotation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], start: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], weights: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], patient: bool, only: bool, threads: typing.SupportsInt | typing.SupportsIndex) -> dict[str, typing.Any]:
+    def kinematics(self, position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None, rotation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None, start: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None, weights: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], patient: bool, only: bool, threads: typing.SupportsInt | typing.SupportsIndex) -> dict[str, typing.Any]:
         ...
-    def modes(self, inertias: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], viscous: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], loss: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], rotation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], wrench: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], gravity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], closed: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], point: str, count: typing.SupportsInt | typing.SupportsIndex, whole: bool, threads: typing.SupportsInt | typing.SupportsIndex) -> dict[str, typing.Any]:
+    def modes(self, inertias: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"]], viscous: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], loss: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None, rotation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None, wrench: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None, gravity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], closed: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None, point: str, count: typing.SupportsInt | typing.SupportsIndex, whole: bool, threads: typing.SupportsInt | typing.SupportsIndex) -> dict[str, typing.Any]:
         ...
-    def point_positions(self, point: str, coordinates: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> dict[str, typing.Any]:
+    def point_positions(self, point: str, coordinates: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None) -> dict[str, typing.Any]:
         ...
-    def reactions(self, position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], rotation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], wrench: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], point: str, gravity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], threads: typing.SupportsInt | typing.SupportsIndex) -> dict[str, typing.Any]:
+    def reactions(self, position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None, rotation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None, wrench: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None, point: str, gravity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], threads: typing.SupportsInt | typing.SupportsIndex) -> dict[str, typing.Any]:
         ...
-    def solve(self, plan: FastPlan, position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], rotation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], wrench: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], load_points: collections.abc.Sequence[str], load_types: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], read_points: collections.abc.Sequence[str], gravity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], load_steps: typing.SupportsInt | typing.SupportsIndex, threads: typing.SupportsInt | typing.SupportsIndex, full: bool, variants: collections.abc.Sequence[FastPlan] = [], closed: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None) -> Answer:
+    def solve(self, plan: FastPlan, position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None, rotation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None, wrench: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None, load_points: collections.abc.Sequence[str], load_types: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], read_points: collections.abc.Sequence[str], gravity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], load_steps: typing.SupportsInt | typing.SupportsIndex, threads: typing.SupportsInt | typing.SupportsIndex, full: bool, variants: collections.abc.Sequence[FastPlan], closed: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None) -> Answer:
         ...
     @property
     def actuators(self) -> list[tuple[str, int]]:
@@ -153,7 +153,7 @@ class Mechanism:
     def springs(self) -> list[tuple[str, int]]:
         ...
     @property
-    def spun_balls(self) -> list[tuple[int, typing.Annotated[list[float], "FixedSize(9)"], typing.Annotated[list[float], "FixedSize(9)"]]]:
+    def spun_balls(self) -> list[tuple[int, typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"], typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"]]]:
         ...
     @property
     def stiffness(self) -> float:
@@ -193,7 +193,7 @@ class OneAnswer:
     def stiffness(self) -> numpy.typing.NDArray[numpy.float64]:
         ...
 class OneCall:
-    def __init__(self, mechanism: Mechanism, plan: FastPlan, rotation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], gravity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
+    def __init__(self, mechanism: Mechanism, plan: FastPlan, rotation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"], gravity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
         ...
     def solve(self, position: typing.Any, wrench: typing.Any) -> OneAnswer:
         ...
@@ -212,8 +212,8 @@ def kernel_level() -> str:
     ...
 def kernel_levels() -> list[str]:
     ...
-def multipliers(frequency: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], ratio: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], mass: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], way: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], rest: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], chips: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], period: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], depth: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], threads: typing.SupportsInt | typing.SupportsIndex) -> dict[str, typing.Any]:
+def multipliers(frequency: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], ratio: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], mass: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], way: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"], rest: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"], chips: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 2]"]], period: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], depth: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], threads: typing.SupportsInt | typing.SupportsIndex) -> dict[str, typing.Any]:
     ...
-def path(mechanism: Mechanism, position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], rotation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], direction: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], point: str, gravity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], control: typing.SupportsInt | typing.SupportsIndex, limit: typing.SupportsFloat | typing.SupportsIndex, steps: typing.SupportsInt | typing.SupportsIndex, cross: typing.SupportsInt | typing.SupportsIndex) -> tuple:
+def path(mechanism: Mechanism, position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], rotation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"], direction: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], point: str, gravity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], control: typing.SupportsInt | typing.SupportsIndex, limit: typing.SupportsFloat | typing.SupportsIndex, steps: typing.SupportsInt | typing.SupportsIndex, cross: typing.SupportsInt | typing.SupportsIndex) -> tuple:
     ...
 DRIVE_NUMBERS: tuple = ('compliance_slope', 'force_limit')

@@ -2,7 +2,7 @@
 // The links of test and benchmark machines.
 #pragma once
 
-#include "stiffmap/types.hpp"
+#include "stiffmap/algebra/types.hpp"
 
 namespace stiffmap::test {
 

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "beam.hpp"
-#include "stiffmap/assemble.hpp"
-#include "stiffmap/solve.hpp"
+#include "stiffmap/solve/assemble.hpp"
+#include "stiffmap/solve/solve.hpp"
 
 namespace stiffmap::test {
 

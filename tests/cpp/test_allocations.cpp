@@ -8,7 +8,7 @@
 
 #include "../../cpp/kernels/dispatch.hpp"
 #include "machines.hpp"
-#include "stiffmap/batch.hpp"
+#include "stiffmap/solve/batch.hpp"
 
 #if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 namespace {
@@ -85,7 +85,7 @@ struct Batch {
     out.displacement = displacement.data();
     out.stiffness = stiffness.data();
     out.status = status.data();
-    const auto solve = [&] { solve_fast(machine, plan, in, {}, 1, out); };
+    const auto solve = [&] { solve_batch(machine, &plan, in, {}, 1, out); };
     solve();
     return counted(solve);
   }

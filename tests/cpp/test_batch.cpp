@@ -9,8 +9,8 @@
 
 #include "machines.hpp"
 #include "numeric.hpp"
-#include "stiffmap/batch.hpp"
-#include "stiffmap/parallel.hpp"
+#include "stiffmap/common/parallel.hpp"
+#include "stiffmap/solve/batch.hpp"
 
 using namespace stiffmap;
 using namespace stiffmap::test;
@@ -46,8 +46,7 @@ Answer run(const Mechanism& m, const std::vector<double>& position, int threads,
   out.effort = a.effort.data();
   out.leg_wrench = a.leg_wrench.data();
   out.status = a.status.data();
-  if (plan) solve_fast(m, *plan, in, {}, threads, out);
-  else solve_reference(m, in, {}, threads, out);
+  solve_batch(m, plan, in, {}, threads, out);
   return a;
 }
 

@@ -6,7 +6,7 @@
 
 #include "machines.hpp"
 #include "numeric.hpp"
-#include "stiffmap/charts.hpp"
+#include "stiffmap/kinematics/charts.hpp"
 
 using namespace stiffmap;
 using namespace stiffmap::test;

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "numeric.hpp"
-#include "stiffmap/law.hpp"
+#include "stiffmap/model/law.hpp"
 
 using namespace stiffmap;
 

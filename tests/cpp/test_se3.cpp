@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "numeric.hpp"
-#include "stiffmap/se3.hpp"
+#include "stiffmap/algebra/se3.hpp"
 
 using namespace stiffmap;
 using test::central_difference;

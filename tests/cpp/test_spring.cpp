@@ -7,7 +7,7 @@
 #include "beam.hpp"
 #include "messages.hpp"
 #include "numeric.hpp"
-#include "stiffmap/spring.hpp"
+#include "stiffmap/model/spring.hpp"
 
 using namespace stiffmap;
 using test::contains;

@@ -3,8 +3,8 @@
 
 #include <algorithm>
 
-#include "stiffmap/dense.hpp"
-#include "stiffmap/whole_branches.hpp"
+#include "stiffmap/algebra/dense.hpp"
+#include "stiffmap/model/whole_branches.hpp"
 
 namespace stiffmap {
 namespace {

@@ -4,9 +4,9 @@
 #include <cmath>
 
 #include "closure.hpp"
-#include "stiffmap/closure.hpp"
-#include "stiffmap/parallel.hpp"
-#include "stiffmap/pose_closer.hpp"
+#include "stiffmap/closure/closure.hpp"
+#include "stiffmap/closure/pose_closer.hpp"
+#include "stiffmap/common/parallel.hpp"
 
 namespace stiffmap {
 namespace {

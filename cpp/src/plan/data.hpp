@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "../../kernels/program.hpp"
-#include "stiffmap/mechanism.hpp"
+#include "stiffmap/model/mechanism.hpp"
 
 namespace stiffmap {
 

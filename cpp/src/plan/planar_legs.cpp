@@ -15,8 +15,8 @@ using Complex = std::complex<double>;
 constexpr double parallel = 1e-12;
 constexpr double shortest = 1e-3;  // arms relative to the mechanism's length, sine of the bend at home
 
-void put(const Vec3& v, double (&out)[3]) { Eigen::Map<Vec3>(static_cast<double*>(out)) = v; }
-void put(Complex z, double (&out)[2]) {
+void write(const Vec3& v, double (&out)[3]) { Eigen::Map<Vec3>(static_cast<double*>(out)) = v; }
+void write(Complex z, double (&out)[2]) {
   out[0] = z.real();
   out[1] = z.imag();
 }
@@ -39,14 +39,14 @@ std::optional<PlanarLeg> planar(const Mechanism& m, const HomeLeg& leg) {
   const Complex bend = std::conj(a) * b / (std::abs(a) * std::abs(b));
   if (std::abs(bend.imag()) < shortest) return std::nullopt;
   PlanarLeg out{};
-  put(u, out.u);
-  put(v, out.v);
-  put(w, out.w);
-  put(turning[0].point, out.first);
-  put(leg.end.R.transpose() * (turning[2].point - leg.end.p), out.third);
-  put(leg.end.R.transpose() * u, out.heading);
-  put(a, out.a);
-  put(b * std::conj(bend), out.b);
+  write(u, out.u);
+  write(v, out.v);
+  write(w, out.w);
+  write(turning[0].point, out.first);
+  write(leg.end.R.transpose() * (turning[2].point - leg.end.p), out.third);
+  write(leg.end.R.transpose() * u, out.heading);
+  write(a, out.a);
+  write(b * std::conj(bend), out.b);
   out.sum = std::norm(a) + std::norm(b);
   out.inverse = 0.5 / (std::abs(a) * std::abs(b));
   out.branch = bend.imag() > 0 ? 1 : -1;

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "data.hpp"
-#include "stiffmap/spins.hpp"
+#include "stiffmap/equilibrium/spins.hpp"
 
 namespace stiffmap {
 

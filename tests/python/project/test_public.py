@@ -79,7 +79,7 @@ def enum_of(header: str, name: str) -> dict[str, int]:
 def test_values_agree_with_the_core() -> None:
     """What Python names by position is what the headers say."""
     folder = ROOT / "cpp/include/stiffmap"
-    text = {p.stem: p.read_text(encoding="utf-8") for p in folder.glob("*.hpp")}
+    text = {p.stem: p.read_text(encoding="utf-8") for p in folder.rglob("*.hpp")}
     from stiffmap.solve.compiled import Role
     from stiffmap.solve.compiled.machine import LOAD_TYPES, PATH_CONTROLS
     from stiffmap.workspace.maps.sweep_line import ENDS

@@ -101,12 +101,7 @@ def defined(path: Path) -> set[str]:
 
 def headers(path: Path) -> set[str]:
     """Names of the headers that a C++ file includes, directly or through others."""
-    folders = (
-        ROOT / "cpp/include/stiffmap",
-        ROOT / "cpp/src",
-        ROOT / "cpp/src/plan",
-        ROOT / "python/bindings",
-    )
+    there = [p for top in ("cpp/include", "cpp/src", "python/bindings") for p in (ROOT / top).rglob("*.hpp")]
     found: set[str] = set()
     new = [path]
     while new:
@@ -114,7 +109,7 @@ def headers(path: Path) -> set[str]:
             set(re.findall(r'#include "(?:\S*/)?(\w+\.hpp)"', new.pop().read_text(encoding="utf-8"))) - found
         )
         found |= names
-        new += [p for name in names for folder in folders if (p := folder / name).is_file()]
+        new += [p for p in there if p.name in names]
     return found
 
 

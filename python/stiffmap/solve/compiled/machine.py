@@ -58,8 +58,8 @@ class CompiledMachine:
         axes (rows) in the frame behind it, where the coordinates are zero. Counted from the axes of `charted`."""
         return {
             self.names.coordinates[first].rpartition(".")[0]: (
-                np.array(turn).reshape(3, 3),
-                np.array(axes).reshape(3, 3).T,
+                np.ascontiguousarray(turn),
+                np.ascontiguousarray(axes).T,
             )
             for first, turn, axes in self._mechanism.spun_balls
         }
@@ -160,14 +160,13 @@ class CompiledMachine:
 
         start: (n, coordinates) on the assembly branch that is meant; None: that of home.
         """
-        return tuple(self._mechanism.closure(self._plan, position, rotation, True, threads, start).values())
+        return tuple(self._mechanism.closure(self._plan, position, rotation, start, threads).values())
 
     def close_actuators(
         self, actuators: Floats, threads: int, start: Floats | None = None
     ) -> tuple[Any, ...]:
         """The same of (n, actuators) actuator coordinates, continued from home or from `start`."""
-        none = np.zeros((0, 3, 3))
-        found = self._mechanism.closure(None, actuators, none, False, threads, start)  # type: ignore[arg-type]
+        found = self._mechanism.closure(None, actuators, None, start, threads)  # type: ignore[arg-type]
         return tuple(found.values())
 
     def point_positions(self, point: str, coordinates: Floats) -> Floats:
@@ -250,12 +249,7 @@ class CompiledMachine:
         start: (n, coordinates) near the answer, NaN where none is known. Not patient: a pose that straight
         continuation from home does not reach is out of reach. Only: so is one that its start does not lead to.
         """
-        begin = self._rows(start)
-        return self._mechanism.kinematics(position, rotation, begin, weights, patient, only, threads)
-
-    def _rows(self, known: Floats | None) -> Floats:
-        """Coordinates (n, coordinates) as the core takes them; None: no rows."""
-        return np.zeros((0, len(self.names.coordinates))) if known is None else known
+        return self._mechanism.kinematics(position, rotation, start, weights, patient, only, threads)
 
     @property
     def not_enclosed(self) -> str:
@@ -279,8 +273,7 @@ class CompiledMachine:
         start: (n, coordinates) near those of the centres, NaN where none is known. slopes: 3 columns
         (translations) or 6 (twists) of the coordinates' slopes. watched: frames whose motion is bounded.
         """
-        columns, begin = np.ascontiguousarray(axes), self._rows(start)
-        return self._mechanism.enclose(centre, half, columns, rotation, begin, slopes, list(watched), threads)
+        return self._mechanism.enclose(centre, half, axes, rotation, start, slopes, list(watched), threads)
 
     def dynamics(
         self,
@@ -301,8 +294,8 @@ class CompiledMachine:
         rates, accelerations: (n, drives) where the tcp's motion leaves some open; (0, drives): it decides them.
         """
         return self._mechanism.dynamics(
-            inertias, coordinates, twist, twist_rate, wrench, gravity, rates, accelerations, weights, threads
-        )
+            list(inertias), coordinates, twist, twist_rate, wrench, gravity, rates, accelerations, weights, threads,
+        )  # fmt: skip
 
     @property
     def redundancy(self) -> int:
@@ -332,8 +325,8 @@ class CompiledMachine:
         """
         none = np.zeros(len(self.names.coordinates))
         return self._mechanism.modes(
-            inertias, none if viscous is None else viscous, none if loss is None else loss, position, rotation, wrench,
-            gravity, self._rows(closed), point, count, whole, threads,
+            list(inertias), none if viscous is None else viscous, none if loss is None else loss, position, rotation, wrench,
+            gravity, closed, point, count, whole, threads,
         )  # fmt: skip
 
     def frames(self, coordinates: Floats) -> tuple[Floats, Floats]:
@@ -369,5 +362,5 @@ def multipliers(
     (modes,) rad/s, ratio, kg and (modes, 3) unit vectors; (3, 3) m/N that follows at once; (intervals, 3, 2) N/m² means of the
     chip's force; (periods,) s; (depths,) m.
     """
-    found = _core.multipliers(frequency, ratio, mass, way, rest, chips, period, depth, threads)
+    found = _core.multipliers(frequency, ratio, mass, way, rest, list(chips), period, depth, threads)
     return np.asarray(found["multipliers"])

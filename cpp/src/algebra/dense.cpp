@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: MIT
+#include "stiffmap/algebra/dense.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/SVD>
+
+namespace stiffmap {
+
+void Lu::compute(const MatX& A) { lu_.compute(A); }
+void Lu::solve(const VecX& b, VecX& x) const { x.noalias() = lu_.solve(b); }
+void Lu::solve(const MatX& B, MatX& X) const { X.noalias() = lu_.solve(B); }
+int Lu::exchanges() const { return static_cast<int>(lu_.permutationP().determinant()); }
+
+void Orthogonal::compute(const MatX& A, double threshold) {
+  cod_.setThreshold(threshold);
+  cod_.compute(A);
+}
+void Orthogonal::solve(const VecX& b, VecX& x) const { x = cod_.solve(b); }
+void Orthogonal::solve(const MatX& B, MatX& X) const { X = cod_.solve(B); }
+
+Singular singular_vectors(const MatX& A) {
+  const Eigen::JacobiSVD<MatX> svd(A, Eigen::ComputeFullV);  // BDCSVD is for larger ones, 20 s more to compile
+  return {svd.singularValues(), svd.matrixV()};
+}
+
+MatX Orthogonal::null_vectors() const {
+  return cod_.colsPermutation() * cod_.matrixZ().transpose().rightCols(cod_.cols() - cod_.rank());
+}
+
+Index rank_of(const MatX& A, double threshold) {
+  Eigen::ColPivHouseholderQR<MatX> qr(A);
+  qr.setThreshold(threshold);
+  return qr.rank();
+}
+
+MatX left_null_vectors(const MatX& A, double threshold) {
+  Eigen::ColPivHouseholderQR<MatX> qr;
+  qr.setThreshold(threshold);
+  qr.compute(A);
+  const MatX Q = qr.householderQ();
+  return Q.rightCols(A.rows() - qr.rank());
+}
+
+Singular6 singular_vectors(const Mat6& A) {
+  const Eigen::JacobiSVD<Mat6> svd(A, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  return {svd.singularValues(), svd.matrixV()};
+}
+
+Mat6 inverse(const Mat6& A) { return A.partialPivLu().inverse(); }
+
+Eigen6 symmetric_eigen(const Mat6& A) {
+  const Eigen::SelfAdjointEigenSolver<Mat6> eigen(A);
+  return {eigen.eigenvalues(), eigen.eigenvectors()};
+}
+
+EigenX symmetric_eigen(const MatX& A) {
+  const Eigen::SelfAdjointEigenSolver<MatX> eigen(A);
+  return {eigen.eigenvalues(), eigen.eigenvectors()};
+}
+
+ComplexEigen general_eigen(const MatX& A) {
+  const Eigen::EigenSolver<MatX> eigen(A);
+  return {eigen.eigenvalues(), eigen.eigenvectors()};
+}
+
+bool cholesky(MatX& A) {
+  const Eigen::LLT<Eigen::Ref<MatX>> llt(A);
+  return llt.info() == Eigen::Success;
+}
+
+bool Cholesky::compute(const MatX& A) {
+  llt_.compute(A);
+  return llt_.info() == Eigen::Success;
+}
+void Cholesky::solve(const VecX& b, VecX& x) const { x = llt_.solve(b); }
+void Cholesky::solve(const MatX& B, MatX& X) const { X = llt_.solve(B); }
+void Cholesky::solve_lower(MatX& B) const { llt_.matrixL().solveInPlace(B); }
+void Cholesky::solve_upper(MatX& B) const { llt_.matrixU().solveInPlace(B); }
+
+}  // namespace stiffmap
