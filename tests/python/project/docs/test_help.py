@@ -25,7 +25,6 @@ SHIPPED = ROOT / "python/stiffmap"
 SERVO = ROOT / "tests/data/experiments/A-servo"
 MADE_SMALLER = {  # the last word counts
     "optimize my_design": ("--generations", "1", "--processes", "1"),
-    "diagnose ur10": ("--budget", "4"),
     "lobes": ("--points", "4,3"),
     "paper": ("--points", "5"),
     **{
