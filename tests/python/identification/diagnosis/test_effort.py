@@ -92,8 +92,10 @@ def test_ctrl_c_at_any_step_gives_the_best_so_far(when: str) -> None:
 
 
 @pytest.mark.usefixtures("interruptible")
-@pytest.mark.parametrize("quantity", ["deflection", "position"])
-@pytest.mark.parametrize("when", ["sensitivities: compliance", "sensitivities: tilt"])
+@pytest.mark.parametrize(
+    ("quantity", "when"),
+    [("deflection", "sensitivities: compliance"), ("position", "sensitivities: tilt")],
+)
 def test_ctrl_c_among_the_sensitivities_says_which_are_missing(quantity: str, when: str) -> None:
     machine = sm.load_machine("orthoglide-revised")
     plan = random_plan(machine, quantity, poses=6, loads=4, repeats=2, seed=len(when))

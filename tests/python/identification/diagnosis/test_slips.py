@@ -102,7 +102,7 @@ CASES: dict[str, tuple[Change, str, str]] = {
 }
 FAST, SLOW = (
     ("orthoglide-revised", "five-bar"),
-    ("rotary-delta", "linear-delta", "ur10", "swing-table", "3-rps"),
+    ("linear-delta", "ur10", "swing-table", "3-rps"),
 )
 
 
@@ -115,9 +115,14 @@ def named(name: str, case: str, soft: bool = False) -> None:
 
 
 @pytest.mark.parametrize("case", CASES)
-@pytest.mark.parametrize("name", FAST)
-def test_each_mistake_is_named(name: str, case: str) -> None:
-    named(name, case)
+def test_each_mistake_is_named(case: str) -> None:
+    named("orthoglide-revised", case)
+
+
+@pytest.mark.parametrize("case", ["sign of y", "µm as mm", "forces swapped", "one row up"])
+def test_mistakes_on_a_planar_machine_are_named(case: str) -> None:
+    """One of each kind; a plane has no third direction to confuse."""
+    named("five-bar", case)
 
 
 @pytest.mark.parametrize("name", SLOW)

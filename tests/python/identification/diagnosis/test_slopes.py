@@ -80,7 +80,7 @@ HOLD_SPINS = ("linear-delta", "rotary-delta", "hexapod")
 @pytest.mark.parametrize(
     ("name", "gravity"),
     [
-        *((name, None) for name in (*HOLD_SPINS, "orthoglide-revised", "ur10")),
+        *((name, None) for name in ("linear-delta", "hexapod", "orthoglide-revised", "ur10")),
         ("orthoglide-revised", DOWN),
         ("ur10", DOWN),
     ],

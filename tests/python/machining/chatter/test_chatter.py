@@ -294,8 +294,7 @@ def test_a_coated_tool_has_no_lobes():
 
 
 @pytest.mark.parametrize("name", ["ur10", "linear-delta", "orthoglide-revised", "hexapod"])
-@pytest.mark.parametrize("count", [60, 200, 400])
-def test_limiting_depth_is_no_deeper_than_any_sample(name, count):
+def test_limiting_depth_is_no_deeper_than_any_sample(name):
     """A coarse receptance answers as a dense one: the least limit is found between the samples."""
     machine = sm.load_machine(name)
     own = sm.natural_frequencies(machine, machine.description.home.p, modes=6).frequency
@@ -305,9 +304,10 @@ def test_limiting_depth_is_no_deeper_than_any_sample(name, count):
     axes = cut_axes(np.array([1.0, 0, 0]), np.array([0, 0, 1.0]))
     dense = axes @ sm.frequency_response(machine, at, f).values[:, :3, :3] @ axes.T
     least = limits(dense, milling_process("slot"))[0].min()
-    coarse = sm.frequency_response(machine, at, np.linspace(f[0], f[-1], count))
-    found = sm.limiting_depth(coarse, "slot")
-    assert 0.997 * least < found <= least * (1 + 1e-5)
+    for count in (60, 200, 400):
+        coarse = sm.frequency_response(machine, at, np.linspace(f[0], f[-1], count))
+        found = sm.limiting_depth(coarse, "slot")
+        assert 0.997 * least < found <= least * (1 + 1e-5), count
     modes = modes_of_machine(tip_modes(machine, at)).turned(axes)
     assert sm.limiting_depth(modes, "slot") <= least * (1 + 1e-5)
     ds = sm.vibration_map(machine, np.array([at]), "slot")

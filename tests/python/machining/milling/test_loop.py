@@ -68,7 +68,7 @@ def test_friction_stays_on_the_side_of_the_travel() -> None:
 def test_from_readings_to_the_part_with_play(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Loads up and down find the play of a drive; the program of the diagnosed machine takes it up."""
     readings, result, true = str(tmp_path / "readings"), tmp_path / "result", tmp_path / "true.yaml"
-    plan = ["--branches", "--loads", "full", "--poses", "8"]
+    plan = ["--branches", "--loads", "full", "--poses", "5"]
     effect = ["--effect", "dead_zone actuator y half_width=60um"]
     assert main(["simulate", "orthoglide-revised", *effect, *plan, "-o", readings]) == 0
     main(["diagnose", "orthoglide-revised", readings, "-o", str(result)])

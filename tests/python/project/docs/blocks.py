@@ -7,9 +7,13 @@ import shlex
 import subprocess
 import sys
 import textwrap
+from contextlib import chdir, redirect_stderr, redirect_stdout
 from dataclasses import dataclass
+from io import StringIO
 from pathlib import Path
 from typing import Any
+
+from stiffmap.ui.cli import main
 
 FENCE = re.compile(r"^([ >]*)```(\w*)\n(.*?)^\1```", re.DOTALL | re.MULTILINE)
 SHELL = ("sh", "bash", "console", "")
@@ -72,6 +76,15 @@ class Reader:
 
     def run(self, command: str) -> None:
         """One command line; a judgement (exit code 1) is an answer, a bad command (2) or a traceback is not."""
+        words = shlex.split(command, comments=True)
+        if words[0] == "stiffmap":
+            said = StringIO()
+            with chdir(self.folder), redirect_stdout(StringIO()), redirect_stderr(said):
+                code = main(words[1:])
+            assert code in (0, 1) and "Traceback" not in said.getvalue(), (
+                f"{command}\n{said.getvalue()[-2000:]}"
+            )
+            return
         bin_folder = shlex.quote(str(Path(sys.executable).parent))
         done = subprocess.run(
             ["bash", "-c", f"export PATH={bin_folder}:$PATH MPLBACKEND=Agg\n{command}"],

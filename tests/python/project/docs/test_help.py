@@ -24,13 +24,21 @@ ROOT = Path(__file__).parents[4]
 SHIPPED = ROOT / "python/stiffmap"
 SERVO = ROOT / "tests/data/experiments/A-servo"
 MADE_SMALLER = {  # the last word counts
-    "optimize my_design": ("--generations", "1"),
+    "optimize my_design": ("--generations", "1", "--processes", "1"),
     "lobes": ("--points", "4,3"),
     "paper": ("--points", "5"),
+    **{
+        f"map orthoglide-revised --{more}": ("--points", "5", "--no-pictures")
+        for more in ("force", "gravity", "points")
+    },
     "map orthoglide": ("--points", "5"),
     "map my_machine": ("--points", "5", "--no-pictures"),
     "map tripteron": ("--points", "5", "--no-pictures"),
     "bench": ("--rounds", "1"),
+    "measures orthoglide-revised --requirements": (
+        *("--nodes", "3", "--coarse", "3"),
+        *("--only", "velocity,force,deflection,transmission_min,transmission_max"),
+    ),
     "measures": ("--nodes", "3", "--coarse", "3"),
     "link bar": ("--quick", "--size", "6"),
     "link bracket": ("--quick",),
@@ -135,6 +143,8 @@ def make_workshop(at: Path) -> Path:
         "search: {method: nsga2, population: 4, generations: 1, seed: 1, nodes: 3}",
         design,
     )
+    design = design.replace("objectives: [mass, footprint]", "objectives: [mass]")
+    design = design.replace("beside: [orthoglide-revised]\n", "")
     shutil.copy(SHIPPED / "workspace/design/trimmer.yaml", at)
     (at / "my_design.yaml").write_text(design, encoding="utf-8")
     return at
@@ -174,6 +184,12 @@ def _workbook(path: Path) -> None:
     book.save(path)
 
 
+def diagnosed(experiment: Path, folder: Path) -> None:
+    """A diagnosis as `stiffmap diagnose` leaves it, without its pictures."""
+    found = sm.diagnose("orthoglide-revised", experiment, cross_validate=False)
+    (folder / "diagnosis.json").write_text(found.to_json(), encoding="utf-8")
+
+
 @pytest.mark.parametrize("name", [c.name for c in COMMANDS])
 def test_examples_run(
     name: str, workshop: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
@@ -183,14 +199,15 @@ def test_examples_run(
     if name == "compensate":  # goes on from a map, which the examples of `map` replace
         main(["map", "orthoglide-revised", "--points", "5", "-o", str(workshop / "results")])
     if name == "monitor":  # goes on from a diagnosis
-        main(["diagnose", "orthoglide-revised", str(workshop / "january"), "-o", str(workshop / "found")])
-        shutil.copy(workshop / "found/diagnosis.json", workshop / "january")
+        diagnosed(workshop / "january", workshop / "january")
+    if name == "bench":
+        for size in ("GRID", "REFERENCE_GRID", "MANY"):
+            monkeypatch.setattr(f"stiffmap.ui.cli.bench.{size}", 3)
     if name == "view":  # serves until it is interrupted
         opening = pytest.importorskip("stiffmap.ui.view.open", reason="needs the extra [view]")
         monkeypatch.setattr(opening.View, "wait", opening.View.close)
         monkeypatch.setattr("webbrowser.open", lambda *_: True)
-        servo = str(workshop / "experiments/servo")
-        main(["diagnose", "orthoglide-revised", servo, "-o", str(workshop / "result")])
+        diagnosed(workshop / "experiments/servo", workshop / "result")
     (workshop / name).mkdir(exist_ok=True)
     monkeypatch.chdir(workshop / name if name == "new" else workshop)
     command = next(c for c in COMMANDS if c.name == name)

@@ -17,7 +17,6 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[4]
-BACKLASH = shlex.quote(str(ROOT / "tests/data/experiments/C-backlash"))
 KR210, TAPS = (shlex.quote(str(ROOT / "examples/taps" / n)) for n in ("kr210.yaml", "taps.csv"))
 DESIGN = """
 name: small
@@ -32,9 +31,9 @@ COMMANDS = {
     "map": "map orthoglide-revised --points 3 --z 0 -o out",
     "mill": "mill orthoglide-revised circle --size 20 --process trimming --at 50,50,0 --step 20 -o out",
     "sweep": "sweep orthoglide-revised --at 0,0,0 --direction 1,0,0 --to 300 --points 3 -o out",
-    "diagnose": f"diagnose orthoglide-revised {BACKLASH} --budget 1 -o out",
-    "calibrate": f"calibrate orthoglide-revised {BACKLASH} -o out",
-    "optimize": "optimize small.yaml -o out",
+    "diagnose": "diagnose five-bar measured --budget 1 -o out",
+    "calibrate": "calibrate five-bar measured -o out",
+    "optimize": "optimize small.yaml --processes 1 -o out",
     "plan": "plan orthoglide-revised --identify 'compliance actuator x scale=1' --rows 4 -o out.csv",
     "link": "link bar.yaml --size 15 --out out.yaml",
     "taps": f"taps {KR210} {TAPS} --only compliance -o out",
@@ -109,11 +108,12 @@ def _lines(path: Path) -> int:
 
 
 def _tried(name: str, folder: Path) -> None:
-    import matplotlib.pyplot  # noqa: F401 - here once, not in each process
+    import distributed  # noqa: F401 - here once, not in each process
     import scipy.optimize
     import scipy.stats  # noqa: F401
 
     import stiffmap.ui.cli.app as app
+    import stiffmap.ui.plot  # noqa: F401
 
     app.load(next(c for c in app.COMMANDS if c.name == name))
     arguments = shlex.split(COMMANDS[name])
@@ -121,6 +121,9 @@ def _tried(name: str, folder: Path) -> None:
     os.chdir(folder)
     Path("small.yaml").write_text(DESIGN)
     Path("bar.yaml").write_text(BAR)
+    if name in ("diagnose", "calibrate"):
+        simulate = shlex.split("simulate five-bar --poses 4 -o measured")
+        assert os.waitstatus_to_exitcode(os.waitpid(_started(simulate), 0)[1]) == 0
     given = set(_files())
 
     def run(kill_at: int | None = None) -> int:

@@ -72,7 +72,7 @@ def test_map_table_and_failed_poses(capsys: pytest.CaptureFixture[str], tmp_path
         "map",
         NAME,
         "--points",
-        "3",
+        "2",
         "--force",
         "20000",
         "-o",

@@ -86,10 +86,10 @@ def test_few(seed: int) -> None:
     check(suspension(seed), 15, seed)
 
 
-def test_five_hundred_random_loads() -> None:
+def test_two_hundred_random_loads() -> None:
     """None is left without an answer, all are the minimum that an independent descent finds."""
     for seed in range(5):
-        check(suspension(seed), 100, seed + 10)
+        check(suspension(seed), 40, seed + 10)
 
 
 def test_pulleys_agree() -> None:
