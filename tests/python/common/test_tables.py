@@ -27,6 +27,7 @@ SPELLINGS = {
     "units in the cells": ("x;y;z\n50,5 mm;0 mm;700 mm\n0 mm;-20,25mm;700 mm\n", "utf-8"),
     "units behind a word": ("x in mm;y, mm;z / mm\n50.5;0;700\n0;-20.25;700\n", "utf-8"),
     "lines above, and names of rows": ("Points of 12 March\n\nNr;Pos X [mm];Pos Y [mm];TCP Z [mm]\nP1;50,5;0;700\nP2;0;-20,25;700\n", "utf-8"),
+    "a unit over all names": ("Places [mm];;\nx;y;z\n50.5;0;700\n0;-20.25;700\n", "utf-8"),
     "inches and thou": (f"x [thou],y [in],z [inch]\n{50.5 / 0.0254},0,{700 / 25.4}\n0,{-20.25 / 25.4},{700 / 25.4}\n", "utf-8"),
 }  # fmt: skip
 POINTS = [[0.0505, 0.0, 0.7], [0.0, -0.02025, 0.7]]

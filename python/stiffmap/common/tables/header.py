@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Callable, Sequence
-from itertools import pairwise
+from itertools import accumulate, pairwise
 
 from stiffmap.common.errors import FileError
 from stiffmap.common.units import name_and_unit, unit_of
@@ -40,6 +40,9 @@ def header_of(
     names = [*names, *[""] * (len(units) - len(names))]
     if len(lines) > 1 and _needs_group(names, lines[-2][1], first):
         names = _grouped(lines[-2][1], names, known)
+    elif len(lines) > 1:  # Position [mm] over x y z
+        over = accumulate((*lines[-2][1], *[""] * len(names)), lambda one, other: other or one)
+        names = [_with_own_unit(n, split_unit(g)[1]) if n else n for n, g in zip(names, over, strict=False)]
     if units:
         names = [_with_own_unit(n, units[i] if i < len(units) else "") for i, n in enumerate(names)]
     return number, _of_metres(names)

@@ -163,7 +163,7 @@ def read_sheet(path: Path, sheet: str | None = None, layout: Layout = PLAIN) -> 
         if first is not None:
             break
     if first is None and not above:
-        raise FileError("the file is empty", file=str(path))
+        raise FileError(f"the {'sheet' if page else 'file'} is empty", file=str(path))
     found = None if first is None else header_of(above, first[1], layout.known)
     if first is not None and (layout.header or (found is None and layout.numbered)):
         found = first[0], _names(first[1], layout.header, str(path), first[0])

@@ -151,7 +151,7 @@ def test_a_workbook_names_its_sheets_where_none_fits(
 
     assert imported(Ugly(fill), tmp_path)[0] == 2
     err = capsys.readouterr().err
-    assert "none of its 2 sheets fits" in err and "'Cover': no header line" in err and "'March': " in err
+    assert "none of its 2 sheets fits" in err and "'Cover': the sheet is empty" in err and "'March': " in err
 
 
 def answering(monkeypatch: pytest.MonkeyPatch, answers: list[str]) -> list[str]:
