@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable, Sequence
-from itertools import accumulate, pairwise
+from collections.abc import Callable, Iterator, Sequence
+from itertools import pairwise, zip_longest
 
 from stiffmap.common.errors import FileError
 from stiffmap.common.units import name_and_unit, unit_of
@@ -41,8 +41,7 @@ def header_of(
     if len(lines) > 1 and _needs_group(names, lines[-2][1], first):
         names = _grouped(lines[-2][1], names, known)
     elif len(lines) > 1:  # Position [mm] over x y z
-        over = accumulate((*lines[-2][1], *[""] * len(names)), lambda one, other: other or one)
-        names = [_with_own_unit(n, split_unit(g)[1]) if n else n for n, g in zip(names, over, strict=False)]
+        names = [_with_own_unit(n, split_unit(g)[1]) if n else n for n, g in _under(lines[-2][1], names)]
     if units:
         names = [_with_own_unit(n, units[i] if i < len(units) else "") for i, n in enumerate(names)]
     return number, _of_metres(names)
@@ -133,19 +132,24 @@ def _needs_group(names: Sequence[str], group: Sequence[str], first: Sequence[str
 
 def _grouped(group: Sequence[str], names: Sequence[str], known: Callable[[str], bool]) -> list[str]:
     """``Force [N]`` over ``x`` is ``Force x [N]``; a group reaches to the next one, as merged cells do."""
-    out, current = [], ""
+    out = []
     once = Counter(split_unit(n)[0].lower() for n in names)
-    for i in range(max(len(group), len(names))):
-        above = group[i] if i < len(group) else ""
-        name = names[i] if i < len(names) else ""
-        current = above or (current if name else "")
-        title, unit = split_unit(current)
+    for name, over in _under(group, names):
+        title, unit = split_unit(over)
         plain, own = split_unit(name)
         text = " ".join(p for p in (title, plain) if p)
         if once[plain.lower()] == 1 and known(plain) and not known(text):
             text = plain  # Force over Fx
         out.append(with_unit(text, own or unit))
     return out
+
+
+def _under(group: Sequence[str], names: Sequence[str]) -> Iterator[tuple[str, str]]:
+    """Each name with the group over it, which reaches to the next one or to a column without a name."""
+    current = ""
+    for above, name in zip_longest(group, names, fillvalue=""):
+        current = above or (current if name else "")
+        yield name, current
 
 
 def split_unit(header: str) -> tuple[str, str]:

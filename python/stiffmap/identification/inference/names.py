@@ -71,8 +71,8 @@ class Search:
     """ln odds of each named effect against none, all places together, in the order of `best.chosen`."""
     equivalents: tuple[tuple[tuple[Place, float], ...], ...]
     """Per named effect, the places that would do in its stead, with their evidence less that of the best."""
-    instead: tuple[Model | None, ...] = ()
-    """Per named effect, the best model of another world in which it is not."""
+    instead: tuple[tuple[Model, float] | None, ...] = ()
+    """Per named effect, the best model of another world in which it is not, and its ln odds against that."""
     exact: float = -np.inf
     """Evidence without any effect where all declared numbers are as declared."""
     calibrated: Fit | None = None
@@ -91,9 +91,11 @@ def searched(
     searches = [_World(columns, parts.gaps, name, own, predict, over, optima) for name, own in worlds.items()]
     searches.sort(key=lambda w: -w.null.score)
     found: dict[str, Search] = {}
+    price = searches[0].price
     for w in searches:
         found[w.name] = w.search(max((s.best for s in found.values()), key=lambda m: m.score, default=w.null))
-    best = max(found.values(), key=lambda s: s.best.score)
+    # each effect may be at any place, which those without effects need not pay for
+    best = max(found.values(), key=lambda s: s.best.score - price * len(s.best.chosen))
     others = [w for w in searches if w.name != best.best.world]
     own = next(w for w in searches if w.name == best.best.world)
     best = replace(best, best=own.coarsest(best.best))
@@ -117,13 +119,21 @@ def put_instead(fit: Fit, c: Chosen, place: Place) -> Chosen:
     return bare.by_posterior(found)
 
 
-def _without(c: Chosen, best: Search, others: Sequence[_World], found: Mapping[str, Search]) -> Model | None:
-    """The best model of another world in which an effect, and what would do in its stead, is not."""
+def _without(
+    c: Chosen, best: Search, others: Sequence[_World], found: Mapping[str, Search]
+) -> tuple[Model, float] | None:
+    """The best model of another world in which an effect, and what would do in its stead, is not; and the odds of the effect, all
+    places together, where each effect more may be at any place."""
     k = best.best.chosen.index(c)
     same = {id(c.place), *(id(p) for p, _ in best.equivalents[k])}
+    price = others[0].price if others else 0.0
     models = [m for w in others for m in (w.less(best.best, c), found[w.name].null, found[w.name].best)]
     allowed = (m for m in models if not same & {id(o.place) for o in m.chosen})
-    return max(allowed, key=lambda m: m.score, default=None)
+    other = max(allowed, key=lambda m: m.score - price * len(m.chosen), default=None)
+    if other is None:
+        return None
+    together = best.best.score + float(np.logaddexp.reduce([0.0, *(s for _, s in best.equivalents[k])]))
+    return other, together - other.score - price * (len(best.best.chosen) - len(other.chosen))
 
 
 @dataclass(eq=False)
@@ -141,6 +151,11 @@ class _World:
     anchors: dict[int, tuple[Model, list[Fit]]] = field(default_factory=dict)
 
     @property
+    def price(self) -> float:
+        """ln of the places that an effect may be at."""
+        return float(np.log(max(1, len(self.columns.places))))
+
+    @property
     def null(self) -> Model:
         """No effect at all."""
         return self._fit((), None)
@@ -152,7 +167,7 @@ class _World:
         if begin.chosen:
             same = self._fit(begin.chosen, amplitudes(begin.fit), begin.fit.weights)
             model = max(null, self._settled(same), key=lambda m: m.score)
-        limit = float(np.log(ODDS) + np.log(max(1, len(self.columns.places))))
+        limit = float(np.log(ODDS)) + self.price
         while len(model.chosen) < MOST_EFFECTS and not self.over():
             trials = self._trials(model)
             if not trials:
@@ -400,7 +415,7 @@ class _World:
                 scores[id(p)] = (max(scores[id(p)][0], m.score - model.score), p)
             scores[id(c.place)] = (0.0, c.place)
             together = float(np.logaddexp.reduce([s for s, _ in scores.values()]))
-            odds = model.score + together - less.score - float(np.log(len(self.columns.places)))
+            odds = model.score + together - less.score - self.price
             near = [(p, s) for s, p in scores.values() if p is not c.place and s > -np.log(ODDS)]
             out.append((odds, tuple(sorted(near, key=lambda n: -n[1]))))
         return tuple(out)

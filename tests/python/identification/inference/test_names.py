@@ -179,10 +179,23 @@ def test_a_name_needs_odds_against_the_best_model_of_another_world_without_it():
     c = setting(1, (0.0, 30.0, 0.0))
     c = replace(c, experiment=one_place(len(c.rows)))
     s = searched(c)
-    for odds, named in ((2.0 * ODDS, 1), (0.5 * ODDS, 0), (1.0, 0)):
-        v = judged(c, replace(s, instead=(replace(s.null, score=s.best.score - np.log(odds)),)))
-        assert len(v.named) == named
-        assert [why for _, why in v.refused] == [TOLERABLE] * (1 - named)
+    for odds, word in ((2.0 * ODDS, "effects"), (0.5 * ODDS, "ambiguous"), (2.0, "ambiguous"), (0.9, "none")):
+        v = judged(c, replace(s, instead=((s.null, float(np.log(odds))),)))
+        assert v.word == word and len(v.named) == (word != "none")
+        assert [why for _, why in v.refused] == [TOLERABLE] * (word == "none")
+
+
+def test_an_effect_pays_for_the_places_that_it_may_be_at():
+    """Numbers that are off show the same as an effect, with a little less evidence: they need no place, the effect may be at any."""
+    c = setting(1, (0.0, 6.0, 0.0))
+    rng = np.random.default_rng(9)
+    others = [place(f"other {k}", rng.normal(size=len(c)), c.free) for k in range(20)]
+    c = replace(c, places=(*c.places, *others))
+    unknown = Unknown("zero of a drive", "zeros", "m", 1e-4)
+    off = replace(c, numbers=0.3 * c.places[1].shapes[0].directions[:, :1], unknowns=(unknown,))
+    exact, best = searched(c).best, searched(off).best
+    assert exact.chosen and not best.chosen
+    assert exact.score - np.log(len(c.places)) < best.score < exact.score
 
 
 def test_declared_numbers_out_of_tolerance_in_the_stead_of_a_name_do_not_take_it_away():
@@ -194,7 +207,7 @@ def test_declared_numbers_out_of_tolerance_in_the_stead_of_a_name_do_not_take_it
     part = Parts(c).together
     none = fitted(c, part)
     for other, named in ((none, 1), (none.without([part[0].name]), 0)):
-        instead = Model("together", (), other, s.best.score)
+        instead = Model("together", (), other, s.best.score), 0.0
         v = judged(c, replace(s, instead=(instead,) * len(s.best.chosen)))
         assert len(v.named) == named
         assert [b.unknown.name for n in v.named for b in n.numbers] == ["zero of a drive"] * named
