@@ -162,7 +162,7 @@ def read_sheet(path: Path, sheet: str | None = None, layout: Layout = PLAIN) -> 
         first = next(_above(rows, spelling, above), None)
         if first is not None:
             break
-    if first is None and not above:
+    if first is None and not above and not page:
         raise FileError("the file is empty", file=str(path))
     found = None if first is None else header_of(above, first[1], layout.known)
     if first is not None and (layout.header or (found is None and layout.numbered)):
