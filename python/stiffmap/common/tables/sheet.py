@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import Floats
-from stiffmap.common.errors import FileError, StiffmapError
+from stiffmap.common.errors import FileError
 from stiffmap.common.tables.cells import Cells, filled, numbered, packed, row_numbers
 from stiffmap.common.tables.header import (
     Line,
@@ -37,7 +37,7 @@ from stiffmap.common.tables.lines import (
     parted,
     with_points,
 )
-from stiffmap.common.units import known, unit_of
+from stiffmap.common.units import unit_of
 
 STATISTICS = re.compile(
     r"(mean|average|avg|mittel(wert)?e?|mw|ø|sum|summe|total|gesamt|std\.?( ?dev\.?)?|stdev|stabw|s|sigma|σ|min(imum)?|"
@@ -80,6 +80,11 @@ class Sheet:
         """The unit that stands in a column's header, or nothing."""
         return split_unit(self.header[column])[1]
 
+    def find(self, pattern: str) -> int | None:
+        """The first column whose name, without its unit, is all of a regular expression in any case."""
+        at = (i for i, n in enumerate(self.names) if re.fullmatch(pattern, n, re.IGNORECASE))
+        return next(at, None)
+
     def with_cells(self, name: str, cells: Iterable[str]) -> Sheet:
         """The sheet and one column more."""
         return replace(self, header=(*self.header, name), columns=(*self.columns, Cells.of(cells)))
@@ -95,17 +100,6 @@ class Sheet:
             cells = with_points(self.columns[column]) if self.decimal_comma else self.columns[column]
             self._read[column] = cells.numbers(lambda cell, row: self._number(cell, column, self.lines[row]))
         return self._read[column]
-
-    def size(self, column: int, meaning: str, quantity: str, said: str = "") -> float:
-        """SI size of a column's unit: `said`, else that of its header. StiffmapError names the column and the way to say it."""
-        unit = unit_of(said or self.unit(column), quantity)
-        if unit is None:
-            usual = "mm" if quantity == "length" else "deg"
-            raise StiffmapError(
-                f"{self.file}: column '{self.header[column]}' ({meaning}) has no unit of {quantity}s ({known(quantity)}): write it in "
-                f"the header, as in '{self.names[column]} [{usual}]', or say --unit {meaning}={usual} (--unit {quantity}={usual}: of all {quantity}s)"
-            )
-        return unit.size
 
     def _number(self, cell: str, column: int, line: int) -> float:
         value = number(cell, Spelling())

@@ -20,8 +20,8 @@ from stiffmap.common.tables.workbook import WORKBOOKS, sheet_names
 from stiffmap.experiment.experiment import Experiment
 from stiffmap.experiment.files.load import load_experiment
 from stiffmap.experiment.noise.level import against_the_load, contradictions
-from stiffmap.experiment.spreadsheet.answers import Answers, Meant
-from stiffmap.experiment.spreadsheet.convert import ImportedSheet, Question, write_folder
+from stiffmap.experiment.spreadsheet.answers import Answers, Meant, Question
+from stiffmap.experiment.spreadsheet.convert import ImportedSheet, write_folder
 from stiffmap.experiment.spreadsheet.dh import LEG, arm, read_dh
 from stiffmap.experiment.spreadsheet.dialogue import (
     Ask,
