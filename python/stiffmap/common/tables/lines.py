@@ -12,7 +12,7 @@ from itertools import chain, islice
 from pathlib import Path
 from typing import NamedTuple
 
-from stiffmap.common.errors import FileError
+from stiffmap.common.errors import FileError, reading
 from stiffmap.common.number_text import number_in
 from stiffmap.common.tables.cells import BETWEEN, BLOCK, Cells, filled
 from stiffmap.common.tables.workbook import WORKBOOKS, workbook_lines
@@ -196,10 +196,8 @@ def is_data(cells: list[str], spelling: Spelling) -> bool:
 
 
 def _text(path: Path) -> Source:
-    try:
+    with reading(path):
         raw = path.read_bytes()
-    except OSError as error:
-        raise FileError(f"cannot be read: {error.strerror}", file=str(path)) from error
     text = _decoded(raw, path).replace("\r\n", "\n").replace("\r", "\n")
     del raw
     lines_ = (line for line in io.StringIO(text) if line.strip() and not line.strip().startswith(COMMENTS))
