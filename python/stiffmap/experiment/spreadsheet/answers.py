@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Any
+from copy import deepcopy
+from dataclasses import dataclass, field, fields
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,6 +26,8 @@ class Question(StiffmapError):
     def __init__(self, message: str, kind: str, meaning: str) -> None:
         super().__init__(message)
         self.kind, self.meaning = kind, meaning
+        self.waits = False
+        """Whether an answer would be taken: not where a step that nobody asks about raises it."""
 
 
 @dataclass
@@ -68,9 +71,8 @@ class Meant(Answers):
     @staticmethod
     def of_sheet(sheet: Sheet, answers: Answers) -> Meant:
         """A sheet as it was read, with what is said of it."""
-        chosen = {k: list(v) for k, v in answers.chosen.items()}
-        a = answers
-        return Meant(chosen, dict(a.units), dict(a.constants), dict(a.noise), sheet=sheet)
+        own = (deepcopy(getattr(answers, f.name)) for f in fields(Answers))
+        return Meant(*own, sheet=sheet)
 
     def spend(self, name: str) -> float:
         """A number of --set that is in a column from now on; 0 where there is none."""
@@ -97,6 +99,11 @@ class Meant(Answers):
     def guessed(self) -> list[Column]:
         """All columns with their meanings."""
         return guess(self.sheet.header, self.chosen)
+
+    def ask_column(self, message: str, meaning: str) -> NoReturn:
+        """Raise Question: which column has a meaning."""
+        there = ", ".join(f"'{h}'" for h in self.sheet.header)
+        raise Question(f"{self.sheet.file}: {message}; columns: {there}", "column", meaning)
 
     def index(self, header: str) -> int:
         """Of a column as a person says it; StiffmapError."""

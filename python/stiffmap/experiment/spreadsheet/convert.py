@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import repeat
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs import make_folder, only_job, write_rows, write_text
@@ -15,7 +15,7 @@ from stiffmap.common.tables.sheet import Sheet
 from stiffmap.common.yaml_text import text_of
 from stiffmap.experiment.experiment import WRENCH
 from stiffmap.experiment.files.fields import POSE
-from stiffmap.experiment.spreadsheet.answers import Meant, Question
+from stiffmap.experiment.spreadsheet.answers import Meant
 from stiffmap.experiment.spreadsheet.guess import READINGS, Column
 from stiffmap.experiment.spreadsheet.together import weight
 
@@ -56,12 +56,11 @@ def understand(m: Meant, loaded: bool = False) -> ImportedSheet:
         columns = [replace(c, meaning="note") if c.meaning in POSE else c for c in columns]
         used = [c for c in columns if c.meaning != "note"]
         known |= set(POSE)
-    _ask(sheet, known, bool(drives))
+    _ask(m, known, bool(drives))
     plain = (*WORDS, *COUNTED, *drives)
     found = {c.meaning: m.unit(c.index, c.meaning) for c in used if c.meaning not in plain}
     if loaded and not known & {*WRENCH, "ll"}:
-        _ask_column(
-            sheet,
+        m.ask_column(
             "missing column: a deflection needs a load; which column is it? Say --map fx='HEADER' (fy, fz, mx, my, mz; "
             "--map fz='-HEADER' where it pulls against the axis), or --set fx=NUMBER (N) where it is the same in every row",
             "load",
@@ -79,28 +78,21 @@ def understand(m: Meant, loaded: bool = False) -> ImportedSheet:
     )
 
 
-def _ask(sheet: Sheet, known_: set[str], joints: bool) -> None:
+def _ask(m: Meant, known_: set[str], joints: bool) -> None:
     lost = [a for a in POSE if a not in known_]
     if lost:
-        _ask_column(
-            sheet,
+        m.ask_column(
             f"which column is the position {lost[0]}? Say --map {lost[0]}='HEADER', or "
             f"--set {lost[0]}=NUMBER (mm) where it is the same in every row",
             lost[0],
         )
     if not known_ & set(READINGS):
         places = "--map px='HEADER' (py, pz) for measured positions; of differences " if joints else ""
-        _ask_column(
-            sheet,
+        m.ask_column(
             f"which column is a reading? Say {places}--map dx='HEADER' (dy, dz, rx, ry, rz), several headers with | between them for "
             "repeats, or length='HEADER'; where a ball stood in one socket, --set px=0 --set py=0 --set pz=0",
             "reading",
         )
-
-
-def _ask_column(sheet: Sheet, message: str, meaning: str) -> NoReturn:
-    there = ", ".join(f"'{h}'" for h in sheet.header)
-    raise Question(f"{sheet.file}: {message}; columns: {there}", "column", meaning)
 
 
 class Rows:

@@ -103,6 +103,7 @@ def asked(m: Meant, ask: Ask | None, step: Callable[[], Made]) -> Made:
             return step()
         except Question as question:
             if ask is None:
+                question.waits = True
                 raise
             try:
                 _answer(m, question, ask)

@@ -173,7 +173,7 @@ def _fitting(
             return understood(name, None)
         except StiffmapError as problem:
             reasons[str(name)] = problem
-    tables = [n for n, p in reasons.items() if type(p) is Question]
+    tables = [n for n, p in reasons.items() if isinstance(p, Question) and p.waits]
     if ask is not None and tables:
         return understood(tables[0], ask)
     lines = "; ".join(f"'{n}': {str(p).removeprefix(str(file)).lstrip(':, ')}" for n, p in reasons.items())

@@ -44,10 +44,7 @@ def commanded(m: Meant, drives: Mapping[str, bool]) -> None:
     if len(lost) == len(at):
         return
     if lost:
-        there = ", ".join(f"'{h}'" for h in m.sheet.header)
-        raise StiffmapError(
-            f"{m.sheet.file}: which column commands {lost[0]}? Say --map {lost[0]}='HEADER'; columns: {there}"
-        )
+        m.ask_column(f"which column commands {lost[0]}? Say --map {lost[0]}='HEADER'", lost[0])
     m.chosen = {k: v for k, v in m.chosen.items() if k not in drives and k not in short}
     for k, (name, slides) in enumerate(drives.items(), 1):
         index = at[name]
