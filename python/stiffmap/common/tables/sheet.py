@@ -28,6 +28,7 @@ from stiffmap.common.tables.lines import (
     COMMENTS,
     Spelling,
     decimal_comma,
+    even,
     is_data,
     is_finite,
     is_nothing,
@@ -176,25 +177,14 @@ def read_sheet(path: Path, sheet: str | None = None, layout: Layout = PLAIN) -> 
     said = [*header, *(c.strip() for _, cells in above for c in cells)]
     lines_, aside = row_numbers(), list[str]()
     data = _data(chain([first], kept(rows)), header, said, spelling, aside, layout, str(path))
-    if layout.strict and separator:
-        data = _whole(data, width, str(path))
-    even = ((n, [*cells, *[""] * width][:width]) for n, cells in data)
-    columns = list(packed(numbered(even, lines_), width))
+    data = even(data, width, str(path), whole=layout.strict and separator != "")
+    columns = list(packed(numbered(data, lines_), width))
     file = f"{path}, sheet '{page}'" if page else str(path)
     if aside and layout.strict:
         raise FileError(f"expected rows of numbers alone below the header; {aside[0]}", file=file)
     for i in range(width):
         names[i], columns[i] = _united(names[i], columns[i], file, lines_)
     return Sheet(file, tuple(names), tuple(columns), lines_, comma, record_of(above), tuple(aside), number_)
-
-
-def _whole(rows: Iterator[Line], width: int, file: str) -> Iterator[Line]:
-    """Rows with a cell for each column; FileError for one with fewer, or with more that are not empty."""
-    for n, cells in rows:
-        found = len(cells) if len(cells) < width else max(i for i, c in enumerate(cells, 1) if c.strip())
-        if len(cells) < width or found > width:
-            raise FileError(f"expected {width} values, found {found}", file=file, line=n)
-        yield n, cells
 
 
 def _united(name: str, cells: Cells, file: str, lines: Sequence[int]) -> tuple[str, Cells]:
