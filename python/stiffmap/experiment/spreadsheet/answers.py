@@ -110,10 +110,10 @@ class Meant(Answers):
         return find_column(header, self.sheet.header)
 
     def written_unit(self, column: int, *names: str, quantity: str = "") -> str:
-        """What --unit says of one of these names, else the header, else the column beside it, else --unit of the quantity."""
+        """What --unit says of one of these names, else the header, else the column next to it, else --unit of the quantity."""
         own = next((self.units[n] for n in names if self.units.get(n)), "") or self.sheet.unit(column)
         return (
-            own or self._beside(column) or self.units.get(quantity or quantity_of(names[0]) or "length", "")
+            own or self._next_to(column) or self.units.get(quantity or quantity_of(names[0]) or "length", "")
         )
 
     def unit(self, column: int, *names: str, quantity: str = "") -> Unit:
@@ -133,7 +133,7 @@ class Meant(Answers):
             why = f": the unit '{text}' is not {'one of this quantity' if another else 'known'}; those of {quantity} are: {known(quantity)}; {way}"
         raise Question(f"{self.sheet.file}: column '{name}' ({names[0]}){why}", "unit", last)
 
-    def _beside(self, column: int) -> str:
+    def _next_to(self, column: int) -> str:
         """The unit in the cells of the next column, where these mean nothing and hold nothing else."""
         cells = {
             c.meaning: set(self.sheet.columns[c.index]) - {""} for c in self.guessed[column + 1 : column + 2]
