@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from types import FrameType
 
 LONGEST_WORD, LONGEST_MESSAGE = 400, 3000  # characters
@@ -65,6 +66,26 @@ class HomeError(StiffmapError):
 
 class MissingPartError(StiffmapError):
     """An optional part of stiffmap, or a package that it needs, is not installed."""
+
+
+@contextmanager
+def needed(what: str, extra: str, otherwise: str = "") -> Iterator[None]:
+    """Imports that `what` needs and an `extra` of stiffmap brings; MissingPartError where one is not there."""
+    try:
+        yield
+    except ImportError as error:
+        raise MissingPartError(
+            f"{what} needs {error.name}, which is not installed: pip install 'stiffmap[{extra}]'{otherwise}"
+        ) from error
+
+
+@contextmanager
+def reading(path: object) -> Iterator[None]:
+    """FileError where the system refuses to read a file."""
+    try:
+        yield
+    except OSError as error:
+        raise FileError(f"cannot be read: {error.strerror}", file=str(path)) from error
 
 
 def shortened(message: str) -> str:

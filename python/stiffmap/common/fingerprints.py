@@ -8,7 +8,7 @@ from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
-from stiffmap.common.errors import FileError
+from stiffmap.common.errors import reading
 from stiffmap.common.python_file import code_run
 from stiffmap.common.version import __version__
 
@@ -24,11 +24,8 @@ def digest(*parts: Any) -> str:
 
 def file_digest(path: Path) -> str:
     """Of the bytes of a file; raises FileError where it cannot be read."""
-    try:
-        with path.open("rb") as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
-    except OSError as error:
-        raise FileError(f"cannot be read: {error.strerror}", file=str(path)) from error
+    with reading(path), path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def code() -> list[str]:

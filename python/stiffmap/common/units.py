@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
@@ -32,9 +31,10 @@ PLANE_ANGLES: dict[str, Fraction | float] = {
     "arcmin": math.pi / 10800,
     "arcsec": math.pi / 648000,
 }
-ANGLES = ("rad", "deg")
-"""Those of a machine file."""
+SIZES: dict[str, Fraction | float] = {**LENGTHS, **FORCES, **MASSES, **MOMENTS, **STRESSES, **PLANE_ANGLES}
 TIMES = {"s": Fraction(1), "min": Fraction(60)}
+QUANTITIES = {"m": "length", "N": "force", "N*m": "moment", "rad": "angle"}
+"""By the unit of SI."""
 GRAVITY = Fraction("9.80665")
 """Standard acceleration of gravity, m/s²: the weight of a kilogram in N."""
 POUND = Fraction("4.4482216152605")
@@ -52,7 +52,7 @@ class Unit(NamedTuple):
     @property
     def size(self) -> float:
         """In SI."""
-        return self.factor * size_of(self.name, LENGTHS, FORCES, MOMENTS, PLANE_ANGLES)
+        return self.factor * size_of(self.name)
 
 
 def _table(*rows: tuple[str, str, Fraction | float]) -> dict[str, Unit]:
@@ -118,13 +118,9 @@ def name_and_unit(header: str) -> tuple[str, str]:
     return match[1], match[2] or ""
 
 
-def size_of(unit: str, *tables: Mapping[str, Fraction | float]) -> float:
-    """SI size of a unit of one of these tables, in any of its spellings; KeyError where it is in none."""
-    name = SYNONYMS.get(unit, unit)
-    for table in tables:
-        if name in table:
-            return float(table[name])
-    raise KeyError(unit)
+def size_of(unit: str) -> float:
+    """SI size of a unit as files declare it; KeyError for another one."""
+    return float(SIZES[SYNONYMS.get(unit, unit)])
 
 
 class Dimension(NamedTuple):

@@ -13,7 +13,7 @@ from typing import Any
 
 import yaml
 
-from stiffmap.common.errors import FileError, StiffmapError
+from stiffmap.common.errors import FileError, StiffmapError, reading
 from stiffmap.common.number_text import bounded
 
 KeyPath = tuple[str | int, ...]
@@ -144,11 +144,10 @@ def _text_keys(
 def read(path: Path) -> Document:
     """Parse a file; raises `FileError` where it cannot be read."""
     try:
-        text = path.read_text(encoding="utf-8")
+        with reading(path):
+            text = path.read_text(encoding="utf-8")
     except UnicodeDecodeError as error:
         raise FileError("not UTF-8 text", file=str(path)) from error
-    except OSError as error:
-        raise FileError(f"cannot be read: {error.strerror}", file=str(path)) from error
     return parse(text, str(path))
 
 

@@ -21,12 +21,12 @@ TABLES = (LENGTHS, FORCES, MASSES, MOMENTS, STRESSES, PLANE_ANGLES)
 
 @pytest.mark.parametrize(("unit", "size"), SIZES.items())
 def test_the_size_of_a_unit(unit: str, size: float) -> None:
-    assert size_of(unit, *TABLES) == size
+    assert size_of(unit) == size
 
 
 def test_parts_of_a_full_turn() -> None:
     for unit, number in {"deg": 360, "°": 360, "arcmin": 360 * 60, "arcsec": 360 * 60 * 60}.items():
-        assert number * size_of(unit, PLANE_ANGLES) == pytest.approx(2 * math.pi, rel=1e-15)
+        assert number * size_of(unit) == pytest.approx(2 * math.pi, rel=1e-15)
 
 
 def test_no_unit_is_without_a_test() -> None:

@@ -12,7 +12,7 @@ from itertools import chain, islice
 from pathlib import Path
 from typing import NamedTuple
 
-from stiffmap.common.errors import FileError
+from stiffmap.common.errors import FileError, reading
 from stiffmap.common.number_text import number_in
 from stiffmap.common.tables.cells import BETWEEN, BLOCK, Cells, filled
 from stiffmap.common.tables.workbook import WORKBOOKS, workbook_lines
@@ -77,30 +77,20 @@ def kept(lines: Iterable[tuple[int, list[str]]]) -> Iterator[tuple[int, list[str
     return ((n, c) for n, c in lines if filled(c) and not c[0].strip().startswith(COMMENTS))
 
 
-def rows_of(path: Path) -> Iterator[tuple[int, list[str]]]:
-    """Lines of a table with something in them, the header first, with their cells: as many as the header has, with decimal points.
-
-    Raises FileError.
-    """
-    source = lines_of(path)
-
-    def lines() -> Iterator[tuple[int, list[str]]]:
-        return ((n, c) for n, c in source.lines() if filled(c))
-
-    comma = source.separator not in ("", ",") and decimal_comma(c for _, c in islice(lines(), 1, None))
-    rows = lines()
-    header = next(rows, None)
-    if header is None:
-        raise FileError("the file is empty", file=str(path))
-    yield header
-    width = len(header[1])
-    for n, row in rows:
-        if not source.separator:  # a row of a workbook ends at its last cell
-            yield n, [*row, *[""] * width][:width]
-        elif len(row) != width:
-            raise FileError(f"expected {width} cells; found {len(row)}", file=str(path), line=n)
-        else:
-            yield n, [with_point(plain(c.strip())) for c in row] if comma else row
+def even(
+    rows: Iterable[tuple[int, list[str]]], width: int, file: str, whole: bool
+) -> Iterator[tuple[int, list[str]]]:
+    """Rows with as many cells as there are columns; where they are to be `whole`, FileError for one with fewer, or with more that
+    are not empty."""
+    for n, cells in rows:
+        found = len(cells)
+        if found != width:
+            if found > width:
+                found = max(i for i, c in enumerate(cells, 1) if i == width or c.strip())
+            if whole and found != width:
+                raise FileError(f"expected {width} values, found {found}", file=file, line=n)
+            cells = [*cells, *[""] * width][:width]
+        yield n, cells
 
 
 def finite_number(cell: str, blank: Sequence[str] = ()) -> float:
@@ -196,10 +186,8 @@ def is_data(cells: list[str], spelling: Spelling) -> bool:
 
 
 def _text(path: Path) -> Source:
-    try:
+    with reading(path):
         raw = path.read_bytes()
-    except OSError as error:
-        raise FileError(f"cannot be read: {error.strerror}", file=str(path)) from error
     text = _decoded(raw, path).replace("\r\n", "\n").replace("\r", "\n")
     del raw
     lines_ = (line for line in io.StringIO(text) if line.strip() and not line.strip().startswith(COMMENTS))

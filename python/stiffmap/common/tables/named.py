@@ -21,14 +21,13 @@ from stiffmap.common.tables.header import split_unit
 from stiffmap.common.tables.lines import Spelling, finite_number, number, with_points
 from stiffmap.common.tables.meaning import meaning_of
 from stiffmap.common.tables.sheet import Layout, Sheet, read_sheet
-from stiffmap.common.units import unit_of
+from stiffmap.common.units import QUANTITIES, unit_of
 from stiffmap.common.value_units import read_value
 
 TURNING = {"rpm": math.pi / 30, "1/min": math.pi / 30, "rad/s": 1.0}
 PER = re.compile(r"_(?:per_)?(min|s|tooth)$")
 WORD = "word"
 """In place of a unit: the column holds text."""
-QUANTITIES = {"m": "length", "N": "force", "N*m": "moment", "rad": "angle"}
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import Floats
-from stiffmap.common.errors import FileError, StiffmapError
+from stiffmap.common.errors import FileError
 from stiffmap.common.tables.cells import Cells, filled, numbered, packed, row_numbers
 from stiffmap.common.tables.header import (
     Line,
@@ -28,6 +28,7 @@ from stiffmap.common.tables.lines import (
     COMMENTS,
     Spelling,
     decimal_comma,
+    even,
     is_data,
     is_finite,
     is_nothing,
@@ -37,7 +38,7 @@ from stiffmap.common.tables.lines import (
     parted,
     with_points,
 )
-from stiffmap.common.units import known, unit_of
+from stiffmap.common.units import unit_of
 
 STATISTICS = re.compile(
     r"(mean|average|avg|mittel(wert)?e?|mw|ø|sum|summe|total|gesamt|std\.?( ?dev\.?)?|stdev|stabw|s|sigma|σ|min(imum)?|"
@@ -80,6 +81,11 @@ class Sheet:
         """The unit that stands in a column's header, or nothing."""
         return split_unit(self.header[column])[1]
 
+    def find(self, pattern: str) -> int | None:
+        """The first column whose name, without its unit, is all of a regular expression in any case."""
+        at = (i for i, n in enumerate(self.names) if re.fullmatch(pattern, n, re.IGNORECASE))
+        return next(at, None)
+
     def with_cells(self, name: str, cells: Iterable[str]) -> Sheet:
         """The sheet and one column more."""
         return replace(self, header=(*self.header, name), columns=(*self.columns, Cells.of(cells)))
@@ -95,17 +101,6 @@ class Sheet:
             cells = with_points(self.columns[column]) if self.decimal_comma else self.columns[column]
             self._read[column] = cells.numbers(lambda cell, row: self._number(cell, column, self.lines[row]))
         return self._read[column]
-
-    def size(self, column: int, meaning: str, quantity: str, said: str = "") -> float:
-        """SI size of a column's unit: `said`, else that of its header. StiffmapError names the column and the way to say it."""
-        unit = unit_of(said or self.unit(column), quantity)
-        if unit is None:
-            usual = "mm" if quantity == "length" else "deg"
-            raise StiffmapError(
-                f"{self.file}: column '{self.header[column]}' ({meaning}) has no unit of {quantity}s ({known(quantity)}): write it in "
-                f"the header, as in '{self.names[column]} [{usual}]', or say --unit {meaning}={usual} (--unit {quantity}={usual}: of all {quantity}s)"
-            )
-        return unit.size
 
     def _number(self, cell: str, column: int, line: int) -> float:
         value = number(cell, Spelling())
@@ -182,25 +177,14 @@ def read_sheet(path: Path, sheet: str | None = None, layout: Layout = PLAIN) -> 
     said = [*header, *(c.strip() for _, cells in above for c in cells)]
     lines_, aside = row_numbers(), list[str]()
     data = _data(chain([first], kept(rows)), header, said, spelling, aside, layout, str(path))
-    if layout.strict and separator:
-        data = _whole(data, width, str(path))
-    even = ((n, [*cells, *[""] * width][:width]) for n, cells in data)
-    columns = list(packed(numbered(even, lines_), width))
+    data = even(data, width, str(path), whole=layout.strict and separator != "")
+    columns = list(packed(numbered(data, lines_), width))
     file = f"{path}, sheet '{page}'" if page else str(path)
     if aside and layout.strict:
         raise FileError(f"expected rows of numbers alone below the header; {aside[0]}", file=file)
     for i in range(width):
         names[i], columns[i] = _united(names[i], columns[i], file, lines_)
     return Sheet(file, tuple(names), tuple(columns), lines_, comma, record_of(above), tuple(aside), number_)
-
-
-def _whole(rows: Iterator[Line], width: int, file: str) -> Iterator[Line]:
-    """Rows with a cell for each column; FileError for one with fewer, or with more that are not empty."""
-    for n, cells in rows:
-        found = len(cells) if len(cells) < width else max(i for i, c in enumerate(cells, 1) if c.strip())
-        if len(cells) < width or found > width:
-            raise FileError(f"expected {width} values, found {found}", file=file, line=n)
-        yield n, cells
 
 
 def _united(name: str, cells: Cells, file: str, lines: Sequence[int]) -> tuple[str, Cells]:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 from zipfile import ZipFile
 
-from stiffmap.common.errors import FileError, MissingPartError
+from stiffmap.common.errors import FileError, MissingPartError, needed
 
 MOST_CELLS = 30_000_000
 """Of a sheet, blank ones between included: one cell far out would make as many as the sheet can have."""
@@ -28,6 +28,7 @@ LONGEST_GAP = 10_000
 EXCEL = (".xlsx", ".xlsm")
 WORKBOOKS = (*EXCEL, ".xls", ".ods")
 """Suffixes."""
+OTHERWISE = " (or save the sheet as CSV)"
 
 
 def sheet_names(path: Path) -> list[str]:
@@ -60,13 +61,8 @@ def _opened(path: Path, sheet: str | None) -> tuple[list[str], list[tuple[int, l
 
 
 def _by_openpyxl(path: Path, sheet: str | None) -> tuple[list[str], list[tuple[int, list[str]]]]:
-    try:
+    with needed(f"{path}: reading {path.suffix} files", "excel", OTHERWISE):
         from openpyxl import load_workbook
-    except ModuleNotFoundError:
-        raise MissingPartError(
-            f"{path}: reading Excel files needs openpyxl, which is not installed: pip install openpyxl "
-            "(or save the sheet as CSV)"
-        ) from None
     computes = any(FORMULA.search(part) for part in _parts(path, "sheet"))
     book = load_workbook(path, data_only=True, read_only=True)
     names = book.sheetnames
@@ -78,13 +74,8 @@ def _by_openpyxl(path: Path, sheet: str | None) -> tuple[list[str], list[tuple[i
 
 
 def _by_calamine(path: Path, sheet: str | None) -> tuple[list[str], list[tuple[int, list[str]]]]:
-    try:
+    with needed(f"{path}: reading {path.suffix} files", "excel", OTHERWISE):
         from python_calamine import CalamineWorkbook
-    except ModuleNotFoundError:
-        raise MissingPartError(
-            f"{path}: reading {path.suffix} files needs python-calamine, which is not installed: "
-            "pip install 'stiffmap[excel]' (or save the sheet as CSV)"
-        ) from None
     if path.suffix.lower() == ".ods":
         rows_of = (row for content in _parts(path, "content.xml") for row in ROW.findall(content))
         cells = sum(_times(row) * sum(map(_times, CELL.findall(body))) for row, body in rows_of)

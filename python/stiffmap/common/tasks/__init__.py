@@ -12,7 +12,7 @@ from itertools import islice
 from multiprocessing import get_context
 from typing import Any
 
-from stiffmap.common.errors import MissingPartError, StiffmapError
+from stiffmap.common.errors import StiffmapError, needed
 from stiffmap.common.one_thread import on_one_thread
 
 Function = Callable[[Any, Any], Any]
@@ -149,12 +149,8 @@ def client_of(scheduler: Any) -> Iterator[Any]:
 
     MissingPartError without dask, StiffmapError where nothing answers or no worker is there.
     """
-    try:
+    with needed("a cluster", "cluster"):
         from distributed import Client
-    except ImportError as error:
-        raise MissingPartError(
-            "a cluster needs the packages dask and distributed: pip install 'stiffmap[cluster]'"
-        ) from error
     if isinstance(scheduler, Client):
         yield scheduler
         return

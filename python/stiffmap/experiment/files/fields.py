@@ -5,6 +5,7 @@ Reading, writing, the units that a header may name and the keys of ``units`` and
 
 from __future__ import annotations
 
+from stiffmap.common.units import QUANTITIES as by_unit
 from stiffmap.experiment.channels import AXES
 from stiffmap.experiment.experiment import ASKED, WRENCH
 from stiffmap.experiment.readings import kinds
@@ -43,7 +44,6 @@ QUANTITIES = {
     **dict.fromkeys(WRENCH[3:], "moment"),
     "temperature": "temperature",
 }
-SI = {"m": "length", "rad": "angle"}
 DECLARED = (*POSE, *POSE2, *AXES, *VECTOR, *WRENCH)
 """Columns whose unit experiment.yaml may declare, in addition to kinds of readings."""
 
@@ -51,7 +51,7 @@ DECLARED = (*POSE, *POSE2, *AXES, *VECTOR, *WRENCH)
 def quantity_of(column: str) -> str | None:
     """Quantity of a column, of its standard deviation or of its commanded value; None for words and plain numbers."""
     base = base_of(column)
-    return QUANTITIES.get(base) or {k.name: SI[k.unit] for k in kinds()}.get(base)
+    return QUANTITIES.get(base) or {k.name: by_unit[k.unit] for k in kinds()}.get(base)
 
 
 def base_of(column: str) -> str:

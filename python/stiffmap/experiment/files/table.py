@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import islice
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -13,9 +14,9 @@ import numpy as np
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError, MissingColumnError
 from stiffmap.common.outputs import unguarded
-from stiffmap.common.tables.cells import Cells, numbered, packed, row_numbers
+from stiffmap.common.tables.cells import Cells, filled, numbered, packed, row_numbers
 from stiffmap.common.tables.header import refuse_twice
-from stiffmap.common.tables.lines import finite_number, rows_of
+from stiffmap.common.tables.lines import decimal_comma, even, finite_number, lines_of, with_points
 from stiffmap.model.files.schema.base import suggestion
 
 
@@ -94,10 +95,20 @@ class Table:
 
 def read_table(path: Path, expected: int | None = None) -> Table:
     """Cells of a text or workbook with a header line and, where it is known, an expected number of rows; raises `FileError`."""
-    rows, lines = rows_of(path), row_numbers()
-    header = tuple(c.strip() for c in next(rows)[1])
+    source, lines = lines_of(path), row_numbers()
+
+    def rows() -> Iterator[tuple[int, list[str]]]:
+        return ((n, cells) for n, cells in source.lines() if filled(cells))
+
+    below = rows()
+    header = tuple(c.strip() for c in next(below, (1, []))[1])
+    if not header:
+        raise FileError("the file is empty", file=str(path))
     refuse_twice(header, str(path), 1)
-    columns = packed(numbered(rows, lines), len(header))
+    below = even(below, len(header), str(path), whole=source.separator != "")
+    columns = packed(numbered(below, lines), len(header))
+    if source.separator not in ("", ",") and decimal_comma(c for _, c in islice(rows(), 1, None)):
+        columns = tuple(map(with_points, columns))
     if not lines:
         raise FileError("expected a header line and at least one row", file=str(path))
     if expected is not None:

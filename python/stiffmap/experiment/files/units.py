@@ -7,16 +7,7 @@ from dataclasses import replace
 
 from stiffmap.common.errors import FileError
 from stiffmap.common.tables.header import refuse_twice
-from stiffmap.common.units import (
-    FORCES,
-    LENGTHS,
-    MOMENTS,
-    PLANE_ANGLES,
-    known,
-    name_and_unit,
-    size_of,
-    unit_of,
-)
+from stiffmap.common.units import known, name_and_unit, size_of, unit_of
 from stiffmap.experiment.files.fields import base_of, quantity_of
 from stiffmap.experiment.files.fields import known as known_columns
 from stiffmap.experiment.files.schema import ExperimentFile
@@ -30,16 +21,13 @@ class Units:
     """SI sizes of the units that a file declares, of all columns of a quantity or of single ones."""
 
     def __init__(self, model: ExperimentFile, file: str) -> None:
-        def sizes(units: dict[str, str]) -> dict[str, float]:
-            return {name: size_of(u, PLANE_ANGLES, MOMENTS, LENGTHS, FORCES) for name, u in units.items()}
-
         self.file = file
-        self.common = sizes(model.units.common())
+        self.common = {name: size_of(u) for name, u in model.units.common().items()}
         if "force" in self.common:
             self.common["moment"] = self.common["force"] * self.common["length"]
         joints = {f"{name}2": c.unit for name, c in model.command.items()}
         joints |= {name: c.unit for name, c in (model.joints | model.command).items()}
-        self.own = sizes(model.units.own() | joints)
+        self.own = {name: size_of(u) for name, u in (model.units.own() | joints).items()}
         self.joints = {name: "angle" if unit in ANGLES else "length" for name, unit in joints.items()}
 
     def of_header(self, table: Table, whole: Collection[str] = ()) -> Table:

@@ -2,15 +2,32 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Any
+from copy import deepcopy
+from dataclasses import dataclass, field, fields
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import Floats
-from stiffmap.common.tables.sheet import Sheet
-from stiffmap.common.units import Unit
+from stiffmap.common.errors import StiffmapError
+from stiffmap.common.tables.header import with_unit
+from stiffmap.common.tables.sheet import Sheet, column_letter
+from stiffmap.common.units import Unit, known, unit_of
+from stiffmap.experiment.files.fields import quantity_of
+from stiffmap.experiment.spreadsheet.guess import READINGS, Column, find_column, guess
+
+USUAL = {"length": "mm", "force": "N", "moment": "N*m", "angle": "deg", "temperature": "degC"}
+
+
+class Question(StiffmapError):
+    """What cannot be guessed. `kind`: ``column`` or ``unit``; `meaning`: of which column of an experiment."""
+
+    def __init__(self, message: str, kind: str, meaning: str) -> None:
+        super().__init__(message)
+        self.kind, self.meaning = kind, meaning
+        self.waits = False
+        """Whether an answer would be taken: not where a step that nobody asks about raises it."""
 
 
 @dataclass
@@ -54,9 +71,8 @@ class Meant(Answers):
     @staticmethod
     def of_sheet(sheet: Sheet, answers: Answers) -> Meant:
         """A sheet as it was read, with what is said of it."""
-        chosen = {k: list(v) for k, v in answers.chosen.items()}
-        a = answers
-        return Meant(chosen, dict(a.units), dict(a.constants), dict(a.noise), sheet=sheet)
+        own = (deepcopy(getattr(answers, f.name)) for f in fields(Answers))
+        return Meant(*own, sheet=sheet)
 
     def spend(self, name: str) -> float:
         """A number of --set that is in a column from now on; 0 where there is none."""
@@ -68,13 +84,69 @@ class Meant(Answers):
         """The answers without columns that were made, which the next sheet of this form has not got, but as `given`."""
         there = {*sheet.header, *(f"{sign}{h}" for h in sheet.header for sign in "+-")}
         own = {k: v for k, v in self.chosen.items() if set(v) <= there}
-        return Answers(own | given.chosen, self.units, self.spent | self.constants, self.noise)
+        return Answers(own | given.chosen, self.units | given.units, self.spent | self.constants, self.noise)
 
-    def add(self, name: str, values: ArrayLike, meaning: str) -> None:
-        """A column more, the only one of its meaning."""
-        if name not in self.sheet.header:
-            self.sheet = self.sheet.with_column(name, values)
-        self.chosen[meaning] = [name]
+    def add(self, name: str, unit: str, values: ArrayLike, meaning: str) -> None:
+        """A column more, the only one of its meaning, in a unit that no word about its meaning changes."""
+        header = with_unit(name, unit)
+        if header not in self.sheet.header:
+            self.sheet = self.sheet.with_column(header, values)
+        self.chosen[meaning] = [header]
+        if unit:
+            self.units.pop(meaning, None)
+
+    @property
+    def guessed(self) -> list[Column]:
+        """All columns with their meanings."""
+        return guess(self.sheet.header, self.chosen)
+
+    def ask_column(self, message: str, meaning: str) -> NoReturn:
+        """Raise Question: which column has a meaning."""
+        there = ", ".join(f"'{h}'" for h in self.sheet.header)
+        raise Question(f"{self.sheet.file}: {message}; columns: {there}", "column", meaning)
+
+    def index(self, header: str) -> int:
+        """Of a column as a person says it; StiffmapError."""
+        return find_column(header, self.sheet.header)
+
+    def written_unit(self, column: int, *names: str, quantity: str = "") -> str:
+        """What --unit says of one of these names, else the header, else the column next to it, else --unit of the quantity."""
+        own = next((self.units[n] for n in names if self.units.get(n)), "") or self.sheet.unit(column)
+        return (
+            own or self._next_to(column) or self.units.get(quantity or quantity_of(names[0]) or "length", "")
+        )
+
+    def unit(self, column: int, *names: str, quantity: str = "") -> Unit:
+        """Of a column, by its names for --unit: the first one is shown, by the last one it is to be said. Raises Question."""
+        quantity = quantity or quantity_of(names[0]) or "length"
+        text = self.written_unit(column, *names, quantity=quantity)
+        found = unit_of(text, quantity) if text else None
+        if found is not None:
+            return found
+        name, last = self.sheet.names[column], names[-1]
+        usual = "um" if last in READINGS and quantity == "length" else USUAL[quantity]
+        way = f"write it in the header, as in '{name} [{usual}]', or say --unit {last}={usual}"
+        if not text:
+            why = f" has no unit: {way} (--unit {quantity}={usual}: of every {quantity} without one)"
+        else:
+            another = unit_of(text) is not None or text.strip() == "mN"
+            why = f": the unit '{text}' is not {'one of this quantity' if another else 'known'}; those of {quantity} are: {known(quantity)}; {way}"
+        raise Question(f"{self.sheet.file}: column '{name}' ({names[0]}){why}", "unit", last)
+
+    def _next_to(self, column: int) -> str:
+        """The unit in the cells of the next column, where these mean nothing and hold nothing else."""
+        cells = {
+            c.meaning: set(self.sheet.columns[c.index]) - {""} for c in self.guessed[column + 1 : column + 2]
+        }
+        units = cells.get("note", set())
+        if not units or any(unit_of(cell) is None for cell in units):
+            return ""
+        if len(units) > 1:
+            raise StiffmapError(
+                f"{self.sheet.file}: column '{self.sheet.names[column + 1]}' ({column_letter(column + 1)}): expected one unit in all "
+                f"rows; found {', '.join(sorted(units))}"
+            )
+        return units.pop()
 
     def coordinates(self) -> Floats:
         """(n, drives) commanded coordinates, m and rad."""

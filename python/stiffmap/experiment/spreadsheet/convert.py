@@ -6,18 +6,17 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import repeat
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs import make_folder, only_job, write_rows, write_text
 from stiffmap.common.tables.cells import row_numbers
-from stiffmap.common.tables.sheet import Sheet, column_letter
-from stiffmap.common.units import Unit, known, unit_of
+from stiffmap.common.tables.sheet import Sheet
 from stiffmap.common.yaml_text import text_of
 from stiffmap.experiment.experiment import WRENCH
-from stiffmap.experiment.files.fields import POSE, quantity_of
+from stiffmap.experiment.files.fields import POSE
 from stiffmap.experiment.spreadsheet.answers import Meant
-from stiffmap.experiment.spreadsheet.guess import READINGS, Column, guess
+from stiffmap.experiment.spreadsheet.guess import READINGS, Column
 from stiffmap.experiment.spreadsheet.together import weight
 
 WORDS = ("id", "setup", "branch", "target")
@@ -25,14 +24,6 @@ WORDS = ("id", "setup", "branch", "target")
 COUNTED = ("order", "repeat")
 ABSOLUTE = {"ll": "length"}
 """Readings that a sheet has in coordinates of their own -> their columns in data.csv."""
-
-
-class Question(StiffmapError):
-    """What cannot be guessed. `kind`: ``column`` or ``unit``; `meaning`: of which column of an experiment."""
-
-    def __init__(self, message: str, kind: str, meaning: str) -> None:
-        super().__init__(message)
-        self.kind, self.meaning = kind, meaning
 
 
 @dataclass(frozen=True)
@@ -55,7 +46,7 @@ def understand(m: Meant, loaded: bool = False) -> ImportedSheet:
     ``loaded``: whether a load must be there.
     """
     sheet, drives = m.sheet, m.columns
-    columns = guess(sheet.header, m.chosen)
+    columns = m.guessed
     used = [c for c in columns if c.meaning != "note"]
     for c in used:
         if c.meaning not in WORDS:
@@ -65,13 +56,11 @@ def understand(m: Meant, loaded: bool = False) -> ImportedSheet:
         columns = [replace(c, meaning="note") if c.meaning in POSE else c for c in columns]
         used = [c for c in columns if c.meaning != "note"]
         known |= set(POSE)
-    _ask(sheet, known, bool(drives))
-    beside = _beside(sheet, columns)
+    _ask(m, known, bool(drives))
     plain = (*WORDS, *COUNTED, *drives)
-    found = {c.meaning: _unit(sheet, c, m.units, beside) for c in used if c.meaning not in plain}
+    found = {c.meaning: m.unit(c.index, c.meaning) for c in used if c.meaning not in plain}
     if loaded and not known & {*WRENCH, "ll"}:
-        _ask_column(
-            sheet,
+        m.ask_column(
             "missing column: a deflection needs a load; which column is it? Say --map fx='HEADER' (fy, fz, mx, my, mz; "
             "--map fz='-HEADER' where it pulls against the axis), or --set fx=NUMBER (N) where it is the same in every row",
             "load",
@@ -89,61 +78,21 @@ def understand(m: Meant, loaded: bool = False) -> ImportedSheet:
     )
 
 
-def _ask(sheet: Sheet, known_: set[str], joints: bool) -> None:
+def _ask(m: Meant, known_: set[str], joints: bool) -> None:
     lost = [a for a in POSE if a not in known_]
     if lost:
-        _ask_column(
-            sheet,
+        m.ask_column(
             f"which column is the position {lost[0]}? Say --map {lost[0]}='HEADER', or "
             f"--set {lost[0]}=NUMBER (mm) where it is the same in every row",
             lost[0],
         )
     if not known_ & set(READINGS):
         places = "--map px='HEADER' (py, pz) for measured positions; of differences " if joints else ""
-        _ask_column(
-            sheet,
+        m.ask_column(
             f"which column is a reading? Say {places}--map dx='HEADER' (dy, dz, rx, ry, rz), several headers with | between them for "
             "repeats, or length='HEADER'; where a ball stood in one socket, --set px=0 --set py=0 --set pz=0",
             "reading",
         )
-
-
-def _ask_column(sheet: Sheet, message: str, meaning: str) -> NoReturn:
-    there = ", ".join(f"'{h}'" for h in sheet.header)
-    raise Question(f"{sheet.file}: {message}; columns: {there}", "column", meaning)
-
-
-def _beside(sheet: Sheet, columns: Sequence[Column]) -> dict[int, str]:
-    """Units in cells of their own: column -> what stands to its right in a column that holds nothing else."""
-    out = {}
-    for c in columns:
-        if c.meaning != "note" or c.index == 0 or columns[c.index - 1].unit:
-            continue
-        cells = {cell.strip() for cell in sheet.columns[c.index]} - {""}
-        if cells and all(unit_of(cell) is not None for cell in cells):
-            if len(cells) > 1:
-                raise StiffmapError(
-                    f"{sheet.file}: column '{c.name}' ({column_letter(c.index)}): expected one unit in all rows; found "
-                    f"{', '.join(sorted(cells))}"
-                )
-            out[c.index - 1] = cells.pop()
-    return out
-
-
-def _unit(sheet: Sheet, c: Column, units: Mapping[str, str], beside: Mapping[int, str]) -> Unit:
-    quantity = quantity_of(c.meaning) or "length"
-    text = units.get(c.meaning, c.unit) or beside.get(c.index, "") or units.get(quantity, "")
-    found = unit_of(text, quantity) if text else None
-    if found is not None:
-        return found
-    if not text:
-        length = "um" if c.meaning in READINGS else "mm"
-        usual = {"length": length, "force": "N", "moment": "N*m", "angle": "deg", "temperature": "degC"}
-        why = f" has no unit: write it in the header, as in '{c.name} [mm]', or say --unit {c.meaning}={usual[quantity]}"
-    else:
-        another = unit_of(text) is not None or text.strip() == "mN"
-        why = f": the unit '{text}' is not {'one of this quantity' if another else 'known'}; those of {quantity} are: {known(quantity)}"
-    raise Question(f"{sheet.file}: column '{c.name}' ({c.meaning}){why}", "unit", c.meaning)
 
 
 class Rows:

@@ -18,6 +18,7 @@ from scipy.spatial.transform import Rotation
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.tables.sheet import Sheet
+from stiffmap.experiment.spreadsheet.answers import Meant
 from stiffmap.model.description import Drive, Element, Joint, Leg, MachineDescription, Offset, Pose
 
 CONVENTIONS = ("standard", "modified")
@@ -33,7 +34,7 @@ WORDS = {
     "low": r"low|min|lower",
     "high": r"high|max|upper",
 }
-LENGTH, ANGLE = ("d", "a"), ("theta", "alpha")
+QUANTITIES = {"theta": "angle", "d": "length", "a": "length", "alpha": "angle"}
 LEG = "arm"
 STEP, TRIES = math.radians(30.0), 200
 """Of the coordinates among which a home is looked for, and how many are tried."""
@@ -61,14 +62,16 @@ def read_dh(sheet: Sheet, units: Mapping[str, str]) -> list[DHRow]:
 
     Raises StiffmapError that names the column which is missing or has no unit.
     """
-    at = _columns(sheet)
+    columns = {n: sheet.find(pattern) for n, pattern in (NUMBERS | WORDS).items()}
+    at = {n: i for n, i in columns.items() if i is not None}
     lost = [n for n in NUMBERS if n not in at]
     if lost:
         raise StiffmapError(
             f"{sheet.file}: no column is {', '.join(lost)}: a table of Denavit and Hartenberg has theta, d, a and alpha, one "
             f"row a joint; found {', '.join(sheet.header)}"
         )
-    units_of = {n: _factor(sheet, at[n], n, units) for n in NUMBERS}
+    m = Meant(units=dict(units), sheet=sheet)
+    units_of = {n: m.unit(at[n], n, quantity=q).size for n, q in QUANTITIES.items()}
     numbers = {n: units_of[n] * np.nan_to_num(sheet.numbers(at[n])) for n in NUMBERS}
     count = len(sheet.lines)
     words = {n: list(sheet.columns[at[n]]) for n in ("name", "type") if n in at}
@@ -177,22 +180,6 @@ def _screw(axis: str, angle: float, shift: float) -> Floats:
 
 def _pose(t: Floats) -> Pose:
     return Pose.of(t[:3, 3], t[:3, :3])
-
-
-def _columns(sheet: Sheet) -> dict[str, int]:
-    found: dict[str, int] = {}
-    for i, name in enumerate(sheet.names):
-        for meaning, pattern in (NUMBERS | WORDS).items():
-            if meaning not in found and re.fullmatch(pattern, name.lower()):
-                found[meaning] = i
-                break
-    return found
-
-
-def _factor(sheet: Sheet, index: int, name: str, units: Mapping[str, str]) -> float:
-    quantity = "length" if name in LENGTH else "angle"
-    said = units.get(name, sheet.unit(index)) or units.get(quantity, "")
-    return sheet.size(index, name, quantity, said)
 
 
 def _named(text: str, number: int) -> str:

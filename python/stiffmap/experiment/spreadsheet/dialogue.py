@@ -18,8 +18,8 @@ from stiffmap.common.units import known, unit_of
 from stiffmap.common.yaml_text import read, text_of
 from stiffmap.experiment.experiment import WRENCH
 from stiffmap.experiment.files.fields import SEEN, quantity_of
-from stiffmap.experiment.spreadsheet.answers import Answers, Meant
-from stiffmap.experiment.spreadsheet.convert import ImportedSheet, Question, understand
+from stiffmap.experiment.spreadsheet.answers import Answers, Meant, Question
+from stiffmap.experiment.spreadsheet.convert import ImportedSheet, understand
 from stiffmap.experiment.spreadsheet.guess import READINGS
 from stiffmap.experiment.spreadsheet.together import together
 
@@ -103,6 +103,7 @@ def asked(m: Meant, ask: Ask | None, step: Callable[[], Made]) -> Made:
             return step()
         except Question as question:
             if ask is None:
+                question.waits = True
                 raise
             try:
                 _answer(m, question, ask)

@@ -20,8 +20,8 @@ from stiffmap.common.tables.workbook import WORKBOOKS, sheet_names
 from stiffmap.experiment.experiment import Experiment
 from stiffmap.experiment.files.load import load_experiment
 from stiffmap.experiment.noise.level import against_the_load, contradictions
-from stiffmap.experiment.spreadsheet.answers import Answers, Meant
-from stiffmap.experiment.spreadsheet.convert import ImportedSheet, Question, write_folder
+from stiffmap.experiment.spreadsheet.answers import Answers, Meant, Question
+from stiffmap.experiment.spreadsheet.convert import ImportedSheet, write_folder
 from stiffmap.experiment.spreadsheet.dh import LEG, arm, read_dh
 from stiffmap.experiment.spreadsheet.dialogue import (
     Ask,
@@ -173,7 +173,7 @@ def _fitting(
             return understood(name, None)
         except StiffmapError as problem:
             reasons[str(name)] = problem
-    tables = [n for n, p in reasons.items() if type(p) is Question]
+    tables = [n for n, p in reasons.items() if isinstance(p, Question) and p.waits]
     if ask is not None and tables:
         return understood(tables[0], ask)
     lines = "; ".join(f"'{n}': {str(p).removeprefix(str(file)).lstrip(':, ')}" for n, p in reasons.items())

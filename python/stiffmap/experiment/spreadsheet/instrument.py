@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError, StiffmapError
-from stiffmap.common.tables.sheet import Sheet
 from stiffmap.common.yaml_text import read
 from stiffmap.experiment.files.fields import SEEN
 from stiffmap.experiment.spreadsheet.answers import Meant
-from stiffmap.experiment.spreadsheet.guess import guess
 
 FOLDER = Path(__file__).parent / "instruments"
 KEYS = {"title", "quantity", "columns", "measured", "circle", "units"}
@@ -79,12 +77,12 @@ def as_readings(m: Meant, instrument: Instrument) -> None:
     chosen: dict[str, list[str]] = {}
     units: dict[str, str] = {}
     for meaning, pattern in instrument.columns.items():
-        index = _find(m.sheet, pattern)
+        index = m.sheet.find(pattern)
         if index is not None:
             chosen[meaning] = [m.sheet.header[index]]
             if meaning in instrument.units and not m.sheet.unit(index):
                 units[meaning] = instrument.units[meaning]
-    said = guess(m.sheet.header, m.chosen)
+    said = m.guessed
     seen = any(c.meaning in SEEN for c in said)
     for c in said:
         unit = instrument.units.get(c.meaning.replace("p", "d") if c.meaning in SEEN else c.meaning)
@@ -92,7 +90,7 @@ def as_readings(m: Meant, instrument: Instrument) -> None:
             units[c.meaning] = unit
     for reading, pattern in ({} if seen else instrument.measured).items():
         axis = reading[-1]
-        own = _find(m.sheet, pattern)
+        own = m.sheet.find(pattern)
         if own is None:
             continue
         if axis not in chosen:
@@ -101,9 +99,11 @@ def as_readings(m: Meant, instrument: Instrument) -> None:
             )
         command = m.sheet.header.index(chosen[axis][0])
         name = f"{m.sheet.header[own]} less {m.sheet.header[command]} [mm]"
-        values = _si(m.sheet, own, reading, instrument) - _si(m.sheet, command, axis, instrument)
+        values = _si(m, own, reading, instrument) - _si(m, command, axis, instrument)
         m.sheet = m.sheet.with_column(name, values)
         chosen[reading] = [name]
+        if reading not in m.chosen:
+            m.units.pop(reading, None)
     m.chosen, m.units = chosen | m.chosen, units | m.units
 
 
@@ -114,13 +114,13 @@ def _of_circle(m: Meant, instrument: Instrument) -> None:
         raise StiffmapError(f"a ball bar needs --set {lost[0]}=NUMBER (mm)")
     at: dict[str, int] = {}
     for key in ("angle", "deviation"):
-        found = _find(m.sheet, instrument.circle[key])
+        found = m.sheet.find(instrument.circle[key])
         if found is None:
             raise StiffmapError(
                 f"{m.sheet.file}: no column is the {key}; there are: {', '.join(m.sheet.header)}"
             )
         at[key] = found
-    angles, deviation = (_si(m.sheet, i, key, instrument) for key, i in at.items())
+    angles, deviation = (_si(m, i, key, instrument) for key, i in at.items())
     *centre, radius = (m.constants.pop(c) for c in CIRCLE)
     plane = instrument.circle["plane"]
     waves = {plane[0]: np.cos(angles), plane[1]: np.sin(angles)}
@@ -134,14 +134,9 @@ def _of_circle(m: Meant, instrument: Instrument) -> None:
     m.chosen = {meaning: [name] for name, (meaning, _) in made.items()} | m.chosen
 
 
-def _find(sheet: Sheet, pattern: str) -> int | None:
-    found = (i for i, n in enumerate(sheet.names) if re.fullmatch(pattern, n, re.IGNORECASE))
-    return next(found, None)
-
-
-def _si(sheet: Sheet, index: int, meaning: str, instrument: Instrument) -> Floats:
-    """A column in mm or rad, of its header's unit, else the instrument's."""
+def _si(m: Meant, index: int, meaning: str, instrument: Instrument) -> Floats:
+    """A column in mm or rad, of the unit that is said or in its header, else the instrument's."""
+    own = {} if m.sheet.unit(index) else {meaning: instrument.units.get(meaning, "")}
     quantity = "angle" if meaning == "angle" else "length"
-    said = sheet.unit(index) or instrument.units.get(meaning, "")
-    size = sheet.size(index, meaning, quantity, said)
-    return (size if quantity == "angle" else 1e3 * size) * sheet.numbers(index)
+    size = replace(m, units=own | m.units).unit(index, meaning, quantity=quantity).size
+    return (size if quantity == "angle" else 1e3 * size) * m.sheet.numbers(index)

@@ -10,12 +10,11 @@ import numpy as np
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.tables.header import with_unit
-from stiffmap.common.tables.sheet import Sheet
-from stiffmap.common.units import unit_of
+from stiffmap.common.units import Unit
 from stiffmap.experiment.channels import AXES
 from stiffmap.experiment.files.fields import SEEN
 from stiffmap.experiment.spreadsheet.answers import Meant
-from stiffmap.experiment.spreadsheet.guess import READINGS, Column, find_column, guess
+from stiffmap.experiment.spreadsheet.guess import READINGS, Column
 from stiffmap.solve.machine import Machine
 
 NUMBERED = r"(joint|axis|achse|gelenk|theta|q|j|a)[ _.-]?{}"
@@ -40,21 +39,22 @@ def commanded(m: Meant, drives: Mapping[str, bool]) -> None:
     """
     short = {n.split(".")[-1] for n in drives}
     given = _given(m.chosen, drives, short)
-    at = {name: _find(m.sheet, name, k, given.get(name)) for k, name in enumerate(drives, 1)}
+    at = {name: _find(m, name, k, given.get(name)) for k, name in enumerate(drives, 1)}
     lost = [n for n, i in at.items() if i is None]
     if len(lost) == len(at):
         return
     if lost:
-        there = ", ".join(f"'{h}'" for h in m.sheet.header)
-        raise StiffmapError(
-            f"{m.sheet.file}: which column commands {lost[0]}? Say --map {lost[0]}='HEADER'; columns: {there}"
-        )
+        m.ask_column(f"which column commands {lost[0]}? Say --map {lost[0]}='HEADER'", lost[0])
     m.chosen = {k: v for k, v in m.chosen.items() if k not in drives and k not in short}
     for k, (name, slides) in enumerate(drives.items(), 1):
         index = at[name]
         assert index is not None
-        m.columns[f"q{k}"] = (name, _unit(m, index, name, slides))
-        m.chosen[f"q{k}"] = [m.sheet.header[index]]
+        unit = _unit(m, index, name, slides)
+        m.columns[f"q{k}"] = (name, unit.name)
+        if unit.factor == 1.0:
+            m.chosen[f"q{k}"] = [m.sheet.header[index]]
+        else:  # a command is in a unit that experiment files have
+            m.add(m.sheet.names[index], unit.name, unit.factor * m.sheet.numbers(index), f"q{k}")
 
 
 def _given(chosen: Mapping[str, list[str]], drives: Mapping[str, bool], short: set[str]) -> dict[str, str]:
@@ -65,35 +65,22 @@ def _given(chosen: Mapping[str, list[str]], drives: Mapping[str, bool], short: s
     return {name: chosen[key][0] for name, key in keys if key in chosen}
 
 
-def _find(sheet: Sheet, name: str, number: int, header: str | None) -> int | None:
+def _find(m: Meant, name: str, number: int, header: str | None) -> int | None:
     if header is not None:
-        return find_column(header, sheet.header)
-    names = [n.lower() for n in sheet.names]
-    for wanted in (name.lower(), name.split(".")[-1].lower()):
-        if wanted in names and wanted not in ("x", "y", "z"):
-            return names.index(wanted)
-    pattern = NUMBERED.format(number)
-    return next((i for i, n in enumerate(names) if re.fullmatch(pattern, n)), None)
+        return m.index(header)
+    own = [re.escape(n) for n in (name, name.split(".")[-1]) if n.lower() not in ("x", "y", "z")]
+    found = map(m.sheet.find, (*own, NUMBERED.format(number)))
+    return next((i for i in found if i is not None), None)
 
 
-def _unit(m: Meant, index: int, name: str, slides: bool) -> str:
-    header, units, quantity = m.sheet.names[index], m.units, "length" if slides else "angle"
-    said = next(
-        (units[k] for k in (name, name.split(".")[-1], header, "joints") if k in units),
-        m.sheet.unit(index) or units.get(quantity, ""),
-    )
-    unit = unit_of(said, quantity) if said else None
-    if unit is not None and unit.factor == 1.0:
-        return unit.name
+def _unit(m: Meant, index: int, name: str, slides: bool) -> Unit:
+    names = (name, name.split(".")[-1], m.sheet.names[index], "joints")
+    quantity = "length" if slides else "angle"
     largest = float(np.nanmax(np.abs(m.sheet.numbers(index)), initial=0.0))
-    if not said and not slides and largest > MOST_TURNS:
+    if not slides and largest > MOST_TURNS and not m.written_unit(index, *names, quantity=quantity):
         m.said.append(f"'{m.sheet.header[index]}' goes to {largest:.4g}: taken as degrees")
-        return "deg"
-    kind = "mm" if slides else "deg"
-    raise StiffmapError(
-        f"column '{m.sheet.header[index]}' ({name}) has no unit of {quantity}s: write it in the header, "
-        f"as in '{header} [{kind}]', or say --unit joints={kind}"
-    )
+        return Unit("deg")
+    return m.unit(index, *names, quantity=quantity)
 
 
 def as_seen(m: Meant, difference: str) -> None:
@@ -104,15 +91,15 @@ def as_seen(m: Meant, difference: str) -> None:
     alone with joints are asked for.
     """
     header = m.sheet.header
-    columns = guess(header, m.chosen)
+    columns = m.guessed
     if not any(k.meaning in READINGS for k in columns):
         for k in columns:
             if k.meaning == "note" and (found := re.fullmatch(MEASURED, k.name.lower())):
                 m.chosen[f"p{found[1]}"] = [header[k.index]]
-    of = {k.meaning: k for k in guess(header, m.chosen) if k.repeat == 0}
+    of = {k.meaning: k for k in m.guessed if k.repeat == 0}
     if any(s in of for s in SEEN):
         for s in SEEN:
-            if s in of and _said(m, of[s]) != "mm":
+            if s in of and m.written_unit(of[s].index, s) != "mm":
                 _in_mm(m, s, [(1.0, of[s])])
     elif "ll" in of:  # a wire's end sits somewhere on the tool; x y z are the controller's
         m.head, m.placed = {"tool": "offset_unknown"}, True
@@ -141,7 +128,7 @@ def turned(m: Meant, difference: str) -> None:
     if difference == DIFFERENCES[0]:
         return
     chosen: dict[str, list[str]] = {}
-    for c in guess(m.sheet.header, m.chosen):
+    for c in m.guessed:
         if c.meaning in (*AXES, "dd"):
             name = f"less {with_unit(c.name, c.unit)}"
             m.sheet = m.sheet.with_column(name, -m.sheet.numbers(c.index))
@@ -152,11 +139,6 @@ def turned(m: Meant, difference: str) -> None:
 def _in_mm(m: Meant, meaning: str, parts: Sequence[tuple[float, Column]]) -> None:
     total = np.zeros(len(m.sheet.lines))
     for sign, column in parts:
-        size = m.sheet.size(column.index, column.meaning, "length", _said(m, column))
+        size = m.unit(column.index, column.meaning).size
         total = total + sign * 1e3 * size * m.sheet.numbers(column.index)
-    m.add(f"{meaning} of {' and '.join(column.name for _, column in parts)} [mm]", total, meaning)
-
-
-def _said(m: Meant, column: Column) -> str:
-    """The unit of a length, as it is said; empty where it is not."""
-    return m.units.get(column.meaning, column.unit) or m.units.get("length", "")
+    m.add(f"{meaning} of {' and '.join(column.name for _, column in parts)}", "mm", total, meaning)

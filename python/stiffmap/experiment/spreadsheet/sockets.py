@@ -9,9 +9,8 @@ import numpy as np
 from stiffmap.common.errors import FileError
 from stiffmap.common.tables.sheet import Sheet
 from stiffmap.experiment.files.fields import SEEN
-from stiffmap.experiment.spreadsheet.answers import Meant
-from stiffmap.experiment.spreadsheet.convert import Question
-from stiffmap.experiment.spreadsheet.guess import READINGS, Column, guess
+from stiffmap.experiment.spreadsheet.answers import Meant, Question
+from stiffmap.experiment.spreadsheet.guess import READINGS, Column
 
 SOCKET = r"(ball[ _-]?)?(socket|seat|nest|cup|datum|pfanne|kugelpfanne|sphere|ball|kugel)[ _.-]?(id|name|no\.?|nr\.?|number|nummer)?"
 PLACE = r"position|pos\.?|place|location|station|ort|stelle|platz"
@@ -24,7 +23,7 @@ def seated(m: Meant) -> None:
     The point stood where ``--set px=0`` and so on say, or in sockets, in a line ``--set socket=`` mm apart. Raises Question where nobody
     says how far, and FileError for a row without a socket.
     """
-    columns = guess(m.sheet.header, m.chosen)
+    columns = m.guessed
     fixed, socket = all(s in m.constants for s in SEEN), _named(columns, SOCKET)
     if any(k.meaning in READINGS for k in columns) or not (fixed or socket):
         return

@@ -8,13 +8,13 @@ import re
 import numpy as np
 
 from stiffmap.common.errors import FileError
-from stiffmap.common.tables.header import split_unit, with_unit
+from stiffmap.common.tables.header import split_unit
 from stiffmap.common.tables.sheet import Sheet, column_letter
 from stiffmap.common.units import Unit, unit_of
 from stiffmap.experiment.channels import AXES
 from stiffmap.experiment.files.fields import EULER, POSE, SEEN, SEEN_TURNED
 from stiffmap.experiment.spreadsheet.answers import Meant
-from stiffmap.experiment.spreadsheet.guess import READINGS, find_column, guess, guessed
+from stiffmap.experiment.spreadsheet.guess import READINGS, guessed
 
 LOAD = re.compile(
     r"(applied |test |hanging |hung )?(load|force|mass|weight|payload|last|prüflast|kraft|prüfkraft|masse|gewicht|belastung|"
@@ -55,13 +55,13 @@ def together(m: Meant, deflection: bool) -> None:
     if deflection:
         _differences(m)
     _directions(m)
-    if not any(re.fullmatch("[fm][xyz]", c.meaning) for c in guess(m.sheet.header, m.chosen)):
+    if not any(re.fullmatch("[fm][xyz]", c.meaning) for c in m.guessed):
         _hung(m)
 
 
 def oriented(m: Meant) -> None:
     """KUKA's A B C next to X Y Z, and names of targets."""
-    taken = {find_column(h, m.sheet.header) for v in m.chosen.values() for h in v}
+    taken = {m.index(h) for v in m.chosen.values() for h in v}
     _abc(m, taken)
     if "target" not in m.chosen:
         _targets(m, taken)
@@ -73,7 +73,7 @@ def _signs(m: Meant) -> None:
         for k, wanted in enumerate(headers):
             if wanted[:1] not in ("+", "-", "−") or wanted in m.sheet.header:
                 continue
-            index = find_column(wanted[1:].strip(), m.sheet.header)
+            index = m.index(wanted[1:].strip())
             name = f"{wanted[0].replace('−', '-')}{m.sheet.header[index]}"
             if name not in m.sheet.header:
                 values = m.sheet.numbers(index)
@@ -84,7 +84,7 @@ def _signs(m: Meant) -> None:
 
 def _lengths(m: Meant) -> None:
     """Lengths of a wire or bar: rows with a wrong sign are left out, and large numbers without a unit are mm."""
-    for c in [c for c in guess(m.sheet.header, m.chosen) if c.meaning == "ll" and not c.repeat]:
+    for c in [c for c in m.guessed if c.meaning == "ll" and not c.repeat]:
         values = m.sheet.numbers(c.index)
         if (
             not c.unit
@@ -98,8 +98,8 @@ def _lengths(m: Meant) -> None:
             rows = ", ".join(f"line {m.sheet.lines[i]} ({values[i]:g})" for i in wrong[:NAMED])
             told = f"{rows} and {wrong.size - NAMED} more" if wrong.size > NAMED else rows
             m.said.append(f"'{c.name}': expected lengths above zero; left out: {told}")
-            name = with_unit(f"{c.name} in use", c.unit)
-            m.add(name, np.where(values > 0.0, values, np.nan), "ll")
+            unit = m.written_unit(c.index, "ll")
+            m.add(f"{c.name} in use", unit, np.where(values > 0.0, values, np.nan), "ll")
 
 
 def _stateless(header: str) -> tuple[str, str]:
@@ -124,9 +124,7 @@ def _differences(m: Meant) -> None:
         if state == "before" or commanded or (name, "before") not in states or not m.sheet.is_numeric(i):
             continue
         j = states.index((name, "before"))
-        mapped = next(
-            (k for k, v in m.chosen.items() if any(find_column(h, m.sheet.header) == i for h in v)), ""
-        )
+        mapped = next((k for k, v in m.chosen.items() if any(m.index(h) == i for h in v)), "")
         meaning = mapped or guessed(name)
         meaning = f"d{meaning}" if meaning in ("x", "y", "z") and not mapped else meaning
         after, before = m.sheet.header[i], m.sheet.header[j]
@@ -137,7 +135,7 @@ def _differences(m: Meant) -> None:
         loaded, unloaded = (unit_of(u or unit) for u in units)
         scale = unloaded.size / loaded.size if unit and loaded and unloaded else 1.0
         values = m.sheet.numbers(i) - scale * m.sheet.numbers(j)
-        m.add(with_unit(f"{m.sheet.names[i]} less {m.sheet.names[j]}", unit), values, meaning)
+        m.add(f"{m.sheet.names[i]} less {m.sheet.names[j]}", unit, values, meaning)
         m.said.append(f"{meaning} is '{after}' less '{before}'")
 
 
@@ -157,7 +155,7 @@ def _directions(m: Meant) -> None:
         for i, n in enumerate(names)
         if LOAD.fullmatch(n) and i not in at and unit_of(m.sheet.unit(i) or "N", "force")
     ]
-    mapped = {find_column(v[0], m.sheet.header): k for k, v in m.chosen.items() if re.fullmatch("f[xyz]", k)}
+    mapped = {m.index(v[0]): k for k, v in m.chosen.items() if re.fullmatch("f[xyz]", k)}
     loads = [i for i in loads if i in mapped] or loads or [i for i in mapped if i < len(names)]
     if len(at) != 1 or len(loads) != 1 or len(mapped) > 1:
         return
@@ -179,10 +177,9 @@ def _directions(m: Meant) -> None:
     for axis, values in zip("xyz", parts.T, strict=True):
         m.chosen.pop(f"f{axis}", None)
         if values.any():
-            m.add(with_unit(f"+{names[load]} along {axis}", unit), values, f"f{axis}")
-            m.units.pop(f"f{axis}", None)
+            m.add(f"+{names[load]} along {axis}", unit, values, f"f{axis}")
     if not parts.any():
-        m.add(with_unit(f"+{names[load]} along z", unit), parts[:, 2], "fz")
+        m.add(f"+{names[load]} along z", unit, parts[:, 2], "fz")
     m.said.append(f"the load is '{m.sheet.header[load]}' along '{m.sheet.header[way]}'")
 
 
@@ -203,9 +200,8 @@ def _hung(m: Meant) -> None:
 
 def _abc(m: Meant, taken: set[int]) -> None:
     """Euler angles A B C (about z, the new y, the new x) where they stand with X Y Z."""
-    names = [n.lower() for n in m.sheet.names]
-    at = [next((i for i, n in enumerate(names) if re.fullmatch(ANGLE.format(a), n)), None) for a in "abc"]
-    meanings = {c.meaning for c in guess(m.sheet.header, m.chosen)}
+    at = [m.sheet.find(ANGLE.format(a)) for a in "abc"]
+    meanings = {c.meaning for c in m.guessed}
     columns = [i for i in at if i is not None and i not in taken and m.sheet.is_numeric(i)]
     seen = set(SEEN) <= meanings
     units = [m.sheet.unit(i) for i in columns]

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.units import LENGTHS, size_of
+from stiffmap.common.units import size_of
 from stiffmap.model.link.arrays import Ints
 from stiffmap.model.link.mesh import SolidMesh, checked_mesh
 from stiffmap.model.link.optional import gmsh_session
 
 CAD, MESH = {".step", ".stp", ".iges", ".igs", ".brep"}, {".msh", ".inp", ".unv", ".bdf", ".med", ".stl"}
-UNITS = {u: size_of(u, LENGTHS) for u in ("mm", "m", "cm", "in", "inch")}
+UNITS = {u: size_of(u) for u in ("mm", "m", "cm", "in", "inch")}
 _GMSH_TO_OURS = [0, 1, 2, 3, 4, 5, 6, 7, 9, 8]  # gmsh lists edge 23 before 13
 
 Faces = dict[str, list[int]]

@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import number_in
-from stiffmap.common.units import FORCES, MOMENTS, STRESSES, size_of
+from stiffmap.common.units import STRESSES, size_of
 from stiffmap.common.yaml_text import read
 from stiffmap.model.link.arrays import Floats
 from stiffmap.model.link.gmshmesh import UNITS
@@ -28,8 +28,8 @@ MATERIALS = {
     "cast-iron": (110e9, 0.26),
     "magnesium": (45e9, 0.35),
 }
-STRESS = {u: float(v) for u, v in STRESSES.items()}
-LOAD_UNITS = {u: size_of(u, FORCES, MOMENTS) for u in ("N", "kN", "N*m", "Nm", "N*mm", "Nmm")}
+STRESS = {u: size_of(u) for u in STRESSES}
+LOAD_UNITS = {u: size_of(u) for u in ("N", "kN", "N*m", "Nm", "N*mm", "Nmm")}
 UNIT_WRENCHES = np.diag([100.0, 100.0, 100.0, 10.0, 10.0, 10.0])  # linear solver: the size does not matter
 
 _BY_NAME: dict[str, type[BaseModel]] = {

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from stiffmap.common.broadcasting import Floats
-from stiffmap.common.errors import FileError
+from stiffmap.common.errors import FileError, reading
 from stiffmap.common.number_text import LARGEST, number_in
 from stiffmap.common.rotations import rotation_about
 from stiffmap.model.description import Body, Pose
@@ -23,10 +23,10 @@ X, Y, Z = np.eye(3)
 def read_urdf(path: Path) -> UrdfModel:
     """Model of a URDF file; FileError for what cannot be used, one line each."""
     file = str(path)
+    with reading(path):
+        text = path.read_bytes()
     try:
-        robot = xml.fromstring(_with_prefixes(path.read_bytes()))
-    except OSError as error:
-        raise FileError(f"cannot be read: {error.strerror}", file=file) from None
+        robot = xml.fromstring(_with_prefixes(text))
     except (
         xml.ParseError,
         LookupError,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from stiffmap.common.errors import FileError, StiffmapError
+from stiffmap.common.errors import FileError, StiffmapError, reading
 from stiffmap.common.json_text import parse_json
 from stiffmap.experiment import load_experiment
 from stiffmap.identification.planning.budget import budgets
@@ -52,13 +52,14 @@ def command(
 def _of(path: Path) -> list[AppliedEffect]:
     """Effects that a diagnosis named."""
     try:
-        data: Any = parse_json(path.read_text(encoding="utf-8"))
+        with reading(path):
+            data: Any = parse_json(path.read_text(encoding="utf-8"))
         terms = []
         for e in data["effects"]:
             values = tuple((n, float(v[0])) for n, v in e["parameters"].items())
             terms.append(AppliedEffect(e["kind"], e["element"], tuple(e["legs"]), values))
-    except OSError as error:
-        raise FileError(f"cannot be read: {error.strerror}", file=str(path)) from error
+    except FileError:
+        raise
     except (ValueError, KeyError, TypeError, IndexError, AttributeError, OverflowError):
         raise FileError(
             "expected a diagnosis as `stiffmap diagnose --json` writes it", file=str(path)

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from stiffmap.common.broadcasting import Floats
-from stiffmap.common.errors import FileError, MissingPartError
+from stiffmap.common.errors import FileError, needed
 from stiffmap.model.urdf.chains import plain_name
 from stiffmap.model.urdf.reader import read_urdf
 from stiffmap.solve.machine import Machine
@@ -26,13 +26,9 @@ class Meshes:
     """
 
     def __init__(self, api: Any, machine: Machine, urdf: Path) -> None:
-        try:
+        with needed("drawing meshes of a URDF", "view"):
             import yourdfpy
             from viser.extras import ViserUrdf
-        except ModuleNotFoundError:
-            raise MissingPartError(
-                "meshes of a URDF need yourdfpy, which is not installed: pip install stiffmap[view]"
-            ) from None
         model = read_urdf(urdf)
         joints = {plain_name(j.name): j.name for j in model.moving if j.mimic is None}
         places = machine.compiled.names.joints

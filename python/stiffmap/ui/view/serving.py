@@ -16,7 +16,7 @@ from http.cookies import CookieError, SimpleCookie
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
-from stiffmap.common.errors import MissingPartError, StiffmapError
+from stiffmap.common.errors import StiffmapError, needed
 
 HERE = "127.0.0.1"
 LOCAL = (HERE, "localhost", "::1")
@@ -27,12 +27,8 @@ COOKIE = "stiffmap_view"
 def need_viser() -> Any:
     """The library of the extra ``[view]``, imported only when something is to be looked at; MissingPartError that says how
     to install it."""
-    try:
+    with needed("a view", "view"):
         import viser
-    except ModuleNotFoundError:
-        raise MissingPartError(
-            "a view needs viser, which is not installed: pip install stiffmap[view]"
-        ) from None
     return viser
 
 

@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 
 from stiffmap.common.broadcasting import Floats, thread_count, whole_number
-from stiffmap.common.errors import MissingPartError, StiffmapError
+from stiffmap.common.errors import StiffmapError, needed
 from stiffmap.common.outputs import make_folder, only_job
 from stiffmap.common.tasks import workers
 from stiffmap.workspace.design.judging import IMPOSSIBLE, Judged, judge
@@ -180,15 +180,11 @@ def _hypervolume(judged: list[Judged]) -> Any:
 
 
 def _algorithm(problem: DesignProblem, generations: int) -> Any:
-    try:
+    with needed("design", "design"):
         from pymoo.algorithms.moo.nsga2 import NSGA2
         from pymoo.algorithms.moo.nsga3 import NSGA3
         from pymoo.core.problem import Problem
         from pymoo.util.ref_dirs import get_reference_directions
-    except ModuleNotFoundError as error:
-        raise MissingPartError(
-            f"design needs {error.name}, which is not installed: pip install 'stiffmap[design]'"
-        ) from error
     search, low_high = problem.model.search, problem.bounds
     goals = len(problem.model.objectives)
     task = Problem(

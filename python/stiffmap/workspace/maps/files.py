@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from stiffmap.common.errors import FileError, MissingPartError
+from stiffmap.common.errors import FileError, needed
 from stiffmap.common.outputs import needs_space, only_job, put_folder, writing
 
 
@@ -65,10 +65,8 @@ def write_zarr(ds: xr.Dataset, folder: Path) -> None:
 
 def zarr_package() -> Any:
     """The package zarr; MissingPartError where it is absent."""
-    try:
+    with needed("writing Zarr", "zarr"):
         import zarr
-    except ImportError as error:
-        raise MissingPartError("writing Zarr needs the package zarr: pip install 'stiffmap[zarr]'") from error
     return zarr
 
 

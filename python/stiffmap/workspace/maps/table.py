@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from stiffmap.common.errors import MissingPartError, StiffmapError
+from stiffmap.common.errors import StiffmapError, needed
 from stiffmap.common.outputs import write_rows, writing
 from stiffmap.solve.compiled import Status
 from stiffmap.solve.labels import COMPONENTS
@@ -77,12 +77,10 @@ def write_map_table(ds: xr.Dataset, path: str | PathLike[str]) -> Path:
 
 
 def _write_xlsx(ds: xr.Dataset, target: Path, names: list[str], rows: Iterator[list[Any]]) -> Path:
-    try:
+    with needed("writing Excel files", "excel"):
         from openpyxl import Workbook
         from openpyxl.cell import WriteOnlyCell
         from openpyxl.cell.cell import ILLEGAL_CHARACTERS_RE
-    except ImportError as error:
-        raise MissingPartError("writing Excel files needs openpyxl: pip install 'stiffmap[excel]'") from error
     book = Workbook(write_only=True)
     sheet = book.create_sheet("map")
     sheet.freeze_panes = "D2"

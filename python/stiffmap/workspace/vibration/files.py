@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from stiffmap.common.broadcasting import Floats
-from stiffmap.common.errors import FileError, MissingPartError, StiffmapError
+from stiffmap.common.errors import FileError, StiffmapError, needed
 from stiffmap.common.tables.named import Known, read_named
 from stiffmap.workspace.vibration.response import Complex
 from stiffmap.workspace.vibration.response_units import FREQUENCIES, ResponseUnit, response_unit
@@ -101,12 +101,8 @@ QUANTITIES = {
 
 
 def _universal(path: Path) -> list[MeasuredResponse]:
-    try:
+    with needed("reading universal files", "vibration"):
         import pyuff  # type: ignore[import-untyped]
-    except ImportError:
-        raise MissingPartError(
-            "universal files need the package pyuff; install it with: pip install 'stiffmap[vibration]'"
-        ) from None
     try:
         sets = pyuff.UFF(str(path)).read_sets()
     except Exception as problem:  # the reader raises whatever its parsing meets

@@ -43,7 +43,7 @@ def test_values_become_si(tmp_path: Path) -> None:
         (HEAD, ROWS.replace("-0.05", "oops"), ["data.csv, line 3", "'dx'", "oops"]),
         (HEAD, ROWS.replace("-100,0,0", "nan,0,0"), ["data.csv, line 3", "'fx'", "finite"]),
         (HEAD, ROWS.replace(",dx\n", ",rx\n"), ["'angle' is not declared"]),
-        (HEAD, ROWS.replace("3,10,0,0,100,0,0,\n", "3,10,0\n"), ["line 4", "expected 8 cells"]),
+        (HEAD, ROWS.replace("3,10,0,0,100,0,0,\n", "3,10,0\n"), ["line 4", "expected 8 values"]),
         (HEAD.replace("deflection", "distance"), ROWS, ["quantity"]),
         (HEAD, "id,x,y,z,dx\n1,0,0,0,0.1\n", ["needs a load"]),
         (HEAD + "colour: red\n", ROWS, ["unknown key 'colour'"]),

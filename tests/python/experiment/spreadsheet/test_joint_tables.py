@@ -182,8 +182,8 @@ def test_measured_positions_are_places_and_named_once(
     [
         ("q1 [deg],q2 [deg],q3 [deg],q4 [deg],q5 [deg],dx [mm]", [], "which column commands arm.wrist_3? Say --map"),
         ("q1 [deg],q2 [deg],q3 [deg],q4 [deg],q5 [deg],q6 [deg],m,n,o", [], "Say --map px='HEADER' (py, pz) for measured positions"),
-        ("q1,q2,q3,q4,q5,q6,dx [mm]", [], "(arm.base) has no unit of angles"),
-        ("q1,q2,q3,q4,q5,q6,dx [mm]", ["--unit", "joints=mm"], "has no unit of angles"),
+        ("q1,q2,q3,q4,q5,q6,dx [mm]", [], "(arm.base) has no unit: write it in the header, as in 'q1 [deg]', or say --unit joints=deg"),
+        ("q1,q2,q3,q4,q5,q6,dx [mm]", ["--unit", "joints=mm"], "(arm.base): the unit 'mm' is not one of this quantity; those of angle are"),
         ("q1 [deg],q2 [deg],q3 [deg],q4 [deg],q5 [deg],q6 [deg],x,y,z", [], "if an instrument read them, say --map px='x'"),
         ("q1 [deg],q2 [deg],q3 [deg],q4 [deg],q5 [deg],q6 [deg],dx [mm]", ["--map", "arm.wrist=q6"], "no drive 'arm.wrist'"),
         ("q1 [deg],q2 [deg],q3 [deg],q4 [deg],q5 [deg],q6 [deg],dx [mm]", ["--difference", "both"], "difference: expected"),
@@ -195,6 +195,24 @@ def test_what_is_not_clear_is_asked(
     file = write(tmp_path, "t.csv", head + "\n" + ",".join(["1"] * (head.count(",") + 1)) + "\n")
     assert main(["experiment", "new", file, "--machine", "ur10", "-o", str(tmp_path / "e"), *more]) == 2
     assert asked in " ".join(capsys.readouterr().err.split())
+
+
+def test_units_of_joints_and_of_places_are_said(tmp_path: Path) -> None:
+    """Minutes of arc, and px py pz in metres by --unit of each, are the same readings as degrees and mm."""
+    joints = (0, -60, 90, -120, -90, 0)
+    heads = {"deg,mm": ("deg", 1, 1.0), "arcmin,m": ("arcmin", 60, 1e-3)}
+    made = []
+    for name, (unit, turns, size) in heads.items():
+        head = ",".join([*(f"q{k} [{unit}]" for k in range(1, 7)), "px", "py", "pz"])
+        row = ",".join(map(str, (*(turns * q for q in joints), 800 * size, 100 * size, -200 * size)))
+        file = write(tmp_path, f"{unit}.csv", f"{head}\n{row}\n")
+        said = dict.fromkeys(("px", "py", "pz"), name.split(",")[1])
+        made.append(sm.experiment_from_table("ur10", file, tmp_path / unit, units=said).experiment)
+    one, other = made
+    assert one.command is not None and one.seen is not None
+    np.testing.assert_allclose(other.command, one.command, rtol=1e-12)
+    np.testing.assert_allclose(one.seen, [[0.8, 0.1, -0.2]], rtol=1e-12)
+    np.testing.assert_allclose(other.seen, one.seen, rtol=1e-12)
 
 
 @pytest.mark.parametrize(

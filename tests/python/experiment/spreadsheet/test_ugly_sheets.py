@@ -217,7 +217,7 @@ def test_missing_openpyxl(
         )
         != 0
     )
-    assert "pip install openpyxl" in capsys.readouterr().err
+    assert "needs openpyxl, which is not installed: pip install 'stiffmap[excel]'" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -198,10 +198,10 @@ def test_without_viser_there_is_one_clear_error(machine: sm.Machine, monkeypatch
                                                 capsys: pytest.CaptureFixture[str]) -> None:  # fmt: skip
     monkeypatch.setitem(sys.modules, "viser", None)
     assert main(["view", "orthoglide-revised"]) == 2
-    assert "a view needs viser, which is not installed: pip install stiffmap[view]" in " ".join(
+    assert "a view needs viser, which is not installed: pip install 'stiffmap[view]'" in " ".join(
         capsys.readouterr().err.split()
     )
-    with pytest.raises(MissingPartError, match=r"pip install stiffmap\[view\]"):
+    with pytest.raises(MissingPartError, match=r"pip install 'stiffmap\[view\]'"):
         machine.view(browser=False)
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from stiffmap.common.broadcasting import Floats
-from stiffmap.common.errors import FileError
+from stiffmap.common.errors import FileError, reading
 from stiffmap.machining.toolpath.gcode.read import ProgramReader, read_moves
 from stiffmap.machining.toolpath.gcode.state import NEVER, ModalState
 from stiffmap.machining.toolpath.path import Kind, Toolpath
@@ -20,12 +20,9 @@ KINDS = {"G0": Kind.RAPID, "G1": Kind.LINE, "G2": Kind.ARC, "G3": Kind.ARC}
 
 def lines_of(path: Path, newline: str | None = None) -> Iterator[str]:
     """Lines of a text file, ended by `newline` or, where that is None, as any system ends them; a byte-order mark passed over; a line that is not UTF-8 is Latin-1. Raises FileError where it cannot be read."""
-    try:
-        with path.open(encoding="utf-8-sig", errors="surrogateescape", newline=newline) as stream:
-            for line in stream:
-                yield line if line.isascii() else _decoded(line)
-    except OSError as error:
-        raise FileError(f"cannot be read: {error.strerror}", file=str(path)) from error
+    with reading(path), path.open(encoding="utf-8-sig", errors="surrogateescape", newline=newline) as stream:
+        for line in stream:
+            yield line if line.isascii() else _decoded(line)
 
 
 def load_gcode(
