@@ -29,7 +29,7 @@ from stiffmap.identification.diagnosis.report.separation import separation
 from stiffmap.identification.inference.amplitudes import Fit
 from stiffmap.identification.inference.chosen import Chosen
 from stiffmap.identification.inference.columns import Columns
-from stiffmap.identification.inference.constants import RARE
+from stiffmap.identification.inference.constants import ODDS, RARE
 from stiffmap.identification.inference.corrected import Corrected, Term, corrected, instead
 from stiffmap.identification.inference.inference import Inferred, terms
 from stiffmap.identification.inference.machines import (
@@ -91,7 +91,7 @@ def answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, cross
         limitations=[
             *_first(fit, v, bool((found.noise.declared > 0).any())),
             *notes,
-            *(_or_number(n) for n in v.named if n.numbers),
+            *(_or_numbers(n) for n in v.named if n.numbers or n.against_numbers < np.log(ODDS)),
             *limitations(e, found.noise, predictor.machine),
             *([] if late is None else [str(late)]),
         ],
@@ -264,9 +264,14 @@ def _first(fit: Fit, v: Verdict, stated: bool) -> list[str]:
     return out
 
 
-def _or_number(n: Named) -> str:
-    names = " or ".join(b.unknown.name for b in n.numbers[:RIVALS])
-    return f"instead of {n.chosen.place.candidate} these declared numbers may be out of tolerance: {names}"
+def _or_numbers(n: Named) -> str:
+    place = n.chosen.place.candidate
+    if names := " or ".join(b.unknown.name for b in n.numbers[:RIVALS]):
+        return f"instead of {place} these declared numbers may be out of tolerance: {names}"
+    return (
+        f"instead of {place} declared numbers within their tolerances may show the same: it is "
+        f"{np.exp(n.against_numbers):.2g} times as likely as they are"
+    )
 
 
 def _numbers(found: Inferred, v: Verdict, best: Corrected | None, given: Readings) -> FoundNumbers | None:

@@ -91,10 +91,11 @@ def searched(
     searches = [_World(columns, parts.gaps, name, own, predict, over, optima) for name, own in worlds.items()]
     searches.sort(key=lambda w: -w.null.score)
     found: dict[str, Search] = {}
+    price = searches[0].price
     for w in searches:
         found[w.name] = w.search(max((s.best for s in found.values()), key=lambda m: m.score, default=w.null))
-    limit = searches[0].limit
-    best = max(found.values(), key=lambda s: s.best.score - limit * len(s.best.chosen))
+    # each effect may be at any place, which those without effects need not pay for
+    best = max(found.values(), key=lambda s: s.best.score - price * len(s.best.chosen))
     others = [w for w in searches if w.name != best.best.world]
     own = next(w for w in searches if w.name == best.best.world)
     best = replace(best, best=own.coarsest(best.best))
@@ -155,11 +156,6 @@ class _World:
         return float(np.log(max(1, len(self.columns.places))))
 
     @property
-    def limit(self) -> float:
-        """Evidence that an effect must gain, in this world or against others that do without it: the odds, all places together."""
-        return float(np.log(ODDS)) + self.price
-
-    @property
     def null(self) -> Model:
         """No effect at all."""
         return self._fit((), None)
@@ -171,14 +167,15 @@ class _World:
         if begin.chosen:
             same = self._fit(begin.chosen, amplitudes(begin.fit), begin.fit.weights)
             model = max(null, self._settled(same), key=lambda m: m.score)
+        limit = float(np.log(ODDS)) + self.price
         while len(model.chosen) < MOST_EFFECTS and not self.over():
             trials = self._trials(model)
             if not trials:
                 break
             best, all_gains = trials
             total = float(np.logaddexp.reduce(all_gains))
-            if total <= self.limit:
-                break
+            if total <= limit:
+                break  # the odds of all places together
             to_come = 1 + MOST_EFFECTS - len(best.chosen)
             if begin.world != self.name and best.score + to_come * (best.score - model.score) < begin.score:
                 break

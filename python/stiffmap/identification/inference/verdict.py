@@ -43,6 +43,13 @@ class Named:
     """rms of what it adds to the readings, in noise."""
     numbers: tuple[Beyond, ...] = ()
     """Declared numbers that would do in its stead, but out of tolerance."""
+    against_numbers: float = np.inf
+    """Its ln odds against declared numbers that are off in its stead."""
+
+    @property
+    def is_alone(self) -> bool:
+        """Whether nothing else would do in its stead."""
+        return not self.equivalents and not self.numbers and self.against_numbers >= np.log(ODDS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +83,7 @@ class Verdict:
     def word(self) -> str:
         """``none``, ``effects``, ``ambiguous``, ``unattributed``."""
         if self.named:
-            return "ambiguous" if any(n.equivalents or n.numbers for n in self.named) else "effects"
+            return "effects" if all(n.is_alone for n in self.named) else "ambiguous"
         return "unattributed" if self.rest else "effects" if self.beyond else "none"
 
 
@@ -93,12 +100,12 @@ def judged(columns: Columns, search: Search) -> Verdict:
         if instead and against < np.log(ODDS):
             known = [b.unknown.name for b in beyond]
             numbers = tuple(b for b in _out_of_tolerance(columns, instead) if b.unknown.name not in known)
-            why = why if numbers else TOLERABLE
+            why = why or ("" if numbers or against > 0.0 else TOLERABLE)
         if why:
             refused.append((c, why))
         else:
             share = float(np.linalg.norm(model.fit.mean(c.part)) / np.sqrt(len(columns)))
-            named.append(Named(c, tuple(p for p, _ in near), odds, scatter, share, numbers))
+            named.append(Named(c, tuple(p for p, _ in near), odds, scatter, share, numbers, against))
     called = {id(b): effect_of(columns, b, model.chosen) for b in beyond}
     for b in beyond:
         effect = called[id(b)]
