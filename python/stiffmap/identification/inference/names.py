@@ -91,23 +91,28 @@ def searched(
     searches = [_World(columns, parts.gaps, name, own, predict, over, optima) for name, own in worlds.items()]
     searches.sort(key=lambda w: -w.null.score)
     found: dict[str, Search] = {}
-    price = searches[0].price
     for w in searches:
         found[w.name] = w.search(max((s.best for s in found.values()), key=lambda m: m.score, default=w.null))
-    # each effect may be at any place, which those without effects need not pay for
-    best = max(found.values(), key=lambda s: s.best.score - price * len(s.best.chosen))
-    others = [w for w in searches if w.name != best.best.world]
-    own = next(w for w in searches if w.name == best.best.world)
-    best = replace(best, best=own.coarsest(best.best))
-    rivals = own.rivals(best.best)
-    best = replace(best, gain=tuple(o for o, _ in rivals), equivalents=tuple(near for _, near in rivals))
+    best = _with_rivals(max((s.best for s in found.values()), key=lambda m: m.score), searches, found)
+    likelier = [m for m, odds in filter(None, best.instead) if odds < 0.0]
+    if likelier:  # without an effect, which may be at any place, in another world
+        best = _with_rivals(max(likelier, key=lambda m: m.score), searches, found)
     off = [s.null.fit for name, s in found.items() if name != EXACT]
     return replace(
         best,
-        instead=tuple(_without(c, best, others, found) for c in best.best.chosen),
         exact=found[EXACT].null.score,
         calibrated=max(off, key=lambda f: f.score, default=None),
     )
+
+
+def _with_rivals(model: Model, searches: Sequence[_World], found: Mapping[str, Search]) -> Search:
+    """A model with what would do in the stead of each of its effects, in its own world and in others."""
+    own = next(w for w in searches if w.name == model.world)
+    others = [w for w in searches if w is not own]
+    model = own.coarsest(model)
+    rivals = own.rivals(model)
+    best = Search(model, own.null, tuple(odds for odds, _ in rivals), tuple(near for _, near in rivals))
+    return replace(best, instead=tuple(_without(c, best, others, found) for c in model.chosen))
 
 
 def put_instead(fit: Fit, c: Chosen, place: Place) -> Chosen:
