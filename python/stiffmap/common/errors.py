@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import difflib
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from types import FrameType
 
 LONGEST_WORD, LONGEST_MESSAGE = 400, 3000  # characters
@@ -65,6 +66,18 @@ class HomeError(StiffmapError):
 
 class MissingPartError(StiffmapError):
     """An optional part of stiffmap, or a package that it needs, is not installed."""
+
+
+def suggestion(word: str, known: Iterable[str]) -> str:
+    """`` (did you mean 'length'?)`` or nothing."""
+    near = difflib.get_close_matches(word, list(known), n=1, cutoff=0.6)
+    return f" (did you mean '{near[0]}'?)" if near else ""
+
+
+def unknown_name(what: str, name: str, known: Iterable[str]) -> str:
+    """That there is nothing of this name, the nearest name, and all that there are."""
+    names = list(known)
+    return f"no {what} '{name}'{suggestion(name, names)}; there are: {', '.join(names) or 'none'}"
 
 
 def shortened(message: str) -> str:

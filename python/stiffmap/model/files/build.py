@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from stiffmap.common.errors import unknown_name
 from stiffmap.common.units import LENGTH, NONE, UnitSystem
 from stiffmap.common.yaml_text import Document
 from stiffmap.model.description import (
@@ -27,7 +28,7 @@ from stiffmap.model.files.build_numbers import build_numbers, build_range
 from stiffmap.model.files.build_strokes import with_strokes
 from stiffmap.model.files.context import Context, Gathered, LinkUse
 from stiffmap.model.files.schema import MachineFile
-from stiffmap.model.files.schema.base import Number, suggestion
+from stiffmap.model.files.schema.base import Number
 from stiffmap.model.files.schema.geometry import BoxModel
 from stiffmap.model.files.schema.machine import EffectModel, ExternalSpringModel
 
@@ -84,9 +85,7 @@ def _check_points(description: MachineDescription, context: Context) -> None:
     known = point_names(description)
     for spring in description.external_springs:
         if spring.point not in known:
-            near = suggestion(spring.point, known)
-            there = ", ".join(known) or "none"
-            context.at(spring.name, "point").fail(f"no point '{spring.point}'{near}; there are: {there}")
+            context.at(spring.name, "point").fail(unknown_name("point", spring.point, known))
 
 
 def build_workspace(

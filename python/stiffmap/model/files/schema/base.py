@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from functools import cache
 from typing import Annotated, Any, Literal, Self
 
@@ -19,6 +18,8 @@ from pydantic import (
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, InitErrorDetails, PydanticCustomError, PydanticKnownError
 
+from stiffmap.common.errors import suggestion
+
 
 def describe(value: object) -> str:
     """A value as an error message shows it: its sort, and itself when short."""
@@ -28,12 +29,6 @@ def describe(value: object) -> str:
         return sort
     text = repr(value)
     return sort if len(text) > 40 else f"{sort} ({text})"
-
-
-def suggestion(word: str, known: list[str]) -> str:
-    """`` (did you mean 'length'?)`` or nothing."""
-    near = difflib.get_close_matches(word, known, n=1, cutoff=0.6)
-    return f" (did you mean '{near[0]}'?)" if near else ""
 
 
 class FileModel(BaseModel):
