@@ -6,11 +6,11 @@ count: ``x.bar_low.bar``.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import TypeVar
 
-from stiffmap.model.description.elements import Block, Branch, Element, Joint, Point
+from stiffmap.model.description.elements import Block, Body, Branch, Element, Joint, Offset, Point
 from stiffmap.model.description.machine import Leg, MachineDescription
 
 Elements = tuple[Element, ...]
@@ -67,6 +67,13 @@ def joint_of(named: Mapping[str, Joint], coordinate: str) -> Joint | None:
 def find(description: MachineDescription, full: str) -> list[Element]:
     """The elements of a full name: a body and a point may share theirs with another sort of element."""
     return [element for name, element in all_elements(description) if name == full]
+
+
+def offset_before(elements: Sequence[Element], k: int) -> int | None:
+    """Index of the offset that is the length of the link at whose end element ``k`` stands; None: there is none."""
+    i = next((i for i in reversed(range(k)) if not isinstance(elements[i], (Body, Point))), None)
+    before = None if i is None else elements[i]
+    return i if isinstance(before, Offset) and any(before.nominal.translation) else None
 
 
 def sequences(elements: Elements) -> Iterator[Elements]:

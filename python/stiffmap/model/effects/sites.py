@@ -16,10 +16,9 @@ from stiffmap.model.description import (
     Joint,
     MachineDescription,
     Offset,
-    Point,
     Spring,
 )
-from stiffmap.model.description.tree import Elements, sequences
+from stiffmap.model.description.tree import Elements, offset_before, sequences
 from stiffmap.model.effects.edit import Sites, change_sites
 from stiffmap.model.effects.types import Place, Placed
 
@@ -89,7 +88,7 @@ def links(elements: Elements) -> dict[str, tuple[int, ...]]:
     """Offsets that are the length of a link, under the name of the spring at the link's end."""
     found: dict[str, tuple[int, ...]] = {}
     for name, at in springs(elements).items():
-        lengths = tuple(i for k in at if (i := _offset_before(elements, k)) is not None)
+        lengths = tuple(i for k in at if (i := offset_before(elements, k)) is not None)
         found.update({name: lengths} if lengths else {})
     return found
 
@@ -97,14 +96,6 @@ def links(elements: Elements) -> dict[str, tuple[int, ...]]:
 def lengths(elements: Elements) -> dict[str, tuple[int, ...]]:
     """Links, and offsets by their own names."""
     return {**offsets(elements), **links(elements)}
-
-
-def _offset_before(elements: Elements, k: int) -> int | None:
-    i = k - 1
-    while i >= 0 and isinstance(elements[i], (Body, Point)):
-        i -= 1
-    before = elements[i] if i >= 0 else None
-    return i if isinstance(before, Offset) and np.any(before.nominal.p) else None
 
 
 def names(elements: Elements, sites: Sites) -> list[str]:

@@ -177,12 +177,11 @@ def with_links(extra: Extra, new: dict[str, LinkUse], context: Context) -> Extra
         FileError: the kept value is not (file, springs, 21 x 21 numbers) entries, or a file's covariance is
             another one than that kept for its other springs.
     """
-    kept = _kept(dict(extra).get(KEY, ()), context)
     linked = {spring for use in new.values() for spring in use.springs}
-    for file, use in list(kept.items()):
-        use.springs[:] = [s for s in use.springs if s not in linked]
-        if not use.springs:
-            del kept[file]
+    kept = {}
+    for file, use in _kept(dict(extra).get(KEY, ()), context).items():
+        if left := [s for s in use.springs if s not in linked]:
+            kept[file] = LinkUse(use.covariance, left)
     for file, use in new.items():
         old = kept.setdefault(file, LinkUse(use.covariance))
         if old.covariance != use.covariance:

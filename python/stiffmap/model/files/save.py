@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import fields, replace
 from os import PathLike
-from typing import Any, TypeGuard
+from typing import Any
 
 import yaml
 
@@ -130,18 +130,16 @@ def _legs(legs: tuple[Leg, ...]) -> Plain:
 
 def _placed(leg: Leg) -> tuple[Plain, Elements, Plain]:
     """Frame, elements between, and attachment of a leg."""
-    middle = leg.elements
     frame: Plain = {}
     attach: Plain = {}
-    if middle and _is_plain_offset(middle[0], "frame"):
-        frame, middle = {"frame": dump_pose(middle[0].nominal)}, middle[1:]
-    if middle and _is_plain_offset(middle[-1], "attach"):
-        attach, middle = {"attach": dump_pose(middle[-1].nominal)}, middle[:-1]
+    middle = leg.elements
+    match middle:
+        case (Offset("frame", pose, None), *_):
+            frame, middle = {"frame": dump_pose(pose)}, middle[1:]
+    match middle:
+        case (*_, Offset("attach", pose, None)):
+            attach, middle = {"attach": dump_pose(pose)}, middle[:-1]
     return frame, middle, attach
-
-
-def _is_plain_offset(element: Element, name: str) -> TypeGuard[Offset]:
-    return isinstance(element, Offset) and element.name == name and element.actual is None
 
 
 def _without_home(element: Element) -> Element:
