@@ -90,7 +90,10 @@ def _element(effect: EffectType, names: list[str], element: str | None) -> str:
 def values_at(effect: EffectType, machine: MachineDescription, record: AppliedEffect) -> dict[str, float]:
     """All values of a record, defaults filled in; raises StiffmapError for missing or out of bounds."""
     given = dict(record.parameters)
-    _check_alternatives(effect, given)
+    if effect.one_of and sum(n in given for n in effect.one_of) != 1:
+        raise StiffmapError(f"{effect.kind}: give exactly one of {', '.join(effect.one_of)}")
+    if effect.vector and not any(n in given for n in effect.vector):
+        raise StiffmapError(f"{effect.kind}: give at least one of {', '.join(effect.vector)}")
     values = {}
     for p in effect.parameters_at(machine, record.element, record.legs):
         default = p.null if p.name in effect.vector else p.default
@@ -106,13 +109,6 @@ def values_at(effect: EffectType, machine: MachineDescription, record: AppliedEf
             )
         values[p.name] = value
     return values
-
-
-def _check_alternatives(effect: EffectType, given: Mapping[str, float]) -> None:
-    if effect.one_of and sum(n in given for n in effect.one_of) != 1:
-        raise StiffmapError(f"{effect.kind}: give exactly one of {', '.join(effect.one_of)}")
-    if effect.vector and not any(n in given for n in effect.vector):
-        raise StiffmapError(f"{effect.kind}: give at least one of {', '.join(effect.vector)}")
 
 
 def check_exclusion(new: AppliedEffect, records: Sequence[AppliedEffect]) -> None:

@@ -71,7 +71,11 @@ def build(
     gathered = context.gathered
     description = with_strokes(description, gathered)
     context.raise_problems()
-    _check_points(description, context.at("external_springs"))
+    points = point_names(description)
+    for spring in description.external_springs:
+        if spring.point not in points:
+            here = context.at("external_springs", spring.name, "point")
+            here.fail(unknown_name("point", spring.point, points))
     return replace(
         description,
         uncertainty=tuple({**gathered.uncertainty, **model.uncertainty}.items()),
@@ -79,13 +83,6 @@ def build(
         notes=tuple({**gathered.notes, **model.notes}.items()),
         sources=tuple({**gathered.sources, **model.sources}.items()),
     )
-
-
-def _check_points(description: MachineDescription, context: Context) -> None:
-    known = point_names(description)
-    for spring in description.external_springs:
-        if spring.point not in known:
-            context.at(spring.name, "point").fail(unknown_name("point", spring.point, known))
 
 
 def build_workspace(

@@ -92,7 +92,7 @@ def dump(description: MachineDescription) -> Plain:
             s.name: {"point": s.point, **dump_numbers(s), "tension_only": bool(s.tension_only)}
             for s in declared.external_springs
         },
-        "effects": [_effect(effect) for effect in description.effects],
+        "effects": [dump_effect(effect) for effect in description.effects],
         "uncertainty": {key: float(value) for key, value in description.uncertainty},
         "sources": dict(description.sources),
         "notes": dict(description.notes),
@@ -101,7 +101,8 @@ def dump(description: MachineDescription) -> Plain:
     return {key: value for key, value in plain.items() if value not in (None, "", [], {})}
 
 
-def _effect(effect: AppliedEffect) -> Plain:
+def dump_effect(effect: AppliedEffect) -> Plain:
+    """An effect, in SI units."""
     return {
         "kind": effect.kind,
         "element": effect.element,

@@ -6,13 +6,13 @@ from stiffmap.model.description import Joint, MachineDescription, Pose
 from stiffmap.model.description.tree import Elements
 from stiffmap.model.effects.edit import built, change_sites, edit_chains, splice
 from stiffmap.model.effects.library.geometry import translation_of, translations
-from stiffmap.model.effects.sites import joints, per_leg, places
+from stiffmap.model.effects.sites import at_sites, joints, per_leg
 from stiffmap.model.effects.types import EffectType, Place, Placed
 
 
 def find(description: MachineDescription) -> list[Place]:
     """Joints, and the two ends of each leg."""
-    return places(description, joints) + per_leg("base")(description) + per_leg("platform")(description)
+    return at_sites(joints)(description) + per_leg("base")(description) + per_leg("platform")(description)
 
 
 def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
