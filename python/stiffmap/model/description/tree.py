@@ -104,6 +104,15 @@ def edit_elements(elements: Elements, change: Callable[[Element], Element]) -> E
     )
 
 
+def edit_all(
+    description: MachineDescription, edit: Callable[[Elements, str], Elements]
+) -> MachineDescription:
+    """The machine with ``edit`` applied to the whole of each leg, base and platform, whose name it is given."""
+    legs = tuple(replace(leg, elements=edit(leg.elements, leg.name)) for leg in description.legs)
+    base, platform = (edit(getattr(description, end), end) for end in ENDS)
+    return replace(description, legs=legs, base=base, platform=platform)
+
+
 def edit_path(elements: Elements, path: str, change: Change) -> Elements | None:
     """The sequence with the elements of a name (branches, then element) changed; None: nothing was."""
     first, _, rest = path.partition(".")
