@@ -79,7 +79,8 @@ def build_element(
     here = context.named(getattr(model, str(sort_of(model))), model)
     match model:
         case OffsetModel():
-            actual = model.actual and build_pose(model.actual, here.at("actual"), "actual.")
+            there = here.at("actual")
+            actual = None if model.actual is None else build_pose(model.actual, there, "actual.")
             return Offset(model.offset, build_pose(model, here), actual)
         case JointModel():
             return _joint(model, here)

@@ -14,7 +14,7 @@ from stiffmap.common.arithmetic import sum_of_numbers
 from stiffmap.common.errors import FileError, suggestion, together, unknown_name
 from stiffmap.common.yaml_text import Document, KeyPath
 from stiffmap.model.files.report import key_text
-from stiffmap.model.files.schema.base import describe
+from stiffmap.model.files.schema.base import describe, unknown_key
 
 _REFERENCE = re.compile(r"\$([A-Za-z_]\w*)")
 
@@ -46,10 +46,7 @@ class _Expansion:
             known = ("parameters", "elements")
             for key in template:
                 if key not in known:
-                    near = suggestion(str(key), known)
-                    self._fail(
-                        ("templates", name, key), f"unknown key '{key}'{near}; known keys: {', '.join(known)}"
-                    )
+                    self._fail(("templates", name, key), unknown_key(key, known))
             if not isinstance(template.get("elements"), list):
                 self._fail(("templates", name), "a template with parameters needs a list of elements")
             if not isinstance(template.get("parameters", {}), dict):

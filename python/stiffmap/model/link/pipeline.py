@@ -50,8 +50,6 @@ def shift_covariance(shifts: list[Floats]) -> Floats:
 
     A deviation is a systematic error of unknown size and sign, common to all entries: rank one each.
     """
-    if not shifts:
-        return np.zeros((36, 36))
     return np.asarray(np.mean([np.outer(s.ravel(), s.ravel()) for s in shifts], axis=0))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache
 from typing import Annotated, Any, Literal, Self
 
@@ -19,6 +20,7 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, InitErrorDetails, PydanticCustomError, PydanticKnownError
 
 from stiffmap.common.errors import suggestion
+from stiffmap.model.description.sources import SOURCES
 
 
 def describe(value: object) -> str:
@@ -53,7 +55,10 @@ class FileModel(BaseModel):
         unknown = [key for key in data if key not in known]
         if not unknown:
             return handler(data)
-        problems = [_unknown_key(str(key), known, data) for key in unknown]
+        errors = [ValueError(unknown_key(key, known)) for key in unknown]
+        problems = [
+            InitErrorDetails(type="value_error", loc=(), input=data, ctx={"error": e}) for e in errors
+        ]
         try:
             handler({key: value for key, value in data.items() if key in known})
         except ValidationError as error:
@@ -71,9 +76,9 @@ def _keys_of(model: type[FileModel]) -> list[str]:
     return [f.alias or name for name, f in fields]
 
 
-def _unknown_key(key: str, known: list[str], data: Any) -> InitErrorDetails:
-    text = f"unknown key '{key}'{suggestion(key, known)}; known keys: {', '.join(known)}"
-    return InitErrorDetails(type="value_error", loc=(), input=data, ctx={"error": ValueError(text)})
+def unknown_key(key: object, known: Sequence[str]) -> str:
+    """That a mapping cannot have this key, and which it can."""
+    return f"unknown key '{key}'{suggestion(str(key), known)}; known keys: {', '.join(known)}"
 
 
 def _once_more(error: Any) -> InitErrorDetails:
@@ -100,7 +105,7 @@ Name = Annotated[
 
 
 Source = Annotated[
-    Literal["assumed", "measured", "computed", "catalogue"],
+    Literal[SOURCES],  # type: ignore[valid-type]
     Field(description="Where numbers come from: reports say how much of an answer rests on those assumed."),
 ]
 
