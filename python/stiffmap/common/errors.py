@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import difflib
 import re
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from types import FrameType
 
@@ -86,6 +87,18 @@ def reading(path: object) -> Iterator[None]:
         yield
     except OSError as error:
         raise FileError(f"cannot be read: {error.strerror}", file=str(path)) from error
+
+
+def suggestion(word: str, known: Iterable[str]) -> str:
+    """`` (did you mean 'length'?)`` or nothing."""
+    near = difflib.get_close_matches(word, list(known), n=1, cutoff=0.6)
+    return f" (did you mean '{near[0]}'?)" if near else ""
+
+
+def unknown_name(what: str, name: str, known: Iterable[str]) -> str:
+    """That there is nothing of this name, the nearest name, and all that there are."""
+    names = list(known)
+    return f"no {what} '{name}'{suggestion(name, names)}; there are: {', '.join(names) or 'none'}"
 
 
 def shortened(message: str) -> str:

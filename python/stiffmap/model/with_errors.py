@@ -25,6 +25,7 @@ from stiffmap.model.description import (
     Spring,
 )
 from stiffmap.model.description.strokes import as_rows
+from stiffmap.model.description.tree import Elements, edit_all
 from stiffmap.model.effects import apply_records
 from stiffmap.model.effects.edit import built as as_built
 from stiffmap.model.effects.library.geometry import about, home_position
@@ -37,7 +38,6 @@ Knots = tuple[tuple[float, float], ...]
 """(coordinate, error) of a drive, m or rad, by rising coordinate."""
 Moves = Mapping[tuple[str, str], float]
 """(full name of the element, what is moved) -> by how much, SI; compliances and masses relative."""
-Elements = tuple[Element, ...]
 
 
 def edited(
@@ -53,16 +53,11 @@ def edited(
         of.setdefault(name, {})[what] = of.get(name, {}).get(what, 0.0) + value
     for name, knots in (travel or {}).items():
         of.setdefault(name, {})["travel"] = knots
-    legs = tuple(replace(g, elements=_sequence(g.elements, g.name, of)) for g in bare.legs)
-    base = _sequence(bare.base, "base", of, end=False)
-    platform = _sequence(bare.platform, "platform", of)
-    built = replace(bare, legs=legs, base=base, platform=platform)
+    built = edit_all(bare, lambda elements, name: _sequence(elements, name, of, end=name != "base"))
     return apply_records(built, description.effects)
 
 
-def _sequence(
-    elements: Elements, path: str, of: Mapping[str, Mapping[str, Any]], end: bool = True
-) -> Elements:
+def _sequence(elements: Elements, path: str, of: Mapping[str, Mapping[str, Any]], end: bool) -> Elements:
     out: list[Element] = []
     for e in elements:
         if isinstance(e, Block):

@@ -12,12 +12,11 @@ from typing import Any, NoReturn
 import numpy as np
 
 from stiffmap.common.broadcasting import Floats
-from stiffmap.common.errors import FileError, MissingColumnError
+from stiffmap.common.errors import FileError, MissingColumnError, suggestion
 from stiffmap.common.outputs import unguarded
 from stiffmap.common.tables.cells import Cells, filled, numbered, packed, row_numbers
 from stiffmap.common.tables.header import refuse_twice
 from stiffmap.common.tables.lines import decimal_comma, even, finite_number, lines_of, with_points
-from stiffmap.model.files.schema.base import suggestion
 
 
 @dataclass(frozen=True)
@@ -43,7 +42,7 @@ class Table:
 
     def _cells(self, column: str) -> Cells:
         if column not in self.header:
-            near = suggestion(column, list(self.header))
+            near = suggestion(column, self.header)
             raise MissingColumnError(
                 f"missing column '{column}'{near}; found {', '.join(self.header)}", file=self.file
             )
@@ -79,7 +78,7 @@ class Table:
         """`FileError` for the first column that is none of these; `list_of` stands before their names."""
         for column in self.header:
             if column not in known:
-                near = suggestion(column, list(known))
+                near = suggestion(column, known)
                 self.fail(f"unknown column '{column}'{near}; {list_of} {', '.join(known)}")
 
     def fail(self, message: str, row: int | None = None) -> NoReturn:

@@ -13,6 +13,7 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs import write_text
 from stiffmap.model.description import Element, Joint, MachineDescription, Offset, Pose, Spring
+from stiffmap.model.description.tree import edit_all
 from stiffmap.solve.machine import Machine, takes_machine
 
 PARALLEL = 0.05
@@ -57,16 +58,7 @@ def corrected_geometry(description: MachineDescription) -> tuple[MachineDescript
                 out.append(e)
         return tuple(out)
 
-    legs = tuple(replace(leg, elements=part(leg.elements, leg.name)) for leg in description.legs)
-    made = replace(
-        description,
-        legs=legs,
-        base=part(description.base, "base"),
-        platform=part(description.platform, "platform"),
-        effects=(),
-        declared=None,
-    )
-    return made, left
+    return replace(edit_all(description, part), effects=(), declared=None), left
 
 
 def _joint(e: Joint, name: str, left: list[str]) -> list[Element]:

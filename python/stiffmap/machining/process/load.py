@@ -7,11 +7,10 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from stiffmap.common.errors import FileError, StiffmapError
+from stiffmap.common.errors import FileError, StiffmapError, suggestion
 from stiffmap.common.yaml_text import Document, read
 from stiffmap.machining.process.build import process_of
 from stiffmap.machining.process.description import Process
-from stiffmap.model.files.schema.base import suggestion
 
 FOLDER = Path(__file__).with_name("library")
 

@@ -11,13 +11,12 @@ from typing import NoReturn
 import numpy as np
 
 from stiffmap.common.broadcasting import Floats
-from stiffmap.common.errors import FileError
+from stiffmap.common.errors import FileError, suggestion
 from stiffmap.common.number_text import number_in
 from stiffmap.common.tables.named import Known, read_named
 from stiffmap.machining.toolpath.gcode.load import lines_of, load_gcode
 from stiffmap.machining.toolpath.outlines import outline, outline_names
 from stiffmap.machining.toolpath.path import Toolpath, path_of
-from stiffmap.model.files.schema.base import suggestion
 
 GCODE = (".ngc", ".nc", ".gcode", ".tap", ".cnc", ".mpf", ".g")
 CL = (".cl", ".cls", ".apt", ".cldata", ".aptsource")

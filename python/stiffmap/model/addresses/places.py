@@ -13,16 +13,7 @@ from typing import NamedTuple
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.addresses.fields import Field, declared, fields, vector_fields
-from stiffmap.model.description import (
-    Block,
-    Body,
-    Element,
-    MachineDescription,
-    Offset,
-    Point,
-    Spring,
-    tree,
-)
+from stiffmap.model.description import Block, Element, MachineDescription, Spring, tree
 from stiffmap.model.description.numbers import with_entry
 from stiffmap.model.description.tree import of_same_sequence
 
@@ -131,11 +122,11 @@ def bar_offset(d: MachineDescription, full: str) -> str | None:
     around, _, name = full.rpartition(".")
     sequence = [e for other, e in tree.all_elements(d) if other.rpartition(".")[0] == around]
     k = next((i for i, e in enumerate(sequence) if isinstance(e, Spring) and e.name == name), 0)
-    spring = sequence[k] if sequence else None
-    before = next((e for e in reversed(sequence[:k]) if not isinstance(e, Body | Point)), None)
-    if not isinstance(spring, Spring) or not isinstance(before, Offset) or "length" not in fields(before):
+    i = tree.offset_before(sequence, k)
+    if i is None:
         return None
-    if spring.beam is not None:
+    before, spring = sequence[i], sequence[k]
+    if isinstance(spring, Spring) and spring.beam is not None:
         length = dict(spring.beam.numbers)["length"]
         if abs(fields(before)["length"].value - length) > 1e-9 * length:
             return None

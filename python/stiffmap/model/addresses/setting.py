@@ -48,21 +48,28 @@ def with_values(description: MachineDescription, values: Mapping[str, float]) ->
 
 def known_values(description: MachineDescription, address: str) -> list[float]:
     """Values (SI) of the numbers that an address stands for; StiffmapError where there are none."""
-    whole = dict(machine_fields(description))
-    if address in whole:
-        return [whole[address].value]
-    field = split(address)[1]
-    found = (
-        _number(description, _place(description, full, field), field) for full in _named(description, address)
-    )
-    return [f.value for f in found if f is not None]
+    return [number.value for number in _numbers(description, address).values()]
 
 
 def single_addresses(description: MachineDescription, address: str) -> list[str]:
     """The addresses of single elements that one address stands for; StiffmapError where there are none."""
-    if address in dict(machine_fields(description)):
-        return [address]
-    return [f"{full}/{split(address)[1]}" for full in _named(description, address)]
+    return list(_numbers(description, address))
+
+
+def _numbers(description: MachineDescription, address: str) -> dict[str, Field]:
+    """The numbers that an address stands for, each by its own address; StiffmapError where there are none."""
+    whole = dict(machine_fields(description))
+    if address in whole:
+        return {address: whole[address]}
+    name, field = split(address)
+    there = {
+        f"{full}/{field}": _number(description, _place(description, full, field), field)
+        for full in full_names(description, name)
+    }
+    found = {one: number for one, number in there.items() if number is not None}
+    if not found:
+        raise StiffmapError(_unknown(description, address, name, field))
+    return found
 
 
 def _with_value(description: MachineDescription, address: str, value: float) -> MachineDescription:
@@ -70,9 +77,8 @@ def _with_value(description: MachineDescription, address: str, value: float) -> 
     if address in whole:
         changed_machine: MachineDescription = whole[address].put(value)
         return changed_machine
-    field = split(address)[1]
     changed: set[str] = set()
-    for full in _named(description, address):
+    for full, field in map(split, _numbers(description, address)):
         place = _place(description, full, field)
         beam = _number(description, full, f"beam.{LENGTH}") if place != full else None
         if beam is not None:
@@ -91,19 +97,6 @@ def _place(description: MachineDescription, full: str, field: str) -> str:
 
 def _number(description: MachineDescription, full: str, field: str) -> Field | None:
     return number_at(description, full, partial(field_of, key=field))
-
-
-def _named(description: MachineDescription, address: str) -> list[str]:
-    """Full names of the elements under an address that have its field."""
-    name, field = split(address)
-    there = [
-        full
-        for full in full_names(description, name)
-        if _number(description, _place(description, full, field), field) is not None
-    ]
-    if not there:
-        raise StiffmapError(_unknown(description, address, name, field))
-    return there
 
 
 def _unknown(description: MachineDescription, address: str, name: str, field: str) -> str:

@@ -10,7 +10,7 @@ from functools import lru_cache
 from stiffmap.model.description.elements import Block, Body, Cable, Element, Joint, Offset, Point, Spring
 from stiffmap.model.description.laws import Law
 from stiffmap.model.description.machine import MachineDescription
-from stiffmap.model.description.tree import Elements, edit_elements
+from stiffmap.model.description.tree import Elements, edit_all, edit_elements
 
 KEPT = 128
 """Sequences whose geometry is kept: variants of a machine share most of theirs."""
@@ -26,12 +26,8 @@ def nominal_geometry(description: MachineDescription) -> Hashable:
 
 def straight(description: MachineDescription) -> MachineDescription:
     """The machine with linear drives and link springs; itself where they are."""
-    d = description
-    legs = tuple(replace(leg, elements=edit_elements(leg.elements, _straight)) for leg in d.legs)
-    ends = edit_elements(d.base, _straight), edit_elements(d.platform, _straight)
-    if (*ends, legs) == (d.base, d.platform, d.legs):
-        return description
-    return replace(d, base=ends[0], platform=ends[1], legs=legs, effects=(), declared=None)
+    d = edit_all(description, lambda elements, name: edit_elements(elements, _straight))
+    return description if d == description else replace(d, effects=(), declared=None)
 
 
 @lru_cache(maxsize=KEPT)

@@ -251,7 +251,7 @@ class Block:
     """Two or more branches between the same two frames."""
 
     name: str
-    branches: tuple[Branch, ...] = field(default=())
+    branches: tuple[Branch, ...] = ()
 
 
 Element = Offset | Joint | Cable | Spring | Body | Point | Block

@@ -6,11 +6,11 @@ count: ``x.bar_low.bar``.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import TypeVar
 
-from stiffmap.model.description.elements import Block, Branch, Element, Joint, Point
+from stiffmap.model.description.elements import Block, Body, Branch, Element, Joint, Offset, Point
 from stiffmap.model.description.machine import Leg, MachineDescription
 
 Elements = tuple[Element, ...]
@@ -69,6 +69,13 @@ def find(description: MachineDescription, full: str) -> list[Element]:
     return [element for name, element in all_elements(description) if name == full]
 
 
+def offset_before(elements: Sequence[Element], k: int) -> int | None:
+    """Index of the offset that is the length of the link at whose end element ``k`` stands; None: there is none."""
+    i = next((i for i in reversed(range(k)) if not isinstance(elements[i], (Body, Point))), None)
+    before = None if i is None else elements[i]
+    return i if isinstance(before, Offset) and any(before.nominal.translation) else None
+
+
 def sequences(elements: Elements) -> Iterator[Elements]:
     """A sequence and those of the branches in it."""
     yield elements
@@ -95,6 +102,15 @@ def edit_elements(elements: Elements, change: Callable[[Element], Element]) -> E
     return edit_sequences(
         elements, lambda sequence: tuple(e if isinstance(e, Block) else change(e) for e in sequence)
     )
+
+
+def edit_all(
+    description: MachineDescription, edit: Callable[[Elements, str], Elements]
+) -> MachineDescription:
+    """The machine with ``edit`` applied to the whole of each leg, base and platform, whose name it is given."""
+    legs = tuple(replace(leg, elements=edit(leg.elements, leg.name)) for leg in description.legs)
+    base, platform = (edit(getattr(description, end), end) for end in ENDS)
+    return replace(description, legs=legs, base=base, platform=platform)
 
 
 def edit_path(elements: Elements, path: str, change: Change) -> Elements | None:

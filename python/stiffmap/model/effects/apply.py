@@ -41,10 +41,21 @@ def add_effect(
         For an unknown kind, element, leg or parameter, a value out of its bounds, a missing one, and
         effects that exclude each other.
     """
-    declared = _declared(description)
+    if description.effects and description.declared is None:
+        raise StiffmapError(f"{description.name}: has effects, but not the machine before them (`declared`)")
+    declared = description.declared or description
     record = _checked(declared, description.effects, kind, element, legs, parameters)
     resolve(registry.get(kind), declared, record)
-    return _with_record(description, record)
+    records = (*description.effects, record)
+    stages = [registry.get(r.kind).stage for r in records]
+    if stages[-1] == max(stages):
+        return replace(_apply(description, declared, record), effects=records, declared=declared)
+    if description != _build(declared, description.effects):
+        raise StiffmapError(
+            f"{description.name}: was changed by other means after effects were added to it; "
+            f"add {record.kind} before, or make the change in the declared machine"
+        )
+    return _build(declared, records)
 
 
 def apply_records(description: MachineDescription, records: Sequence[AppliedEffect]) -> MachineDescription:
@@ -86,30 +97,6 @@ def resolve(effect: EffectType, declared: MachineDescription, record: AppliedEff
     values = values_at(effect, declared, record)
     options = {o.name: o.choices[0] for o in effect.options} | dict(record.options)
     return Placed(record.kind, record.element, record.legs, values, options)
-
-
-def _declared(description: MachineDescription) -> MachineDescription:
-    if description.declared is not None:
-        return description.declared
-    if description.effects:
-        raise StiffmapError(f"{description.name}: has effects, but not the machine before them (`declared`)")
-    return description
-
-
-def _with_record(description: MachineDescription, record: AppliedEffect) -> MachineDescription:
-    declared = _declared(description)
-    records = (*description.effects, record)
-    stages = [registry.get(r.kind).stage for r in records]
-    if stages[-1] == max(stages):
-        built = _apply(description, declared, record)
-    else:
-        if description != _build(declared, description.effects):
-            raise StiffmapError(
-                f"{description.name}: was changed by other means after effects were added to it; "
-                f"add {record.kind} before, or make the change in the declared machine"
-            )
-        built = _build(declared, records)
-    return replace(built, effects=records, declared=declared)
 
 
 def _build(declared: MachineDescription, records: tuple[AppliedEffect, ...]) -> MachineDescription:

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from difflib import get_close_matches
 from typing import Any
 
-from stiffmap.common.errors import StiffmapError
+from stiffmap.common.errors import StiffmapError, suggestion
 from stiffmap.common.kept import Kept
 from stiffmap.model.description import AppliedEffect, MachineDescription
 from stiffmap.model.effects import registry
@@ -22,8 +21,7 @@ def split(effect: EffectType, given: Mapping[str, Any]) -> tuple[Numbers, Words]
     known = [p.name for p in effect.parameters] + [o.name for o in effect.options]
     for name in given:
         if name not in known:
-            near = get_close_matches(name, known, 1)
-            hint = f" (did you mean {near[0]!r}?)" if near else ""
+            hint = suggestion(name, known)
             raise StiffmapError(f"{effect.kind}: unknown parameter {name!r}{hint}; known: {', '.join(known)}")
     numbers = tuple((p.name, _number(effect, p, given[p.name])) for p in effect.parameters if p.name in given)
     words = tuple((o.name, str(given[o.name])) for o in effect.options if o.name in given)
@@ -82,8 +80,7 @@ def _element(effect: EffectType, names: list[str], element: str | None) -> str:
             raise StiffmapError(f"{effect.kind}: say on which element; there are: {there}")
         return names[0]
     if element not in names:
-        near = get_close_matches(element, names, 1)
-        hint = f" (did you mean {near[0]!r}?)" if near else ""
+        hint = suggestion(element, names)
         raise StiffmapError(
             f"{effect.kind}: no element {element!r} that it can act on{hint}; there are: {there}"
         )
@@ -93,7 +90,10 @@ def _element(effect: EffectType, names: list[str], element: str | None) -> str:
 def values_at(effect: EffectType, machine: MachineDescription, record: AppliedEffect) -> dict[str, float]:
     """All values of a record, defaults filled in; raises StiffmapError for missing or out of bounds."""
     given = dict(record.parameters)
-    _check_alternatives(effect, given)
+    if effect.one_of and sum(n in given for n in effect.one_of) != 1:
+        raise StiffmapError(f"{effect.kind}: give exactly one of {', '.join(effect.one_of)}")
+    if effect.vector and not any(n in given for n in effect.vector):
+        raise StiffmapError(f"{effect.kind}: give at least one of {', '.join(effect.vector)}")
     values = {}
     for p in effect.parameters_at(machine, record.element, record.legs):
         default = p.null if p.name in effect.vector else p.default
@@ -109,13 +109,6 @@ def values_at(effect: EffectType, machine: MachineDescription, record: AppliedEf
             )
         values[p.name] = value
     return values
-
-
-def _check_alternatives(effect: EffectType, given: Mapping[str, float]) -> None:
-    if effect.one_of and sum(n in given for n in effect.one_of) != 1:
-        raise StiffmapError(f"{effect.kind}: give exactly one of {', '.join(effect.one_of)}")
-    if effect.vector and not any(n in given for n in effect.vector):
-        raise StiffmapError(f"{effect.kind}: give at least one of {', '.join(effect.vector)}")
 
 
 def check_exclusion(new: AppliedEffect, records: Sequence[AppliedEffect]) -> None:

@@ -7,17 +7,22 @@ from functools import cache
 from os import PathLike
 
 from stiffmap.common.errors import FileError, StiffmapError
-from stiffmap.common.python_file import run_python_file
+from stiffmap.common.python_file import modules_of, run_python_file
 from stiffmap.model.effects.evidence import RECORDS
 from stiffmap.model.effects.synonyms import found_by
 from stiffmap.model.effects.types import EffectType
 
 
 @cache
-def _known() -> dict[str, EffectType]:
-    from stiffmap.model.effects.library import EFFECTS
+def _library() -> dict[str, EffectType]:
+    import stiffmap.model.effects.library as library
 
-    return {effect.kind: effect for effect in EFFECTS}
+    return {m.EFFECT.kind: m.EFFECT for m in modules_of(library) if hasattr(m, "EFFECT")}
+
+
+@cache
+def _known() -> dict[str, EffectType]:
+    return dict(_library())
 
 
 def kinds() -> tuple[str, ...]:
@@ -41,9 +46,7 @@ def register(effect: EffectType) -> EffectType:
     Raises StiffmapError where the library has a kind of that name, or where the definition contradicts itself. A
     kind that was registered before is replaced.
     """
-    from stiffmap.model.effects.library import EFFECTS
-
-    if effect.kind in {e.kind for e in EFFECTS}:
+    if effect.kind in _library():
         raise StiffmapError(f"effect {effect.kind!r}: the library has a kind of that name")
     _check(effect)
     _known()[effect.kind] = effect
@@ -61,16 +64,11 @@ def load_effects(path: str | PathLike[str]) -> tuple[EffectType, ...]:
     Raises `FileError` where it cannot be run or defines none.
     """
     module = run_python_file(path, "effect", "an effect")
-    found = defined(module)
+    one = getattr(module, "EFFECT", None)
+    found = tuple(getattr(module, "EFFECTS", ())) or ((one,) if isinstance(one, EffectType) else ())
     if not found:
         raise FileError("defines no effect: expected EFFECT = EffectType(...)", file=str(path))
     return tuple(register(e) for e in found)
-
-
-def defined(module: object) -> tuple[EffectType, ...]:
-    """The kinds that a module defines as ``EFFECT`` or ``EFFECTS``."""
-    one = getattr(module, "EFFECT", None)
-    return tuple(getattr(module, "EFFECTS", ())) or ((one,) if isinstance(one, EffectType) else ())
 
 
 def _check(effect: EffectType) -> None:

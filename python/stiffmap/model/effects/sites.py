@@ -16,12 +16,11 @@ from stiffmap.model.description import (
     Joint,
     MachineDescription,
     Offset,
-    Point,
     Spring,
 )
-from stiffmap.model.description.tree import Elements, sequences
+from stiffmap.model.description.tree import Elements, offset_before, sequences
 from stiffmap.model.effects.edit import Sites, change_sites
-from stiffmap.model.effects.types import Place, Placed
+from stiffmap.model.effects.types import Place, Placed, Places
 
 
 def named(match: Callable[[Element], bool]) -> Sites:
@@ -89,7 +88,7 @@ def links(elements: Elements) -> dict[str, tuple[int, ...]]:
     """Offsets that are the length of a link, under the name of the spring at the link's end."""
     found: dict[str, tuple[int, ...]] = {}
     for name, at in springs(elements).items():
-        lengths = tuple(i for k in at if (i := _offset_before(elements, k)) is not None)
+        lengths = tuple(i for k in at if (i := offset_before(elements, k)) is not None)
         found.update({name: lengths} if lengths else {})
     return found
 
@@ -97,14 +96,6 @@ def links(elements: Elements) -> dict[str, tuple[int, ...]]:
 def lengths(elements: Elements) -> dict[str, tuple[int, ...]]:
     """Links, and offsets by their own names."""
     return {**offsets(elements), **links(elements)}
-
-
-def _offset_before(elements: Elements, k: int) -> int | None:
-    i = k - 1
-    while i >= 0 and isinstance(elements[i], (Body, Point)):
-        i -= 1
-    before = elements[i] if i >= 0 else None
-    return i if isinstance(before, Offset) and np.any(before.nominal.p) else None
 
 
 def names(elements: Elements, sites: Sites) -> list[str]:
@@ -121,26 +112,23 @@ def found(
     return [seq[i] for c in chains for seq in sequences(c) for i in sites(seq).get(element, ())]
 
 
-def places(description: MachineDescription, sites: Sites) -> list[Place]:
+def at_sites(sites: Sites) -> Places:
     """Each name in each leg alone, then in all legs that have it; then those of base and platform."""
-    having: dict[str, list[str]] = {}
-    for leg in description.legs:
-        for name in names(leg.elements, sites):
-            having.setdefault(name, []).append(leg.name)
-    out: list[Place] = []
-    for name, legs in having.items():
-        out += _alone_and_together(name, legs)
-    trunk = names((*description.base, *description.platform), sites)
-    return out + [(name, ()) for name in trunk if name not in having]
+
+    def find(description: MachineDescription) -> list[Place]:
+        having: dict[str, list[str]] = {}
+        for leg in description.legs:
+            for name in names(leg.elements, sites):
+                having.setdefault(name, []).append(leg.name)
+        out = [place for name, legs in having.items() for place in _alone_and_together(name, legs)]
+        trunk = names((*description.base, *description.platform), sites)
+        return out + [(name, ()) for name in trunk if name not in having]
+
+    return find
 
 
 def _alone_and_together(name: str, legs: list[str]) -> list[Place]:
     return [(name, (leg,)) for leg in legs] + ([(name, tuple(legs))] if len(legs) > 1 else [])
-
-
-def at_sites(sites: Sites) -> Callable[[MachineDescription], list[Place]]:
-    """`places` of these sites as a function of the machine."""
-    return lambda description: places(description, sites)
 
 
 def each(sites: Sites, change: Callable[[Any, Placed], Elements]) -> dict[str, Any]:
@@ -152,12 +140,12 @@ def each(sites: Sites, change: Callable[[Any, Placed], Elements]) -> dict[str, A
     return {"places": at_sites(sites), "apply": apply}
 
 
-def at(element: str) -> Callable[[MachineDescription], list[Place]]:
+def at(element: str) -> Places:
     """One place without legs."""
     return lambda description: [(element, ())]
 
 
-def per_leg(element: str) -> Callable[[MachineDescription], list[Place]]:
+def per_leg(element: str) -> Places:
     """A place that every leg has, such as its mount on the base."""
 
     def find(description: MachineDescription) -> list[Place]:

@@ -72,8 +72,6 @@ class EffectType:
     reverses
         Whether it shows as itself only where a load changes its sign; under one that never does it reads as a
         constant offset, and the offset is named before it.
-    certified
-        Whether it is an error of an instrument whose certificate bounds it.
     instrument_scale
         Parameter that is the instrument's scale, which a calibration leaves uncertain as its certificate says.
     signature
@@ -114,7 +112,6 @@ class EffectType:
     hidden: Callable[[Plan], bool] | None = None
     behind_platform: bool = False
     reverses: bool = False
-    certified: bool = False
     instrument_scale: str = ""
     at: ParametersAt | None = None
     derived: Derived | None = None

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from stiffmap.common.errors import unknown_name
 from stiffmap.common.units import LENGTH, NONE, UnitSystem
 from stiffmap.common.yaml_text import Document
 from stiffmap.model.description import (
@@ -27,7 +28,7 @@ from stiffmap.model.files.build_numbers import build_numbers, build_range
 from stiffmap.model.files.build_strokes import with_strokes
 from stiffmap.model.files.context import Context, Gathered, LinkUse
 from stiffmap.model.files.schema import MachineFile
-from stiffmap.model.files.schema.base import Number, suggestion
+from stiffmap.model.files.schema.base import Number
 from stiffmap.model.files.schema.geometry import BoxModel
 from stiffmap.model.files.schema.machine import EffectModel, ExternalSpringModel
 
@@ -70,7 +71,11 @@ def build(
     gathered = context.gathered
     description = with_strokes(description, gathered)
     context.raise_problems()
-    _check_points(description, context.at("external_springs"))
+    points = point_names(description)
+    for spring in description.external_springs:
+        if spring.point not in points:
+            here = context.at("external_springs", spring.name, "point")
+            here.fail(unknown_name("point", spring.point, points))
     return replace(
         description,
         uncertainty=tuple({**gathered.uncertainty, **model.uncertainty}.items()),
@@ -78,15 +83,6 @@ def build(
         notes=tuple({**gathered.notes, **model.notes}.items()),
         sources=tuple({**gathered.sources, **model.sources}.items()),
     )
-
-
-def _check_points(description: MachineDescription, context: Context) -> None:
-    known = point_names(description)
-    for spring in description.external_springs:
-        if spring.point not in known:
-            near = suggestion(spring.point, known)
-            there = ", ".join(known) or "none"
-            context.at(spring.name, "point").fail(f"no point '{spring.point}'{near}; there are: {there}")
 
 
 def build_workspace(
@@ -178,12 +174,11 @@ def with_links(extra: Extra, new: dict[str, LinkUse], context: Context) -> Extra
         FileError: the kept value is not (file, springs, 21 x 21 numbers) entries, or a file's covariance is
             another one than that kept for its other springs.
     """
-    kept = _kept(dict(extra).get(KEY, ()), context)
     linked = {spring for use in new.values() for spring in use.springs}
-    for file, use in list(kept.items()):
-        use.springs[:] = [s for s in use.springs if s not in linked]
-        if not use.springs:
-            del kept[file]
+    kept = {}
+    for file, use in _kept(dict(extra).get(KEY, ()), context).items():
+        if left := [s for s in use.springs if s not in linked]:
+            kept[file] = LinkUse(use.covariance, left)
     for file, use in new.items():
         old = kept.setdefault(file, LinkUse(use.covariance))
         if old.covariance != use.covariance:

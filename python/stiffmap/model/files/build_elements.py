@@ -33,7 +33,6 @@ from stiffmap.model.files.context import Context
 from stiffmap.model.files.schema.base import Number
 from stiffmap.model.files.schema.elements import (
     ActuatorModel,
-    BlockModel,
     BodyModel,
     CableModel,
     ElementModel,
@@ -80,7 +79,9 @@ def build_element(
     here = context.named(getattr(model, str(sort_of(model))), model)
     match model:
         case OffsetModel():
-            return _offset(model, here)
+            there = here.at("actual")
+            actual = None if model.actual is None else build_pose(model.actual, there, "actual.")
+            return Offset(model.offset, build_pose(model, here), actual)
         case JointModel():
             return _joint(model, here)
         case ActuatorModel():
@@ -93,12 +94,11 @@ def build_element(
             return _body(model, here, *among)
         case PointModel():
             return Point(model.point, **build_numbers(model, Point, False, here))
-    return _block(model, context)  # a full name holds the branch, not the block
-
-
-def _offset(model: OffsetModel, context: Context) -> Offset:
-    actual = None if model.actual is None else build_pose(model.actual, context.at("actual"), "actual.")
-    return Offset(model.offset, build_pose(model, context), actual)
+    branches = (  # a full name holds the branch, not the block
+        Branch(name, build_elements(models, context.at("branches", name).inside(name)))
+        for name, models in model.branches.items()
+    )
+    return Block(model.block, tuple(branches))
 
 
 def _joint(model: JointModel, context: Context) -> Joint:
@@ -240,11 +240,3 @@ def _inertia(terms: list[Number | list[Number]], context: Context) -> Rows:
     if principal[0] < -1e-12 * principal[2]:
         here.fail(f"the inertia has a negative principal moment ({principal[0]:.3g} kg m^2)")
     return rows(matrix)
-
-
-def _block(model: BlockModel, context: Context) -> Block:
-    branches = tuple(
-        Branch(name, build_elements(models, context.at("branches", name).inside(name)))
-        for name, models in model.branches.items()
-    )
-    return Block(model.block, branches)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from stiffmap.common.errors import unknown_name
 from stiffmap.model.description import Joint, Leg, Offset, Pose
 from stiffmap.model.description.tree import ENDS, Elements, edit_path, walk
 from stiffmap.model.files.build_elements import HOME, build_elements
 from stiffmap.model.files.build_geometry import build_pose
 from stiffmap.model.files.build_numbers import build_number
 from stiffmap.model.files.context import Context, Gathered
-from stiffmap.model.files.schema.base import Number, suggestion
+from stiffmap.model.files.schema.base import Number
 from stiffmap.model.files.schema.elements import ElementModel
 from stiffmap.model.files.schema.machine import LegModel
 
@@ -23,11 +24,7 @@ def build_leg(name: str, leg: LegModel, templates: dict[str, list[ElementModel]]
     problems = len(context.gathered.problems)
     if leg.template is not None:
         if leg.template not in templates:
-            known = list(templates)
-            near = suggestion(leg.template, known)
-            here.at("template").fail(
-                f"no template '{leg.template}'{near}; there are: {', '.join(known) or 'none'}"
-            )
+            here.at("template").fail(unknown_name("template", leg.template, templates))
         template = replace(here, path=("templates", leg.template))
         elements = build_elements(templates[leg.template], template)
     else:
@@ -61,8 +58,7 @@ def with_home(elements: Elements, path: str, home: Home, context: Context) -> El
     edited = edit_path(elements, path, lambda e: _joint(e, home, context) if isinstance(e, Joint) else None)
     if edited is None:
         known = [name.partition(".")[2] for name, e in walk(elements, "") if isinstance(e, Joint)]
-        there = ", ".join(known) or "none"
-        context.fail(f"no joint '{path}'{suggestion(path, known)}; there are: {there}")
+        context.fail(unknown_name("joint", path, known))
     return edited
 
 

@@ -73,14 +73,16 @@ def build_matrix(model: Matrix, word: str, context: Context) -> Matrix6:
 
 
 def _check(matrix: NDArray[np.float64], word: str, context: Context) -> None:
-    size, i, j = asymmetry(matrix)
-    if size > 0.0:
+    scale = _scale(matrix)
+    size = np.outer(scale, scale)
+    gap = np.abs(matrix - matrix.T) / size
+    i, j = np.unravel_index(int(np.argmax(gap)), gap.shape)
+    if gap[i, j] > SYMMETRY_TOLERANCE:
         context.fail(
-            f"the {word} is not symmetric: k{i + 1}{j + 1} and k{j + 1}{i + 1} differ by {size:.3g} "
+            f"the {word} is not symmetric: k{i + 1}{j + 1} and k{j + 1}{i + 1} differ by {gap[i, j]:.3g} "
             "of the geometric mean of their diagonal terms"
         )
-    scale = _scale(matrix)
-    lowest = float(np.linalg.eigvalsh(matrix / np.outer(scale, scale))[0])
+    lowest = float(np.linalg.eigvalsh(matrix / size)[0])
     if lowest < -EIGENVALUE_TOLERANCE:
         context.fail(
             f"the {word} is indefinite: its lowest eigenvalue, scaled to unit diagonal, is {lowest:.3g}; "
@@ -192,12 +194,3 @@ def _scale(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
         # a zero diagonal term has no scale of its own; its couplings, which must vanish, give one
         scale[i] = max(np.abs(matrix[i, known]) / scale[known], default=0.0)
     return np.where(scale > 0.0, scale, 1.0)
-
-
-def asymmetry(matrix: NDArray[np.float64]) -> tuple[float, int, int]:
-    """Largest |k_ij - k_ji| / sqrt(k_ii k_jj) with its row and column; 0 within rounding."""
-    scale = _scale(matrix)
-    difference = np.abs(matrix - matrix.T) / np.outer(scale, scale)
-    i, j = np.unravel_index(int(np.argmax(difference)), difference.shape)
-    size = float(difference[i, j])
-    return (size if size > SYMMETRY_TOLERANCE else 0.0), int(i), int(j)

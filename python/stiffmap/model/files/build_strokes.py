@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import partial
 
+from stiffmap.common.errors import unknown_name
 from stiffmap.common.units import ANGLE, LENGTH, Dimension
 from stiffmap.model.description import BeamStroke, Element, Joint, MachineDescription, Spring, TableStroke
 from stiffmap.model.description.tree import all_elements, edit
 from stiffmap.model.files.build_springs import build_matrix
 from stiffmap.model.files.context import Context, Gathered
-from stiffmap.model.files.schema.base import Number, suggestion
+from stiffmap.model.files.schema.base import Number
 from stiffmap.model.files.schema.elements import SpringModel
 
 
@@ -89,7 +90,4 @@ def stroke_joint(description: MachineDescription, name: str, context: Context) -
             return found
     own = context.full.partition(".")[0]
     near = [n.partition(".")[2] if n.partition(".")[0] == own else n for n in joints]
-    there = ", ".join(near) or "none"
-    raise context.at("joint").error(
-        f"no joint of one axis '{name}'{suggestion(name, near)}; there are: {there}"
-    )
+    raise context.at("joint").error(unknown_name("joint of one axis", name, near))

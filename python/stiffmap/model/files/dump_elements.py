@@ -90,14 +90,10 @@ def _joint(joint: Joint) -> Plain:
     plain.update({"axis": axes[0]} if len(axes) == 1 else {"axes": axes})
     numbers = dump_numbers(joint)
     rest = {"rest": numbers.pop("rest")} if "rest" in numbers else {}
-    return {**plain, **numbers, **rest, **_law(joint.law), **_axis_laws(joint)}
-
-
-def _axis_laws(joint: Joint) -> Plain:
     if any(set(dump_numbers(one)) != {"stiffness"} for one in joint.axis_laws):
         raise StiffmapError(f"{joint.name}: a file holds one stiffness per axis, no other laws")
-    each = [float(one.stiffness) for one in joint.axis_laws]
-    return {"stiffness": each} if each else {}
+    each = {"stiffness": floats(one.stiffness for one in joint.axis_laws)} if joint.axis_laws else {}
+    return {**plain, **numbers, **rest, **_law(joint.law), **each}
 
 
 def _actuator(joint: Joint) -> Plain:

@@ -6,9 +6,9 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from stiffmap.common.errors import FileError, together
+from stiffmap.common.errors import FileError, suggestion, together
 from stiffmap.common.yaml_text import Document, KeyPath
-from stiffmap.model.files.schema.base import describe, suggestion
+from stiffmap.model.files.schema.base import describe
 from stiffmap.model.files.schema.elements import SORTS
 
 M = TypeVar("M", bound=BaseModel)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import fields, replace
 from os import PathLike
-from typing import Any, TypeGuard
+from typing import Any
 
 import yaml
 
@@ -92,7 +92,7 @@ def dump(description: MachineDescription) -> Plain:
             s.name: {"point": s.point, **dump_numbers(s), "tension_only": bool(s.tension_only)}
             for s in declared.external_springs
         },
-        "effects": [_effect(effect) for effect in description.effects],
+        "effects": [dump_effect(effect) for effect in description.effects],
         "uncertainty": {key: float(value) for key, value in description.uncertainty},
         "sources": dict(description.sources),
         "notes": dict(description.notes),
@@ -101,7 +101,8 @@ def dump(description: MachineDescription) -> Plain:
     return {key: value for key, value in plain.items() if value not in (None, "", [], {})}
 
 
-def _effect(effect: AppliedEffect) -> Plain:
+def dump_effect(effect: AppliedEffect) -> Plain:
+    """An effect, in SI units."""
     return {
         "kind": effect.kind,
         "element": effect.element,
@@ -130,18 +131,16 @@ def _legs(legs: tuple[Leg, ...]) -> Plain:
 
 def _placed(leg: Leg) -> tuple[Plain, Elements, Plain]:
     """Frame, elements between, and attachment of a leg."""
-    middle = leg.elements
     frame: Plain = {}
     attach: Plain = {}
-    if middle and _is_plain_offset(middle[0], "frame"):
-        frame, middle = {"frame": dump_pose(middle[0].nominal)}, middle[1:]
-    if middle and _is_plain_offset(middle[-1], "attach"):
-        attach, middle = {"attach": dump_pose(middle[-1].nominal)}, middle[:-1]
+    middle = leg.elements
+    match middle:
+        case (Offset("frame", pose, None), *_):
+            frame, middle = {"frame": dump_pose(pose)}, middle[1:]
+    match middle:
+        case (*_, Offset("attach", pose, None)):
+            attach, middle = {"attach": dump_pose(pose)}, middle[:-1]
     return frame, middle, attach
-
-
-def _is_plain_offset(element: Element, name: str) -> TypeGuard[Offset]:
-    return isinstance(element, Offset) and element.name == name and element.actual is None
 
 
 def _without_home(element: Element) -> Element:

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 
-from stiffmap.common.errors import UnknownMachineError
+from stiffmap.common.errors import UnknownMachineError, suggestion
 from stiffmap.common.yaml_text import read
-from stiffmap.model.files.schema.base import suggestion
 
 
 @dataclass(frozen=True)

@@ -11,10 +11,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from stiffmap.common.arithmetic import sum_of_numbers
-from stiffmap.common.errors import FileError, together
+from stiffmap.common.errors import FileError, suggestion, together, unknown_name
 from stiffmap.common.yaml_text import Document, KeyPath
 from stiffmap.model.files.report import key_text
-from stiffmap.model.files.schema.base import describe, suggestion
+from stiffmap.model.files.schema.base import describe, unknown_key
 
 _REFERENCE = re.compile(r"\$([A-Za-z_]\w*)")
 
@@ -46,10 +46,7 @@ class _Expansion:
             known = ("parameters", "elements")
             for key in template:
                 if key not in known:
-                    near = suggestion(str(key), list(known))
-                    self._fail(
-                        ("templates", name, key), f"unknown key '{key}'{near}; known keys: {', '.join(known)}"
-                    )
+                    self._fail(("templates", name, key), unknown_key(key, known))
             if not isinstance(template.get("elements"), list):
                 self._fail(("templates", name), "a template with parameters needs a list of elements")
             if not isinstance(template.get("parameters", {}), dict):
@@ -64,9 +61,7 @@ class _Expansion:
         if not isinstance(asked, str | int) or not self.sound:
             return leg
         if self.templates and str(asked) not in self.names:
-            near = suggestion(str(asked), self.names)
-            there = ", ".join(self.names)
-            self._fail(("legs", name, "template"), f"no template '{asked}'{near}; there are: {there}")
+            self._fail(("legs", name, "template"), unknown_name("template", str(asked), self.names))
         if asked not in self.templates:
             return leg
         template = self.templates[asked]
@@ -77,9 +72,7 @@ class _Expansion:
             return leg
         for key in given:
             if key not in declared:
-                near = suggestion(str(key), list(declared))
-                there = ", ".join(declared) or "none"
-                self._fail(("legs", name, "with", key), f"no parameter '{key}'{near}; there are: {there}")
+                self._fail(("legs", name, "with", key), unknown_name("parameter", str(key), declared))
         values = {**declared, **given}
         missing = [key for key, value in values.items() if value is None]
         if missing:
@@ -103,7 +96,7 @@ class _Expansion:
             return data
         unknown = [name for name in _REFERENCE.findall(data) if name not in values]
         if unknown:
-            near = suggestion(unknown[0], list(values))
+            near = suggestion(unknown[0], values)
             self._fail(path, f"no parameter '{unknown[0]}'{near}; there are: {', '.join(values)}")
             return data
         alone = _REFERENCE.fullmatch(data.strip())

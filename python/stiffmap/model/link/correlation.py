@@ -29,11 +29,9 @@ FIT_NODES, COVARIANCE_NODES = 250, 1000
 class Correlation(NamedTuple):
     """Spatial correlation of the residuals of all load cases together."""
 
-    moran: Floats  # (cases,) Moran's I of the residual field, about 0 when independent
-    p_value: float  # of independence, cases combined
+    p_value: float  # of independence by Moran's I, cases combined
     correlated: bool  # p below 1e-3
     length: float  # m, of exp(-distance / length); 0 when independent
-    nugget: float  # share of the variance that neighbours do not share
     inflation: Floats  # (6,) factor on the variance of the twist at the centroid
     effective_nodes: float  # n / mean(inflation)
     repetition: float  # largest |correlation| between the residual fields of two cases
@@ -48,14 +46,14 @@ def analyse_correlation(points: Floats, residuals: Floats) -> Correlation:
     n = len(points)
     energy = np.sum(residuals**2, axis=(1, 2))
     live = residuals[energy > 0]
-    none = Correlation(np.zeros(len(residuals)), 1.0, False, 0.0, 1.0, np.ones(6), float(n), 0.0)
+    none = Correlation(1.0, False, 0.0, np.ones(6), float(n), 0.0)
     if n <= NEIGHBOURS + 3 or len(live) == 0:
         return none
-    moran, z = _moran(points, live)
+    z = _moran(points, live)
     p = float(norm.sf(z.sum() / np.sqrt(len(z))))
     unit = live.reshape(len(live), -1) / np.sqrt(energy[energy > 0])[:, None]
     cross = np.abs(unit @ unit.T - np.eye(len(live))).max() if len(live) > 1 else 0.0
-    tested = none._replace(moran=moran, p_value=p, repetition=float(cross))
+    tested = none._replace(p_value=p, repetition=float(cross))
     if p > LEVEL:
         return tested
     length, nugget = _fit_exponential(points, live)
@@ -63,14 +61,13 @@ def analyse_correlation(points: Floats, residuals: Floats) -> Correlation:
     return tested._replace(
         correlated=True,
         length=length,
-        nugget=nugget,
         inflation=inflation,
         effective_nodes=float(n / inflation.mean()),
     )
 
 
-def _moran(points: Floats, residuals: Floats) -> tuple[Floats, Floats]:
-    """Moran's I per case and its z-score; moments of the ratio of quadratic forms are exact for
+def _moran(points: Floats, residuals: Floats) -> Floats:
+    """z-score of Moran's I per case; moments of the ratio of quadratic forms are exact for
     residuals of a least-squares fit, which are not exchangeable.
     """
     n = len(points)
@@ -87,7 +84,7 @@ def _moran(points: Floats, residuals: Floats) -> tuple[Floats, Floats]:
     variance = (trace**2 + 2 * trace2) / (nu * (nu + 2)) - mean**2
     r = residuals.reshape(len(residuals), -1)
     moran = np.sum(r * np.asarray(W @ r.T).T, axis=1) / np.sum(r**2, axis=1)
-    return moran, (moran - mean) / np.sqrt(variance)
+    return np.asarray((moran - mean) / np.sqrt(variance))
 
 
 def _subset(points: Floats, limit: int) -> np.ndarray:

@@ -96,9 +96,7 @@ def _generate(gmsh: Any, size: float) -> None:
 
 def _extract(gmsh: Any, names: Faces, unit: float) -> SolidMesh:
     tags, xyz, _ = gmsh.model.mesh.getNodes()
-    if len(tags) == 0:
-        raise StiffmapError("mesh: expected ten-node tetrahedra, found none (is the part a closed volume?)")
-    number = np.full(int(tags.max()) + 1, -1, dtype=np.int64)
+    number = np.full(int(tags.max(initial=0)) + 1, -1, dtype=np.int64)
     number[tags] = np.arange(len(tags))
     tets = number[gmsh.model.mesh.getElementsByType(11)[1]].reshape(-1, 10)[:, _GMSH_TO_OURS]
     faces: dict[str, Ints] = {}

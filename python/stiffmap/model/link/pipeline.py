@@ -50,8 +50,6 @@ def shift_covariance(shifts: list[Floats]) -> Floats:
 
     A deviation is a systematic error of unknown size and sign, common to all entries: rank one each.
     """
-    if not shifts:
-        return np.zeros((36, 36))
     return np.asarray(np.mean([np.outer(s.ravel(), s.ravel()) for s in shifts], axis=0))
 
 
@@ -126,11 +124,13 @@ def link_from_part(
     Raises:
         StiffmapError: see the solvers, the meshers and :func:`identify_link`.
     """
-    chosen = chosen_solver(solver)
+    if solver not in ("auto", "ccx", "skfem"):
+        raise StiffmapError(f"solver: expected auto, ccx or skfem, got {solver!r}")
     if other_support not in ("bed", "soft"):
         raise StiffmapError(f"support: expected bed or soft, got {other_support!r}")
     mesh = mesher(size)
-    solve = solve_ccx if chosen == "CalculiX" else solve_skfem
+    by_ccx = solver == "ccx" or (solver == "auto" and has_ccx())
+    chosen, solve = ("CalculiX", solve_ccx) if by_ccx else ("scikit-fem", solve_skfem)
     field = solve(mesh, material, setup, wrenches)
     nodes = mesh.face_nodes(setup.loaded)
     link = _identify(mesh, nodes, field, setup, wrenches)
@@ -159,13 +159,6 @@ def link_from_part(
     return PartLink(
         link, CovarianceBudget(parts), refinement, mesh, nodes, field, wrenches, chosen, material, setup
     )
-
-
-def chosen_solver(solver: Solver) -> str:
-    """ "CalculiX" or "scikit-fem": what "auto" means here."""
-    if solver not in ("auto", "ccx", "skfem"):
-        raise StiffmapError(f"solver: expected auto, ccx or skfem, got {solver!r}")
-    return "CalculiX" if solver == "ccx" or (solver == "auto" and has_ccx()) else "scikit-fem"
 
 
 def _identify(mesh: SolidMesh, nodes: Ints, field: Floats, setup: Setup, wrenches: Floats) -> Link:

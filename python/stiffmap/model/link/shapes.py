@@ -146,10 +146,11 @@ class ForkBar(Bar):
         solid, _ = occ.fuse(body, prongs)
         occ.cut(solid, holes)
         occ.synchronize()
-        found = _hole_faces(gmsh)
+        round_faces = [t for _, t in gmsh.model.getEntities(2) if gmsh.model.getType(2, t) == "Cylinder"]
+        centre = {t: float(occ.getCenterOfMass(2, t)[0]) for t in round_faces}
         return {
-            "fixed": [t for t, x in found if x < 0.5 * mm * self.length],
-            "loaded": [t for t, x in found if x > 0.5 * mm * self.length],
+            "fixed": [t for t, x in centre.items() if x < 0.5 * mm * self.length],
+            "loaded": [t for t, x in centre.items() if x > 0.5 * mm * self.length],
         }
 
 
@@ -217,12 +218,3 @@ def _end_faces(gmsh: Any, axis: int, fixed: float, loaded: float) -> Faces:
             if flat and abs(low - place) < 1e-3:
                 names[name].append(tag)
     return with_others(gmsh, names)
-
-
-def _hole_faces(gmsh: Any) -> list[tuple[int, float]]:
-    """Cylindrical surfaces and the x of their centre in mm."""
-    return [
-        (t, float(gmsh.model.occ.getCenterOfMass(2, t)[0]))
-        for _, t in gmsh.model.getEntities(2)
-        if gmsh.model.getType(2, t) == "Cylinder"
-    ]

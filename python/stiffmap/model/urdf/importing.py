@@ -7,10 +7,9 @@ from os import PathLike, fspath
 from pathlib import Path
 
 from stiffmap.common.broadcasting import given_path
-from stiffmap.common.errors import FileError, StiffmapError
+from stiffmap.common.errors import FileError, StiffmapError, suggestion
 from stiffmap.model.description import TASK, Leg, MachineDescription, Offset
 from stiffmap.model.files.save import description_text
-from stiffmap.model.files.schema.base import suggestion
 from stiffmap.model.urdf.chains import Chains, ball, end_pose, plain_name
 from stiffmap.model.urdf.model import UrdfModel
 from stiffmap.model.urdf.reader import read_urdf
@@ -86,13 +85,13 @@ def _check_names(model: UrdfModel, side: Sidecar, file: str) -> None:
     for key in ("name_mot", "joint_name", "home", "actuators"):
         for name in getattr(side, key):
             if name not in joints:
-                near = suggestion(name, list(joints))
+                near = suggestion(name, joints)
                 raise FileError(f"no joint '{name}' in {model.file}{near}", file=file, key=key)
             if joints[name].kind == "fixed":
                 raise FileError(f"joint '{name}' is fixed", file=file, key=key)
     for name in side.springs:
         if name not in model.links:
-            near = suggestion(name, list(model.links))
+            near = suggestion(name, model.links)
             raise FileError(f"no link '{name}' in {model.file}{near}", file=file, key="springs")
 
 

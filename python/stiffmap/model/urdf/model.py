@@ -7,10 +7,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from stiffmap.common.broadcasting import Floats
-from stiffmap.common.errors import FileError
+from stiffmap.common.errors import FileError, suggestion
 from stiffmap.model.description import Body, Pose
 from stiffmap.model.description.pose import Rows, Vector
-from stiffmap.model.files.schema.base import suggestion
 
 DUST, POINT = 1e-12, 1e-15
 """Of the largest term of a tensor: what turning it leaves where there is nothing. m²: a tensor less than this times its mass

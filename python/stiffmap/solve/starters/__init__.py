@@ -18,10 +18,9 @@ from types import MappingProxyType
 from typing import Any
 
 from stiffmap.common.arithmetic import evaluate
-from stiffmap.common.errors import HomeError, StiffmapError
+from stiffmap.common.errors import HomeError, StiffmapError, unknown_name
 from stiffmap.common.yaml_text import read
 from stiffmap.model.files.load import description_from_text
-from stiffmap.model.files.schema.base import suggestion
 from stiffmap.solve.kinematics import inverse_kinematics
 from stiffmap.solve.machine import Machine
 
@@ -173,9 +172,7 @@ SHRINK, MOST_TRIES = 0.8, 16
 def class_of(name: str) -> MachineClass:
     """A class by its name; StiffmapError lists them."""
     if name not in CLASSES:
-        raise StiffmapError(
-            f"--from: no class '{name}'{suggestion(name, list(CLASSES))}; there are: {', '.join(CLASSES)}"
-        )
+        raise StiffmapError(f"--from: {unknown_name('class', name, CLASSES)}")
     return CLASSES[name]
 
 

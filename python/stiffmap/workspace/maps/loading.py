@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.fingerprints import code, digest
 from stiffmap.common.version import __version__
+from stiffmap.model.files.save import dump_effect
 from stiffmap.solve.labels import COMPONENTS, TWIST_UNITS, flag_attrs, meaning, status_attrs
 from stiffmap.solve.machine import Machine, solve_with
 from stiffmap.solve.options import LoadingKeywords, options_of
@@ -102,7 +103,7 @@ def describe(loading: Loading, title: str, call: dict[str, Any]) -> dict[str, An
         "machine": machine.name,
         "machine_title": machine.description.title,
         "machine_digest": machine_digest(machine),
-        "effects": json.dumps([plain_effect(e) for e in machine.description.effects]),
+        "effects": json.dumps([dump_effect(e) for e in machine.description.effects]),
         "stiffmap_version": __version__,
         "call": json.dumps(call | loading.options.as_plain(), ensure_ascii=False, default=np.ndarray.tolist),
         "units": "SI: m, rad, N, N m",
@@ -119,14 +120,3 @@ def describe(loading: Loading, title: str, call: dict[str, Any]) -> dict[str, An
 def machine_digest(machine: Machine) -> str:
     """Fingerprint of everything that a machine is made of, link files and users' kinds of effects among it."""
     return digest(machine.description, code()[1:] if machine.description.effects else [])[:16]
-
-
-def plain_effect(effect: Any) -> dict[str, Any]:
-    """An applied effect as plain data."""
-    return {
-        "kind": effect.kind,
-        "element": effect.element,
-        "legs": list(effect.legs),
-        "parameters": dict(effect.parameters),
-        "options": dict(effect.options),
-    }

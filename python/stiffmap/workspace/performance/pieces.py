@@ -10,7 +10,7 @@ from stiffmap.common.broadcasting import Floats, whole_number
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.description import Body, Offset, Pose, Spring
 from stiffmap.model.description.elements import Element
-from stiffmap.model.description.tree import Elements, edit_sequences
+from stiffmap.model.description.tree import Elements, edit_all, edit_sequences
 from stiffmap.solve.machine import Machine, takes_machine
 
 LIKE = 1e-6
@@ -32,14 +32,12 @@ def in_pieces(machine: Machine, pieces: int) -> Machine:
     def divide(elements: Elements) -> Elements:
         return _divided(elements, count, found)
 
-    d = machine.description
-    legs = tuple(replace(leg, elements=edit_sequences(leg.elements, divide)) for leg in d.legs)
-    base, platform = edit_sequences(d.base, divide), edit_sequences(d.platform, divide)
+    divided = edit_all(machine.description, lambda elements, name: edit_sequences(elements, divide))
     if not found:
         raise StiffmapError(
             f"{machine.name}: no uniform bar (offset, body in its middle, spring of a beam of that length)"
         )
-    return Machine(replace(d, legs=legs, base=base, platform=platform))
+    return Machine(divided)
 
 
 def _divided(elements: Elements, count: int, found: list[str]) -> Elements:

@@ -21,23 +21,23 @@ from stiffmap.ui.cli.app import main
 # Two harmonics of one gear tied together; its size counts in decades, so that no value makes it vanish.
 WORN_PINION = """
 from collections.abc import Iterator
+from dataclasses import replace
 from math import log10, pi
 
 import numpy as np
 
 from stiffmap.model.description import AppliedEffect, CommandError, MachineDescription
+from stiffmap.model.effects.edit import change_sites
 from stiffmap.model.effects.evidence import Probe, Signature, Tried
-from stiffmap.model.effects.library.command import add_command_error
 from stiffmap.model.effects.sites import at_sites, drives
 from stiffmap.model.effects.types import EffectType, Parameter, Placed
 
 
 def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
     size, period, phase = 10 ** placed.values["decades"], placed.values["pitch"], placed.values["phase"]
-    for k in (1, 2):
-        error = CommandError(amplitude=size / k, period=period / k, phase=k * phase, reference=None)
-        description = add_command_error(description, placed, error)
-    return description
+    errors = [CommandError(amplitude=size / k, period=period / k, phase=k * phase, reference=None) for k in (1, 2)]
+    change = lambda e: (replace(e, command_errors=(*e.command_errors, *errors)),)
+    return change_sites(description, placed.legs, placed.element, drives, change)
 
 
 def signature(probe: Probe, tried: Tried) -> Iterator[Signature]:

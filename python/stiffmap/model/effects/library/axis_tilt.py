@@ -5,7 +5,7 @@ from __future__ import annotations
 from stiffmap.model.description import Joint, Pose
 from stiffmap.model.description.tree import Elements
 from stiffmap.model.effects.edit import built
-from stiffmap.model.effects.library.geometry import ANGLES, about, home_position, rotation_of, rotations
+from stiffmap.model.effects.library.geometry import about, home_position, rotation_of, rotations
 from stiffmap.model.effects.sites import each, joints
 from stiffmap.model.effects.types import EffectType, Placed
 
@@ -26,12 +26,11 @@ EFFECT = EffectType(
         "home position) whatever the joint carries stands as declared. A rotation about the axis itself "
         "does nothing."
     ),
-    parameters=rotations("rotation of the axis"),
+    **rotations("rotation of the axis"),
     **each(joints, tilted),
     pivot="home position of the carriage; origin of a revolute joint",
     frame="local axes before the joint; about x, then the turned y, then the twice turned z",
     moves="the axis alone",
-    vector=ANGLES,
     excludes=("axis_tilt",),
     stage=45,
 )

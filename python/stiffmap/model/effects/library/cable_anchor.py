@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from stiffmap.model.description import Cable
 from stiffmap.model.description.tree import Elements
+from stiffmap.model.effects.library.geometry import components
 from stiffmap.model.effects.sites import cables, each
 from stiffmap.model.effects.types import EffectType, Parameter, Placed
 
@@ -27,9 +28,8 @@ EFFECT = EffectType(
     precedence=165,
     title="anchor of a cable",
     doc="The cable enters its guide (dx, dy, dz) away from where its controller believes.",
-    parameters=OFF,
+    **components(OFF),
     **each(cables, displaced),
     frame="base axes",
     moves="nothing",
-    vector=("dx", "dy", "dz"),
 )

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.description import Law, MachineDescription
-from stiffmap.model.effects.library.drive_law import change_law
+from stiffmap.model.effects.library.drive_law import change_law, linear
 from stiffmap.model.effects.sites import at_sites, elastic_directions, elastic_drives
 from stiffmap.model.effects.types import EffectType, Option, Parameter, ParametersAt, Placed, is_revolute
 
@@ -42,10 +42,12 @@ def _law(old: Law, level: float, branch: str) -> Law:
 
 
 def _gap(law: Law) -> float:
-    """Half width of the dead zone that the law has, 0 for a linear one."""
-    if law.cubic or (law.knots and (len(law.knots) != 2 or law.knots[0][1] != 0.0 or law.knots[1][1] != 0.0)):
-        raise StiffmapError("the drive has a declared nonlinear law already, which this effect cannot join")
-    return law.knots[1][0] if law.knots else 0.0
+    """Half width of the dead zone that the law has, 0 for a linear one; StiffmapError for any other."""
+    match law:
+        case Law(cubic=0.0, knots=((_, 0.0), (half, 0.0))):
+            return half
+    linear(law)
+    return 0.0
 
 
 def force_or_torque(force: Parameter, torque: Parameter) -> ParametersAt:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,17 +13,22 @@ from stiffmap.model.description import Joint, Pose
 from stiffmap.model.effects.types import Parameter
 
 AXES = "xyz"
-ERRORS, ANGLES = (tuple(f"{word}_{a}" for a in AXES) for word in ("error", "angle"))
 
 
-def translations(doc: str, prefix: str = "error_") -> tuple[Parameter, ...]:
-    """``error_x``, ``error_y``, ``error_z`` (m)."""
-    return tuple(Parameter(f"{prefix}{a}", "m", -0.1, 0.1, 0.0, 1e-4, f"{doc} along {a}") for a in AXES)
+def components(parameters: Iterable[Parameter]) -> dict[str, Any]:
+    """``parameters`` and ``vector`` of an effect that has these parameters only."""
+    known = tuple(parameters)
+    return {"parameters": known, "vector": tuple(p.name for p in known)}
 
 
-def rotations(doc: str, axes: str = AXES) -> tuple[Parameter, ...]:
-    """``angle_x``, ``angle_y``, ``angle_z`` (rad)."""
-    return tuple(Parameter(f"angle_{a}", "rad", -0.1, 0.1, 0.0, 1e-4, f"{doc} about {a}") for a in axes)
+def translations(doc: str, prefix: str = "error_") -> dict[str, Any]:
+    """`components` ``error_x``, ``error_y``, ``error_z`` (m)."""
+    return components(Parameter(f"{prefix}{a}", "m", -0.1, 0.1, 0.0, 1e-4, f"{doc} along {a}") for a in AXES)
+
+
+def rotations(doc: str) -> dict[str, Any]:
+    """`components` ``angle_x``, ``angle_y``, ``angle_z`` (rad)."""
+    return components(Parameter(f"angle_{a}", "rad", -0.1, 0.1, 0.0, 1e-4, f"{doc} about {a}") for a in AXES)
 
 
 def translation_of(values: Mapping[str, float], prefix: str = "error_") -> NDArray[np.float64]:

@@ -8,7 +8,7 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.model.description import Body, MachineDescription
 from stiffmap.model.description.tree import all_elements
 from stiffmap.model.effects.edit import change_sites
-from stiffmap.model.effects.sites import bodies, places
+from stiffmap.model.effects.sites import at_sites, bodies
 from stiffmap.model.effects.types import EffectType, Parameter, Place, Placed
 
 STANDARD = 9.81
@@ -22,7 +22,7 @@ def find(description: MachineDescription) -> list[Place]:
     heavy = any(isinstance(e, Body) and e.mass for _, e in all_elements(description))
     if heavy and description.gravity is None:
         return [("machine", ())]
-    return places(description, bodies)
+    return at_sites(bodies)(description)
 
 
 def apply(description: MachineDescription, placed: Placed) -> MachineDescription:

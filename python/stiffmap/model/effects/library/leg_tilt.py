@@ -5,7 +5,7 @@ from __future__ import annotations
 from stiffmap.model.description import MachineDescription, Offset, Pose
 from stiffmap.model.description.tree import Elements
 from stiffmap.model.effects.edit import built, edit_chains, splice
-from stiffmap.model.effects.library.geometry import ANGLES, rotation_of, rotations
+from stiffmap.model.effects.library.geometry import rotation_of, rotations
 from stiffmap.model.effects.sites import per_leg
 from stiffmap.model.effects.types import EffectType, Placed
 
@@ -26,13 +26,12 @@ EFFECT = EffectType(
     precedence=190,
     title="whole leg mounted askew",
     doc="The whole leg is mounted on the base turned about the origin of its frame.",
-    parameters=rotations("rotation"),
+    **rotations("rotation"),
     places=per_leg("base"),
     apply=apply,
     pivot="origin of the leg's frame on the base",
     frame="axes of the leg's frame; about x, then the turned y, then the twice turned z",
     moves="the whole leg up to the platform",
-    vector=ANGLES,
     excludes=("leg_tilt",),
     stage=25,
 )

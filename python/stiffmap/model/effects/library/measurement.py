@@ -16,11 +16,11 @@ import numpy as np
 from stiffmap.common.broadcasting import Floats
 from stiffmap.model.description import AppliedEffect
 from stiffmap.model.effects.evidence import Plan, Reading
-from stiffmap.model.effects.library.geometry import AXES, rotations
+from stiffmap.model.effects.library.geometry import AXES, components, rotations
 from stiffmap.model.effects.sites import at
 from stiffmap.model.effects.types import EffectType, Parameter
 
-ANGLES: tuple[Parameter, ...] = rotations("rotation")
+ANGLES: tuple[Parameter, ...] = rotations("rotation")["parameters"]
 
 
 def gains(doc: str) -> tuple[Parameter, ...]:
@@ -79,13 +79,12 @@ def measured(
         kind,
         title,
         doc,
-        parameters,
-        at(element),
-        None,
+        places=at(element),
+        apply=None,
         precedence=precedence,
         frame=frame,
         moves="nothing of the machine",
-        vector=tuple(p.name for p in parameters),
         excludes=(kind,),
+        **components(parameters),
         **more,
     )

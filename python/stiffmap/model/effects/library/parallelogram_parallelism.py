@@ -7,7 +7,7 @@ from dataclasses import replace
 from stiffmap.model.description import Block, Branch, Joint, Pose
 from stiffmap.model.effects.edit import built, splice
 from stiffmap.model.effects.library.bars import on_branches
-from stiffmap.model.effects.library.geometry import ANGLES, rotation_of, rotations
+from stiffmap.model.effects.library.geometry import rotation_of, rotations
 from stiffmap.model.effects.types import EffectType, Option, Placed
 
 
@@ -30,13 +30,12 @@ EFFECT = EffectType(
         "The axes of the two pins at one `end` are not parallel: the second branch's pin is turned by half "
         "of the angles, the first one's by minus half. The directions of the axes alone change."
     ),
-    parameters=rotations("angle of the second pin against the first"),
+    **rotations("angle of the second pin against the first"),
     **on_branches(turned),
     pivot="centre of each pin",
     frame="local axes before the pin",
     moves="nothing: the bars stay where they are at home",
     options=(Option("end", ("proximal", "distal"), "which pins"),),
-    vector=ANGLES,
     excludes=("parallelogram_parallelism",),
     stage=40,
 )

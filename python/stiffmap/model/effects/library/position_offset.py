@@ -5,14 +5,14 @@ from __future__ import annotations
 from stiffmap.model.description import Joint, MachineDescription, Pose
 from stiffmap.model.description.tree import Elements
 from stiffmap.model.effects.edit import built, change_sites, edit_chains, splice
-from stiffmap.model.effects.library.geometry import ERRORS, translation_of, translations
-from stiffmap.model.effects.sites import joints, per_leg, places
+from stiffmap.model.effects.library.geometry import translation_of, translations
+from stiffmap.model.effects.sites import at_sites, joints, per_leg
 from stiffmap.model.effects.types import EffectType, Place, Placed
 
 
 def find(description: MachineDescription) -> list[Place]:
     """Joints, and the two ends of each leg."""
-    return places(description, joints) + per_leg("base")(description) + per_leg("platform")(description)
+    return at_sites(joints)(description) + per_leg("base")(description) + per_leg("platform")(description)
 
 
 def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
@@ -41,11 +41,10 @@ EFFECT = EffectType(
         "platform axes. Along a prismatic drive it is its zero offset; with `tilt` it is the line of the "
         "axis."
     ),
-    parameters=translations("displacement"),
+    **translations("displacement"),
     places=find,
     apply=apply,
     frame="axes of the frame before the joint at its zero; base axes; platform axes",
     moves="the joint and all that it carries, up to the platform; nothing turns",
-    vector=ERRORS,
     stage=30,
 )

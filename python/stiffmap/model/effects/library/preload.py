@@ -26,9 +26,8 @@ EFFECT = EffectType(
         "The link is free of force not at zero deflection but at `rest`: mounted, it pulls the machine. In a "
         "parallelogram both bars alike."
     ),
-    parameters=translations("force-free deflection", "rest_"),
+    **translations("force-free deflection", "rest_"),
     **each(springs, pulled),
     frame="local axes of the spring",
     moves="all behind the link",
-    vector=("rest_x", "rest_y", "rest_z"),
 )

@@ -15,5 +15,4 @@ EFFECT = measured(
     frame="declared axes of the reading; about x, then the turned y, then the twice turned z",
     reading=of_coordinates(lambda values, parameters: turned(values, rotation_of(parameters).T)),
     hidden=lambda plan: plan.frame == "unknown",
-    certified=True,
 )

@@ -13,6 +13,5 @@ EFFECT = measured(
     340,
     frame="axes of the reading",
     reading=of_coordinates(scaled),
-    certified=True,
     instrument_scale="gain",
 )

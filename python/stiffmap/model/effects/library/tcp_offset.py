@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from stiffmap.model.description import MachineDescription, Pose
 from stiffmap.model.effects.edit import built, fresh
-from stiffmap.model.effects.library.geometry import ERRORS, translation_of, translations
+from stiffmap.model.effects.library.geometry import translation_of, translations
 from stiffmap.model.effects.sites import at
 from stiffmap.model.effects.types import EffectType, Placed
 
@@ -22,11 +22,10 @@ EFFECT = EffectType(
     precedence=220,
     title="position of the tool on the platform",
     doc="The tool (TCP) sits displaced on the platform; the external wrench acts at the displaced TCP.",
-    parameters=translations("displacement of the tool"),
+    **translations("displacement of the tool"),
     places=at("platform"),
     apply=apply,
     frame="platform axes",
     moves="the TCP; other points and bodies of the platform stay",
-    vector=ERRORS,
     stage=60,
 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from stiffmap.model.description import Joint
 from stiffmap.model.description.tree import Elements
 from stiffmap.model.effects.edit import built
-from stiffmap.model.effects.library.geometry import ANGLES, about, home_position, rotation_of, rotations
+from stiffmap.model.effects.library.geometry import about, home_position, rotation_of, rotations
 from stiffmap.model.effects.sites import each, joints
 from stiffmap.model.effects.types import EffectType, Placed
 
@@ -23,12 +23,11 @@ EFFECT = EffectType(
         "Guide tilt: the guide, its carriage and the joint axes that the carriage carries turn together "
         "about the carriage's home position. The same for any joint about its own frame."
     ),
-    parameters=rotations("rotation"),
+    **rotations("rotation"),
     **each(joints, tilted),
     pivot="home position of the carriage; origin of a revolute joint",
     frame="local axes before the joint; about x, then the turned y, then the twice turned z",
     moves="the joint and all that it carries, up to the platform",
-    vector=ANGLES,
     excludes=("tilt",),
     stage=40,
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import difflib
+from collections.abc import Sequence
 from functools import cache
 from typing import Annotated, Any, Literal, Self
 
@@ -19,6 +19,9 @@ from pydantic import (
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, InitErrorDetails, PydanticCustomError, PydanticKnownError
 
+from stiffmap.common.errors import suggestion
+from stiffmap.model.description.sources import SOURCES
+
 
 def describe(value: object) -> str:
     """A value as an error message shows it: its sort, and itself when short."""
@@ -28,12 +31,6 @@ def describe(value: object) -> str:
         return sort
     text = repr(value)
     return sort if len(text) > 40 else f"{sort} ({text})"
-
-
-def suggestion(word: str, known: list[str]) -> str:
-    """`` (did you mean 'length'?)`` or nothing."""
-    near = difflib.get_close_matches(word, known, n=1, cutoff=0.6)
-    return f" (did you mean '{near[0]}'?)" if near else ""
 
 
 class FileModel(BaseModel):
@@ -58,7 +55,10 @@ class FileModel(BaseModel):
         unknown = [key for key in data if key not in known]
         if not unknown:
             return handler(data)
-        problems = [_unknown_key(str(key), known, data) for key in unknown]
+        errors = [ValueError(unknown_key(key, known)) for key in unknown]
+        problems = [
+            InitErrorDetails(type="value_error", loc=(), input=data, ctx={"error": e}) for e in errors
+        ]
         try:
             handler({key: value for key, value in data.items() if key in known})
         except ValidationError as error:
@@ -76,9 +76,9 @@ def _keys_of(model: type[FileModel]) -> list[str]:
     return [f.alias or name for name, f in fields]
 
 
-def _unknown_key(key: str, known: list[str], data: Any) -> InitErrorDetails:
-    text = f"unknown key '{key}'{suggestion(key, known)}; known keys: {', '.join(known)}"
-    return InitErrorDetails(type="value_error", loc=(), input=data, ctx={"error": ValueError(text)})
+def unknown_key(key: object, known: Sequence[str]) -> str:
+    """That a mapping cannot have this key, and which it can."""
+    return f"unknown key '{key}'{suggestion(str(key), known)}; known keys: {', '.join(known)}"
 
 
 def _once_more(error: Any) -> InitErrorDetails:
@@ -105,7 +105,7 @@ Name = Annotated[
 
 
 Source = Annotated[
-    Literal["assumed", "measured", "computed", "catalogue"],
+    Literal[SOURCES],  # type: ignore[valid-type]
     Field(description="Where numbers come from: reports say how much of an answer rests on those assumed."),
 ]
 
