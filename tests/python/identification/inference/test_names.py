@@ -198,20 +198,23 @@ def test_an_effect_pays_for_the_places_that_it_may_be_at():
     assert exact.score - np.log(len(c.places)) < best.score < exact.score
 
 
-def test_declared_numbers_out_of_tolerance_in_the_stead_of_a_name_do_not_take_it_away():
+@pytest.mark.parametrize(("aside", "numbers"), [(0.3, ["zero of a drive"]), (0.0, [])])
+def test_declared_numbers_out_of_tolerance_in_the_stead_of_a_name_do_not_take_it_away(aside, numbers):
+    """A number that shows the same as the effect is the effect by another name, and makes nothing ambiguous."""
     c = setting(1, (0.0, 30.0, 0.0))
-    d = 8.0 * c.places[1].shapes[0].directions[:, :1]
+    along, other = (c.places[k].shapes[0].directions[:, :1] for k in (1, 2))
     unknown = Unknown("zero of a drive", "zeros", "m", 1e-4)
     s = searched(c)
+    d = 6.0 * (along + aside * other)
     c = replace(c, experiment=one_place(len(c.rows)), numbers=d, unknowns=(unknown,))
     part = Parts(c).together
     none = fitted(c, part)
-    for other, named in ((none, 1), (none.without([part[0].name]), 0)):
-        instead = Model("together", (), other, s.best.score), 0.0
+    for fit, named in ((none, 1), (none.without([part[0].name]), 0)):
+        instead = Model("together", (), fit, s.best.score), 0.0
         v = judged(c, replace(s, instead=(instead,) * len(s.best.chosen)))
         assert len(v.named) == named
-        assert [b.unknown.name for n in v.named for b in n.numbers] == ["zero of a drive"] * named
-        assert v.word == ("ambiguous" if named else "none")
+        assert [b.unknown.name for n in v.named for b in n.numbers] == numbers * named
+        assert v.word == (("ambiguous" if numbers else "effects") if named else "none")
 
 
 def test_a_number_is_no_effect_that_contains_a_named_one():
