@@ -80,6 +80,7 @@ def test_a_budget_gives_the_best_so_far() -> None:
     d = sm.diagnose(machine, data, time_limit=1e-3)
     assert d.stopped
     assert "stopped early" in d.lines()[-1]
+    assert d.as_plain()["held_out"] is None
 
 
 def test_an_unknown_exclusion_is_refused() -> None:

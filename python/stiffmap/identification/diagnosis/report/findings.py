@@ -185,8 +185,7 @@ class Findings:
         out |= {"machine": self.declared.name, "experiment": self.experiment.name}
         out |= {f.name: plain(getattr(self, f.name)) for f in fields(self) if f.repr and f.name not in APART}
         out["shares"] = [{"part": name, "share": share} for name, share in self.shares.items()]
-        if self.held_out:
-            h = self.held_out
-            out["held_out"] = {"folds": h.folds, "by": h.by}
+        h = self.held_out
+        out["held_out"] = {"folds": h.folds, "by": h.by} if h else None
         out["calibration"] = plain(self.calibration)
         return out
