@@ -12,6 +12,7 @@ from stiffmap.common.tables.poses import read_pose_table
 from stiffmap.experiment.files.table import read_table
 from stiffmap.machining.toolpath.load import load_path
 from stiffmap.workspace.performance.motion.trajectory import read_points
+from stiffmap.workspace.vibration.files import read_responses
 
 SPELLINGS = {
     "commas": ("x [mm],y [mm],z [mm]\n50.5,0,700\n0,-20.25,700\n", "utf-8"),
@@ -41,6 +42,31 @@ def test_a_table_is_the_same_in_every_spelling_and_command(name: str, tmp_path: 
     np.testing.assert_allclose(read_pose_table(file).position, POINTS, rtol=1e-12, atol=1e-15)
     np.testing.assert_allclose(load_path(file).end[-1], POINTS[-1], rtol=1e-12, atol=1e-15)
     np.testing.assert_allclose(read_points(file).position[[0, -1]], POINTS, rtol=1e-9, atol=1e-12)
+
+
+def test_a_workbook_is_a_table_of_every_command(tmp_path: Path) -> None:
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    for row in (
+        ["Points of March"],
+        [],
+        ["Nr", "x", "y", "z"],
+        ["", "mm", "mm", "mm"],
+        [1, 50.5, 0, 700],
+        [2, 0, -20.25, 700],
+    ):
+        book.active.append(row)
+    book.save(tmp_path / "points.xlsx")
+    for found in (
+        read_pose_table(tmp_path / "points.xlsx").position,
+        load_path(tmp_path / "points.xlsx").end,
+    ):
+        np.testing.assert_allclose(found[[0, -1]], POINTS, rtol=1e-12, atol=1e-15)
+    book.active.delete_rows(1, 6)
+    for row in (["frequency_Hz", "real_um/N", "imag_um/N"], [10, 1, 0], [20, 2, -1]):
+        book.active.append(row)
+    book.save(tmp_path / "response.xlsx")
+    np.testing.assert_allclose(read_responses(tmp_path / "response.xlsx")[0].receptance, [1e-6, 2e-6 - 1e-6j])
 
 
 @pytest.mark.parametrize(

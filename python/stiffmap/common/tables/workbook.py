@@ -28,6 +28,8 @@ LONGEST_GAP = 10_000
 EXCEL = (".xlsx", ".xlsm")
 WORKBOOKS = (*EXCEL, ".xls", ".ods")
 """Suffixes."""
+TABLES = (".csv", ".tsv", *WORKBOOKS)
+"""Suffixes of files that are tables whatever stands in them."""
 OTHERWISE = " (or save the sheet as CSV)"
 
 

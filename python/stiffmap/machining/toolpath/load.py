@@ -14,6 +14,7 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError, suggestion
 from stiffmap.common.number_text import number_in
 from stiffmap.common.tables.named import Known, read_named
+from stiffmap.common.tables.workbook import TABLES
 from stiffmap.machining.toolpath.gcode.load import lines_of, load_gcode
 from stiffmap.machining.toolpath.outlines import outline, outline_names
 from stiffmap.machining.toolpath.path import Toolpath, path_of
@@ -53,9 +54,9 @@ def load_path(
         return load_gcode(path, offsets=offsets, progress=progress)
     if suffix in CL:
         return read_cl(path)
-    if suffix == ".csv":
+    if suffix in TABLES:
         return read_points(path)
-    known = ", ".join((*GCODE, *CL, ".csv"))
+    known = ", ".join((*GCODE, *CL, *TABLES))
     raise FileError(f"unknown kind of path {suffix!r}; known: {known}", file=str(path))
 
 

@@ -11,15 +11,13 @@ from rich.text import Text
 from stiffmap.common.errors import FileError
 from stiffmap.common.outputs import new_file
 from stiffmap.common.outputs.option import written
-from stiffmap.common.tables.workbook import WORKBOOKS
+from stiffmap.common.tables.workbook import TABLES
 from stiffmap.model.urdf import Imported, import_urdf
 from stiffmap.solve.machine import Machine
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import pairs
 from stiffmap.ui.cli.options import argument, option
 from stiffmap.ui.cli.output import show
-
-TABLES = (".csv", ".txt", ".tsv", *WORKBOOKS)
 
 
 def command(
@@ -49,7 +47,7 @@ def command(
 
       [cyan]stiffmap import arm.urdf --tip tool -o tool.yaml[/cyan]
     """
-    table = urdf.suffix.lower() in TABLES
+    table = urdf.suffix.lower() in (*TABLES, ".txt")
     for name, given in {"--sidecar": sidecar, "--tip": tip}.items() if table else [("--unit", unit)]:
         if given:
             expected, other = ("URDF", "table") if table else ("table", "URDF")

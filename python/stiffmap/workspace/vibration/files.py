@@ -13,6 +13,7 @@ import numpy as np
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError, StiffmapError, needed
 from stiffmap.common.tables.named import Known, read_named
+from stiffmap.common.tables.workbook import TABLES
 from stiffmap.workspace.vibration.response import Complex
 from stiffmap.workspace.vibration.response_units import FREQUENCIES, ResponseUnit, response_unit
 
@@ -46,20 +47,20 @@ class MeasuredResponse:
 
 
 def read_responses(path: str | PathLike[str]) -> list[MeasuredResponse]:
-    """All responses of a file: .csv, or .uff, .unv (data sets 58).
+    """All responses of a file: a table (.csv, .tsv, workbook), or .uff, .unv (data sets 58).
 
     Raises FileError naming file, row and what was expected: frequencies that do not rise, a coherence outside 0 to 1, units.
     """
     p = Path(path)
     if not p.is_file():
         raise FileError("no such file of frequency responses", file=str(path))
-    found = [_csv(p)] if p.suffix.lower() == ".csv" else _universal(p)
+    found = [_table(p)] if p.suffix.lower() in TABLES else _universal(p)
     for one in found:
         _check(one, str(path))
     return found
 
 
-def _csv(path: Path) -> MeasuredResponse:
+def _table(path: Path) -> MeasuredResponse:
     t = read_named(path, COLUMNS)
     unit = t.units.get("real", "")
     known = response_unit(unit)
