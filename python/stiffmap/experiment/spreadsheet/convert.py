@@ -206,7 +206,7 @@ def write_folder(
         )
         if not head["rows"]:
             read = ", ".join(f"'{c.name}'" for c in found.columns if c.meaning in READINGS)
-            raise StiffmapError(f"{sheet.file}: no row has a reading: {read} hold no number")
+            raise StiffmapError(f"{sheet.file}: no row has a reading: no number in {read}")
         notes = [c.index for c in found.columns if c.meaning == "note"]
         if notes:
             kept = ([row[i] for i in notes] for row in sheet.rows)

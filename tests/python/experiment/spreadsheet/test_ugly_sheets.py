@@ -101,6 +101,17 @@ def test_points_that_are_read_again_have_names_of_their_own(tmp_path: Path) -> N
     ("old", "new", "words"),
     [
         ("14.0", "soft", "line 3: column 'dx [µm]': expected a number; found 'soft' (cell E3)"),
+        (
+            CLEAN[-15:],
+            "2;50;400;100 N;14.0\n",
+            "line 3: column 'fx [N]': expected a number; found '100 N' (cell D3)",
+        ),
+        (
+            "fx [N];dx [µm]\n1;0;400;100;12.5\n2;50;400;100;14.0",
+            "fx [N];dx [µm]\n1;0;400;100 N;12.5\n2;50;400;0.1 kN;14.0",
+            "line 3: column 'fx [N]': expected N in its cells; found kN",
+        ),
+        ("12.5\n2;50;400;100;14.0", "-\n2;50;400;100;", "no row has a reading: no number in 'dx'"),
         ("2;50;", "2;;", "line 3: column 'x [mm]' (B): expected a number; found an empty cell"),
         (
             "fx [N]",
