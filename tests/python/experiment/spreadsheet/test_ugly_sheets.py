@@ -102,8 +102,8 @@ def test_points_that_are_read_again_have_names_of_their_own(tmp_path: Path) -> N
     [
         ("14.0", "soft", "line 3: column 'dx [µm]': expected a number; found 'soft' (cell E3)"),
         (
-            CLEAN[-15:],
-            "2;50;400;100 N;14.0\n",
+            "2;50;400;100;14.0",
+            "2;50;400;100 N;14.0",
             "line 3: column 'fx [N]': expected a number; found '100 N' (cell D3)",
         ),
         (
