@@ -57,11 +57,9 @@ def test_a_workbook_is_a_table_of_every_command(tmp_path: Path) -> None:
     ):
         book.active.append(row)
     book.save(tmp_path / "points.xlsx")
-    for found in (
-        read_pose_table(tmp_path / "points.xlsx").position,
-        load_path(tmp_path / "points.xlsx").end,
-    ):
-        np.testing.assert_allclose(found[[0, -1]], POINTS, rtol=1e-12, atol=1e-15)
+    file = tmp_path / "points.xlsx"
+    np.testing.assert_allclose(read_pose_table(file).position, POINTS, rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(load_path(file).end[-1], POINTS[-1], rtol=1e-12, atol=1e-15)
     book.active.delete_rows(1, 6)
     for row in (["frequency_Hz", "real_um/N", "imag_um/N"], [10, 1, 0], [20, 2, -1]):
         book.active.append(row)

@@ -46,11 +46,6 @@ class Named:
     against_numbers: float = np.inf
     """Its ln odds against declared numbers that are off in its stead."""
 
-    @property
-    def is_alone(self) -> bool:
-        """Whether nothing else would do in its stead."""
-        return not self.equivalents and not self.numbers and self.against_numbers >= np.log(ODDS)
-
 
 @dataclass(frozen=True, eq=False)
 class Beyond:
@@ -83,7 +78,7 @@ class Verdict:
     def word(self) -> str:
         """``none``, ``effects``, ``ambiguous``, ``unattributed``."""
         if self.named:
-            return "effects" if all(n.is_alone for n in self.named) else "ambiguous"
+            return "ambiguous" if any(n.equivalents or n.numbers for n in self.named) else "effects"
         return "unattributed" if self.rest else "effects" if self.beyond else "none"
 
 
