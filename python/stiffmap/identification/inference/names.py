@@ -111,8 +111,10 @@ def _with_rivals(model: Model, searches: Sequence[_World], found: Mapping[str, S
     others = [w for w in searches if w is not own]
     model = own.coarsest(model)
     rivals = own.rivals(model)
-    best = Search(model, own.null, tuple(odds for odds, _ in rivals), tuple(near for _, near in rivals))
-    return replace(best, instead=tuple(_without(c, best, others, found) for c in model.chosen))
+    near = tuple(places for _, places in rivals)
+    each = zip(model.chosen, near, strict=True)
+    instead = tuple(_without(c, places, model, own.price, others, found) for c, places in each)
+    return Search(model, own.null, tuple(odds for odds, _ in rivals), near, instead)
 
 
 def put_instead(fit: Fit, c: Chosen, place: Place) -> Chosen:
@@ -125,20 +127,23 @@ def put_instead(fit: Fit, c: Chosen, place: Place) -> Chosen:
 
 
 def _without(
-    c: Chosen, best: Search, others: Sequence[_World], found: Mapping[str, Search]
+    c: Chosen,
+    near: Sequence[tuple[Place, float]],
+    model: Model,
+    price: float,
+    others: Sequence[_World],
+    found: Mapping[str, Search],
 ) -> tuple[Model, float] | None:
-    """The best model of another world in which an effect, and what would do in its stead, is not; and the odds of the effect, all
-    places together, where each effect more may be at any place."""
-    k = best.best.chosen.index(c)
-    same = {id(c.place), *(id(p) for p, _ in best.equivalents[k])}
-    price = others[0].price if others else 0.0
-    models = [m for w in others for m in (w.less(best.best, c), found[w.name].null, found[w.name].best)]
+    """The best model of another world in which an effect, and what would do in its stead, is not; and the ln odds against that of the
+    effect and of what would do in its stead, each effect more at the `price` of its places."""
+    same = {id(c.place), *(id(p) for p, _ in near)}
+    models = [m for w in others for m in (w.less(model, c), found[w.name].null, found[w.name].best)]
     allowed = (m for m in models if not same & {id(o.place) for o in m.chosen})
     other = max(allowed, key=lambda m: m.score - price * len(m.chosen), default=None)
     if other is None:
         return None
-    together = best.best.score + float(np.logaddexp.reduce([0.0, *(s for _, s in best.equivalents[k])]))
-    return other, together - other.score - price * (len(best.best.chosen) - len(other.chosen))
+    together = model.score + float(np.logaddexp.reduce([0.0, *(s for _, s in near)]))
+    return other, together - other.score - price * (len(model.chosen) - len(other.chosen))
 
 
 @dataclass(eq=False)

@@ -97,7 +97,7 @@ def judged(columns: Columns, search: Search) -> Verdict:
             numbers = tuple(b for b in _out_of_tolerance(columns, instead) if b.unknown.name not in known)
             if any((e := effect_of(columns, b, ())) and e.place is c.place for b in numbers):
                 numbers, against = (), np.inf  # the effect by another name
-            why = why or ("" if numbers or against > 0.0 else TOLERABLE)
+            why = why if numbers or against > 0.0 else TOLERABLE
         if why:
             refused.append((c, why))
         else:

@@ -186,6 +186,18 @@ def test_a_name_needs_odds_against_the_best_model_of_another_world_without_it():
         assert [why for _, why in v.refused] == [TOLERABLE] * (word == "none")
 
 
+def test_what_numbers_within_tolerances_show_is_not_unexplained_whatever_else_refuses_the_name(monkeypatch):
+    c = setting(1, (0.0, 30.0, 0.0))
+    c = replace(c, experiment=one_place(len(c.rows)))
+    s = searched(c)
+    monkeypatch.setattr(
+        "stiffmap.identification.inference.verdict.refusal", lambda *_: (0.0, "another reason")
+    )
+    for odds, why, word in ((0.9, TOLERABLE, "none"), (1.1, "another reason", "unattributed")):
+        v = judged(c, replace(s, instead=((s.null, float(np.log(odds))),)))
+        assert [w for _, w in v.refused] == [why] and v.word == word
+
+
 def test_an_effect_pays_for_the_places_that_it_may_be_at():
     """Numbers that are off show the same as an effect, with a little less evidence: they need no place, the effect may be at any."""
     c = setting(1, (0.0, 6.0, 0.0))
