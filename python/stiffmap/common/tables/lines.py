@@ -36,7 +36,10 @@ NUMBER = re.compile(r"\s*[+-]?(\d+[.,]?\d*|[.,]\d+)([eEdD][+-]?\d+)?\s*")
 GROUPED = re.compile(r"[+-]?\d{1,3}(?:(['’ ])\d{3}(?:\1\d{3})*(?:\.\d+)?|(?:,\d{3})+\.\d+)")
 """``1'000``, ``1 000.5``, ``1,000.5``."""
 FORTRAN = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)[dD][+-]?\d+")
-WITH_UNIT = re.compile(r"([+-−]?\d[\d.,'’ ]*(?:[eE][+-]?\d+)?)(\D.*)", re.DOTALL)
+WITH_UNIT = re.compile(
+    r"([+\-−]?\d(?:[\d.,]|['’ ](?=\d))*(?:[eE][+-]?\d+)?)\s*((?:[^\W\d_]|[°\"']).{0,19})", re.DOTALL
+)
+"""``12.5 µm``; what a wrong separator leaves together has no letter behind its first number, or is longer than any unit."""
 
 NOTHING = {
     "", *["na", "n/a", "n.a.", "nan", "none", "null", "#n/a", "#nv", "n.m.", "k.a.", "ka", "?", "x", "./.", "*", "out", "off", "leer", "empty", "fehlt", "missing", "entfällt", "ausreißer"],

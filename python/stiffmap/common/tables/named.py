@@ -18,7 +18,7 @@ import numpy as np
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.tables.header import split_unit
-from stiffmap.common.tables.lines import Spelling, finite_number, number, with_points
+from stiffmap.common.tables.lines import Spelling, finite_number, number
 from stiffmap.common.tables.meaning import meaning_of
 from stiffmap.common.tables.sheet import Layout, Sheet, read_sheet
 from stiffmap.common.units import QUANTITIES, unit_of
@@ -48,7 +48,7 @@ class Known:
 
     def has(self, name: str) -> bool:
         """Whether a table may have a column of this name, without its unit."""
-        return re.sub(r"\s+", "_", name.lower()) in {*self.units, *self.aliases}
+        return _joined(name) in {*self.units, *self.aliases}
 
 
 @dataclass(eq=False)
@@ -119,7 +119,7 @@ def _numbers(sheet: Sheet, column: int, name: str, table: NamedTable, blank: boo
                 table.fail(f"expected {expected}, found {found}", name, row)
         return value
 
-    cells = with_points(sheet.columns[column]) if sheet.decimal_comma else sheet.columns[column]
+    cells = sheet.with_points(column)
     out = cells.numbers(one)
     if not blank and np.isnan(out).any():
         row = int(np.argmax(np.isnan(out)))
@@ -127,14 +127,17 @@ def _numbers(sheet: Sheet, column: int, name: str, table: NamedTable, blank: boo
     return out
 
 
+def _joined(name: str) -> str:
+    return re.sub(r"\s+", "_", name.lower())
+
+
 def _meaning(head: str, known: Known, table: NamedTable) -> tuple[str, str, float]:
     """Name of a column, its unit as written, and the SI size of that."""
-    names = {*known.units, *known.aliases}
     text, unit = split_unit(head)
-    name = re.sub(r"\s+", "_", text.lower())
-    if name not in names:  # x_per_tooth_mm, real_m/N
+    name = _joined(text)
+    if not known.has(text):  # x_per_tooth_mm, real_m/N
         whole = re.sub(r"\s", "_", head)
-        cuts = [m.start() for m in re.finditer("_", whole) if whole[: m.start()].lower() in names]
+        cuts = [m.start() for m in re.finditer("_", whole) if known.has(whole[: m.start()])]
         if cuts:
             name, unit = whole[: cuts[-1]].lower(), PER.sub(r"/\1", whole[cuts[-1] + 1 :])
             unit = {"N_m": "N*m"}.get(unit, unit)

@@ -95,11 +95,16 @@ class Sheet:
         cells = ["" if v != v else repr(v) for v in np.asarray(values, dtype=float).tolist()]
         return self.with_cells(name, (c.replace(".", ",") for c in cells) if self.decimal_comma else cells)
 
+    def with_points(self, column: int) -> Cells:
+        """A column of numbers as text, with decimal points."""
+        return with_points(self.columns[column]) if self.decimal_comma else self.columns[column]
+
     def numbers(self, column: int) -> Floats:
         """A column; NaN where nothing was read. FileError names the line of what is no number."""
         if column not in self._read:
-            cells = with_points(self.columns[column]) if self.decimal_comma else self.columns[column]
-            self._read[column] = cells.numbers(lambda cell, row: self._number(cell, column, self.lines[row]))
+            self._read[column] = self.with_points(column).numbers(
+                lambda cell, row: self._number(cell, column, self.lines[row])
+            )
         return self._read[column]
 
     def _number(self, cell: str, column: int, line: int) -> float:

@@ -135,18 +135,19 @@ class Meant(Answers):
 
     def _next_to(self, column: int) -> str:
         """The unit in the cells of the next column, where these mean nothing and hold nothing else."""
-        cells = {
-            c.meaning: set(self.sheet.columns[c.index]) - {""} for c in self.guessed[column + 1 : column + 2]
-        }
-        units = cells.get("note", set())
-        if not units or any(unit_of(cell) is None for cell in units):
+        beside = self.guessed[column + 1 : column + 2]
+        if not beside or beside[0].meaning != "note":
             return ""
+        cells = self.sheet.columns[column + 1]
+        if any(cell and unit_of(cell) is None for cell in cells):
+            return ""
+        units = set(cells) - {""}
         if len(units) > 1:
             raise StiffmapError(
                 f"{self.sheet.file}: column '{self.sheet.names[column + 1]}' ({column_letter(column + 1)}): expected one unit in all "
                 f"rows; found {', '.join(sorted(units))}"
             )
-        return units.pop()
+        return units.pop() if units else ""
 
     def coordinates(self) -> Floats:
         """(n, drives) commanded coordinates, m and rad."""

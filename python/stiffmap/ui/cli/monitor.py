@@ -51,19 +51,17 @@ def command(
 
 def _of(path: Path) -> list[AppliedEffect]:
     """Effects that a diagnosis named."""
-    try:
-        with reading(path):
+    with reading(path):
+        try:
             data: Any = parse_json(path.read_text(encoding="utf-8"))
-        terms = []
-        for e in data["effects"]:
-            values = tuple((n, float(v[0])) for n, v in e["parameters"].items())
-            terms.append(AppliedEffect(e["kind"], e["element"], tuple(e["legs"]), values))
-    except FileError:
-        raise
-    except (ValueError, KeyError, TypeError, IndexError, AttributeError, OverflowError):
-        raise FileError(
-            "expected a diagnosis as `stiffmap diagnose --json` writes it", file=str(path)
-        ) from None
+            terms = []
+            for e in data["effects"]:
+                values = tuple((n, float(v[0])) for n, v in e["parameters"].items())
+                terms.append(AppliedEffect(e["kind"], e["element"], tuple(e["legs"]), values))
+        except (ValueError, KeyError, TypeError, IndexError, AttributeError, OverflowError):
+            raise FileError(
+                "expected a diagnosis as `stiffmap diagnose --json` writes it", file=str(path)
+            ) from None
     if not terms:
         raise FileError("the diagnosis names no effect that could be followed", file=str(path))
     return terms

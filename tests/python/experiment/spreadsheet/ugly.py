@@ -206,7 +206,8 @@ LATER: dict[str, Ugly] = {
 "20 units in cells of two columns":Ugly("x [mm];y [mm];Load;Direction;dx;dy [um]\n0;400;100 N;+x;12.5 um;-3.0\n50;400;100 N;+x;14.0 um;-2.5\n0;450;100 N;-x;-13.0 um;3.5\n"),
 "21 units over names":Ugly("Nr;Position [mm];;Force [N];Dial gauges [µm];;Remark\n;x;y;fx;dx;dy;\n1;0;400;100;12,5;-3,0;a\n2;50;400;100;14,0;-2,5;\n3;0;450;-100;-13,0;3,5;b\n"),
 "22 a draft":Ugly("Compliance test [draft 2]\nx [mm];y [mm];fx [N];dx [µm];dy [µm]\n0;400;100;12,5;-3,0\n50;400;100;14,0;-2,5\n0;450;-100;-13,0;3,5\n"),
+"23 names that end as units do":Ugly("Load case;X [mm];Y [mm];Fx [N];dX [µm];dY [µm]\nP1 m;0;400;100;12,5;-3,0\nP2 t;50;400;100;14,0;-2,5\nP3 m;0;450;-100;-13,0;3,5\n"),
 }  # fmt: skip
-"""Ten that were made when the reader was done: at the first try it read four (4 to 7); `STILL` are not read yet. Twelve from later days (from 11),
-of which none but the last was read right at once."""
+"""Ten that were made when the reader was done: at the first try it read four (4 to 7); `STILL` are not read yet. Thirteen from later days (from 11),
+of which none but the last two was read right at once."""
 STILL = {"3 three header rows in workbook"}
