@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import xml.etree.ElementTree as xml
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -15,9 +16,12 @@ from stiffmap.common.rotations import rotation_about
 from stiffmap.model.description import Body, Pose
 from stiffmap.model.description.pose import vector
 from stiffmap.model.urdf.model import Mimic, UrdfJoint, UrdfModel, tensor
+from stiffmap.model.urdf.tip import listed
 
 KINDS = {"revolute": "revolute", "continuous": "revolute", "prismatic": "prismatic", "fixed": "fixed"}
 X, Y, Z = np.eye(3)
+MOST = 4 * np.pi
+"""Angle of an origin, two turns, beyond which none is in radians."""
 
 
 def read_urdf(path: Path) -> UrdfModel:
@@ -35,12 +39,15 @@ def read_urdf(path: Path) -> UrdfModel:
         raise FileError(f"not XML: {error}", file=file) from None
     if path.suffix == ".xacro" or any(_is_xacro(e) for e in robot.iter()):
         raise _unexpanded(path)
-    if robot.tag != "robot":
+    if robot.tag.rpartition("}")[2] != "robot":
         raise FileError(f"expected a URDF, whose root element is <robot>; found <{robot.tag}>", file=file)
-    links = {_name(e, file): _body(e, file) for e in robot.findall("link")}
+    plain = robot.tag.removesuffix("robot")
+    for e in robot.iter():  # a namespace that has no prefix says nothing
+        e.tag = e.tag.removeprefix(plain)
+    links = [(_name(e, file), _body(e, file)) for e in robot.findall("link")]
     joints = [_joint(e, file) for e in robot.findall("joint")]
-    _check_tree(links, joints, file)
-    return UrdfModel(file, robot.get("name", path.stem), links, {j.child: j for j in joints})
+    _check_tree([name for name, _ in links], joints, file)
+    return UrdfModel(file, robot.get("name") or path.stem, dict(links), {j.child: j for j in joints})
 
 
 def _with_prefixes(text: bytes) -> bytes:
@@ -69,7 +76,11 @@ def _name(element: xml.Element, file: str) -> str:
     return name
 
 
-def _check_tree(links: dict[str, Body | None], joints: list[UrdfJoint], file: str) -> None:
+def _check_tree(links: list[str], joints: list[UrdfJoint], file: str) -> None:
+    for tag, names in {"link": links, "joint": [j.name for j in joints]}.items():
+        name, times = Counter(names).most_common(1)[0] if names else ("", 0)
+        if times > 1:
+            raise FileError(f"there are {times} of this name", file=file, key=f"{tag} {name}")
     for joint in joints:
         for end in (joint.parent, joint.child):
             if end not in links:
@@ -83,19 +94,27 @@ def _check_tree(links: dict[str, Body | None], joints: list[UrdfJoint], file: st
         raise FileError(
             f"expected one root link, found {len(roots)}: {', '.join(roots) or 'none'}", file=file
         )
+    reached = set(roots)
+    while more := {j.child for j in joints if j.parent in reached} - reached:
+        reached |= more
+    ring = [link for link in links if link not in reached]
+    if ring:
+        raise FileError(f"links hang on each other in a ring and not on the root link '{roots[0]}': {listed(ring)}",
+                        file=file)  # fmt: skip
 
 
 def _joint(e: xml.Element, file: str) -> UrdfJoint:
     name = _name(e, file)
     key, kind = f"joint {name}", e.get("type", "")
-    parent, child = (_link(e, tag, file, key) for tag in ("parent", "child"))
-    axis = _numbers(e.find("axis"), "xyz", X, file, key)
+    parent, child = (str(_wanted(e, tag, "link", file, key).get("link")) for tag in ("parent", "child"))
+    along = _only(e, "axis", file, key)
+    axis = _numbers(along, "xyz", X if along is None else np.zeros(3), file, key)
     largest = float(np.abs(axis).max())  # taken out first: the square of 1e308 overflows
     axis = axis / (largest or 1.0)
     length = float(np.linalg.norm(axis))
     if KINDS.get(kind) in ("revolute", "prismatic") and length == 0:
         raise FileError("a zero-length axis has no direction", file=file, key=key)
-    limit, mimic = e.find("limit"), e.find("mimic")
+    limit, mimic = _only(e, "limit", file, key), _only(e, "mimic", file, key)
     lower, upper = (_limit(limit, k, file, key) for k in ("lower", "upper"))
     ranged = kind != "continuous" and lower != upper and max(abs(lower), abs(upper)) < LARGEST
     return UrdfJoint(
@@ -109,24 +128,36 @@ def _joint(e: xml.Element, file: str) -> UrdfJoint:
     )  # fmt: skip
 
 
-def _link(e: xml.Element, tag: str, file: str, key: str) -> str:
-    found = e.find(tag)
-    if found is None or not found.get("link"):
-        raise FileError(f"has no <{tag} link=...>", file=file, key=key)
-    return str(found.get("link"))
+def _only(e: xml.Element, tag: str, file: str, key: str) -> xml.Element | None:
+    """The one element of a tag, if there is one; FileError where there are several."""
+    found = e.findall(tag)
+    if len(found) > 1:
+        raise FileError(f"expected one <{tag}>, found {len(found)}", file=file, key=key)
+    return found[0] if found else None
+
+
+def _wanted(e: xml.Element, tag: str, attribute: str, file: str, key: str) -> xml.Element:
+    """The one element of a tag, with an attribute that must be there."""
+    found = _only(e, tag, file, key)
+    if found is None or not found.get(attribute):
+        raise FileError(f"has no <{tag} {attribute}=...>", file=file, key=key)
+    return found
 
 
 def _body(e: xml.Element, file: str) -> Body | None:
-    inertial, name = e.find("inertial"), _name(e, file)
-    if inertial is None:
-        return None
+    name = _name(e, file)
     key = f"link {name}"
-    mass = _number(inertial.find("mass"), "value", file, key)
+    inertial = _only(e, "inertial", file, key)
+    if inertial is None or not len(inertial):
+        return None
+    mass = _number(_wanted(inertial, "mass", "value", file, key), "value", file, key)
     if mass == 0:
         return None
     if mass < 0:
         raise FileError(f"the mass is negative: {mass}", file=file, key=key)
-    at, given = _origin(inertial, file, key), inertial.find("inertia")
+    at, given = _origin(inertial, file, key), _only(inertial, "inertia", file, key)
+    for k in ("ixx", "iyy", "izz") if given is not None else ():
+        _wanted(inertial, "inertia", k, file, key)
     xx, yy, zz, xy, xz, yz = (
         _number(given, k, file, key) for k in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
     )
@@ -135,8 +166,18 @@ def _body(e: xml.Element, file: str) -> Body | None:
 
 
 def _origin(e: xml.Element, file: str, key: str) -> Pose:
-    found = e.find("origin")
-    roll, pitch, yaw = _numbers(found, "rpy", np.zeros(3), file, key)
+    found = _only(e, "origin", file, key)
+    other = [k for k in (found.attrib if found is not None else ()) if k not in ("xyz", "rpy")]
+    if found is not None and other:
+        raise FileError(
+            f"origin: expected xyz and rpy, found {other[0]}='{found.get(other[0])}'", file=file, key=key
+        )
+    angles = _numbers(found, "rpy", np.zeros(3), file, key)
+    if found is not None and np.abs(angles).max() > MOST:
+        raise FileError(
+            f"rpy: expected radians, found '{found.get('rpy')}', as degrees are", file=file, key=key
+        )
+    roll, pitch, yaw = angles
     turned = rotation_about(Z, yaw) @ rotation_about(Y, pitch) @ rotation_about(X, roll)
     return Pose.of(_numbers(found, "xyz", np.zeros(3), file, key), turned)
 

@@ -108,6 +108,23 @@ BAD_URDF = {
     "a zero-length axis": ('<axis xyz="1 0 0"/>', '<axis xyz="0 0 0"/>'),
     "xyz: expected three numbers, found '0 0'": ('<origin xyz="0 0 0.3"', '<origin xyz="0 0"'),
     "not XML": ("</robot>", ""),
+    "link fore: there are 2 of this name": ('<link name="fore"/>', '<link name="fore"/><link name="fore"/>'),
+    "joint q2: there are 2 of this name": ('name="q1"', 'name="q2"'),
+    "links hang on each other in a ring and not on the root link 'base': shoulder, upper": (
+        '<parent link="base"/>',
+        '<parent link="fore"/>',
+    ),
+    "link shoulder: has no <mass value=...>": ('<mass value="4"/>', "<mass>4</mass>"),
+    "link upper: has no <mass value=...>": ('<mass value="3"/>', ""),
+    "link slide: has no <inertia iyy=...>": ('iyy="0.01"', ""),
+    "link slide: expected one <inertial>, found 2": ('<link name="slide">', '<link name="slide"><inertial/>'),
+    "joint q1: expected one <origin>, found 2": ('<axis xyz="0 0 1"/>', '<origin rpy="0 0 1"/>'),
+    "joint q1: origin: expected xyz and rpy, found quat_xyzw='0 0 0 1'": (
+        'rpy="0 0 0.2"',
+        'quat_xyzw="0 0 0 1"',
+    ),
+    "joint q4: rpy: expected radians, found '0 90 0', as degrees are": ('rpy="0 0.4 0"', 'rpy="0 90 0"'),
+    "joint q4: a zero-length axis": ('<axis xyz="1 0 0"/>', '<axis rpy="1 0 0"/>'),
     "expected one root link, found 2": ('<link name="fore"/>', '<link name="fore"/><link name="loose"/>'),
 }
 
@@ -121,6 +138,13 @@ def test_bad_urdf(message: str, tmp_path: Path, capsys: pytest.CaptureFixture[st
     error = capsys.readouterr().err
     assert message in error and error.count("\n") == 1
     assert not (tmp_path / "m.yaml").exists()
+
+
+def test_a_namespace_and_an_empty_name_say_nothing(tmp_path: Path) -> None:
+    """As Drake's files have the one, and some exporters the other."""
+    plain = machine(tmp_path, robots.ARM.replace('name="arm"', 'name="robot"'))
+    other = robots.ARM.replace('name="arm"', 'xmlns="http://drake.mit.edu" name=""')
+    assert machine(tmp_path, other).description.legs == plain.description.legs
 
 
 def test_meshes_need_not_be_there(tmp_path: Path) -> None:
