@@ -12,6 +12,7 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs import make_folder, only_job, write_rows, write_text
 from stiffmap.common.tables.cells import row_numbers
 from stiffmap.common.tables.sheet import Sheet
+from stiffmap.common.units import Unit
 from stiffmap.common.yaml_text import text_of
 from stiffmap.experiment.experiment import WRENCH
 from stiffmap.experiment.files.fields import POSE
@@ -58,7 +59,15 @@ def understand(m: Meant, loaded: bool = False) -> ImportedSheet:
         known |= set(POSE)
     _ask(m, known, bool(drives))
     plain = (*WORDS, *COUNTED, *drives)
-    found = {c.meaning: m.unit(c.index, c.meaning) for c in used if c.meaning not in plain}
+    found: dict[str, Unit] = {}
+    for c in used:
+        if c.meaning not in plain:
+            unit = m.unit(c.index, c.meaning)
+            if found.setdefault(c.meaning, unit) != unit:
+                written = " and ".join(f"'{sheet.header[k.index]}'" for k in used if k.meaning == c.meaning)
+                raise StiffmapError(
+                    f"{sheet.file}: expected one unit of all repeats of {c.meaning}; found {written}"
+                )
     if loaded and not known & {*WRENCH, "ll"}:
         m.ask_column(
             "missing column: a deflection needs a load; which column is it? Say --map fx='HEADER' (fy, fz, mx, my, mz; "

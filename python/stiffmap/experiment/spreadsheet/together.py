@@ -29,9 +29,20 @@ DIRECTION = re.compile(
     re.IGNORECASE,
 )
 WAY = re.compile(r"([+-]?)\s*([xyz])|([xyz])\s*([+-])", re.IGNORECASE)
-BEFORE = r"unloaded|no[ -]load|without load|before|unbelastet|ohne last|vorher|leer|entlastet|initial|zero"
-AFTER = r"loaded|with load|under load|after|belastet|mit last|unter last|nachher|final"
-STATES = {"before": re.compile(rf"\b({BEFORE})\b", re.I), "after": re.compile(rf"\b({AFTER})\b", re.I)}
+BEFORE = (
+    r"(unloaded|after unloading)( again)?|no[ -]load|without load|before( loading)?|unbelastet|ohne last|vorher|leer|entlastet|"
+    "initial|zero"
+)
+LOADED = r"loaded|with load|under load|belastet|mit last|unter last"
+STATES = {
+    state: re.compile(rf"\b({words})\b", re.I)
+    for state, words in {
+        "before": BEFORE,
+        "loaded": LOADED,
+        "after": "after( loading)?|nachher|final",
+    }.items()
+}
+"""A gauge that was read ``before``, ``loaded`` and ``after`` was read without the load after it, too."""
 TARGET = re.compile(
     r"(target|reflector|reflektor|smr|srm|nest|tooling ball|ball|sphere|kugel|marker|marke|prism|prisma|zielmarke|ziel|zielpunkt)"
     r"[ _.-]?(id|name|no\.?|nr\.?|number|nummer)?",
@@ -113,30 +124,40 @@ def _stateless(header: str) -> tuple[str, str]:
 
 def _differences(m: Meant) -> None:
     """A gauge's reading with the load less that without it."""
-    header = [h.replace("_", " ") for h in m.sheet.header]
-    states = [_stateless(h) for h in header]
+    header, units = m.sheet.header, dict(m.units)
+    states = [_stateless(h.replace("_", " ")) for h in header]
+    given = {m.index(h): k for k, v in m.chosen.items() for h in v}
     for i, (name, state) in enumerate(states):
-        if state == "before" and not {(name, "after"), (name, "")} & set(states):
+        first = (name, "before") in states
+        loaded = {(name, "loaded"), (name, "after"), (name, "")} & set(states)
+        if state == "before" and not loaded:
             m.said.append(
-                f"'{m.sheet.header[i]}' is in no reading; if it was read without the load, call the other one the same but 'loaded'"
+                f"'{header[i]}' is in no reading; if it was read without the load, call the other one the same but 'loaded'"
             )
-        commanded = not state and (name, "after") in states
-        if state == "before" or commanded or (name, "before") not in states or not m.sheet.is_numeric(i):
+        used = state if state != "after" or (name, "loaded") not in states else "before"
+        taken = states.index((name, state)) == i and used == state
+        if first and loaded and state and not taken:
+            m.said.append(
+                f"'{header[i]}' is not used: a second reading {'without' if used == 'before' else 'with'} the load"
+            )
+        commanded = not state and loaded != {(name, "")}
+        if used == "before" or not first or not taken or commanded or not m.sheet.is_numeric(i):
             continue
         j = states.index((name, "before"))
-        mapped = next((k for k, v in m.chosen.items() if any(m.index(h) == i for h in v)), "")
+        mapped = given.get(i, "")
         meaning = mapped or guessed(name)
         meaning = f"d{meaning}" if meaning in ("x", "y", "z") and not mapped else meaning
-        after, before = m.sheet.header[i], m.sheet.header[j]
         if meaning not in READINGS:
             continue
-        units = [m.sheet.unit(k) for k in (i, j)]
-        unit = m.units.get(meaning) or units[0] or units[1]
-        loaded, unloaded = (unit_of(u or unit) for u in units)
-        scale = unloaded.size / loaded.size if unit and loaded and unloaded else 1.0
+        own = [m.sheet.unit(k) for k in (i, j)]
+        unit = units.get(meaning) or own[0] or own[1]
+        with_load, without = (unit_of(u or unit) for u in own)
+        scale = without.size / with_load.size if unit and with_load and without else 1.0
         values = m.sheet.numbers(i) - scale * m.sheet.numbers(j)
+        others = [h for h in m.chosen.get(meaning, []) if m.index(h) != i]
         m.add(f"{m.sheet.names[i]} less {m.sheet.names[j]}", unit, values, meaning)
-        m.said.append(f"{meaning} is '{after}' less '{before}'")
+        m.chosen[meaning] = [*others, *m.chosen[meaning]]
+        m.said.append(f"{meaning} is '{header[i]}' less '{header[j]}'")
 
 
 def _way(cell: str) -> tuple[str, float] | None:

@@ -162,6 +162,49 @@ def test_a_gauge_before_and_after(
     assert "dz is '" in capsys.readouterr().out
 
 
+@pytest.mark.parametrize(
+    "heads",
+    [
+        "Dial Z before [mm],Dial Z loaded [mm],Dial Z after [mm]",
+        "Dial Z before loading [mm],Dial Z after loading [mm],Dial Z after unloading [mm]",
+        "Uhr Z unbelastet [mm],Uhr Z belastet [mm],Uhr Z entlastet [mm]",
+        "dz unloaded [mm],dz loaded [mm],dz unloaded again [mm]",
+    ],
+)
+def test_a_gauge_that_is_read_again_without_the_load(
+    heads: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = f"{POSES},Fz [N],{heads}\n0,0,300,-10,1.250,1.230,1.251\n0,0,310,-20,1.250,1.200,1.249\n"
+    e = made(tmp_path, text, "--noise", "dz=0.002")
+    assert e is not None, capsys.readouterr().err
+    np.testing.assert_allclose(e.reading[:, 2], [-20e-6, -50e-6], rtol=1e-9)
+    assert (
+        f"'{heads.split(',')[2]}' is not used: a second reading without the load" in capsys.readouterr().out
+    )
+
+
+@pytest.mark.parametrize(
+    ("heads", "more"),
+    [
+        ("Dial Z 1 unloaded [um],Dial Z 1 loaded [um],Dial Z 2 unloaded [um],Dial Z 2 loaded [um]", ()),
+        ("A unloaded,A loaded,B unloaded,B loaded", ("--map", "dz=A loaded|B loaded", "--unit", "dz=um")),
+    ],
+)
+def test_gauges_before_and_after_side_by_side_are_repeats(
+    heads: str, more: tuple[str, ...], tmp_path: Path
+) -> None:
+    text = f"{POSES},Fz [N],{heads}\n0,0,300,-10,250,230,10,-11\n0,0,310,-20,250,200,10,-41\n"
+    e = made(tmp_path, text, *more, "--noise", "dz=2")
+    assert e is not None
+    np.testing.assert_allclose(e.reading[:, 2], [-20e-6, -21e-6, -50e-6, -51e-6], rtol=1e-9)
+
+
+def test_repeats_in_two_units_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = f"{POSES},Fz [N],A [um],B [mm]\n0,0,300,-10,-20,-0.021\n"
+    assert made(tmp_path, text, "--map", "dz=A|B", "--noise", "dz=2") is None
+    assert "expected one unit of all repeats of dz; found 'A [um]' and 'B [mm]'" in capsys.readouterr().err
+
+
 KUKA = "X [mm],Y [mm],Z [mm],A [deg],B [deg],C [deg],Fx [N],dx [um]\n10,0,700,90,0,0,10,1\n20,0,710,0,30,0,10,1\n0,0,700,10,20,30,10,1\n"
 
 
