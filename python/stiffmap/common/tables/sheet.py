@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import chain
@@ -82,10 +82,10 @@ class Sheet:
         """The unit that stands in a column's header, or nothing."""
         return split_unit(self.header[column])[1]
 
-    def find(self, pattern: str) -> int | None:
-        """The first column whose name, without its unit, is all of a regular expression in any case."""
+    def find(self, pattern: str, besides: Collection[int] = ()) -> int | None:
+        """The first column, `besides` some, whose name, without its unit, is all of a regular expression in any case."""
         at = (i for i, n in enumerate(self.names) if re.fullmatch(pattern, n, re.IGNORECASE))
-        return next(at, None)
+        return next((i for i in at if i not in besides), None)
 
     def with_cells(self, name: str, cells: Iterable[str]) -> Sheet:
         """The sheet and one column more."""
