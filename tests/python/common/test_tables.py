@@ -9,6 +9,7 @@ import pytest
 
 from stiffmap.common.errors import FileError
 from stiffmap.common.tables.poses import read_pose_table
+from stiffmap.common.tables.sheet import read_sheet
 from stiffmap.experiment.files.table import read_table
 from stiffmap.machining.toolpath.load import load_path
 from stiffmap.workspace.performance.motion.trajectory import read_points
@@ -109,3 +110,33 @@ def test_a_thousand_in_quotes_is_no_decimal_comma(tmp_path: Path) -> None:
     file.write_text('id,x,dx\n1,"1,000",1\n', encoding="utf-8")
     with pytest.raises(FileError, match="line 2: column 'x': expected a number; found '1,000'"):
         read_table(file).numbers("x")
+
+
+ROWS = "x [mm],fx [N],dx [um]\n0,100,40\n1,200,80\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (
+            ROWS.replace("200,80", "200,7,5"),
+            "line 3: expected 3 values, one for each name of the header; found 4",
+        ),
+        ('x [mm],fx [N],dx [um]\n"1",0,100,40\n"2",1,200,80\n', "line 2: expected 3 values"),
+        (ROWS.replace(",", " ").replace("200 80", "200"), "line 3: expected 3 values, found 2"),
+        (f"Nr {ROWS.replace(',', ' ')}", "line 2: expected 4 values, found 3"),
+    ],
+)
+def test_a_row_whose_cells_may_be_those_of_other_columns(text: str, words: str, tmp_path: Path) -> None:
+    (tmp_path / "t.txt").write_text(text)
+    with pytest.raises(FileError, match=words):
+        read_sheet(tmp_path / "t.txt")
+
+
+@pytest.mark.parametrize("text", [ROWS, ROWS.replace(",", " "), ROWS.replace(",", ";")])
+def test_words_behind_a_row_are_said(text: str, tmp_path: Path) -> None:
+    between = next(s for s in " ;," if s in text.splitlines()[1])
+    (tmp_path / "t.txt").write_text(text.replace("80", f"80{between}# bumped"))
+    sheet = read_sheet(tmp_path / "t.txt")
+    assert sheet.numbers(2).tolist() == [40.0, 80.0]
+    assert sheet.aside == ("row 3, '# bumped' behind the last column",)

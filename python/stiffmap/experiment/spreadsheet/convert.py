@@ -12,16 +12,17 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs import make_folder, only_job, write_rows, write_text
 from stiffmap.common.tables.cells import row_numbers
 from stiffmap.common.tables.sheet import Sheet
+from stiffmap.common.units import Unit
 from stiffmap.common.yaml_text import text_of
+from stiffmap.experiment.channels import AXES
 from stiffmap.experiment.experiment import WRENCH
-from stiffmap.experiment.files.fields import POSE
+from stiffmap.experiment.files.fields import POSE, quantity_of
 from stiffmap.experiment.spreadsheet.answers import Meant
 from stiffmap.experiment.spreadsheet.guess import READINGS, Column
 from stiffmap.experiment.spreadsheet.together import weight
 
 WORDS = ("id", "setup", "branch", "target")
 """Columns of words that a sheet may have."""
-COUNTED = ("order", "repeat")
 ABSOLUTE = {"ll": "length"}
 """Readings that a sheet has in coordinates of their own -> their columns in data.csv."""
 
@@ -57,8 +58,15 @@ def understand(m: Meant, loaded: bool = False) -> ImportedSheet:
         used = [c for c in columns if c.meaning != "note"]
         known |= set(POSE)
     _ask(m, known, bool(drives))
-    plain = (*WORDS, *COUNTED, *drives)
-    found = {c.meaning: m.unit(c.index, c.meaning) for c in used if c.meaning not in plain}
+    found: dict[str, Unit] = {}
+    for c in used:
+        if quantity_of(c.meaning):
+            unit = m.unit(c.index, c.meaning)
+            if found.setdefault(c.meaning, unit) != unit:
+                written = " and ".join(f"'{sheet.header[k.index]}'" for k in used if k.meaning == c.meaning)
+                raise StiffmapError(
+                    f"{sheet.file}: expected one unit of all repeats of {c.meaning}; found {written}"
+                )
     if loaded and not known & {*WRENCH, "ll"}:
         m.ask_column(
             "missing column: a deflection needs a load; which column is it? Say --map fx='HEADER' (fy, fz, mx, my, mz; "
@@ -191,6 +199,8 @@ def write_folder(
     if m.noise:
         factors = {n.replace("p", "d"): f for n, f in found.factors.items()}
         own = {absolute: n for n, absolute in ABSOLUTE.items()}
+        if set(AXES[3:]) & set(m.noise) - set(found.units):
+            head["units"].setdefault("angle", m.units.get("angle", "deg"))
         head["noise"] = {own.get(n, n): v * factors.get(own.get(n, n), 1.0) for n, v in m.noise.items()}
     if m.columns:
         head["command"] = {k: {"actuator": a, "unit": u} for k, (a, u) in m.columns.items()}

@@ -205,9 +205,9 @@ def _understood(
         as_seen(m, difference)
     elif wrote is not None:
         as_readings(m, wrote)
+    oriented(m)
     if not m.placed:
         turned(m, difference)
-    oriented(m)
     try:
         found = ask_all(m, ask, deflection and not m.placed)
     except Unanswered as left:

@@ -15,6 +15,7 @@ from stiffmap.experiment.channels import AXES
 from stiffmap.experiment.files.fields import SEEN
 from stiffmap.experiment.spreadsheet.answers import Meant
 from stiffmap.experiment.spreadsheet.guess import READINGS, Column
+from stiffmap.experiment.spreadsheet.together import quaternion
 from stiffmap.solve.machine import Machine
 
 NUMBERED = r"(joint|axis|achse|gelenk|theta|q|j|a)[ _.-]?{}"
@@ -69,7 +70,7 @@ def _find(m: Meant, name: str, number: int, header: str | None) -> int | None:
     if header is not None:
         return m.index(header)
     own = [re.escape(n) for n in (name, name.split(".")[-1]) if n.lower() not in ("x", "y", "z")]
-    found = map(m.sheet.find, (*own, NUMBERED.format(number)))
+    found = (m.sheet.find(pattern, quaternion(m.sheet)) for pattern in (*own, NUMBERED.format(number)))
     return next((i for i in found if i is not None), None)
 
 
@@ -92,7 +93,7 @@ def as_seen(m: Meant, difference: str) -> None:
     """
     header = m.sheet.header
     columns = m.guessed
-    if not any(k.meaning in READINGS for k in columns):
+    if not any(k.meaning in READINGS and k.meaning not in AXES[3:] for k in columns):
         for k in columns:
             if k.meaning == "note" and (found := re.fullmatch(MEASURED, k.name.lower())):
                 m.chosen[f"p{found[1]}"] = [header[k.index]]

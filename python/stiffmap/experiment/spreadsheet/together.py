@@ -1,4 +1,4 @@
-"""Columns that mean something only together: a load and its direction, a gauge before and after, angles next to a position,
+"""Columns that mean something only together: a load and its direction, a gauge before and after, turns next to a position,
 names of targets, and headers with a sign."""
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from stiffmap.common.tables.header import split_unit
 from stiffmap.common.tables.sheet import Sheet, column_letter
 from stiffmap.common.units import Unit, unit_of
 from stiffmap.experiment.channels import AXES
-from stiffmap.experiment.files.fields import EULER, POSE, SEEN, SEEN_TURNED
+from stiffmap.experiment.files.fields import EULER, POSE, QUATERNION, SEEN, SEEN_TURNED, VECTOR
 from stiffmap.experiment.spreadsheet.answers import Meant
 from stiffmap.experiment.spreadsheet.guess import READINGS, guessed
 
@@ -29,9 +29,20 @@ DIRECTION = re.compile(
     re.IGNORECASE,
 )
 WAY = re.compile(r"([+-]?)\s*([xyz])|([xyz])\s*([+-])", re.IGNORECASE)
-BEFORE = r"unloaded|no[ -]load|without load|before|unbelastet|ohne last|vorher|leer|entlastet|initial|zero"
-AFTER = r"loaded|with load|under load|after|belastet|mit last|unter last|nachher|final"
-STATES = {"before": re.compile(rf"\b({BEFORE})\b", re.I), "after": re.compile(rf"\b({AFTER})\b", re.I)}
+BEFORE = (
+    r"(unloaded|after unloading)( again)?|no[ -]load|without load|before( loading)?|unbelastet|ohne last|vorher|leer|entlastet|"
+    "initial|zero"
+)
+LOADED = r"loaded|with load|under load|belastet|mit last|unter last"
+STATES = {
+    state: re.compile(rf"\b({words})\b", re.I)
+    for state, words in {
+        "before": BEFORE,
+        "loaded": LOADED,
+        "after": "after( loading)?|nachher|final",
+    }.items()
+}
+"""A gauge that was read ``before``, ``loaded`` and ``after`` was read without the load after it, too."""
 TARGET = re.compile(
     r"(target|reflector|reflektor|smr|srm|nest|tooling ball|ball|sphere|kugel|marker|marke|prism|prisma|zielmarke|ziel|zielpunkt)"
     r"[ _.-]?(id|name|no\.?|nr\.?|number|nummer)?",
@@ -45,6 +56,16 @@ MOST_METRES = 20.0
 NAMED = 5
 """Rows that a sentence names."""
 ANGLE = r"(tcp|pos|ist|soll|nominal|cmd|orientation|ori|rot)?[ _.-]?{}"
+FIXED = "turns about the fixed x, y, z ({}; degrees where no unit is given)"
+TURNS = (
+    ("a b c", "ZYX", "turns about z, the new y, the new x (KUKA's A, B, C; degrees where no unit is given)"),
+    ("w p r", "xyz", FIXED.format("Fanuc's W, P, R")),
+    ("roll pitch yaw", "xyz", FIXED.format("roll, pitch, yaw")),
+)
+"""Names of three angles, their convention, and that in words."""
+WXYZ = tuple(f"p{c}" for c in QUATERNION)
+ROUNDED = 0.01
+"""By how much digits of a table may change the length of a quaternion."""
 
 
 def together(m: Meant, deflection: bool) -> None:
@@ -60,9 +81,9 @@ def together(m: Meant, deflection: bool) -> None:
 
 
 def oriented(m: Meant) -> None:
-    """KUKA's A B C next to X Y Z, and names of targets."""
+    """Angles, rotation vectors and quaternions next to X Y Z, and names of targets."""
     taken = {m.index(h) for v in m.chosen.values() for h in v}
-    _abc(m, taken)
+    _turns(m, taken)
     if "target" not in m.chosen:
         _targets(m, taken)
 
@@ -113,30 +134,34 @@ def _stateless(header: str) -> tuple[str, str]:
 
 def _differences(m: Meant) -> None:
     """A gauge's reading with the load less that without it."""
-    header = [h.replace("_", " ") for h in m.sheet.header]
-    states = [_stateless(h) for h in header]
-    for i, (name, state) in enumerate(states):
-        if state == "before" and not {(name, "after"), (name, "")} & set(states):
+    header, units = m.sheet.header, dict(m.units)
+    states = [_stateless(h.replace("_", " ")) for h in header]
+    first = {s: i for i, s in reversed([*enumerate(states)])}
+    given = {m.index(h): k for k, v in m.chosen.items() for h in v}
+    for name in dict.fromkeys(n for n, state in states if state == "before"):
+        j = first[name, "before"]
+        i = next((first[name, s] for s in ("loaded", "after", "") if (name, s) in first), None)
+        if i is None:
             m.said.append(
-                f"'{m.sheet.header[i]}' is in no reading; if it was read without the load, call the other one the same but 'loaded'"
+                f"'{header[j]}' is in no reading; if it was read without the load, call the other one the same but 'loaded'"
             )
-        commanded = not state and (name, "after") in states
-        if state == "before" or commanded or (name, "before") not in states or not m.sheet.is_numeric(i):
             continue
-        j = states.index((name, "before"))
-        mapped = next((k for k, v in m.chosen.items() if any(m.index(h) == i for h in v)), "")
+        mapped = given.get(i, "")
         meaning = mapped or guessed(name)
         meaning = f"d{meaning}" if meaning in ("x", "y", "z") and not mapped else meaning
-        after, before = m.sheet.header[i], m.sheet.header[j]
-        if meaning not in READINGS:
+        if meaning not in READINGS or not m.sheet.is_numeric(i):
             continue
-        units = [m.sheet.unit(k) for k in (i, j)]
-        unit = m.units.get(meaning) or units[0] or units[1]
-        loaded, unloaded = (unit_of(u or unit) for u in units)
+        own = [m.sheet.unit(k) for k in (i, j)]
+        unit = units.get(meaning) or own[0] or own[1]
+        loaded, unloaded = (unit_of(u or unit) for u in own)
         scale = unloaded.size / loaded.size if unit and loaded and unloaded else 1.0
         values = m.sheet.numbers(i) - scale * m.sheet.numbers(j)
+        others = [h for h in m.chosen.get(meaning, []) if m.index(h) != i]
         m.add(f"{m.sheet.names[i]} less {m.sheet.names[j]}", unit, values, meaning)
-        m.said.append(f"{meaning} is '{after}' less '{before}'")
+        m.chosen[meaning] = [*others, *m.chosen[meaning]]
+        idle = [f"'{header[k]}'" for k, (n, s) in enumerate(states) if n == name and s and k not in (i, j)]
+        left = f"; not used, as read again: {', '.join(idle)}" if idle else ""
+        m.said.append(f"{meaning} is '{header[i]}' less '{header[j]}'{left}")
 
 
 def _way(cell: str) -> tuple[str, float] | None:
@@ -198,30 +223,69 @@ def _hung(m: Meant) -> None:
             return
 
 
-def _abc(m: Meant, taken: set[int]) -> None:
-    """Euler angles A B C (about z, the new y, the new x) where they stand with X Y Z."""
-    at = [m.sheet.find(ANGLE.format(a)) for a in "abc"]
-    meanings = {c.meaning for c in m.guessed}
-    columns = [i for i in at if i is not None and i not in taken and m.sheet.is_numeric(i)]
-    seen = set(SEEN) <= meanings
-    units = [m.sheet.unit(i) for i in columns]
-    if any(u and unit_of(u, "angle") is None for u in units):
-        return  # gauges A, B and C
-    if len(columns) < 3 or not (seen or set(POSE) <= meanings):
+def quaternion(sheet: Sheet) -> list[int]:
+    """Columns w x y z of quaternions, by their names and their length of one; empty where there are none."""
+    for names in (QUATERNION, ("q1", "q2", "q3", "q4"), ("q0", "q1", "q2", "q3")):
+        at = [i for i in map(sheet.find, names) if i is not None and sheet.is_numeric(i)]
+        if len(at) == 4:
+            size = np.linalg.norm([sheet.numbers(i) for i in at], axis=0)
+            if np.nanmax(np.abs(size - 1.0), initial=0.0) < ROUNDED and not np.isnan(size).all():
+                return at
+    return []
+
+
+def _turns(m: Meant, taken: set[int]) -> None:
+    """An orientation that stands with X Y Z."""
+    meanings = {c.meaning: c for c in m.guessed}
+    seen = set(SEEN) <= set(meanings)
+    if not seen and not set(POSE) <= set(meanings):
         return
-    shown = ", ".join(f"'{m.sheet.header[i]}'" for i in columns)
+    behind = meanings["pz" if seen else "z"].index + 1
+    forms = [
+        ("", quaternion(m.sheet), "quaternions, w first"),
+        *((e, _angles(m.sheet, n), w) for n, e, w in TURNS),
+    ]
+    if set(READINGS) & set(meanings) - set(AXES[3:]):  # else they are what is read
+        at = [m.sheet.find(f"r{a}") for a in "xyz"]
+        forms.append(
+            (
+                "rotvec",
+                at if at == [*range(behind, behind + 3)] else [],
+                "a rotation vector (UR's RX, RY, RZ)",
+            )
+        )
+    found = next((form for form in forms if form[1] and not taken & {*form[1]}), None)
+    if found is None:
+        return
+    euler, columns, words = found
+    headers = [m.sheet.header[i] for i in columns]
+    shown = ", ".join(map(repr, headers))
     if seen and not set(AXES[3:]) <= set(m.noise):
+        m.chosen["note"] = [*m.chosen.get("note", ()), *headers]
         m.said.append(f"{shown} are not used; as the orientation seen they need --noise rx=… ry=… rz=…")
         return
-    for i, unit, meaning in zip(columns, units, SEEN_TURNED if seen else EULER, strict=True):
-        m.chosen[meaning] = [m.sheet.header[i]]
+    free = euler not in ("", "rotvec")
+    of_pose = EULER if free else VECTOR if euler else QUATERNION
+    for i, header, meaning in zip(
+        columns, headers, (SEEN_TURNED if euler else WXYZ) if seen else of_pose, strict=True
+    ):
+        m.chosen[meaning] = [header]
         taken.add(i)
-        if not unit:
+        if free and not m.sheet.unit(i):
             m.units.setdefault(meaning, m.units.get("angle", "deg"))
-    m.head |= {"target_orientation": "ZYX"} if seen else {"orientation": {"against": "base", "euler": "ZYX"}}
-    m.said.append(
-        f"{shown} are the orientation: turns about z, the new y, the new x (KUKA's A, B, C; degrees where no unit is given)"
-    )
+    if not seen:
+        m.head["orientation"] = {"against": "base"} | ({"euler": euler} if free else {})
+    elif euler:
+        m.head["target_orientation"] = euler
+    m.said.append(f"{shown} are the orientation: {words}")
+
+
+def _angles(sheet: Sheet, names: str) -> list[int]:
+    """Three columns of angles, or none."""
+    at = [sheet.find(ANGLE.format(name)) for name in names.split()]
+    columns = [i for i in at if i is not None and sheet.is_numeric(i)]
+    gauges = any((u := sheet.unit(i)) and unit_of(u, "angle") is None for i in columns)
+    return [] if gauges or len(columns) < 3 else columns
 
 
 def _targets(m: Meant, taken: set[int]) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from scipy.spatial.transform import Rotation
 
 import stiffmap as sm
 from stiffmap.ui.cli.app import main
@@ -162,6 +163,47 @@ def test_a_gauge_before_and_after(
     assert "dz is '" in capsys.readouterr().out
 
 
+@pytest.mark.parametrize(
+    "heads",
+    [
+        "Dial Z before [mm],Dial Z loaded [mm],Dial Z after [mm]",
+        "Dial Z before loading [mm],Dial Z after loading [mm],Dial Z after unloading [mm]",
+        "Uhr Z unbelastet [mm],Uhr Z belastet [mm],Uhr Z entlastet [mm]",
+        "dz unloaded [mm],dz loaded [mm],dz unloaded again [mm]",
+    ],
+)
+def test_a_gauge_that_is_read_again_without_the_load(
+    heads: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = f"{POSES},Fz [N],{heads}\n0,0,300,-10,1.250,1.230,1.251\n0,0,310,-20,1.250,1.200,1.249\n"
+    e = made(tmp_path, text, "--noise", "dz=0.002")
+    assert e is not None, capsys.readouterr().err
+    np.testing.assert_allclose(e.reading[:, 2], [-20e-6, -50e-6], rtol=1e-9)
+    assert f"not used, as read again: '{heads.split(',')[2]}'" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("heads", "more"),
+    [
+        ("Dial Z 1 unloaded [um],Dial Z 1 loaded [um],Dial Z 2 unloaded [um],Dial Z 2 loaded [um]", ()),
+        ("A unloaded,A loaded,B unloaded,B loaded", ("--map", "dz=A loaded|B loaded", "--unit", "dz=um")),
+    ],
+)
+def test_gauges_before_and_after_side_by_side_are_repeats(
+    heads: str, more: tuple[str, ...], tmp_path: Path
+) -> None:
+    text = f"{POSES},Fz [N],{heads}\n0,0,300,-10,250,230,10,-11\n0,0,310,-20,250,200,10,-41\n"
+    e = made(tmp_path, text, *more, "--noise", "dz=2")
+    assert e is not None
+    np.testing.assert_allclose(e.reading[:, 2], [-20e-6, -21e-6, -50e-6, -51e-6], rtol=1e-9)
+
+
+def test_repeats_in_two_units_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = f"{POSES},Fz [N],A [um],B [mm]\n0,0,300,-10,-20,-0.021\n"
+    assert made(tmp_path, text, "--map", "dz=A|B", "--noise", "dz=2") is None
+    assert "expected one unit of all repeats of dz; found 'A [um]' and 'B [mm]'" in capsys.readouterr().err
+
+
 KUKA = "X [mm],Y [mm],Z [mm],A [deg],B [deg],C [deg],Fx [N],dx [um]\n10,0,700,90,0,0,10,1\n20,0,710,0,30,0,10,1\n0,0,700,10,20,30,10,1\n"
 
 
@@ -186,6 +228,50 @@ def test_angles_of_kuka_beside_a_position(text: str, tmp_path: Path) -> None:
                [[1, 0, 0], [0, c[2], -s[2]], [0, s[2], c[2]]])  # fmt: skip
     np.testing.assert_allclose(e.rotation[2], np.array(z) @ np.array(y) @ np.array(x), atol=1e-12)
     np.testing.assert_allclose(e.rotation[0], [[0, -1, 0], [1, 0, 0], [0, 0, 1]], atol=1e-12)
+
+
+TURN = Rotation.from_euler("xyz", [3.0, -5.0, 7.0], degrees=True)
+TURNS = {
+    "W [deg],P [deg],R [deg]": TURN.as_euler("xyz", degrees=True),
+    "Roll,Pitch,Yaw": TURN.as_euler("xyz", degrees=True),
+    "A,B,C": TURN.as_euler("ZYX", degrees=True),
+    "RX [rad],RY [rad],RZ [rad]": TURN.as_rotvec(),
+    "rx [deg],ry [deg],rz [deg]": TURN.as_rotvec(degrees=True),
+    "qw,qx,qy,qz": TURN.as_quat()[[3, 0, 1, 2]],
+    "qx,qy,qz,qw": TURN.as_quat(),
+    "Q1,Q2,Q3,Q4": TURN.as_quat()[[3, 0, 1, 2]],
+}
+
+
+@pytest.mark.parametrize("heads", TURNS)
+def test_an_orientation_beside_a_commanded_position(heads: str, tmp_path: Path) -> None:
+    cells = ",".join(map(repr, TURNS[heads].tolist()))
+    text = f"Pt,X [mm],Y [mm],Z [mm],{heads},Fx [N],dx [um]\nP1,10,0,5,{cells},10,1\nP2,20,0,5,{cells},10,1\n"
+    e = made(tmp_path, text, "--noise", "dx=1", machine="hexapod")
+    assert e is not None and e.rotation is not None and e.rotation_against == "base"
+    np.testing.assert_allclose(e.rotation[1], TURN.as_matrix(), atol=1e-12)
+    assert np.isnan(e.reading[:, 3:]).all()
+
+
+@pytest.mark.parametrize("heads", [h for h in TURNS if "deg],ry" not in h])
+def test_an_orientation_beside_a_seen_position(heads: str, tmp_path: Path) -> None:
+    cells = ",".join(map(repr, TURNS[heads].tolist()))
+    joints = "J1 [deg],J2 [deg],J3 [deg],J4 [deg],J5 [deg],J6 [deg]"
+    rows = [f"{100 * k},200,{30 * k},{cells},{10 * k},-20,{30 - 5 * k},40,50,60" for k in range(4)]
+    text = f"X meas [mm],Y meas [mm],Z meas [mm],{heads},{joints}\n" + "\n".join(rows)
+    noise = [o for a in ("dx", "dy", "dz", "rx", "ry", "rz") for o in ("--noise", f"{a}=0.01")]
+    e = made(tmp_path, text, *noise, machine="dh")
+    assert e is not None and e.seen_rotation is not None and e.command is not None
+    np.testing.assert_allclose(e.seen_rotation[1], TURN.as_matrix(), atol=1e-12)
+    np.testing.assert_allclose(np.degrees(e.command[1]), [10, -20, 25, 40, 50, 60])
+    assert np.isfinite(e.sigma).all()
+
+
+def test_turns_that_are_the_reading_stay_readings(tmp_path: Path) -> None:
+    text = f"{POSES},rx [mrad],ry [mrad],rz [mrad],Mx [Nm]\n0,0,300,1,2,3,10\n"
+    e = made(tmp_path, text, "--noise", "rx=1")
+    assert e is not None and e.rotation is None
+    np.testing.assert_allclose(e.reading[0, 3:], [1e-3, 2e-3, 3e-3])
 
 
 BARE = "P1;100.5;50;700;100.031;50.012;699.954;;\nP2;-100;50;700;-99.97;50.015;699.95;;\n"
