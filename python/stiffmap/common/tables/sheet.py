@@ -142,6 +142,8 @@ class Layout:
     """Which of several tables on a sheet, from 1."""
     strict: bool = False
     """Whether all below the header are rows of numbers, with a cell for each column, in a command without --header and --table."""
+    repeated: bool = False
+    """Whether names may come again, as those of displacements do once per load case."""
 
 
 PLAIN = Layout()
@@ -179,6 +181,8 @@ def read_sheet(path: Path, sheet: str | None = None, layout: Layout = PLAIN) -> 
         )
     number_, header = found
     names = _checked(header, str(path), number_)
+    if not layout.repeated:
+        refuse_twice(names, str(path), number_)
     width = len(names)
     said = [*header, *(c.strip() for _, cells in above for c in cells)]
     lines_, aside = row_numbers(), list[str]()
@@ -215,7 +219,7 @@ def _united(name: str, cells: Cells, file: str, lines: Sequence[int]) -> tuple[s
 
 
 def _checked(header: Sequence[str], file: str, line: int) -> list[str]:
-    """Names of columns up to the last that has one: neither endless nor twice."""
+    """Names of columns up to the last that has one; none is endless."""
     endless = next((c for c in header if len(c) > LONGEST_HEADER), None)
     if endless is not None or len(header) > MOST_COLUMNS:
         what = f"{len(header)} columns" if endless is None else f"one of {len(endless)} characters"
@@ -225,9 +229,7 @@ def _checked(header: Sequence[str], file: str, line: int) -> list[str]:
             line=line,
         )
     width = max(i for i, c in enumerate(header) if c) + 1
-    names = [h or f"column {i + 1}" for i, h in enumerate(header[:width])]
-    refuse_twice(names, file, line)
-    return names
+    return [h or f"column {i + 1}" for i, h in enumerate(header[:width])]
 
 
 def _names(first: Sequence[str], given: Sequence[str], file: str, line: int) -> list[str]:

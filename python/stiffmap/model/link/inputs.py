@@ -9,13 +9,12 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from stiffmap.common.errors import StiffmapError
-from stiffmap.common.number_text import number_in
+from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.units import STRESSES, size_of
 from stiffmap.common.yaml_text import read
 from stiffmap.model.link.arrays import Floats
 from stiffmap.model.link.gmshmesh import UNITS
-from stiffmap.model.link.readers import table_lines
+from stiffmap.model.link.readers import known_columns
 from stiffmap.model.link.shapes import Bar, Foot, ForkBar, HollowBar
 from stiffmap.model.link.solve import Material
 
@@ -29,7 +28,8 @@ MATERIALS = {
     "magnesium": (45e9, 0.35),
 }
 STRESS = {u: size_of(u) for u in STRESSES}
-LOAD_UNITS = {u: size_of(u) for u in ("N", "kN", "N*m", "Nm", "N*mm", "Nmm")}
+WRENCH = {f"f{a}": ("N", f"f{a} [N]") for a in "xyz"} | {f"m{a}": ("N*m", f"m{a} [N*mm]") for a in "xyz"}
+"""Columns of load cases: their SI unit, and how they are usually written."""
 UNIT_WRENCHES = np.diag([100.0, 100.0, 100.0, 10.0, 10.0, 10.0])  # linear solver: the size does not matter
 
 _BY_NAME: dict[str, type[BaseModel]] = {
@@ -107,26 +107,17 @@ def read_cases(path: str | Path) -> Floats:
     Raises:
         StiffmapError: no such file, a column or unit missing, cells that are not numbers.
     """
-    lines = table_lines(path)
-    columns = {}
-    for place, cell in enumerate(lines[0].split(",") if lines else []):
-        found = re.fullmatch(r"\s*([fm][xyz])\s*\[\s*([A-Za-z*]+)\s*\]\s*", cell, re.IGNORECASE)
-        if found and found[2] in LOAD_UNITS and ("m" in found[2]) == (found[1][0].lower() == "m"):
-            columns[found[1].lower()] = (place, LOAD_UNITS[found[2]])
-    wanted = [a + b for a in "fm" for b in "xyz"]
-    missing = [c for c in wanted if c not in columns]
-    if missing:
-        raise StiffmapError(
-            f"{path}: expected the columns 'fx [N]' to 'mz [N*mm]' with units, missing {missing}"
+    table, found = known_columns(path, WRENCH)
+    missing = [c for c, columns in found.items() if not columns]
+    twice = [c for c, columns in found.items() if len(columns) > 1]
+    if missing or twice:
+        problem = f"missing {', '.join(missing)}" if missing else f"found {', '.join(twice)} more than once"
+        raise FileError(
+            f"expected the columns 'fx [N]' to 'mz [N*mm]' with units, {problem}",
+            file=table.file,
+            line=table.top,
         )
-    rows = []
-    for number, line in enumerate(lines[1:], 2):
-        cells = line.split(",")
-        try:
-            rows.append([number_in(cells[columns[c][0]]) * columns[c][1] for c in wanted])
-        except (ValueError, IndexError):
-            raise StiffmapError(f"{path}: row {number} does not hold numbers in all columns") from None
-    return np.array(rows).reshape(-1, 6)
+    return np.stack([found[c][0] for c in WRENCH], axis=-1)
 
 
 def _part_material(path: str | Path, file: PartFile) -> Material | None:

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from stiffmap.common.errors import StiffmapError
+from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.number_text import number_in
+from stiffmap.common.tables.named import Known, named
+from stiffmap.common.tables.sheet import Layout, Sheet, read_sheet
 from stiffmap.model.link.arrays import Floats, Ints
 from stiffmap.model.link.gmshmesh import UNITS
 from stiffmap.model.link.optional import need
 
 Rows = tuple[Ints, Floats]
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[EeDd][-+]?\d+)?"
-_BRACKET = re.compile(r"^\s*([A-Za-z]\w*)\s*(?:[\[(]\s*([\w./µ]+)\s*[\])])?\s*$")
 
 
 def read_csv_field(path: str | Path) -> tuple[Floats, Floats]:
@@ -26,34 +29,35 @@ def read_csv_field(path: str | Path) -> tuple[Floats, Floats]:
     Raises:
         StiffmapError: no such file, a column or its unit missing, cells that are not numbers.
     """
-    lines = table_lines(path)
-    if len(lines) < 2:
-        raise StiffmapError(f"{path}: expected a header and rows, got {len(lines)} lines")
-    names, factor = _header(path, lines[0])
-    rows = []
-    for number, line in enumerate(lines[1:], 2):
-        try:
-            row = [number_in(cell) for cell in line.split(",")]
-        except ValueError:
-            raise StiffmapError(
-                f"{path}: row {number} has a cell that is not a number: {line.strip()[:60]}"
-            ) from None
-        if len(row) != len(names):
-            raise StiffmapError(f"{path}: row {number} has {len(row)} cells, the header {len(names)}")
-        rows.append(row)
-    table = np.array(rows) * factor
-    where = {
-        axis: [i for i, n in enumerate(names) if n == axis] for axis in ("x", "y", "z", "ux", "uy", "uz")
-    }
-    counts = {axis: len(i) for axis, i in where.items()}
-    cases = counts["ux"]
-    if any(counts[a] != 1 for a in "xyz") or cases == 0 or {counts["uy"], counts["uz"]} != {cases}:
-        raise StiffmapError(
-            f"{path}: expected x, y, z once and ux, uy, uz once per load case, got {', '.join(names)}"
-        )
-    points = table[:, [where[a][0] for a in "xyz"]]
-    fields = np.stack([table[:, where[a]].T for a in ("ux", "uy", "uz")], axis=-1)
-    return points, fields
+    axes = ("x", "y", "z", "ux", "uy", "uz")
+    table, found = known_columns(
+        path, {"node": ("", "node")} | {axis: ("m", f"{axis} [mm]") for axis in axes}
+    )
+    counts = {axis: len(columns) for axis, columns in found.items()}
+    if any(counts[a] != 1 for a in "xyz") or {counts["ux"], counts["uy"], counts["uz"]} - {counts["ux"] or 1}:
+        raise FileError(
+            f"expected x, y, z once and ux, uy, uz once per load case, got {', '.join(table.names)}",
+            file=table.file, line=table.top,
+        )  # fmt: skip
+    points = np.stack([found[a][0] for a in "xyz"], axis=-1)
+    return points, np.stack([np.array(found[a]) for a in ("ux", "uy", "uz")], axis=-1)
+
+
+def known_columns(
+    path: str | Path, units: Mapping[str, tuple[str, str]]
+) -> tuple[Sheet, dict[str, list[Floats]]]:
+    """The table, and the numbers (SI) of each column that has one of these names, each with its SI unit and how it is
+    usually written; other columns are left alone. Raises FileError."""
+    if not Path(path).is_file():
+        raise FileError("no such file", file=str(path))
+    has = lambda name: name.lower() in units  # noqa: E731
+    sheet = read_sheet(Path(path), None, Layout(has, strict=True, repeated=True))
+    found: dict[str, list[Floats]] = {name: [] for name in units}
+    for head, cells, name in zip(sheet.header, sheet.columns, map(str.lower, sheet.names), strict=True):
+        if name in units:
+            known = Known({name: units[name][0]}, {name: units[name][1]}, {})
+            found[name].append(named(replace(sheet, header=(head,), columns=(cells,)), known).values[name])
+    return sheet, found
 
 
 def read_dat(path: str | Path) -> Rows:
@@ -159,34 +163,11 @@ def read_field(
     return UNITS[unit] * np.array([place[int(i)] for i in numbers]), UNITS[unit] * fields
 
 
-def table_lines(path: str | Path) -> list[str]:
-    """Lines of a table in text, without empty ones and comments."""
-    return [line for line in _lines(path) if line.strip() and not line.lstrip().startswith("#")]
-
-
 def _lines(path: str | Path) -> list[str]:
     try:
         return Path(path).read_text(errors="replace").splitlines()
     except OSError:
         raise StiffmapError(f"{path}: no such file") from None
-
-
-def _header(path: str | Path, line: str) -> tuple[list[str], Floats]:
-    names, factors = [], []
-    for cell in line.split(","):
-        found = _BRACKET.match(cell)
-        if not found:
-            raise StiffmapError(
-                f"{path}: expected a column name with its unit, like 'ux [mm]', got {cell.strip()!r}"
-            )
-        name, unit = found[1].lower(), found[2]
-        if name in {"x", "y", "z", "ux", "uy", "uz"} and unit not in UNITS:
-            raise StiffmapError(
-                f"{path}: column {name} needs its unit, one of {', '.join(UNITS)}: '{name} [mm]'"
-            )
-        names.append(name)
-        factors.append(UNITS.get(unit or "", 1.0))
-    return names, np.array(factors)
 
 
 def _node_rows(text: str, columns: tuple[int, ...] = (4,)) -> dict[int, list[float]]:

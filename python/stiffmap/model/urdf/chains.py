@@ -38,6 +38,10 @@ class Chains:
     def sequence(self, way: list[UrdfJoint], end: str | None = None) -> tuple[Element, ...]:
         """Elements along joints; the spring of a link stands at its end, before the joint that leaves
         it, that of `end` at the last frame."""
+        heads = {j.child for j in way if j.kind != "fixed"}
+        bodies = [n for n, body in self.model.links.items() if body and self.carrier(n) in heads]
+        self._refuse_alike("joint", [j.name for j in way if j.kind != "fixed" or j.origin != Pose()])
+        self._refuse_alike("link", bodies)
         out: list[Element] = []
         for joint in way:
             if joint.origin != Pose():
@@ -47,6 +51,16 @@ class Chains:
                 out.append(self._joint(joint))
                 out += self._bodies(joint.child)
         return (*out, *(self._spring(end, None) if end else ()))
+
+    def _refuse_alike(self, tag: str, names: list[str]) -> None:
+        """FileError for two names that are one in a machine file."""
+        seen: dict[str, str] = {}
+        for name in names:
+            other = seen.setdefault(plain_name(name), name)
+            if other != name:
+                raise FileError(f"'{other}' and '{name}' would both be '{plain_name(name)}' in a machine file, whose names "
+                                "are of letters without accents, digits, _ and -; rename one",
+                                file=self.model.file, key=tag)  # fmt: skip
 
     def _spring(self, link: str, end: str | None) -> tuple[Element, ...]:
         given = self.side.springs.get(link)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from tests.python.model.link.link_fields import REFERENCE, WRENCHES, bar_compliance, noisy_field
@@ -101,10 +103,20 @@ def write(tmp_path, name, text):
 @pytest.mark.parametrize(
     ("name", "text", "unit", "words"),
     [
-        ("a.csv", csv_text().replace("ux [mm]", "ux"), None, "column ux needs its unit"),
+        (
+            "a.csv",
+            csv_text().replace("ux [mm]", "ux"),
+            None,
+            "line 2: ux: the unit is missing: write ux .mm.",
+        ),
         ("a.csv", csv_text().replace("uz [mm]", "uw [mm]", 1), None, "ux, uy, uz once per load case"),
-        ("a.csv", csv_text().replace("\n2.0,", "\ntwo,"), None, "row 3 has a cell that is not a number"),
-        ("a.csv", csv_text() + "11.0,1\n", None, "row 12 has 2 cells"),
+        (
+            "a.csv",
+            csv_text().replace("\n2.0,", "\ntwo,"),
+            None,
+            "line 4: node: expected a number, found 'two'",
+        ),
+        ("a.csv", csv_text() + "11.0,1\n", None, "line 13: expected 22 values, found 2"),
         ("a.dat", dat_text(), None, "no units; give --unit"),
         ("a.dat", dat_text(), "mm", "give the coordinates with --nodes"),
         ("a.dat", "nothing\n", "mm", "expected nodal displacements, found none"),
@@ -128,13 +140,44 @@ def test_cases_come_in_si(tmp_path):
     assert read_cases(path) == pytest.approx(np.array([[1, 2000, 3, 0.004, 5, 0.006]]))
 
 
+SPELLINGS = {
+    "decimal commas": lambda t: t.replace(",", ";").replace(".", ","),
+    "tabs": lambda t: t.replace(",", "\t"),
+    "a mark of UTF-8": lambda t: "\ufeff" + t,
+    "lines above": lambda t: "Export of the FEA\nModel: bar\n\n" + t,
+    "units behind a bar": lambda t: t.replace(" [", "_").replace("]", ""),
+    "quoted names": lambda t: "".join(f'"{w}"' if "[" in w else w for w in re.split("([,\n])", t)),
+    "a comma at each end": lambda t: t.replace("\n", ",\n"),
+}
+
+
+@pytest.mark.parametrize("spelling", SPELLINGS)
+def test_tables_as_programs_write_them(tmp_path, spelling):
+    """Fields and load cases are tables like all others."""
+    write_as = SPELLINGS[spelling]
+    points, u = read_field(write(tmp_path, "f.csv", write_as(csv_text().removeprefix("# a field\n"))))
+    np.testing.assert_allclose(points, POINTS, rtol=1e-15)
+    np.testing.assert_allclose(u, U, rtol=1e-15)
+    cases = "fx [N],fy [kN],fz [N],mx [N*mm],my [N*m],mz [Nmm]\n1.5,2,3,4,5,6\n0,0,0,1,2,3.5\n"
+    found = read_cases(write(tmp_path, "c.csv", write_as(cases)))
+    np.testing.assert_allclose(found, [[1.5, 2000, 3, 0.004, 5, 0.006], [0, 0, 0, 0.001, 2, 0.0035]])
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("fx [N],fy [N],fz [N],mx [N*mm],my [N*mm],mz\n1,2,3,4,5,6\n", "missing .'mz'."),
-        ("fx [N],fy [N],fz [N],mx [N],my [N*mm],mz [N*m]\n1,2,3,4,5,6\n", "missing .'mx'."),
-        ("fx [N],fy [N],fz [N],mx [N*mm],my [N*mm],mz [Nm]\n1,2,3,4,5\n", "row 2 does not hold numbers"),
-        ("", "missing"),
+        ("fx [N],fy [N],fz [N],mx [N*mm],my [N*mm],mz\n1,2,3,4,5,6\n", "line 1: mz: the unit is missing"),
+        (
+            "fx [N],fy [N],fz [N],mx [N],my [N*mm],mz [N*m]\n1,2,3,4,5,6\n",
+            "line 1: mx .N.: expected a unit such as in mx .N.mm., found N",
+        ),
+        (
+            "fx [N],fy [N],fz [N],mx [N*mm],my [N*mm],mz [Nm]\n1,2,3,4,5\n",
+            "line 2: expected 6 values, found 5",
+        ),
+        ("", "the file is empty"),
+        ("fx [N],fy [N],fz [N],mx [N*mm],my [N*mm]\n1,2,3,4,5\n", "'mz .N.mm.' with units, missing mz"),
+        ("fx [N],fy [N],fz [N],mx [Nm],my [Nm],mz [Nm],fx [N]\n1,2,3,4,5,6,7\n", "found fx more than once"),
     ],
 )
 def test_bad_case_files(tmp_path, text, words):

@@ -140,6 +140,15 @@ def test_bad_urdf(message: str, tmp_path: Path, capsys: pytest.CaptureFixture[st
     assert not (tmp_path / "m.yaml").exists()
 
 
+def test_two_names_that_are_one_in_a_machine_file(tmp_path: Path) -> None:
+    with pytest.raises(
+        sm.StiffmapError, match="joint: '关节一' and '关节二' would both be '_' in a machine file"
+    ):
+        machine(tmp_path, robots.ARM.replace('"q2"', '"关节一"').replace('"q3"', '"关节二"'))
+    with pytest.raises(sm.StiffmapError, match=r"link: 'arm\.1' and 'arm/1' would both be 'arm_1'"):
+        machine(tmp_path, robots.ARM.replace('"shoulder"', '"arm.1"').replace('"upper"', '"arm/1"'))
+
+
 def test_a_namespace_and_an_empty_name_say_nothing(tmp_path: Path) -> None:
     """As Drake's files have the one, and some exporters the other."""
     plain = machine(tmp_path, robots.ARM.replace('name="arm"', 'name="robot"'))
