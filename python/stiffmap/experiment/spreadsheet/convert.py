@@ -12,7 +12,6 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs import make_folder, only_job, write_rows, write_text
 from stiffmap.common.tables.cells import row_numbers
 from stiffmap.common.tables.sheet import Sheet
-from stiffmap.common.units import Unit
 from stiffmap.common.yaml_text import text_of
 from stiffmap.experiment.channels import AXES
 from stiffmap.experiment.experiment import WRENCH
@@ -58,15 +57,11 @@ def understand(m: Meant, loaded: bool = False) -> ImportedSheet:
         used = [c for c in columns if c.meaning != "note"]
         known |= set(POSE)
     _ask(m, known, bool(drives))
-    found: dict[str, Unit] = {}
-    for c in used:
-        if quantity_of(c.meaning):
-            unit = m.unit(c.index, c.meaning)
-            if found.setdefault(c.meaning, unit) != unit:
-                written = " and ".join(f"'{sheet.header[k.index]}'" for k in used if k.meaning == c.meaning)
-                raise StiffmapError(
-                    f"{sheet.file}: expected one unit of all repeats of {c.meaning}; found {written}"
-                )
+    units = dict.fromkeys((c.meaning, m.unit(c.index, c.meaning)) for c in used if quantity_of(c.meaning))
+    found = dict(list(units))
+    for meaning in (name for name, unit in units if unit != found[name]):
+        written = " and ".join(f"'{sheet.header[c.index]}'" for c in used if c.meaning == meaning)
+        raise StiffmapError(f"{sheet.file}: expected one unit of all repeats of {meaning}; found {written}")
     if loaded and not known & {*WRENCH, "ll"}:
         m.ask_column(
             "missing column: a deflection needs a load; which column is it? Say --map fx='HEADER' (fy, fz, mx, my, mz; "

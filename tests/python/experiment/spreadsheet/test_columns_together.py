@@ -400,6 +400,20 @@ def test_readings_against_the_load_come_first(
     assert first.startswith("WARNING: 3 of 3 readings go against their force (row 1: ") is wrong
 
 
+def test_rows_without_a_load_that_do_not_read_zero_come_first(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = f"{POSES},Load [kg],Dial Z [um]\n0,0,300,0,1234\n0,0,300,5,1214\n0,0,310,0,1250\n0,0,310,5,1230\n"
+    e = made(tmp_path, text, "--noise", "dz=1")
+    out = capsys.readouterr().out
+    assert e is not None and out.startswith(
+        "WARNING: rows without a load do not read zero (row 1: dz 0.001234 in SI)"
+    )
+    assert (
+        "write 'unloaded: unknown' into experiment.yaml" in out.replace("\n", " ") and "other sign" not in out
+    )
+
+
 def test_a_lone_reading_without_load_is_not_dropped_in_silence(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
