@@ -97,12 +97,8 @@ def even(
             behind = [c.strip() for c in cells[width:] if c.strip()]
             if found > width:
                 found = max(i for i, c in enumerate(cells, 1) if i == width or c.strip())
-            whole = (
-                aside is None or separator == " "
-                if found < width
-                else aside is None or NUMBER.fullmatch((*behind, "")[0])
-            )
-            if separator and whole and found != width:
+            unclear = NUMBER.fullmatch(behind[0]) if behind else separator == " "
+            if separator and found != width and (aside is None or unclear):
                 raise FileError(f"expected {width} values, found {found}", file=file, line=n)
             if behind:
                 left.append(f"row {n}, '{' '.join(behind)[:40]}' behind the last column")

@@ -115,7 +115,8 @@ def against_the_load(experiment: Experiment) -> str:
     A machine yields along the force: another sign is one of the load's or of the readings', or of a gauge that was not at zero.
     """
     e = experiment
-    idle = ~e.wrench.any(axis=1)[:, None] & (np.abs(e.reading) > LOUD * np.nan_to_num(e.sigma, nan=np.inf))
+    without = np.all(e.wrench == 0, axis=1, keepdims=True)
+    idle = without & (np.abs(e.reading) > LOUD * np.nan_to_num(e.sigma, nan=np.inf))
     if e.quantity == "deflection" and e.unloaded != "unknown" and idle.any():
         row, axis = np.argwhere(idle)[0]
         return (

@@ -170,9 +170,6 @@ class Rows:
     def _same(self, cell: Any) -> Iterable[Any]:
         return repeat(cell, len(self._sheet.lines))
 
-    def __len__(self) -> int:
-        return sum(1 for _ in self)
-
 
 def write_folder(
     found: ImportedSheet,

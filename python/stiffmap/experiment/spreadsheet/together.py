@@ -190,10 +190,8 @@ def _directions(m: Meant) -> None:
     unit = m.sheet.unit(load) or m.units.get(mapped.get(load, "force"), common)
     for axis, values in zip("xyz", parts.T, strict=True):
         m.chosen.pop(f"f{axis}", None)
-        if values.any():
+        if values.any() or (axis == "z" and not parts.any()):
             m.add(f"+{names[load]} along {axis}", unit, values, f"f{axis}")
-    if not parts.any():
-        m.add(f"+{names[load]} along z", unit, parts[:, 2], "fz")
     m.said.append(f"the load is '{m.sheet.header[load]}' along '{m.sheet.header[way]}'")
 
 
@@ -202,12 +200,8 @@ def _hung(m: Meant) -> None:
     for i, name in enumerate(m.sheet.names):
         unit = m.sheet.unit(i)
         found = unit_of(unit, "force") if unit else None
-        if (
-            found is not None
-            and (found.mass or HUNG.search(name))
-            and WEIGHS.search(name)
-            and m.sheet.is_numeric(i)
-        ):
+        heavy = found and (found.mass or HUNG.search(name)) and WEIGHS.search(name)
+        if heavy and m.sheet.is_numeric(i):
             m.chosen.setdefault("fz", [m.sheet.header[i]])
             return
 
@@ -235,9 +229,7 @@ def _turns(m: Meant, taken: set[int]) -> None:
         return
     of_pose = {"": QUATERNION, "rotvec": VECTOR}.get(turns, EULER)
     of_seen = SEEN_TURNED if turns else [f"p{c}" for c in QUATERNION]
-    if (
-        of_pose is VECTOR
-    ):  # rx ry rz are a reading unless they stand right behind the position and something else is read
+    if of_pose is VECTOR:  # a reading, unless it stands right behind the position and something else is read
         others = set(READINGS) & set(meanings) - set(AXES[3:])
         said = not seen and set(AXES[3:]) & set(m.noise)
         if said or not others or columns[0] != meanings[position[2]] + 1:
@@ -295,9 +287,8 @@ def _targets(m: Meant, taken: set[int]) -> None:
 def weight(sheet: Sheet, index: int, explicit: bool, meaning: str, unit: Unit) -> tuple[float, str]:
     """Sign of a load along an axis, and what to say of it: a mass, and what is called a weight, pulls down."""
     values, header = sheet.numbers(index), sheet.header[index]
-    if not (unit.mass or HUNG.search(sheet.names[index])):
-        return 1.0, ""
-    if explicit or meaning[0] != "f" or np.nanmin(values, initial=0.0) < 0:
+    hangs = unit.mass or HUNG.search(sheet.names[index])
+    if not hangs or explicit or meaning[0] != "f" or np.nanmin(values, initial=0.0) < 0:
         return 1.0, ""
     sign = -1.0 if meaning == "fz" else 1.0
     way = f"{'-' if sign < 0 else '+'}{meaning[1]}"

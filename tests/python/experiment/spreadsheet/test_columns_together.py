@@ -419,3 +419,14 @@ def test_a_lone_reading_without_load_is_not_dropped_in_silence(
 ) -> None:
     made(tmp_path, f"{POSES},fz [N],gauge unloaded [mm],dz [um]\n0,0,300,-10,1.25,-20\n", "--noise", "dz=2")
     assert "'gauge unloaded [mm]' is in no reading" in capsys.readouterr().out
+
+
+def test_places_side_by_side_are_refused_with_the_way(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    joints = "J1 [deg],J2 [deg],J3 [deg],J4 [deg],J5 [deg],J6 [deg]"
+    text = f"{joints},X1,Y1,Z1,X2,Y2,Z2\n10,-20,30,40,50,60,1,2,3,4,5,6\n40,-30,20,10,20,30,7,8,9,10,11,12\n"
+    more = ("--map", "px=X1|X2", "--map", "py=Y1|Y2", "--map", "pz=Z1|Z2", "--unit", "length=mm")
+    assert made(tmp_path, text, *more, machine="dh") is None
+    err = capsys.readouterr().err
+    assert "expected one place in each row; found 'X1', 'Y1'" in err and "a column 'Target'" in err
