@@ -186,7 +186,7 @@ def write_folder(
         "title": title,
         "machine": machine,
         "quantity": quantity,
-        "units": head_units(found),
+        "units": head_units(found, sheet.file),
     }
     if m.noise:
         factors = {n.replace("p", "d"): f for n, f in found.factors.items()}
@@ -216,7 +216,7 @@ def write_folder(
         write_text(folder / "experiment.yaml", text_of(head))
 
 
-def head_units(found: ImportedSheet) -> dict[str, str]:
+def head_units(found: ImportedSheet, file: str) -> dict[str, str]:
     """Units for experiment.yaml: mm and N in common, every column that differs by its name."""
     common = {"length": "mm", "force": "N"}
     out = dict(common)
@@ -229,7 +229,7 @@ def head_units(found: ImportedSheet) -> dict[str, str]:
         elif meaning.startswith("u_"):
             if found.units.get(base) != unit:
                 raise StiffmapError(
-                    f"columns {base} and {meaning} need the same unit; found {found.units.get(base)} and {unit}"
+                    f"{file}: columns {base} and {meaning} need the same unit; found {found.units.get(base)} and {unit}"
                 )
         elif unit not in common.values():
             out[meaning] = unit

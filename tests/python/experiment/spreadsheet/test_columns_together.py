@@ -430,3 +430,11 @@ def test_places_side_by_side_are_refused_with_the_way(
     assert made(tmp_path, text, *more, machine="dh") is None
     err = capsys.readouterr().err
     assert "expected one place in each row; found 'X1', 'Y1'" in err and "a column 'Target'" in err
+
+
+def test_a_deviation_in_another_unit_names_the_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = f"{POSES},Fz [N],dz [mm],u_dz [um]\n0,0,300,-10,-0.02,2\n"
+    assert made(tmp_path, text) is None
+    assert "sheet.csv: columns dz and u_dz need the same unit; found mm and um" in capsys.readouterr().err
