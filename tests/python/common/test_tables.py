@@ -120,7 +120,7 @@ ROWS = "x [mm],fx [N],dx [um]\n0,100,40\n1,200,80\n"
     [
         (
             ROWS.replace("200,80", "200,7,5"),
-            "line 3: expected 3 values, one for each name of the header; found 4",
+            "line 3: expected 3 values, found 4",
         ),
         ('x [mm],fx [N],dx [um]\n"1",0,100,40\n"2",1,200,80\n', "line 2: expected 3 values"),
         (ROWS.replace(",", " ").replace("200 80", "200"), "line 3: expected 3 values, found 2"),

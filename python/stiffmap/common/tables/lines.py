@@ -81,19 +81,31 @@ def kept(lines: Iterable[tuple[int, list[str]]]) -> Iterator[tuple[int, list[str
 
 
 def even(
-    rows: Iterable[tuple[int, list[str]]], width: int, file: str, whole: bool
+    rows: Iterable[tuple[int, list[str]]],
+    width: int,
+    file: str,
+    separator: str,
+    aside: list[str] | None = None,
 ) -> Iterator[tuple[int, list[str]]]:
-    """Rows with as many cells as there are columns; where they are to be `whole`, FileError for one with fewer, or with more that
-    are not empty."""
+    """Rows with as many cells as there are columns; FileError for a row of a text with fewer, or with more that are not empty.
+
+    With `aside` a row may be short, unless blanks leave open which cell it lacks, and words behind the last column are said there.
+    """
+    left: list[str] = []
     for n, cells in rows:
-        found = len(cells)
-        if found != width:
+        if (found := len(cells)) != width:
+            behind = [c.strip() for c in cells[width:] if c.strip()]
             if found > width:
                 found = max(i for i, c in enumerate(cells, 1) if i == width or c.strip())
-            if whole and found != width:
+            unclear = NUMBER.fullmatch(behind[0]) if behind else separator == " "
+            if separator and found != width and (aside is None or unclear):
                 raise FileError(f"expected {width} values, found {found}", file=file, line=n)
+            if behind:
+                left.append(f"row {n}, '{' '.join(behind)[:40]}' behind the last column")
             cells = [*cells, *[""] * width][:width]
         yield n, cells
+    if left and aside is not None:
+        aside.append(left[0] + (f", and {len(left) - 1} rows like it" if len(left) > 1 else ""))
 
 
 def finite_number(cell: str, blank: Sequence[str] = ()) -> float:

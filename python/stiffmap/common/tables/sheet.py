@@ -26,7 +26,6 @@ from stiffmap.common.tables.header import (
 )
 from stiffmap.common.tables.lines import (
     COMMENTS,
-    NUMBER,
     Spelling,
     decimal_comma,
     even,
@@ -187,10 +186,7 @@ def read_sheet(path: Path, sheet: str | None = None, layout: Layout = PLAIN) -> 
     said = [*header, *(c.strip() for _, cells in above for c in cells)]
     lines_, aside = row_numbers(), list[str]()
     data = _data(chain([first], kept(rows)), header, said, spelling, aside, layout, str(path))
-    if not layout.strict:
-        data = _beside(data, width, separator, aside, str(path))
-    # between blanks nothing says which cell is missing
-    data = even(data, width, str(path), whole=separator == " " or (layout.strict and separator != ""))
+    data = even(data, width, str(path), separator, None if layout.strict else aside)
     columns = list(packed(numbered(data, lines_), width))
     file = f"{path}, sheet '{page}'" if page else str(path)
     if aside and layout.strict:
@@ -322,26 +318,6 @@ def _data(
             aside.append(f"row {n} {'repeats the header' if again else f'is a remark: {first[:40]}'}")
         else:
             yield n, cells
-
-
-def _beside(rows: Iterable[Line], width: int, separator: str, aside: list[str], file: str) -> Iterator[Line]:
-    """Rows without what stands behind the last column, of which `aside` says so; FileError for a number there in a text, where the
-    cells before it may be those of other columns."""
-    left: list[tuple[int, str]] = []
-    for n, cells in rows:
-        behind = [c.strip() for c in cells[width:] if c.strip()]
-        if behind and separator and NUMBER.fullmatch(behind[0]):
-            raise FileError(
-                f"expected {width} values, one for each name of the header; found {width + len(behind)}",
-                file=file,
-                line=n,
-            )
-        if behind:
-            left.append((n, " ".join(behind)))
-        yield n, cells[:width]
-    if left:
-        more = f", and more in {len(left) - 1} other rows" if len(left) > 1 else ""
-        aside.append(f"row {left[0][0]}, '{left[0][1][:40]}' behind the last column{more}")
 
 
 def column_letter(index: int) -> str:

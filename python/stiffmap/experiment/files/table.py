@@ -104,7 +104,7 @@ def read_table(path: Path, expected: int | None = None) -> Table:
     if not header:
         raise FileError("the file is empty", file=str(path))
     refuse_twice(header, str(path), 1)
-    below = even(below, len(header), str(path), whole=source.separator != "")
+    below = even(below, len(header), str(path), source.separator)
     columns = packed(numbered(below, lines), len(header))
     if source.separator not in ("", ",") and decimal_comma(c for _, c in islice(rows(), 1, None)):
         columns = tuple(map(with_points, columns))

@@ -12,7 +12,6 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs import make_folder, only_job, write_rows, write_text
 from stiffmap.common.tables.cells import row_numbers
 from stiffmap.common.tables.sheet import Sheet
-from stiffmap.common.units import Unit
 from stiffmap.common.yaml_text import text_of
 from stiffmap.experiment.channels import AXES
 from stiffmap.experiment.experiment import WRENCH
@@ -58,15 +57,11 @@ def understand(m: Meant, loaded: bool = False) -> ImportedSheet:
         used = [c for c in columns if c.meaning != "note"]
         known |= set(POSE)
     _ask(m, known, bool(drives))
-    found: dict[str, Unit] = {}
-    for c in used:
-        if quantity_of(c.meaning):
-            unit = m.unit(c.index, c.meaning)
-            if found.setdefault(c.meaning, unit) != unit:
-                written = " and ".join(f"'{sheet.header[k.index]}'" for k in used if k.meaning == c.meaning)
-                raise StiffmapError(
-                    f"{sheet.file}: expected one unit of all repeats of {c.meaning}; found {written}"
-                )
+    units = dict.fromkeys((c.meaning, m.unit(c.index, c.meaning)) for c in used if quantity_of(c.meaning))
+    found = dict(list(units))
+    for meaning in (name for name, unit in units if unit != found[name]):
+        written = " and ".join(f"'{sheet.header[c.index]}'" for c in used if c.meaning == meaning)
+        raise StiffmapError(f"{sheet.file}: expected one unit of all repeats of {meaning}; found {written}")
     if loaded and not known & {*WRENCH, "ll"}:
         m.ask_column(
             "missing column: a deflection needs a load; which column is it? Say --map fx='HEADER' (fy, fz, mx, my, mz; "
@@ -175,9 +170,6 @@ class Rows:
     def _same(self, cell: Any) -> Iterable[Any]:
         return repeat(cell, len(self._sheet.lines))
 
-    def __len__(self) -> int:
-        return sum(1 for _ in self)
-
 
 def write_folder(
     found: ImportedSheet,
@@ -194,7 +186,7 @@ def write_folder(
         "title": title,
         "machine": machine,
         "quantity": quantity,
-        "units": head_units(found),
+        "units": head_units(found, sheet.file),
     }
     if m.noise:
         factors = {n.replace("p", "d"): f for n, f in found.factors.items()}
@@ -224,7 +216,7 @@ def write_folder(
         write_text(folder / "experiment.yaml", text_of(head))
 
 
-def head_units(found: ImportedSheet) -> dict[str, str]:
+def head_units(found: ImportedSheet, file: str) -> dict[str, str]:
     """Units for experiment.yaml: mm and N in common, every column that differs by its name."""
     common = {"length": "mm", "force": "N"}
     out = dict(common)
@@ -237,7 +229,7 @@ def head_units(found: ImportedSheet) -> dict[str, str]:
         elif meaning.startswith("u_"):
             if found.units.get(base) != unit:
                 raise StiffmapError(
-                    f"columns {base} and {meaning} need the same unit; found {found.units.get(base)} and {unit}"
+                    f"{file}: columns {base} and {meaning} need the same unit; found {found.units.get(base)} and {unit}"
                 )
         elif unit not in common.values():
             out[meaning] = unit

@@ -97,6 +97,11 @@ def as_seen(m: Meant, difference: str) -> None:
         for k in columns:
             if k.meaning == "note" and (found := re.fullmatch(MEASURED, k.name.lower())):
                 m.chosen[f"p{found[1]}"] = [header[k.index]]
+    if wide := [f"'{header[k.index]}'" for k in m.guessed if k.meaning in SEEN and k.repeat]:
+        raise StiffmapError(
+            f"{m.sheet.file}: expected one place in each row; found {', '.join(wide)}: write the places of several targets, or repeats, "
+            "in rows one below the other, with a column 'Target' that names the target"
+        )
     of = {k.meaning: k for k in m.guessed if k.repeat == 0}
     if any(s in of for s in SEEN):
         for s in SEEN:
@@ -138,8 +143,5 @@ def turned(m: Meant, difference: str) -> None:
 
 
 def _in_mm(m: Meant, meaning: str, parts: Sequence[tuple[float, Column]]) -> None:
-    total = np.zeros(len(m.sheet.lines))
-    for sign, column in parts:
-        size = m.unit(column.index, column.meaning).size
-        total = total + sign * 1e3 * size * m.sheet.numbers(column.index)
-    m.add(f"{meaning} of {' and '.join(column.name for _, column in parts)}", "mm", total, meaning)
+    each = [sign * 1e3 * m.unit(c.index, c.meaning).size * m.sheet.numbers(c.index) for sign, c in parts]
+    m.add(f"{meaning} of {' and '.join(c.name for _, c in parts)}", "mm", sum(each, 0.0), meaning)

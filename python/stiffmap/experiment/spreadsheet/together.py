@@ -29,19 +29,11 @@ DIRECTION = re.compile(
     re.IGNORECASE,
 )
 WAY = re.compile(r"([+-]?)\s*([xyz])|([xyz])\s*([+-])", re.IGNORECASE)
-BEFORE = (
-    r"(unloaded|after unloading)( again)?|no[ -]load|without load|before( loading)?|unbelastet|ohne last|vorher|leer|entlastet|"
-    "initial|zero"
-)
-LOADED = r"loaded|with load|under load|belastet|mit last|unter last"
 STATES = {
-    state: re.compile(rf"\b({words})\b", re.I)
-    for state, words in {
-        "before": BEFORE,
-        "loaded": LOADED,
-        "after": "after( loading)?|nachher|final",
-    }.items()
-}
+    "before": re.compile(r"\b((unloaded|after unloading)( again)?|no[ -]load|without load|before( loading)?|unbelastet|ohne last|vorher|leer|entlastet|initial|zero)\b", re.I),
+    "loaded": re.compile(r"\b(loaded|with load|under load|belastet|mit last|unter last)\b", re.I),
+    "after": re.compile(r"\b(after( loading)?|nachher|final)\b", re.I),
+}  # fmt: skip
 """A gauge that was read ``before``, ``loaded`` and ``after`` was read without the load after it, too."""
 TARGET = re.compile(
     r"(target|reflector|reflektor|smr|srm|nest|tooling ball|ball|sphere|kugel|marker|marke|prism|prisma|zielmarke|ziel|zielpunkt)"
@@ -56,14 +48,13 @@ MOST_METRES = 20.0
 NAMED = 5
 """Rows that a sentence names."""
 ANGLE = r"(tcp|pos|ist|soll|nominal|cmd|orientation|ori|rot)?[ _.-]?{}"
-FIXED = "turns about the fixed x, y, z ({}; degrees where no unit is given)"
 TURNS = (
     ("a b c", "ZYX", "turns about z, the new y, the new x (KUKA's A, B, C; degrees where no unit is given)"),
-    ("w p r", "xyz", FIXED.format("Fanuc's W, P, R")),
-    ("roll pitch yaw", "xyz", FIXED.format("roll, pitch, yaw")),
+    ("w p r", "xyz", "turns about the fixed x, y, z (Fanuc's W, P, R; degrees where no unit is given)"),
+    ("roll pitch yaw", "xyz", "turns about the fixed x, y, z (degrees where no unit is given)"),
+    ("rx ry rz", "rotvec", "a rotation vector (UR's RX, RY, RZ)"),
 )
-"""Names of three angles, their convention, and that in words."""
-WXYZ = tuple(f"p{c}" for c in QUATERNION)
+"""Names of three angles, how they turn, and that in words."""
 ROUNDED = 0.01
 """By how much digits of a table may change the length of a quaternion."""
 
@@ -146,9 +137,7 @@ def _differences(m: Meant) -> None:
                 f"'{header[j]}' is in no reading; if it was read without the load, call the other one the same but 'loaded'"
             )
             continue
-        mapped = given.get(i, "")
-        meaning = mapped or guessed(name)
-        meaning = f"d{meaning}" if meaning in ("x", "y", "z") and not mapped else meaning
+        meaning = given.get(i) or {"x": "dx", "y": "dy", "z": "dz"}.get(guessed(name), guessed(name))
         if meaning not in READINGS or not m.sheet.is_numeric(i):
             continue
         own = [m.sheet.unit(k) for k in (i, j)]
@@ -201,10 +190,8 @@ def _directions(m: Meant) -> None:
     unit = m.sheet.unit(load) or m.units.get(mapped.get(load, "force"), common)
     for axis, values in zip("xyz", parts.T, strict=True):
         m.chosen.pop(f"f{axis}", None)
-        if values.any():
+        if values.any() or (axis == "z" and not parts.any()):
             m.add(f"+{names[load]} along {axis}", unit, values, f"f{axis}")
-    if not parts.any():
-        m.add(f"+{names[load]} along z", unit, parts[:, 2], "fz")
     m.said.append(f"the load is '{m.sheet.header[load]}' along '{m.sheet.header[way]}'")
 
 
@@ -213,12 +200,8 @@ def _hung(m: Meant) -> None:
     for i, name in enumerate(m.sheet.names):
         unit = m.sheet.unit(i)
         found = unit_of(unit, "force") if unit else None
-        if (
-            found is not None
-            and (found.mass or HUNG.search(name))
-            and WEIGHS.search(name)
-            and m.sheet.is_numeric(i)
-        ):
+        heavy = found and (found.mass or HUNG.search(name)) and WEIGHS.search(name)
+        if heavy and m.sheet.is_numeric(i):
             m.chosen.setdefault("fz", [m.sheet.header[i]])
             return
 
@@ -236,47 +219,36 @@ def quaternion(sheet: Sheet) -> list[int]:
 
 def _turns(m: Meant, taken: set[int]) -> None:
     """An orientation that stands with X Y Z."""
-    meanings = {c.meaning: c for c in m.guessed}
+    meanings = {c.meaning: c.index for c in m.guessed}
     seen = set(SEEN) <= set(meanings)
-    if not seen and not set(POSE) <= set(meanings):
+    position = SEEN if seen else POSE
+    forms = [(quaternion(m.sheet), "", "quaternions, w first")]
+    forms += [(_angles(m.sheet, names), turns, words) for names, turns, words in TURNS]
+    columns, turns, words = next((f for f in forms if f[0] and not taken & {*f[0]}), ([], "", ""))
+    if not columns or not set(position) <= set(meanings):
         return
-    behind = meanings["pz" if seen else "z"].index + 1
-    forms = [
-        ("", quaternion(m.sheet), "quaternions, w first"),
-        *((e, _angles(m.sheet, n), w) for n, e, w in TURNS),
-    ]
-    if set(READINGS) & set(meanings) - set(AXES[3:]):  # else they are what is read
-        at = [m.sheet.find(f"r{a}") for a in "xyz"]
-        forms.append(
-            (
-                "rotvec",
-                at if at == [*range(behind, behind + 3)] else [],
-                "a rotation vector (UR's RX, RY, RZ)",
-            )
-        )
-    found = next((form for form in forms if form[1] and not taken & {*form[1]}), None)
-    if found is None:
-        return
-    euler, columns, words = found
+    of_pose = {"": QUATERNION, "rotvec": VECTOR}.get(turns, EULER)
+    of_seen = SEEN_TURNED if turns else [f"p{c}" for c in QUATERNION]
+    if of_pose is VECTOR:  # a reading, unless it stands right behind the position and something else is read
+        others = set(READINGS) & set(meanings) - set(AXES[3:])
+        said = not seen and set(AXES[3:]) & set(m.noise)
+        if said or not others or columns[0] != meanings[position[2]] + 1:
+            return
     headers = [m.sheet.header[i] for i in columns]
     shown = ", ".join(map(repr, headers))
     if seen and not set(AXES[3:]) <= set(m.noise):
         m.chosen["note"] = [*m.chosen.get("note", ()), *headers]
         m.said.append(f"{shown} are not used; as the orientation seen they need --noise rx=… ry=… rz=…")
         return
-    free = euler not in ("", "rotvec")
-    of_pose = EULER if free else VECTOR if euler else QUATERNION
-    for i, header, meaning in zip(
-        columns, headers, (SEEN_TURNED if euler else WXYZ) if seen else of_pose, strict=True
-    ):
+    for i, header, meaning in zip(columns, headers, of_seen if seen else of_pose, strict=True):
         m.chosen[meaning] = [header]
         taken.add(i)
-        if free and not m.sheet.unit(i):
+        if of_pose is EULER and not m.sheet.unit(i):
             m.units.setdefault(meaning, m.units.get("angle", "deg"))
-    if not seen:
-        m.head["orientation"] = {"against": "base"} | ({"euler": euler} if free else {})
-    elif euler:
-        m.head["target_orientation"] = euler
+    if seen:
+        m.head |= {"target_orientation": turns} if turns else {}
+    else:
+        m.head["orientation"] = {"against": "base"} | ({"euler": turns} if of_pose is EULER else {})
     m.said.append(f"{shown} are the orientation: {words}")
 
 
@@ -315,9 +287,8 @@ def _targets(m: Meant, taken: set[int]) -> None:
 def weight(sheet: Sheet, index: int, explicit: bool, meaning: str, unit: Unit) -> tuple[float, str]:
     """Sign of a load along an axis, and what to say of it: a mass, and what is called a weight, pulls down."""
     values, header = sheet.numbers(index), sheet.header[index]
-    if not (unit.mass or HUNG.search(sheet.names[index])):
-        return 1.0, ""
-    if explicit or meaning[0] != "f" or np.nanmin(values, initial=0.0) < 0:
+    hangs = unit.mass or HUNG.search(sheet.names[index])
+    if not hangs or explicit or meaning[0] != "f" or np.nanmin(values, initial=0.0) < 0:
         return 1.0, ""
     sign = -1.0 if meaning == "fz" else 1.0
     way = f"{'-' if sign < 0 else '+'}{meaning[1]}"

@@ -400,8 +400,41 @@ def test_readings_against_the_load_come_first(
     assert first.startswith("WARNING: 3 of 3 readings go against their force (row 1: ") is wrong
 
 
+def test_rows_without_a_load_that_do_not_read_zero_come_first(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = f"{POSES},Load [kg],Dial Z [um]\n0,0,300,0,1234\n0,0,300,5,1214\n0,0,310,0,1250\n0,0,310,5,1230\n"
+    e = made(tmp_path, text, "--noise", "dz=1")
+    out = capsys.readouterr().out
+    assert e is not None and out.startswith(
+        "WARNING: rows without a load do not read zero (row 1: dz 0.001234 in SI)"
+    )
+    assert (
+        "write 'unloaded: unknown' into experiment.yaml" in out.replace("\n", " ") and "other sign" not in out
+    )
+
+
 def test_a_lone_reading_without_load_is_not_dropped_in_silence(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     made(tmp_path, f"{POSES},fz [N],gauge unloaded [mm],dz [um]\n0,0,300,-10,1.25,-20\n", "--noise", "dz=2")
     assert "'gauge unloaded [mm]' is in no reading" in capsys.readouterr().out
+
+
+def test_places_side_by_side_are_refused_with_the_way(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    joints = "J1 [deg],J2 [deg],J3 [deg],J4 [deg],J5 [deg],J6 [deg]"
+    text = f"{joints},X1,Y1,Z1,X2,Y2,Z2\n10,-20,30,40,50,60,1,2,3,4,5,6\n40,-30,20,10,20,30,7,8,9,10,11,12\n"
+    more = ("--map", "px=X1|X2", "--map", "py=Y1|Y2", "--map", "pz=Z1|Z2", "--unit", "length=mm")
+    assert made(tmp_path, text, *more, machine="dh") is None
+    err = capsys.readouterr().err
+    assert "expected one place in each row; found 'X1', 'Y1'" in err and "a column 'Target'" in err
+
+
+def test_a_deviation_in_another_unit_names_the_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = f"{POSES},Fz [N],dz [mm],u_dz [um]\n0,0,300,-10,-0.02,2\n"
+    assert made(tmp_path, text) is None
+    assert "sheet.csv: columns dz and u_dz need the same unit; found mm and um" in capsys.readouterr().err
