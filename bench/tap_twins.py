@@ -19,7 +19,7 @@ import stiffmap as sm
 from stiffmap.identification.taps import TapTest, explain_taps
 from stiffmap.identification.taps.causes import causes
 from stiffmap.identification.taps.causes import term as change
-from stiffmap.identification.taps.explain import _fitted, _refined
+from stiffmap.identification.taps.explain import fitted
 from stiffmap.identification.taps.problem import TapsProblem, shifted, uncertain_numbers
 from stiffmap.model.effects import apply_records
 
@@ -27,6 +27,8 @@ MACHINES = ("ur10", "orthoglide-revised", "five-bar", "linear-delta", "travellin
 POSES, MODES, NOISE, TURN, DEFAULT = 4, 5, 0.005, 0.05, 0.05
 VISIBLE = 8.0
 """Standard deviations."""
+TRIES = 50
+"""Drives and sizes, of which the first visible one is taken."""
 
 
 def twin(machine, rng, term=None):
@@ -47,19 +49,23 @@ def twin(machine, rng, term=None):
 
 def visible(problem, place, scale):
     """Standard deviations by which an effect shifts the readings, net of what uncertain numbers can imitate, to first order."""
-    rows, W = problem.whitener()
-    return float(np.linalg.norm(W @ (problem.residual(change(place, scale)) - problem.residual())[rows]))
+    J = problem.slopes[problem.used]
+    white = np.linalg.cholesky(np.eye(len(J)) + J @ J.T)
+    return float(
+        np.linalg.norm(np.linalg.solve(white, problem.residual(change(place, scale)) - problem.residual()))
+    )
 
 
 def drawn(machine, rng):
-    """A drive that is softer than its file says, visible to these taps."""
+    """A drive that is softer than its file says, visible to these taps; None where there is none."""
     problem = TapsProblem(machine, twin(machine, rng), None, DEFAULT)
     own = {a.rpartition(".")[2] for a in machine.actuators}
-    drives = [c for c in causes(problem) if c.kind == "compliance" and c.element in own]
-    while True:
+    drives = [c for c in causes(problem) if c.kind == "compliance" and c.element in own and len(c.legs) == 1]
+    for _ in range(TRIES if drives else 0):
         place, scale = drives[rng.integers(len(drives))], float(rng.uniform(1.5, 6.0))
-        if len(place.legs) == 1 and visible(problem, place, scale) > VISIBLE:
+        if visible(problem, place, scale) > VISIBLE:
             return place, scale
+    return None
 
 
 def main() -> None:
@@ -76,18 +82,23 @@ def main() -> None:
         machine = machine_of(name)
         for _ in range(given.nulls * k // given.twins, given.nulls * (k + 1) // given.twins):
             found = explain_taps(machine, twin(machine, rng), default_u=DEFAULT)
-            nulls, false = nulls + 1, false + (found.named is not None)
-            if found.named is not None:
+            nulls, false = nulls + 1, false + bool(found.named)
+            if found.named:
                 print("false cause", name, found.sentence, flush=True)
-        place, scale = drawn(machine, rng)
+        softer = drawn(machine, rng)
+        if softer is None:
+            print(name, "no drive is visible", flush=True)
+            continue
+        place, scale = softer
         taps = twin(machine, rng, place.term([scale]))
         found = explain_taps(machine, taps, default_u=DEFAULT)
-        names = [e.candidate for e in found.alike]
-        right = str(place) in names
-        how = "named" if right and len(names) == 1 else "listed" if right else "wrong" if names else "missed"
+        names = [[e.candidate, *(a.candidate for a in e.alike)] for e in found.named]
+        how = "missed" if not names else "wrong" if len(names) > 1 or str(place) not in names[0] else (
+            "named" if len(names[0]) == 1 else "listed"
+        )  # fmt: skip
         tally.setdefault(name, []).append(how)
         problem = TapsProblem(machine, taps, None, DEFAULT)
-        true = _refined(problem, _fitted(problem, place))
+        (true,) = fitted(problem, [(place, scale)]).named
         off.append(
             float(np.log(true.parameters["scale"] / scale) * true.parameters["scale"] / true.u["scale"])
         )

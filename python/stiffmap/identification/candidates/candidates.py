@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.model import effects
@@ -115,7 +116,13 @@ def _plausible(p: Parameter) -> Parameter:
 
 def clash(candidate: Candidate, others: Iterable[Candidate]) -> bool:
     """Whether the candidate and one of the others exclude each other at a place that they share."""
-    legs, excluded = set(candidate.legs), effects.get(candidate.kind).excludes
+    legs = set(candidate.legs)
     shared = (o for o in others if o.element == candidate.element)
     shared = (o for o in shared if not legs or not o.legs or legs & set(o.legs))
-    return any(o.kind in excluded or candidate.kind in effects.get(o.kind).excludes for o in shared)
+    return any(o.kind in _excluded(candidate.kind) or candidate.kind in _excluded(o.kind) for o in shared)
+
+
+@cache
+def _excluded(kind: str) -> Sequence[str]:
+    """Kinds that an effect excludes; a cause of a tap test that is no effect excludes none."""
+    return effects.get(kind).excludes if kind in registry.kinds() else ()

@@ -112,6 +112,8 @@ def reach(p: Parameter) -> float:
 
 def possible(p: Parameter) -> tuple[float, float]:
     """Least and largest value of a parameter (SI) that a machine can have."""
+    if p.plausible:
+        return p.plausible
     null, most = float(p.null or 0.0), LARGEST_ERROR.get(p.unit, np.inf)
     return max(p.lower, null - most), min(p.upper, null + most)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -27,9 +27,13 @@ FIELDS = {"link_mass": "mass", "damper": "damping"}
 TYPICAL = 0.02
 """Damping ratio that a damper of typical size adds to one of the modes."""
 HAMMER = {
-    "hammer_direction": Parameter("angle", "rad", -3.2, 3.2, 0.0, 0.1, "by which the hammer is turned about a base axis"),
-    "hammer_point": Parameter("offset", "m", -5.0, 5.0, 0.0, 0.05, "of the point that is hit, from the TCP, base axes"),
+    "hammer_direction": Parameter("angle", "rad", -3.2, 3.2, 0.0, 0.1, "by which the hammer is turned about a base axis",
+        plausible=(-3.2, 3.2)),
+    "hammer_point": Parameter("offset", "m", -5.0, 5.0, 0.0, 0.05, "of the point that is hit, from the TCP, base axes",
+        plausible=(-5.0, 5.0)),
 }  # fmt: skip
+Causes = Sequence[tuple[Candidate, float]]
+"""Causes with their values, SI."""
 
 
 def causes(problem: TapsProblem) -> list[Candidate]:
@@ -95,14 +99,28 @@ def term(c: Candidate, value: float) -> Term:
     return applied
 
 
-def corrected(machine: Machine, c: Candidate, value: float) -> Machine:
-    """The machine with the cause, an effect as an effect."""
-    if c.kind in KINDS:
-        p = c.parameters[0].name
-        return machine.with_effect(c.kind, element=c.element, legs=list(c.legs) or None, **{p: value})
+def together(causes: Causes) -> Term:
+    """Several causes with their values (SI)."""
+
+    def applied(d: MachineDescription, taps: TapTest) -> tuple[MachineDescription, TapTest]:
+        for c, value in causes:
+            d, taps = term(c, value)(d, taps)
+        return d, taps
+
+    return applied
+
+
+def corrected(machine: Machine, causes: Causes) -> Machine:
+    """The machine with the causes, an effect as an effect."""
     nowhere = np.zeros((0, 3))
     none = TapTest(nowhere, np.zeros(0), np.zeros(0), np.zeros(0), nowhere)
-    return Machine(term(c, value)(machine.description, none)[0], like=machine)
+    for c, value in causes:
+        if c.kind in KINDS:
+            p = c.parameters[0].name
+            machine = machine.with_effect(c.kind, element=c.element, legs=list(c.legs) or None, **{p: value})
+        else:
+            machine = Machine(term(c, value)(machine.description, none)[0], like=machine)
+    return machine
 
 
 def scaled(p: Parameter) -> tuple[Callable[[float], float], float, float]:

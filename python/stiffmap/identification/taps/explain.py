@@ -1,45 +1,51 @@
-"""Which effect explains the frequencies of tap tests, and static readings with them (docs/theory.md V8).
+"""Which effects explain the frequencies of tap tests, and static readings with them: the inference of all other readings.
 
-Every effect that changes stiffness or mass is fitted at every place of the machine. The numbers of the machine file that are
-uncertain move within their uncertainty in every fit, so that none of them passes for a cause.
+Every effect that changes stiffness or mass may be at every place of the machine. A frequency bends with the size of an effect, so each
+place has the changes by several sizes as its shapes (docs/theory.md V8).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from itertools import combinations, pairwise
 from typing import Any
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 from scipy.stats import chi2
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
+from stiffmap.common.one_thread import on_one_thread
 from stiffmap.experiment import Experiment
 from stiffmap.identification.candidates.candidates import Candidate
-from stiffmap.identification.inference.optimum import Optimum, covariance, differences, optimum, possible
-from stiffmap.identification.taps.causes import causes, scaled, term
+from stiffmap.identification.candidates.sensitivity import Variant
+from stiffmap.identification.inference.chosen import Chosen
+from stiffmap.identification.inference.columns import Columns
+from stiffmap.identification.inference.constants import MOST_EFFECTS, ODDS, RARE
+from stiffmap.identification.inference.free import Free
+from stiffmap.identification.inference.names import put_instead, searched
+from stiffmap.identification.inference.optimum import Optimum, covariance
+from stiffmap.identification.inference.places import Place, shape_of
+from stiffmap.identification.inference.verdict import judged
+from stiffmap.identification.numbers.unknowns import Unknown
+from stiffmap.identification.taps.causes import Causes, causes, scaled, together
 from stiffmap.identification.taps.predict import predict_taps
-from stiffmap.identification.taps.problem import LEAST, STEP, STEPS, TapsProblem
+from stiffmap.identification.taps.problem import LEAST, TapsProblem
 from stiffmap.identification.taps.table import TapTest
 from stiffmap.solve.machine import Machine, takes_machine
 
-SIGNIFICANT = 1e-3
-"""Probability with which the best of all candidates may be one where nothing is missing."""
-UNLIKELY = 0.05
-"""Probability below which readings do not fit the machine, and with which a cause that is only the likeliest may be chance."""
-ALIKE = 6.0
-"""Chi-squares of candidates nearer than this cannot be distinguished."""
+PARTS = ("statics", "taps")
 DISAGREE = 3.0
 """Standard deviations between what statics and frequencies say."""
-REFINED = 5
-"""Candidates whose fit leaves the uncertain numbers free."""
-STARTS = (-1.5, -0.7, -0.2, 0.2, 0.7, 1.2, 1.7)
-"""Logarithms of a factor, of which the best begins its fit."""
-SIZES = (-10.0, -3.0, -1.0, 0.05, 1.0, 3.0, 10.0, 30.0)
+FACTORS = (-1.5, -0.8, -0.4, -0.15, 0.15, 0.4, 0.8, 1.3, 1.8, 2.4)
+"""Logarithms of a factor at which its changes are predicted."""
+SIZES = (-10.0, -3.0, -1.0, 1.0, 3.0, 10.0, 30.0)
 """The same of a number whose null is zero, in typical sizes."""
-FEWEST = 16
-"""Candidates that are fitted at least; the others promise less."""
+BETWEEN = 16
+"""Sizes from one of these to the next, both among them."""
 
 
 @dataclass(frozen=True)
@@ -58,41 +64,62 @@ class Explained:
     """The same by frequencies alone."""
     disagreement: float | None = None
     """Standard deviations between the two."""
-    machine: Machine | None = field(default=None, repr=False)
-    off: Floats | None = field(default=None, repr=False)
-    """Uncertain numbers of the fit, in standard uncertainties."""
+    alike: tuple[Explained, ...] = ()
+    """Candidates that the readings cannot distinguish from this one."""
 
     @property
     def candidate(self) -> str:
         """Kind, element and legs in words."""
         return str(self.place)
 
+    @property
+    def value(self) -> float:
+        """SI."""
+        return next(iter(self.parameters.values()))
+
+    @property
+    def sd(self) -> float:
+        """SI."""
+        return next(iter(self.u.values()))
+
+    def by(self, statics: Explained | None = None, taps: Explained | None = None) -> Explained:
+        """With its parameter by static readings alone and by frequencies alone, where there are both and each determines it."""
+        if statics is None or taps is None:
+            return self
+        one, two = statics.value, taps.value
+        sd = float(np.hypot(statics.sd, taps.sd))
+        if not np.isfinite(sd):
+            return self
+        return replace(self, statics=one, taps=two, disagreement=abs(one - two) / sd)
+
 
 @dataclass(frozen=True)
 class TapDiagnosis:
-    """What explains a tap test; `named` is None where nothing has to, or nothing does."""
+    """What explains a tap test; `named` is empty where nothing has to, or nothing does."""
 
     before: float
     """Chi-square of the machine as it is."""
     readings: int
-    named: Explained | None
-    alike: tuple[Explained, ...]
-    """Candidates that the readings cannot distinguish from the best, which is the first."""
+    named: tuple[Explained, ...]
     sentence: str
+    fits: bool
+    """Whether nothing is left unexplained."""
+    machine: Machine | None = field(default=None, repr=False)
+    """With the causes that are named, and the uncertain numbers as they fit."""
 
     def as_plain(self) -> dict[str, Any]:
         """Data of JSON."""
+        shown = ("candidate", "parameters", "u", "chi2", "statics", "taps", "disagreement")
         return {
-            "sentence": self.sentence, "chi2_before": self.before, "readings": self.readings,
-            "named": None if self.named is None else self.named.candidate,
-            "candidates": [
-                {n: getattr(e, n) for n in ("candidate", "parameters", "u", "chi2", "statics", "taps", "disagreement")}
-                for e in self.alike
+            "sentence": self.sentence, "chi2_before": self.before, "readings": self.readings, "fits": self.fits,
+            "named": [
+                {n: getattr(e, n) for n in shown} | {"alike": [a.candidate for a in e.alike]} for e in self.named
             ],
         }  # fmt: skip
 
 
 @takes_machine
+@on_one_thread
 def explain_taps(
     machine: Machine,
     taps: TapTest,
@@ -101,7 +128,7 @@ def explain_taps(
     default_u: float = 0.05,
     only: Sequence[str] | None = None,
 ) -> TapDiagnosis:
-    """The effect that the frequencies of a tap test ask for, with static readings where there are any.
+    """The effects that the frequencies of a tap test ask for, with static readings where there are any.
 
     Parameters
     ----------
@@ -117,35 +144,170 @@ def explain_taps(
     Raises StiffmapError for bad input.
     """
     problem = TapsProblem(machine, taps, statics, default_u)
-    before = problem.settled().chi2
-    n = int(problem.used.sum())
     tried = [c for c in causes(problem) if only is None or c.kind in only]
     if not tried:
         raise StiffmapError(f"only: no candidate of {', '.join(only or ())} on {machine.name}")
-    remarks = _remarks(problem)
-    certain, likely = (chi2.isf(p / len(tried), 1) for p in (SIGNIFICANT, UNLIKELY))
-    found: list[Explained] = []
-    if before >= min(certain, chi2.isf(UNLIKELY, n)):
-        promising = sorted(tried, key=lambda c: -_promise(problem, c))[: max(FEWEST, len(tried) // 3)]
-        first = sorted((e for c in promising if (e := _fitted(problem, c))), key=lambda e: e.chi2)[:REFINED]
-        found = sorted((_refined(problem, e) for e in first), key=lambda e: e.chi2)
-        before = min([before, *(problem.settled(e.off).chi2 for e in found[:2] if e.off is not None)])
-    fall, poor = before - found[0].chi2 if found else 0.0, before >= chi2.isf(UNLIKELY, n)
-    if fall < (likely if poor else certain):
-        lead = "The readings do not fit, and no single effect explains them: chi-square" if poor else (
-            "Nothing is missing that these readings show: chi-square"
+    n, remarks, null = int(problem.used.sum()), _remarks(problem), fitted(problem, [])
+    slopes = problem.slopes[problem.used]
+    declared = Optimum(np.zeros(slopes.shape[1]), problem.residual(), slopes)
+    price = 2.0 * float(np.log(ODDS) + np.log(len(tried)))  # chi-square that an effect must be worth
+    fits = [null]
+
+    def least() -> FittedCauses:
+        noise = max(1.0, min(f.chi2 for f in fits) / n)
+        return min(fits, key=lambda f: f.chi2 + noise * price * len(f.named))
+
+    def search(at: FittedCauses) -> bool:
+        """Whether further causes leave nothing to explain, or explain nothing more."""
+        before = least()
+        fits.extend(fitted(problem, s) for s in _searched(problem, tried, at))
+        # without causes other modes may be paired from here than from the declared machine
+        fits.append(fitted(problem, (), least().lines.x))
+        return least().explains or (at is before and least() is before)
+
+    if null.chi2 > price and not search(replace(null, lines=declared)) and not search(null):
+        while len(least().named) < MOST_EFFECTS and not search(least()):
+            pass
+    best, before = least(), min(f.chi2 for f in fits if not f.named)
+    if not best.named:
+        lead = "Nothing is missing that these readings show" if best.explains else (
+            "The readings do not fit, and no effect explains them"
         )  # fmt: skip
-        return TapDiagnosis(before, n, None, (), f"{lead} {before:.1f} of {n} readings.{remarks}")
-    best = _both(problem, found[0])
-    alike = (best, *(e for e in found[1:] if e.chi2 < best.chi2 + ALIKE))
-    fits = best.chi2 < chi2.isf(SIGNIFICANT, n)
-    lead = "" if fits else "Not explained by one effect; the best is "
-    if fits and fall < certain:
-        lead = (
-            f"The readings do not fit (chi-square {before:.1f} of {n}), nothing is certain; the likeliest is "
-        )
-    said = f"{lead}{_sentence(best, alike, before, n)}{remarks}"
-    return TapDiagnosis(before, n, best if fits and fall >= certain else None, alike, said)
+        text = f"{lead}: chi-square {before:.1f} of {n} readings.{remarks}"
+        return TapDiagnosis(before, n, (), text, best.explains)
+    alike = [f for f in fits if f is not best and f.chi2 < best.chi2 + 2.0 * np.log(ODDS)]
+    parts = [fitted(problem.only(part), best.causes) for part in PARTS] if statics else []
+    named = []
+    for k, e in enumerate(best.named):
+        known = {o.place for o in best.named if o is not e}
+        same = (f for f in alike if len(f.named) == len(best.named) and known < {s.place for s in f.named})
+        steads = {s.place: s for f in same for s in f.named if s.place not in {*known, e.place}}
+        instead = tuple(sorted(steads.values(), key=lambda s: s.chi2))
+        named.append(replace(e.by(*(f.named[k] for f in parts)), alike=instead))
+    lead = "" if best.explains else "Not all is explained; "
+    text = f"{lead}{_sentence(named, before, best.chi2, n)}{remarks}"
+    return TapDiagnosis(before, n, tuple(named), text, best.explains, best.machine)
+
+
+@dataclass(frozen=True, eq=False)
+class FittedCauses:
+    """A set of causes, fitted together with the uncertain numbers."""
+
+    named: tuple[Explained, ...]
+    chi2: float
+    machine: Machine
+    lines: Optimum
+    """Where the uncertain numbers (k,) are, the residual (n,) there, and its change (n, k) by each, with the causes as they are."""
+    own: Floats
+    """(n, causes) change of the residual by each cause."""
+
+    @property
+    def explains(self) -> bool:
+        """Whether chi-square is no larger than chance lets it be."""
+        return bool(chi2.sf(self.chi2, len(self.lines.residual)) > RARE)
+
+    @property
+    def causes(self) -> Causes:
+        """SI."""
+        return [(e.place, e.value) for e in self.named]
+
+
+def _searched(problem: TapsProblem, tried: Sequence[Candidate], at: FittedCauses) -> list[Causes]:
+    """Further causes that have a name where readings follow the uncertain numbers along straight lines from a fit, and what would
+    do in the stead of each; all of them, and some, with the causes of the fit and without."""
+    columns = _columns(problem, tried, at)
+
+    def predict(chosen: Sequence[Chosen]) -> Floats:
+        try:
+            there = problem.residual(together([*at.causes, *_values(chosen)]), at.lines.x)
+            return columns.rotated(there - at.lines.residual)
+        except StiffmapError:
+            return np.full(len(columns), np.nan)
+
+    search = searched(columns, predict)
+    named = judged(columns, search).named
+    own = _values([n.chosen for n in named])
+    sets = [own]
+    for k, n in enumerate(named):
+        instead = _values([put_instead(search.best.fit, n.chosen, p) for p in n.equivalents])
+        sets += [[*own[:k], v, *own[k + 1 :]] for v in instead]
+    some = (part for s in sets for k in range(1, len(s) + 1) for part in combinations(s, k))
+    both = (s for part in some for s in (part, (*at.causes, *part)))
+    return list({frozenset(c for c, _ in s): s for s in both}.values())
+
+
+def _columns(problem: TapsProblem, tried: Sequence[Candidate], at: FittedCauses) -> Columns:
+    """The readings, by their noise, as the inference takes them."""
+    lines, taken = at.lines, [c for c, _ in at.causes]
+    m = len(lines.residual)
+    spared = Free.across(np.linalg.qr(at.own)[0], np.eye(m))  # causes of the fit move with further ones
+    free = spared.matrix
+    residual = free.T @ (lines.jacobian @ lines.x - lines.residual)
+    bare = Columns.bare(problem.plan, problem.row[problem.used], np.zeros(m, np.intp), spared, residual)
+    unknowns = tuple(Unknown(key, key.rpartition("/")[2], "", u) for key, _, u in problem.numbers)
+    found = (_place(problem, c, at, free) for c in tried if c not in taken)
+    places = tuple(p for p in found if p.shapes)
+    return replace(bare, unknowns=unknowns, numbers=free.T @ lines.jacobian, places=places)
+
+
+def _place(problem: TapsProblem, c: Candidate, at: FittedCauses, free: Floats) -> Place:
+    """A candidate with the changes of the readings by its sizes, predicted at some and interpolated between them."""
+    lines = at.lines
+    p, (to, low, high) = c.parameters[0], scaled(c.parameters[0])
+    changes = {0.0: np.zeros(len(lines.residual))}
+    for t in FACTORS if p.null == 1.0 else SIZES:
+        with suppress(StiffmapError):
+            if low < t < high:
+                there = together([*at.causes, (c, to(t))])
+                changes[t] = problem.residual(there, lines.x) - lines.residual
+    knots = sorted(changes)
+    sizes = np.unique([np.linspace(*ends, BETWEEN) for ends in pairwise(knots)])
+    found = CubicSpline(knots, [changes[t] for t in knots])(sizes) if len(knots) > 1 else ()
+    shapes = []
+    for t, change in zip(sizes, found, strict=True):
+        step = (to(float(t)) - float(p.null or 0.0)) / p.scale
+        if step:
+            line = change[None] / step
+            shapes.append(shape_of(Variant(c, line, np.array([np.sign(step)])), free.T @ line.T))
+    return Place(c, tuple(s for s in shapes if s is not None))
+
+
+def _values(chosen: Sequence[Chosen]) -> Causes:
+    """Causes with their values, SI, within their bounds."""
+    every = ((c.place.candidate, *c.strengths[0]) for c in chosen)
+    return [(cause, float(np.clip(value, p.lower, p.upper))) for cause, p, value in every]
+
+
+def fitted(problem: TapsProblem, begin: Causes, off: Floats | None = None) -> FittedCauses:
+    """Causes near their values with the uncertain numbers free, which are not taken to be small."""
+    scales = [scaled(c.parameters[0]) for c, _ in begin]
+
+    def at(x: Floats) -> Causes:
+        return [(c, to(float(t))) for (c, _), (to, *_), t in zip(begin, scales, x, strict=True)]
+
+    fit = problem.settled(
+        [_free(c, value) for c, value in begin],
+        lambda x: together(at(x)),
+        [low for _, low, _ in scales],
+        [high for *_, high in scales],
+        off,
+    )
+    k, n = len(begin), int(problem.used.sum())
+    found = []
+    for (c, value), variance in zip(at(fit.x[:k]), np.diag(covariance(fit.jacobian)[0])[:k], strict=True):
+        p = c.parameters[0]
+        u = float(np.sqrt(variance)) * (value if p.null == 1.0 else p.scale)
+        found.append(Explained(c, {p.name: value}, {p.name: u}, fit.chi2))
+    machine, _ = problem.real(together(at(fit.x[:k])), fit.x[k:])
+    slopes = fit.jacobian[:n]
+    lines = Optimum(fit.x[k:], fit.residual[:n], slopes[:, k:])
+    return FittedCauses(tuple(found), fit.chi2, machine, lines, slopes[:, :k])
+
+
+def _free(c: Candidate, value: float) -> float:
+    """The number of a fit behind a value: its logarithm where it is a factor."""
+    p = c.parameters[0]
+    return float(np.log(value)) if p.null == 1.0 else value / p.scale
 
 
 def _remarks(problem: TapsProblem) -> str:
@@ -172,81 +334,21 @@ def _remarks(problem: TapsProblem) -> str:
     return text
 
 
-def _sentence(best: Explained, alike: tuple[Explained, ...], before: float, n: int) -> str:
-    values = ", ".join(f"{k} = {v:.4g} ± {best.u[k]:.2g}" for k, v in best.parameters.items())
-    text = f"{best.candidate}: {values}; chi-square {before:.1f} before, {best.chi2:.1f} after, {n} readings."
-    if len(alike) > 1:
-        text += f" These readings cannot distinguish it from: {'; '.join(e.candidate for e in alike[1:])}."
-    off = best.disagreement
-    if off is not None and off > DISAGREE:
-        text += (
-            f" Statics and frequencies disagree by {off:.1f} standard deviations (statics {best.statics:.4g}, frequencies "
-            f"{best.taps:.4g}): friction, preload, or a servo that holds what creeps at rest."
-        )
-    elif off is not None:
-        text += f" Statics and frequencies agree ({off:.1f} standard deviations)."
+def _sentence(named: Sequence[Explained], before: float, after: float, n: int) -> str:
+    sizes = [f"{e.candidate}: {k} = {v:.4g} ± {e.u[k]:.2g}" for e in named for k, v in e.parameters.items()]
+    text = f"{'; '.join(sizes)}; chi-square {before:.1f} before, {after:.1f} after, {n} readings."
+    for e in named:
+        it = "it" if len(named) == 1 else e.candidate
+        if e.alike:
+            text += (
+                f" These readings cannot distinguish {it} from: {'; '.join(a.candidate for a in e.alike)}."
+            )
+        on = "" if it == "it" else f" on {it}"
+        if e.disagreement is not None and e.disagreement > DISAGREE:
+            text += (
+                f" Statics and frequencies disagree{on} by {e.disagreement:.1f} standard deviations (statics {e.statics:.4g}, "
+                f"frequencies {e.taps:.4g}): friction, preload, or a servo that holds what creeps at rest."
+            )
+        elif e.disagreement is not None:
+            text += f" Statics and frequencies agree{on} ({e.disagreement:.1f} standard deviations)."
     return text
-
-
-def _promise(problem: TapsProblem, c: Candidate) -> float:
-    """Fall of chi-square that one small step promises, to first order."""
-    rows, W = problem.whitener()
-    r0 = W @ problem.residual()[rows]
-    try:
-        slope = (W @ problem.residual(term(c, scaled(c.parameters[0])[0](0.1)))[rows] - r0) / 0.1
-    except StiffmapError:
-        return -1.0
-    size = float(slope @ slope)
-    return float(slope @ r0) ** 2 / size if size > 0 else -1.0
-
-
-def _fitted(problem: TapsProblem, c: Candidate, part: str = "") -> Explained | None:
-    """With uncertain numbers to first order; None where the readings do not identify it."""
-    p = c.parameters[0]
-    to, low, high = scaled(p)
-    rows, W = problem.whitener(part)
-
-    def residual(t: Floats) -> Floats:
-        return np.asarray(W @ problem.residual(term(c, to(float(t[0]))))[rows])
-
-    starts = [t for t in (STARTS if p.null == 1.0 else SIZES) if low < t < high] or [low]
-    least, start = min((float((possible(residual, np.array([t]), 1) ** 2).sum()), t) for t in starts)
-    if not np.isfinite(least):
-        return None
-    bounds = np.array([low]), np.array([high])
-    fit = optimum(residual, np.array([start]), bounds, lambda t: differences(residual, t, STEP), STEPS)
-    found = _explained(problem, c, fit)
-    return found if np.isfinite(found.u[p.name]) else None
-
-
-def _refined(problem: TapsProblem, e: Explained) -> Explained:
-    """The fit again with the uncertain numbers as unknowns of their own, which are not taken to be small."""
-    p = e.place.parameters[0]
-    to, low, high = scaled(p)
-    value = e.parameters[p.name]
-    start = np.log(value) if p.null == 1.0 else value / p.scale
-    begin = np.r_[start, np.zeros(len(problem.numbers))]
-    return _explained(problem, e.place, problem.settled(begin, lambda t: term(e.place, to(t)), (low, high)))
-
-
-def _explained(problem: TapsProblem, c: Candidate, fit: Optimum) -> Explained:
-    """A candidate where the first number of a fit is its own, and further ones are the uncertain numbers."""
-    p, off = c.parameters[0], fit.x[1:]
-    value = scaled(p)[0](float(fit.x[0]))
-    u = float(np.sqrt(covariance(fit.jacobian)[0][0, 0])) * (value if p.null == 1.0 else p.scale)
-    machine, _ = problem.real(term(c, value), off)
-    return Explained(c, {p.name: value}, {p.name: u}, fit.chi2, machine=machine, off=off)
-
-
-def _both(problem: TapsProblem, best: Explained) -> Explained:
-    """The same parameter by statics alone and by frequencies alone."""
-    if problem.statics is None:
-        return best
-    one, two = _fitted(problem, best.place, "statics"), _fitted(problem, best.place, "taps")
-    if one is None or two is None:
-        return best
-    name = best.place.parameters[0].name
-    a, b = one.parameters[name], two.parameters[name]
-    return replace(
-        best, statics=a, taps=b, disagreement=abs(a - b) / float(np.hypot(one.u[name], two.u[name]))
-    )

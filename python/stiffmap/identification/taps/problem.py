@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.experiment import Experiment
@@ -69,11 +69,18 @@ class TapsProblem:
         of_frequency = np.sqrt((t.u / t.frequency) ** 2 + real**4 + merged**2)
         self.noise = np.concatenate([of_frequency, of_damping, of_shape])
         self.kind = np.repeat(["frequency", "damping", "flexibility"], [len(t), len(t), 3 * len(t)])
+        each, at, wrench = np.arange(len(t)), t.position, np.zeros((len(t), 6))
+        self.row = np.concatenate([each, each, each.repeat(3)])
         if self.statics is not None:
             at_first = Predictor(self.machine, self.statics)(())
             self.keep = self.statics.read & np.isfinite(at_first)
             self.noise = np.concatenate([self.noise, noise_of(self.statics).sigma[self.keep]])
             self.kind = np.concatenate([self.kind, ["statics"] * int(self.keep.sum())])
+            self.row = np.concatenate([self.row, len(t) + np.nonzero(self.keep)[0]])
+            at, wrench = np.vstack([at, self.statics.position]), np.vstack([wrench, self.statics.wrench])
+        none, ids = np.zeros_like(wrench), tuple(map(str, range(len(at))))
+        self.plan = Experiment("taps", self.machine.name, "deflection", ids, at, wrench, none, none + 1.0)
+        """Rows of taps, then of statics."""
         base = self._raw(self.machine, t)
         self.used = np.isfinite(base) & np.isfinite(self.noise)
         columns = []
@@ -113,30 +120,31 @@ class TapsProblem:
         raw = self._raw(*self.real(term, off))
         return np.asarray(np.where(np.isfinite(raw), raw, LOST)[self.used] / self.noise[self.used])
 
-    def whitener(self, part: str = "") -> tuple[NDArray[np.bool_], Floats]:
-        """Rows (mask) of a part of the readings (``taps``, ``statics``, all), and what whitens them to first order."""
-        tap = self.kind[self.used] != "statics"
-        rows = tap if part == "taps" else ~tap if part == "statics" else np.ones(len(tap), np.bool_)
-        J = self.slopes[self.used][rows]
-        return rows, np.linalg.inv(np.linalg.cholesky(np.eye(len(J)) + J @ J.T))
+    def only(self, part: str) -> TapsProblem:
+        """The problem with a part of the readings: ``taps`` or ``statics``."""
+        out = copy(self)
+        out.used = self.used & ((self.kind == "statics") == (part == "statics"))
+        return out
 
     def settled(
         self,
-        start: Floats | None = None,
-        cause: Callable[[float], Term] | None = None,
-        bounds: tuple[float, float] = (0.0, 0.0),
+        start: Sequence[float] = (),
+        cause: Callable[[Floats], Term] | None = None,
+        low: Sequence[float] = (),
+        high: Sequence[float] = (),
+        off: Floats | None = None,
     ) -> Optimum:
-        """Least chi-square near a start (numbers,) with the uncertain numbers free within their uncertainty; or (1 + numbers,), where
-        a cause with a free number between bounds is the first."""
-        k, free = len(self.numbers), int(cause is not None)
+        """Least chi-square with the uncertain numbers free within their uncertainty, near `off` (numbers,); the first numbers are those
+        of a cause, if any, near their start (k,) and between bounds (k,)."""
+        free, most = len(start), np.full(len(self.numbers), WIDEST)
 
         def both(x: Floats) -> Floats:
-            term = cause(float(x[0])) if cause else None
+            term = cause(x[:free]) if cause else None
             return np.concatenate([self.residual(term, x[free:]), x[free:]])
 
-        low, high = (np.r_[[b] * free, np.full(k, s * WIDEST)] for b, s in zip(bounds, (-1, 1), strict=True))
-        begin = np.zeros(k) if start is None else start
-        return optimum(both, begin, (low, high), lambda x: differences(both, x, STEP), STEPS)
+        bounds = np.r_[low, -most], np.r_[high, most]
+        begin = np.r_[start, np.zeros(len(most)) if off is None else off]
+        return optimum(both, begin, bounds, lambda x: differences(both, x, STEP), STEPS)
 
 
 def uncertain_numbers(d: MachineDescription, default_u: float) -> list[tuple[str, float, float]]:

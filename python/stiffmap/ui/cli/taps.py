@@ -55,7 +55,7 @@ def command(
     files = write_files(output, _files(m, measured, found))
     data = {"machine": m.name, **found.as_plain(), "modes": rows}
     show(as_json, data, [found.sentence, *map(_row, rows)], files)
-    finish(bool(found.alike) or not found.sentence.startswith("Nothing"))
+    finish(bool(found.named) or not found.fits)
 
 
 def _row(r: dict[str, Any]) -> str:
@@ -72,8 +72,7 @@ def _row(r: dict[str, Any]) -> str:
 def compared(machine: Any, measured: TapTest, found: TapDiagnosis) -> list[dict[str, Any]]:
     """A row per mode: measured, before and after."""
     before = predict_taps(machine, measured)
-    real = found.alike[0].machine if found.alike else None
-    after = None if real is None else predict_taps(real, measured)
+    after = None if found.machine is None else predict_taps(found.machine, measured)
     return [
         {
             "at_mm": (1e3 * measured.position[i]).tolist(), "measured_Hz": float(measured.frequency[i]),
@@ -94,8 +93,8 @@ def _files(machine: Any, measured: TapTest, found: TapDiagnosis) -> Iterator[tup
     f = np.geomspace(0.3 * measured.frequency.min(), 2 * measured.frequency.max(), 600)
     at = measured.position[0]
     many = {"before": frequency_response(machine, at, f)}
-    named = found.named
-    if named is not None and named.machine is not None and not named.place.kind.startswith("hammer"):
-        many["after"] = frequency_response(named.machine, at, f)
-        yield "corrected.yaml", corrected(machine, named.place, next(iter(named.parameters.values())))
+    own = [(e.place, e.value) for e in found.named if not e.place.kind.startswith("hammer")]
+    if own and found.machine is not None:
+        many["after"] = frequency_response(found.machine, at, f)
+        yield "corrected.yaml", corrected(machine, own)
     yield "response.png", response_figure(many)

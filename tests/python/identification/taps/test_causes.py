@@ -32,7 +32,7 @@ def explained(name, change, folder, **how):
 def test_a_machine_as_declared_gets_no_cause(name, tmp_path):
     """Also where one hammer finds several modes as one, as on machines with legs alike."""
     found = explained(name, lambda m: m, tmp_path, seed=1)
-    assert found.named is None and found.alike == () and "Nothing is missing" in found.sentence
+    assert found.named == () and found.fits and "Nothing is missing" in found.sentence
 
 
 @pytest.mark.parametrize(
@@ -45,9 +45,11 @@ def test_a_machine_as_declared_gets_no_cause(name, tmp_path):
 )
 def test_a_heavier_link_is_named_or_listed(name, body, mass, tmp_path):
     found = explained(name, lambda m: heavier(m, body, mass), tmp_path)
-    own = next(e for e in found.alike if e.candidate == "link_mass of {1}, leg {0}".format(*body.split(".")))
-    assert own.parameters["mass"] == pytest.approx(mass, abs=3 * own.u["mass"])
-    assert found.named is not None and "Nothing is missing" not in found.sentence
+    (named,) = found.named
+    candidate = "link_mass of {1}, leg {0}".format(*body.split("."))
+    own = next(e for e in (named, *named.alike) if e.candidate == candidate)
+    assert own.value == pytest.approx(mass, abs=3 * own.u["mass"])
+    assert "Nothing is missing" not in found.sentence
 
 
 @pytest.mark.parametrize(
@@ -56,8 +58,9 @@ def test_a_heavier_link_is_named_or_listed(name, body, mass, tmp_path):
 )
 def test_a_damper_is_named(name, joint, damping, tmp_path):
     found = explained(name, lambda m: damped(m, joint, damping), tmp_path)
-    assert found.named is not None and found.named.candidate == f"damper of {joint[4:]}, leg arm"
-    assert found.named.parameters["damping"] == pytest.approx(damping, abs=3 * found.named.u["damping"])
+    (named,) = found.named
+    assert named.candidate == f"damper of {joint[4:]}, leg arm"
+    assert named.value == pytest.approx(damping, abs=3 * named.u["damping"])
     assert "times the declared" in found.sentence
 
 
@@ -73,9 +76,10 @@ def test_a_damper_is_named(name, joint, damping, tmp_path):
 )
 def test_a_hammer_that_was_held_otherwise_is_named(name, how, cause, value, tmp_path):
     found = explained(name, lambda m: m, tmp_path, **how)
-    own = next(e for e in found.alike if e.candidate == cause)
-    (number,), (u,) = own.parameters.values(), own.u.values()
-    assert found.named is not None and number == pytest.approx(value, abs=3 * u)
+    (named,) = found.named
+    own = next(e for e in (named, *named.alike) if e.candidate == cause)
+    (u,) = own.u.values()
+    assert own.value == pytest.approx(value, abs=3 * u)
 
 
 def test_typed_damping_is_compared(tmp_path, capsys):
