@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from stiffmap.model.description import (
-    Block,
     Body,
     Cable,
     Element,
@@ -62,8 +61,6 @@ bodies = named(lambda e: isinstance(e, Body))
 """Bodies."""
 offsets = named(lambda e: isinstance(e, Offset) and bool(np.any(e.nominal.p)))
 """Offsets that are longer than zero."""
-blocks = named(lambda e: isinstance(e, Block) and len(e.branches) == 2)
-"""Parallel blocks of two branches."""
 
 
 def elastic_directions(elements: Elements) -> dict[str, tuple[int, ...]]:

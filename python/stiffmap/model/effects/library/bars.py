@@ -11,19 +11,18 @@ from numpy.typing import NDArray
 
 from stiffmap.model.description import Block, Branch, Element, Joint, Offset
 from stiffmap.model.description.tree import Elements
-from stiffmap.model.effects.edit import Sites
-from stiffmap.model.effects.sites import blocks, each
+from stiffmap.model.effects.sites import each, named
 from stiffmap.model.effects.types import Placed
 
 
-def spread_blocks(elements: Elements) -> dict[str, tuple[int, ...]]:
-    """Blocks of two branches that begin with different offsets: the pins stand apart."""
-    return {n: at for n, at in blocks(elements).items() if all(_stands_apart(elements[i]) for i in at)}
-
-
-def _stands_apart(e: Element) -> bool:
-    assert isinstance(e, Block)
-    return all(_ends(b) is not None for b in e.branches) and bool(np.linalg.norm(width(e)) > 0.0)
+def stands_apart(e: Element) -> bool:
+    """Whether it is a block of two branches that begin with different offsets: the pins stand apart."""
+    return (
+        isinstance(e, Block)
+        and len(e.branches) == 2
+        and all(_ends(b) is not None for b in e.branches)
+        and bool(np.linalg.norm(width(e)) > 0.0)
+    )
 
 
 def _ends(b: Branch) -> tuple[int, int] | None:
@@ -54,13 +53,14 @@ def _offset(b: Branch, end: str) -> NDArray[np.float64]:
 
 
 def on_branches(
-    change: Callable[[Block, Branch, float, Placed], Branch], sites: Sites = spread_blocks
+    change: Callable[[Block, Branch, float, Placed], Branch],
+    match: Callable[[Element], bool] = stands_apart,
 ) -> dict[str, Any]:
-    """``places`` and ``apply`` of an effect that changes both branches, with the share -1/2 for the first and +1/2 for
-    the second."""
+    """``places`` and ``apply`` of an effect that changes both branches of the blocks that match, with the share -1/2 for
+    the first and +1/2 for the second."""
 
     def block(e: Block, placed: Placed) -> Elements:
         pairs = zip(e.branches, (-0.5, 0.5), strict=True)
         return (replace(e, branches=tuple(change(e, b, share, placed) for b, share in pairs)),)
 
-    return each(sites, block)
+    return each(named(match), block)
