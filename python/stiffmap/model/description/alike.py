@@ -10,7 +10,7 @@ from functools import lru_cache
 from stiffmap.model.description.elements import Block, Body, Cable, Element, Joint, Offset, Point, Spring
 from stiffmap.model.description.laws import Law
 from stiffmap.model.description.machine import MachineDescription
-from stiffmap.model.description.tree import Elements, edit_all, edit_elements
+from stiffmap.model.description.tree import Elements, chains, edit_all, edit_elements
 
 KEPT = 128
 """Sequences whose geometry is kept: variants of a machine share most of theirs."""
@@ -19,9 +19,8 @@ KEPT = 128
 def nominal_geometry(description: MachineDescription) -> Hashable:
     """Equal for machines whose joints close at the same places: they differ in springs, laws, masses and errors only."""
     d = description
-    parts = (_nominal_elements(d.base), _nominal_elements(d.platform))
-    legs = tuple((leg.name, _nominal_elements(leg.elements)) for leg in d.legs)
-    return *parts, legs, d.home, d.search_home, d.task, d.workspace
+    parts = tuple((name, _nominal_elements(elements)) for name, elements in chains(d))
+    return parts, d.home, d.search_home, d.task, d.workspace
 
 
 def straight(description: MachineDescription) -> MachineDescription:
