@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from stiffmap.model.description import (
-    Block,
     Body,
     CommandError,
     Element,
@@ -25,7 +25,7 @@ from stiffmap.model.description import (
     Spring,
 )
 from stiffmap.model.description.strokes import as_rows
-from stiffmap.model.description.tree import Elements, edit_all
+from stiffmap.model.description.tree import Elements, edit_all, edit_named
 from stiffmap.model.effects import apply_records
 from stiffmap.model.effects.edit import built as as_built
 from stiffmap.model.effects.library.geometry import about, home_position
@@ -53,20 +53,13 @@ def edited(
         of.setdefault(name, {})[what] = of.get(name, {}).get(what, 0.0) + value
     for name, knots in (travel or {}).items():
         of.setdefault(name, {})["travel"] = knots
-    built = edit_all(bare, lambda elements, name: _sequence(elements, name, of, end=name != "base"))
+    built = edit_all(bare, lambda elements, name: edit_named(elements, name, partial(_sequence, of=of)))
     return apply_records(built, description.effects)
 
 
-def _sequence(elements: Elements, path: str, of: Mapping[str, Mapping[str, Any]], end: bool) -> Elements:
+def _sequence(elements: Elements, path: str, of: Mapping[str, Mapping[str, Any]]) -> Elements:
     out: list[Element] = []
     for e in elements:
-        if isinstance(e, Block):
-            branches = tuple(
-                replace(b, elements=_sequence(b.elements, f"{path}.{b.name}", of, end=False))
-                for b in e.branches
-            )
-            out.append(replace(e, branches=branches))
-            continue
         change = of.get(f"{path}.{e.name}", {})
         if isinstance(e, Joint) and any(k in change for k in FRAME):
             frame = _pose(change)
@@ -74,7 +67,7 @@ def _sequence(elements: Elements, path: str, of: Mapping[str, Mapping[str, Any]]
             out.append(as_built(f"{e.name}_frame", Pose.of(turned.p + frame.p, frame.r)))
         out.append(_changed(e, change))
     last = of.get(f"{path}.{END}")
-    if end and last is not None:
+    if last is not None and path != "base" and "." not in path:
         out.append(as_built(f"{path}_{END}", _pose(last)))
     return tuple(out)
 

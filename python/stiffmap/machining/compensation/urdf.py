@@ -79,14 +79,14 @@ def _origins(description: MachineDescription, model: UrdfModel) -> tuple[dict[st
             after = after @ e.nominal
     said = re.search(r" to (\S+)", description.source)  # the tip, as the import writes it
     for joint in model.way(said[1] if said else ""):
-        if joint.name not in out and joint.kind == "fixed" and joint.parent == model.joint([*out][-1]).child:
+        if joint.name not in out and joint.kind == "fixed" and joint.parent == model.joints[[*out][-1]].child:
             out[joint.name], after = after, Pose()
     return out, after
 
 
 def _check(description: MachineDescription, model: UrdfModel, declared: dict[str, Pose]) -> None:
     """FileError where the declared origins are not those of the file on the way to the last joint."""
-    way = model.way(model.joint([*declared][-1]).child)
+    way = model.way(model.joints[[*declared][-1]].child)
     moving = [e.name for e, _, _ in serial_joints(description)[0]]
     for joint in way:
         if joint.kind != "fixed" and plain_name(joint.name) not in moving:

@@ -58,14 +58,9 @@ def single_addresses(description: MachineDescription, address: str) -> list[str]
 
 def _numbers(description: MachineDescription, address: str) -> dict[str, Field]:
     """The numbers that an address stands for, each by its own address; StiffmapError where there are none."""
-    whole = dict(machine_fields(description))
-    if address in whole:
-        return {address: whole[address]}
     name, field = split(address)
-    there = {
-        f"{full}/{field}": _number(description, _place(description, full, field), field)
-        for full in full_names(description, name)
-    }
+    names = [name] if address in dict(machine_fields(description)) else full_names(description, name)
+    there = {f"{n}/{field}": _number(description, _place(description, n, field), field) for n in names}
     found = {one: number for one, number in there.items() if number is not None}
     if not found:
         raise StiffmapError(_unknown(description, address, name, field))
@@ -73,10 +68,6 @@ def _numbers(description: MachineDescription, address: str) -> dict[str, Field]:
 
 
 def _with_value(description: MachineDescription, address: str, value: float) -> MachineDescription:
-    whole = dict(machine_fields(description))
-    if address in whole:
-        changed_machine: MachineDescription = whole[address].put(value)
-        return changed_machine
     changed: set[str] = set()
     for full, field in map(split, _numbers(description, address)):
         place = _place(description, full, field)
@@ -96,7 +87,8 @@ def _place(description: MachineDescription, full: str, field: str) -> str:
 
 
 def _number(description: MachineDescription, full: str, field: str) -> Field | None:
-    return number_at(description, full, partial(field_of, key=field))
+    of_machine = dict(machine_fields(description)).get(f"{full}/{field}")
+    return of_machine or number_at(description, full, partial(field_of, key=field))
 
 
 def _unknown(description: MachineDescription, address: str, name: str, field: str) -> str:

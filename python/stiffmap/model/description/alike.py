@@ -3,14 +3,14 @@ that of the other (docs/fast_path.md F10)."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+from collections.abc import Hashable
 from dataclasses import replace
 from functools import lru_cache
 
 from stiffmap.model.description.elements import Block, Body, Cable, Element, Joint, Offset, Point, Spring
 from stiffmap.model.description.laws import Law
 from stiffmap.model.description.machine import MachineDescription
-from stiffmap.model.description.tree import Elements, edit_all, edit_elements
+from stiffmap.model.description.tree import ENDS, Elements, chains, edit_all, edit_elements
 
 KEPT = 128
 """Sequences whose geometry is kept: variants of a machine share most of theirs."""
@@ -19,9 +19,8 @@ KEPT = 128
 def nominal_geometry(description: MachineDescription) -> Hashable:
     """Equal for machines whose joints close at the same places: they differ in springs, laws, masses and errors only."""
     d = description
-    parts = (_nominal_elements(d.base), _nominal_elements(d.platform))
-    legs = tuple((leg.name, _nominal_elements(leg.elements)) for leg in d.legs)
-    return *parts, legs, d.home, d.search_home, d.task, d.workspace
+    parts = tuple((name, _nominal_elements(elements)) for name, elements in chains(d))
+    return parts, d.home, d.search_home, d.task, d.workspace
 
 
 def straight(description: MachineDescription) -> MachineDescription:
@@ -68,16 +67,13 @@ def alike(one: MachineDescription, other: MachineDescription, *, heavy: bool) ->
     if _whole(one) != _whole(other) or len(one.legs) != len(other.legs):
         return False
     shared = len(one.legs) > 1 and any(isinstance(e, (Spring, Joint, Block)) for e in one.base)
-    pairs = [(a.elements, b.elements) for a, b in zip(one.legs, other.legs, strict=True)]
 
-    def same(a: Elements, b: Elements, of: Callable[[Elements, bool], Hashable] = _solid) -> bool:
+    def same(a: Elements, b: Elements, name: str) -> bool:
+        of = _standing if shared and name not in ENDS else _solid
         return a is b or of(a, heavy) == of(b, heavy)
 
-    return (
-        same(one.base, other.base)
-        and same(one.platform, other.platform)
-        and all(same(a, b, _standing if shared else _solid) for a, b in pairs)
-    )
+    pairs = zip(chains(one), chains(other), strict=True)
+    return all(same(a, b, name) for (name, a), (_, b) in pairs)
 
 
 def _whole(d: MachineDescription) -> tuple[object, ...]:

@@ -8,17 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import TypeVar
 
-from stiffmap.model.description.elements import Block, Body, Branch, Element, Joint, Offset, Point
-from stiffmap.model.description.machine import Leg, MachineDescription
+from stiffmap.model.description.elements import Block, Body, Element, Joint, Offset, Point
+from stiffmap.model.description.machine import MachineDescription
 
 Elements = tuple[Element, ...]
 Edit = Callable[[Elements], Elements]
 Change = Callable[[Element], Element | None]
 """None: the element stays as it is."""
 ENDS = ("base", "platform")
-Holder = TypeVar("Holder", Leg, Branch)
 
 
 def walk(elements: Elements, name: str) -> Iterator[tuple[str, Element]]:
@@ -30,12 +28,16 @@ def walk(elements: Elements, name: str) -> Iterator[tuple[str, Element]]:
                 yield from walk(branch.elements, f"{name}.{branch.name}")
 
 
+def chains(description: MachineDescription) -> list[tuple[str, Elements]]:
+    """The base, each leg and the platform, with their names."""
+    legs = [(leg.name, leg.elements) for leg in description.legs]
+    return [("base", description.base), *legs, ("platform", description.platform)]
+
+
 def all_elements(description: MachineDescription) -> Iterator[tuple[str, Element]]:
     """Every element of a machine with its full name, from base to platform."""
-    yield from walk(description.base, "base")
-    for leg in description.legs:
-        yield from walk(leg.elements, leg.name)
-    yield from walk(description.platform, "platform")
+    for name, elements in chains(description):
+        yield from walk(elements, name)
 
 
 def point_names(description: MachineDescription) -> list[str]:
@@ -85,16 +87,23 @@ def sequences(elements: Elements) -> Iterator[Elements]:
                 yield from sequences(branch.elements)
 
 
-def edit_sequences(elements: Elements, edit: Edit) -> Elements:
-    """The sequence with ``edit`` applied to it and to those of the branches in it."""
+def edit_named(elements: Elements, name: str, edit: Callable[[Elements, str], Elements]) -> Elements:
+    """The sequence with ``edit`` applied to it and to those of the branches in it, each with its full name."""
 
     def inside(element: Element) -> Element:
         if not isinstance(element, Block):
             return element
-        branches = tuple(replace(b, elements=edit_sequences(b.elements, edit)) for b in element.branches)
-        return replace(element, branches=branches)
+        branches = (
+            replace(b, elements=edit_named(b.elements, f"{name}.{b.name}", edit)) for b in element.branches
+        )
+        return replace(element, branches=tuple(branches))
 
-    return edit(tuple(inside(element) for element in elements))
+    return edit(tuple(inside(element) for element in elements), name)
+
+
+def edit_sequences(elements: Elements, edit: Edit) -> Elements:
+    """The same with an ``edit`` that asks for no names."""
+    return edit_named(elements, "", lambda sequence, name: edit(sequence))
 
 
 def edit_elements(elements: Elements, change: Callable[[Element], Element]) -> Elements:
@@ -115,35 +124,22 @@ def edit_all(
 
 def edit_path(elements: Elements, path: str, change: Change) -> Elements | None:
     """The sequence with the elements of a name (branches, then element) changed; None: nothing was."""
-    first, _, rest = path.partition(".")
-    out, hit = list(elements), False
-    for i, element in enumerate(elements):
-        new: Element | None = None
-        if element.name == path:
-            new = change(element)
-        elif rest and isinstance(element, Block):
-            branches = _edit_one(element.branches, first, rest, change)
-            new = None if branches is None else replace(element, branches=branches)
-        if new is not None:
-            out[i], hit = new, True
-    return tuple(out) if hit else None
+    changed = False
 
+    def edit(sequence: Elements, name: str) -> Elements:
+        nonlocal changed
+        new = [change(e) if f"{name}.{e.name}" == f".{path}" else None for e in sequence]
+        changed |= any(new)
+        return tuple(e or old for e, old in zip(new, sequence, strict=True))
 
-def _edit_one(among: tuple[Holder, ...], name: str, path: str, change: Change) -> tuple[Holder, ...] | None:
-    """Legs, or branches, with the elements of a name in one of them changed; None: nothing was."""
-    edited = {one.name: edit_path(one.elements, path, change) for one in among if one.name == name}
-    if not any(edited.values()):
-        return None
-    return tuple(replace(one, elements=edited.get(one.name) or one.elements) for one in among)
+    edited = edit_named(elements, "", edit)
+    return edited if changed else None
 
 
 def edit(description: MachineDescription, full: str, change: Change) -> MachineDescription | None:
     """The machine with the elements of a full name changed; None: there are none that ``change`` changes."""
-    sequence, _, path = full.partition(".")
-    if sequence in ENDS:
-        end = edit_path(getattr(description, sequence), path, change)
-        if end is None:
-            return None
-        return replace(description, base=end) if sequence == "base" else replace(description, platform=end)
-    legs = _edit_one(description.legs, sequence, path, change)
-    return None if legs is None else replace(description, legs=legs)
+    chain, _, path = full.partition(".")
+    edited = edit_path(dict(chains(description)).get(chain, ()), path, change)
+    if edited is None:
+        return None
+    return edit_all(description, lambda elements, name: edited if name == chain else elements)

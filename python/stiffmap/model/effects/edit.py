@@ -8,7 +8,7 @@ from typing import Any
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.model.description import MachineDescription, Offset, Pose
-from stiffmap.model.description.tree import Edit, Elements, edit_sequences
+from stiffmap.model.description.tree import ENDS, Edit, Elements, edit_all, edit_sequences
 
 Sites = Callable[[Elements], dict[str, tuple[int, ...]]]
 Change = Callable[[Any], Elements]
@@ -16,18 +16,12 @@ Change = Callable[[Any], Elements]
 
 def edit_legs(description: MachineDescription, legs: tuple[str, ...], edit: Edit) -> MachineDescription:
     """``edit`` on every sequence of the legs named; without legs on those of base and platform."""
-    if not legs:
-        base, platform = (edit_sequences(e, edit) for e in (description.base, description.platform))
-        return replace(description, base=base, platform=platform)
-    return edit_chains(description, legs, lambda elements: edit_sequences(elements, edit))
+    return edit_chains(description, legs or ENDS, lambda elements: edit_sequences(elements, edit))
 
 
-def edit_chains(description: MachineDescription, legs: tuple[str, ...], edit: Edit) -> MachineDescription:
-    """``edit`` on the whole chain of each of the legs named."""
-    changed = (
-        replace(leg, elements=edit(leg.elements)) if leg.name in legs else leg for leg in description.legs
-    )
-    return replace(description, legs=tuple(changed))
+def edit_chains(description: MachineDescription, chains: tuple[str, ...], edit: Edit) -> MachineDescription:
+    """``edit`` on the whole of each leg, or end, that is named."""
+    return edit_all(description, lambda elements, name: edit(elements) if name in chains else elements)
 
 
 def change_sites(

@@ -28,8 +28,10 @@ def parse_effect(text: str, machine: MachineDescription | None = None) -> Applie
     words = re.sub(r"\s*=\s*", "=", text).split()
     if not words:
         raise StiffmapError(f"empty effect; expected {_FORM}")
-    effect = registry.get(words[0])
-    place, assignments = _split(words[1:])
+    # a unit may stand apart from its number
+    before, *assignments = re.split(r"\s(?=\S*=)", " ".join(words))
+    kind, *place = before.split()
+    effect = registry.get(kind)
     if len(place) > 2:
         raise StiffmapError(f"{text!r}: cannot read {' '.join(place[2:])!r}; expected {_FORM}")
     element = place[0] if place else ""
@@ -48,20 +50,6 @@ def _units(
     declared = machine.declared or machine
     at = place_of(effect, declared, element or None, legs or None)
     return {p.name: (p.unit,) for p in effect.parameters_at(declared, *at)}
-
-
-def _split(words: Sequence[str]) -> tuple[list[str], list[str]]:
-    """Words of the place, and assignments with a unit that stands apart drawn to its number."""
-    place: list[str] = []
-    assignments: list[str] = []
-    for word in words:
-        if "=" in word:
-            assignments.append(word)
-        elif assignments:
-            assignments[-1] += f" {word}"
-        else:
-            place.append(word)
-    return place, assignments
 
 
 def _read(

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from stiffmap.model.description import (
-    Block,
     Body,
     Cable,
     Element,
@@ -18,7 +17,7 @@ from stiffmap.model.description import (
     Offset,
     Spring,
 )
-from stiffmap.model.description.tree import Elements, offset_before, sequences
+from stiffmap.model.description.tree import ENDS, Elements, chains, offset_before, sequences
 from stiffmap.model.effects.edit import Sites, change_sites
 from stiffmap.model.effects.types import Place, Placed, Places
 
@@ -62,8 +61,6 @@ bodies = named(lambda e: isinstance(e, Body))
 """Bodies."""
 offsets = named(lambda e: isinstance(e, Offset) and bool(np.any(e.nominal.p)))
 """Offsets that are longer than zero."""
-blocks = named(lambda e: isinstance(e, Block) and len(e.branches) == 2)
-"""Parallel blocks of two branches."""
 
 
 def elastic_directions(elements: Elements) -> dict[str, tuple[int, ...]]:
@@ -107,9 +104,8 @@ def found(
     description: MachineDescription, legs: tuple[str, ...], element: str, sites: Sites
 ) -> list[Element]:
     """The elements that a name stands for in these legs; without legs in base and platform."""
-    trunk = (*description.base, *description.platform)
-    chains = [leg.elements for leg in description.legs if leg.name in legs] if legs else [trunk]
-    return [seq[i] for c in chains for seq in sequences(c) for i in sites(seq).get(element, ())]
+    there = [elements for name, elements in chains(description) if name in (legs or ENDS)]
+    return [seq[i] for c in there for seq in sequences(c) for i in sites(seq).get(element, ())]
 
 
 def at_sites(sites: Sites) -> Places:

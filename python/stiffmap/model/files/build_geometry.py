@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from stiffmap.common.rotations import rotation_about
 from stiffmap.common.units import ANGLE, LENGTH, NONE, Dimension
@@ -40,16 +39,12 @@ def build_rotation(frame: FrameModel, context: Context) -> Rows:
         matrix = np.array([NAMED[name] for name in frame.axes]).T
         if np.linalg.det(matrix) < 0.0:
             context.at("axes").fail(f"{''.join(frame.axes)} is left-handed; change one sign")
-        return _rows(matrix)
+        return rows(matrix)
     matrix = np.eye(3)
     for i, turn in enumerate(frame.turns or []):
         angle = context.at("turns", i).si(turn.by, ANGLE)
         matrix = matrix @ rotation_about(np.array(turn.about), angle)
-    return _rows(matrix)
-
-
-def _rows(matrix: NDArray[np.float64]) -> Rows:
-    return rows(matrix + 0.0)  # which removes the sign of zeros
+    return rows(matrix)
 
 
 def _checked_rows(given: list[list[Number]], context: Context) -> Rows:
@@ -65,4 +60,4 @@ def _checked_rows(given: list[list[Number]], context: Context) -> Rows:
     if error > EXACT:
         u, _, v = np.linalg.svd(matrix)  # the nearest rotation
         matrix = u @ v
-    return _rows(matrix) if np.any(matrix != np.eye(3)) else IDENTITY
+    return rows(matrix) if np.any(matrix != np.eye(3)) else IDENTITY

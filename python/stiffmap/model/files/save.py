@@ -117,30 +117,28 @@ def _legs(legs: tuple[Leg, ...]) -> Plain:
     if not legs:
         return {}
     placed = [_placed(leg) for leg in legs]
-    middles = [middle for _, middle, _ in placed]
+    middles = [middle for _, middle in placed]
     template = middles[0]
     bare = [edit_elements(middle, _without_home) for middle in middles]
     shared = len(legs) > 1 and all(b == bare[0] for b in bare)
     plain = {}
-    for leg, (frame, middle, attach) in zip(legs, placed, strict=True):
+    for leg, (ends, middle) in zip(legs, placed, strict=True):
         chain: Plain = {"template": TEMPLATE} if shared else {"elements": dump_elements(middle)}
         home = _different_homes(middle, template) if shared else {}
-        plain[leg.name] = {**chain, **frame, **attach, **({"home": home} if home else {})}
+        plain[leg.name] = {**chain, **ends, **({"home": home} if home else {})}
     return {"templates": {TEMPLATE: dump_elements(template)} if shared else {}, "legs": plain}
 
 
-def _placed(leg: Leg) -> tuple[Plain, Elements, Plain]:
-    """Frame, elements between, and attachment of a leg."""
-    frame: Plain = {}
-    attach: Plain = {}
-    middle = leg.elements
-    match middle:
-        case (Offset("frame", pose, None), *_):
-            frame, middle = {"frame": dump_pose(pose)}, middle[1:]
-    match middle:
-        case (*_, Offset("attach", pose, None)):
-            attach, middle = {"attach": dump_pose(pose)}, middle[:-1]
-    return frame, middle, attach
+def _placed(leg: Leg) -> tuple[Plain, Elements]:
+    """Frame and attachment of a leg, and the elements between."""
+    ends: Plain = {}
+    middle = list(leg.elements)
+    for name, i in (("frame", 0), ("attach", -1)):
+        match middle and middle[i]:
+            case Offset(found, pose, None) if found == name:
+                ends[name] = dump_pose(pose)
+                del middle[i]
+    return ends, tuple(middle)
 
 
 def _without_home(element: Element) -> Element:

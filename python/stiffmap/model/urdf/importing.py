@@ -81,18 +81,14 @@ def _check_file(description: MachineDescription, file: str) -> None:
 
 
 def _check_names(model: UrdfModel, side: Sidecar, file: str) -> None:
-    joints = {j.name: j for j in model.above.values()}
-    for key in ("name_mot", "joint_name", "home", "actuators"):
+    for key in ("name_mot", "joint_name", "home", "actuators", "springs"):
+        sort, known = ("link", model.links) if key == "springs" else ("joint", model.joints)
         for name in getattr(side, key):
-            if name not in joints:
-                near = suggestion(name, joints)
-                raise FileError(f"no joint '{name}' in {model.file}{near}", file=file, key=key)
-            if joints[name].kind == "fixed":
+            if name not in known:
+                near = suggestion(name, known)
+                raise FileError(f"no {sort} '{name}' in {model.file}{near}", file=file, key=key)
+            if sort == "joint" and model.joints[name].kind == "fixed":
                 raise FileError(f"joint '{name}' is fixed", file=file, key=key)
-    for name in side.springs:
-        if name not in model.links:
-            near = suggestion(name, model.links)
-            raise FileError(f"no link '{name}' in {model.file}{near}", file=file, key="springs")
 
 
 def _tip(model: UrdfModel, side: Sidecar, tip: str | None, file: str) -> tuple[str, str]:

@@ -73,9 +73,10 @@ class UrdfModel:
         """Joints that are not fixed, in the file's order."""
         return [joint for joint in self.above.values() if joint.kind != "fixed"]
 
-    def joint(self, name: str) -> UrdfJoint:
-        """The joint of a name."""
-        return next(joint for joint in self.above.values() if joint.name == name)
+    @property
+    def joints(self) -> dict[str, UrdfJoint]:
+        """All joints by their names."""
+        return {joint.name: joint for joint in self.above.values()}
 
     def way(self, link: str) -> list[UrdfJoint]:
         """Joints from the root to a link."""
@@ -95,8 +96,7 @@ class UrdfModel:
         """The link that a frame name means: a link, or the link below a joint of that name."""
         if name in self.links:
             return name
-        for joint in self.above.values():
-            if joint.name == name:
-                return joint.child
-        known = [*self.links, *(j.name for j in self.above.values())]
-        raise FileError(f"no frame '{name}' in {self.file}{suggestion(name, known)}", file=file, key=what)
+        if name in self.joints:
+            return self.joints[name].child
+        near = suggestion(name, [*self.links, *self.joints])
+        raise FileError(f"no frame '{name}' in {self.file}{near}", file=file, key=what)

@@ -54,7 +54,7 @@ def _named(links: list[str]) -> list[str]:
 def _by_bodies(model: UrdfModel, ends: list[str]) -> list[str]:
     """Links from which the tool is chosen where no end has the name of one."""
     jaws = _jaws(model)
-    hands = [model.joint(name).parent for name in jaws]
+    hands = [model.joints[name].parent for name in jaws]
     moving = [j for j in model.moving if not any(k.name in jaws for k in model.way(j.child))]
     carriers = {model.body_of(j.parent) for j in moving}
     last = [j.child for j in moving if j.child not in carriers]
@@ -76,7 +76,7 @@ def _jaws(model: UrdfModel) -> set[str]:
             below.setdefault(model.body_of(joint.parent), []).append(joint.name)
     on = [model.body_of(j.parent) for j in model.moving]
     return {name for body, names in below.items() for name in names
-            if len(names) > 1 or (on.count(body) > 1 and model.joint(name).mimic)}  # fmt: skip
+            if len(names) > 1 or (on.count(body) > 1 and model.joints[name].mimic)}  # fmt: skip
 
 
 def _independent(model: UrdfModel, link: str) -> int:

@@ -10,7 +10,7 @@ from stiffmap.model.description import AppliedEffect
 from stiffmap.model.effects.evidence import Plan
 from stiffmap.model.effects.library.geometry import AXES, translation_of
 from stiffmap.model.effects.library.measurement import added, measured
-from stiffmap.model.effects.types import Option, Parameter
+from stiffmap.model.effects.types import EffectType, Option, Parameter
 
 
 def drift(plan: Plan, term: AppliedEffect) -> Floats:
@@ -27,13 +27,13 @@ def drift(plan: Plan, term: AppliedEffect) -> Floats:
     return np.asarray((clock - clock.min())[:, None] * rate)
 
 
-EFFECT = measured(
-    "drift",
-    "drift of the instrument",
-    "The reading gains the drift times (order - first order), or times the hours since the first reading.",
-    "sensor",
-    tuple(Parameter(a, "m", -1e-3, 1e-3, 0.0, 1e-8, f"per reading or per hour, {a}") for a in AXES),
-    370,
+RATES = tuple(Parameter(a, "m", -1e-3, 1e-3, 0.0, 1e-8, f"per reading or per hour, {a}") for a in AXES)
+
+EFFECT = EffectType(
+    **measured("drift", "sensor", RATES),
+    precedence=370,
+    title="drift of the instrument",
+    doc="The reading gains the drift times (order - first order), or times the hours since the first reading.",
     frame="axes of the reading",
     options=(Option("per", ("order", "hour"), "what the drift goes with"),),
     needs=("order",),

@@ -12,7 +12,7 @@ from stiffmap.model.description import AppliedEffect
 from stiffmap.model.effects.evidence import Plan
 from stiffmap.model.effects.library.geometry import AXES, rotation_of, translation_of
 from stiffmap.model.effects.library.measurement import added, measured
-from stiffmap.model.effects.types import Parameter
+from stiffmap.model.effects.types import EffectType, Parameter
 
 PARAMETERS = (
     *(Parameter(a, "m", -1.0, 1.0, 0.0, 1e-4, f"shift of every reading along {a}") for a in AXES),
@@ -35,16 +35,15 @@ def offset(plan: Plan, term: AppliedEffect) -> Floats:
     return np.hstack([shift + plan.position @ (r - np.eye(3)).T, turn])
 
 
-EFFECT = measured(
-    "frame_offset",
-    "position and orientation of the instrument's frame",
-    (
+EFFECT = EffectType(
+    **measured("frame_offset", "sensor", PARAMETERS),
+    precedence=360,
+    title="position and orientation of the instrument's frame",
+    doc=(
         "The instrument's frame is not where it is believed: a measured position p reads as shift + "
         "Rx·Ry·Rz p, so that an error of position gains shift + (Rx·Ry·Rz - 1) p."
     ),
-    "sensor",
-    PARAMETERS,
-    360,
+    frame="base axes",
     pivot="origin of the base",
     reading=added(offset),
     hidden=lambda plan: plan.frame != "known",

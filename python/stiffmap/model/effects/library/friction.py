@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.description import Law, MachineDescription
 from stiffmap.model.effects.library.drive_law import change_law, linear
 from stiffmap.model.effects.sites import at_sites, elastic_directions, elastic_drives
-from stiffmap.model.effects.types import EffectType, Option, Parameter, ParametersAt, Placed, is_revolute
+from stiffmap.model.effects.types import EffectType, Option, Parameter, Placed, is_revolute
 
-FORCE = Parameter("force", "N", 0.0, 1e5, 0.0, 10.0, "Coulomb level where it slides")
-TORQUE = Parameter("torque", "N·m", 0.0, 1e5, 0.0, 1.0, "Coulomb level where it turns")
+BRANCHES = ("loading", "unloading", "loading_stuck")
 
 
 def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
@@ -50,20 +50,32 @@ def _gap(law: Law) -> float:
     return 0.0
 
 
-def force_or_torque(force: Parameter, torque: Parameter) -> ParametersAt:
-    """Torque where it turns, force where it slides: the other is not to be fitted."""
+def dry(force: str, torque: str, *branches: str) -> dict[str, Any]:
+    """What effects of dry friction share: a Coulomb level where it slides and one where it turns, of which the other is
+    not to be fitted, and the branch on which the load was reached."""
+    parameters = (
+        Parameter("force", "N", 0.0, 1e5, 0.0, 10.0, force),
+        Parameter("torque", "N·m", 0.0, 1e5, 0.0, 1.0, torque),
+    )
 
     def at(description: MachineDescription, element: str, legs: tuple[str, ...]) -> tuple[Parameter, ...]:
         turns = is_revolute(description, element)
-        return (replace(force, fitted=not turns), replace(torque, fitted=turns))
+        return tuple(replace(p, fitted=turns == (p.name == "torque")) for p in parameters)
 
-    return at
+    return {
+        "parameters": parameters,
+        "reverses": True,
+        "options": (Option("branch", branches, "how the load was reached", recorded=True),),
+        "one_of": ("force", "torque"),
+        "stage": 20,
+        "better_with": ("branch",),
+        "at": at,
+    }
 
 
 EFFECT = EffectType(
     kind="friction",
     precedence=60,
-    reverses=True,
     title="dry friction of a drive, an elastic joint or a spring's direction",
     doc=(
         "Coulomb friction parallel to the spring of a drive, an elastic joint or an uncoupled direction of a link spring "
@@ -74,19 +86,10 @@ EFFECT = EffectType(
         "where |F| < L, with the sign that F has in linear statics without friction; a drive that really "
         "sticks there, a = 0, is `loading_stuck`. Both agree where |F| > L."
     ),
-    parameters=(FORCE, TORQUE),
+    **dry("Coulomb level where it slides", "Coulomb level where it turns", *BRANCHES),
     places=at_sites(elastic_directions),
     apply=apply,
     tried=at_sites(elastic_drives),
     frame="the coordinate",
-    options=(
-        Option(
-            "branch", ("loading", "unloading", "loading_stuck"), "how the load was reached", recorded=True
-        ),
-    ),
-    one_of=("force", "torque"),
     excludes=("friction", "hardening", "position_dependent_compliance", "tabulated"),
-    stage=20,
-    better_with=("branch",),
-    at=force_or_torque(FORCE, TORQUE),
 )

@@ -16,25 +16,12 @@ from stiffmap.model.effects.types import EffectType, Placed
 def pins(elements: Elements) -> dict[str, tuple[int, ...]]:
     """Passive joints by their names, and the two next to a link by the name of the link's spring."""
     single = passive_joints(elements)
-    out = dict(single)
-    for name, at in springs(elements).items():
-        around = tuple(
-            i for k in at for i in (_next(elements, k, -1), _next(elements, k, 1)) if i is not None
-        )
-        out.update({name: around} if len(around) == 2 * len(at) and name not in single else {})
-    return out
-
-
-def _next(elements: Elements, k: int, way: int) -> int | None:
-    i = k + way
-    while 0 <= i < len(elements):
-        e = elements[i]
-        if isinstance(e, Joint):
-            return None if e.actuated else i
-        if isinstance(e, Spring):
-            return None
-        i += way
-    return None
+    passive = {i for at in single.values() for i in at}
+    row = [i for i, e in enumerate(elements) if isinstance(e, (Joint, Spring))]
+    sides = {k: (before, after) for before, k, after in zip(row, row[1:], row[2:], strict=False)}
+    links = {name: [i for k in at for i in sides.get(k, ())] for name, at in springs(elements).items()}
+    ends = {name: tuple(at) for name, at in links.items() if at and passive.issuperset(at)}
+    return single | {name: at for name, at in ends.items() if name not in single}
 
 
 def insert(

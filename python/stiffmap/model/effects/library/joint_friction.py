@@ -8,10 +8,7 @@ from stiffmap.model.description import JointFriction, MachineDescription
 from stiffmap.model.effects.edit import change_sites
 from stiffmap.model.effects.library import friction
 from stiffmap.model.effects.sites import at_sites, free_joints
-from stiffmap.model.effects.types import EffectType, Option, Placed
-
-FORCE = replace(friction.FORCE, doc="Coulomb level of a sliding joint")
-TORQUE = replace(friction.TORQUE, doc="Coulomb level about each axis of a joint that turns")
+from stiffmap.model.effects.types import EffectType, Placed
 
 
 def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
@@ -25,7 +22,6 @@ def apply(description: MachineDescription, placed: Placed) -> MachineDescription
 EFFECT = EffectType(
     kind="joint_friction",
     precedence=250,
-    reverses=True,
     title="dry friction of a passive joint",
     doc=(
         "Coulomb friction about each axis of a free passive joint, level L, against its motion q from the commanded "
@@ -34,18 +30,15 @@ EFFECT = EffectType(
         "`loading_stuck` holds the joint at q = 0 until L is reached and resists with L beyond. Where a joint slips, "
         "`loading` and `loading_stuck` agree; where it would not, `loading` pushes it back too far."
     ),
-    parameters=(FORCE, TORQUE),
+    **friction.dry(
+        "Coulomb level of a sliding joint",
+        "Coulomb level about each axis of a joint that turns",
+        "loading_stuck",
+        "loading",
+        "unloading",
+    ),
     places=at_sites(free_joints),
     apply=apply,
     frame="the joint's axes",
-    options=(
-        Option(
-            "branch", ("loading_stuck", "loading", "unloading"), "how the load was reached", recorded=True
-        ),
-    ),
-    one_of=("force", "torque"),
     excludes=("joint_friction",),
-    stage=20,
-    better_with=("branch",),
-    at=friction.force_or_torque(FORCE, TORQUE),
 )

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from stiffmap.model.description import Block, Branch, Spring
+from stiffmap.model.description import Block, Branch, Element, Spring
 from stiffmap.model.description.numbers import with_entry
-from stiffmap.model.description.tree import Elements
-from stiffmap.model.effects.library.bars import on_branches, spread_blocks
+from stiffmap.model.effects.library.bars import on_branches, stands_apart
 from stiffmap.model.effects.library.length import longer
 from stiffmap.model.effects.sites import links
 from stiffmap.model.effects.types import EffectType, Parameter, Placed
 
 
-def rod_blocks(elements: Elements) -> dict[str, tuple[int, ...]]:
-    """Parallelograms whose bars have a length."""
-    found = spread_blocks(elements)
-    rods = [all(_rod(b) is not None for b in e.branches) if isinstance(e, Block) else False for e in elements]
-    return {n: at for n, at in found.items() if all(rods[i] for i in at)}
+def has_rods(e: Element) -> bool:
+    """Whether it is a parallelogram whose bars have a length."""
+    return isinstance(e, Block) and stands_apart(e) and all(_rod(b) is not None for b in e.branches)
 
 
 def _rod(b: Branch) -> int | None:
@@ -42,7 +39,7 @@ EFFECT = EffectType(
         "half; their mean is as declared (its error is `length`)."
     ),
     parameters=(Parameter("difference", "m", -0.1, 0.1, 0.0, 1e-4, "second rod minus first rod"),),
-    **on_branches(lengthened, rod_blocks),
+    **on_branches(lengthened, has_rods),
     pivot="near end of each rod",
     frame="direction of the rods",
     moves="all behind each rod; the block's end turns with the two rods",

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from stiffmap.model.effects.library.measurement import gains, measured, scaled
+from stiffmap.model.effects.types import EffectType
 
-EFFECT = measured(
-    "load_gain",
-    "gain of the force measurement",
-    "The force that acts is the declared one times gain, per axis times gain·gain_axis.",
-    "load",
-    gains("acting force over declared force"),
-    330,
+EFFECT = EffectType(
+    **measured("load_gain", "load", gains("acting force over declared force")),
+    precedence=330,
+    title="gain of the force measurement",
+    doc="The force that acts is the declared one times gain, per axis times gain·gain_axis.",
+    frame="base axes",
     load=lambda wrench, plan, term: scaled(wrench, dict(term.parameters)),
 )

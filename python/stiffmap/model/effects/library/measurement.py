@@ -18,7 +18,7 @@ from stiffmap.model.description import AppliedEffect
 from stiffmap.model.effects.evidence import Plan, Reading
 from stiffmap.model.effects.library.geometry import AXES, components, rotations
 from stiffmap.model.effects.sites import at
-from stiffmap.model.effects.types import EffectType, Parameter
+from stiffmap.model.effects.types import Parameter
 
 ANGLES: tuple[Parameter, ...] = rotations("rotation")["parameters"]
 
@@ -63,28 +63,13 @@ def added(part: Callable[[Plan, AppliedEffect], Floats]) -> Reading:
     return reading
 
 
-def measured(
-    kind: str,
-    title: str,
-    doc: str,
-    element: str,
-    parameters: tuple[Parameter, ...],
-    precedence: int,
-    *,
-    frame: str = "base axes",
-    **more: Any,
-) -> EffectType:
-    """A kind that lives in the measurement; `more` as in `EffectType`."""
-    return EffectType(
-        kind,
-        title,
-        doc,
-        places=at(element),
-        apply=None,
-        precedence=precedence,
-        frame=frame,
-        moves="nothing of the machine",
-        excludes=(kind,),
+def measured(kind: str, element: str, parameters: tuple[Parameter, ...]) -> dict[str, Any]:
+    """What kinds share that live in the measurement."""
+    return {
+        "kind": kind,
+        "places": at(element),
+        "apply": None,
+        "moves": "nothing of the machine",
+        "excludes": (kind,),
         **components(parameters),
-        **more,
-    )
+    }

@@ -7,7 +7,7 @@ import numpy as np
 from stiffmap.model.description import Block, Branch, Offset
 from stiffmap.model.description.numbers import with_entry
 from stiffmap.model.effects.edit import shifted
-from stiffmap.model.effects.library.bars import end_index, on_branches, width
+from stiffmap.model.effects.library.bars import ends, on_branches, width
 from stiffmap.model.effects.types import EffectType, Option, Parameter, Placed
 
 
@@ -15,7 +15,7 @@ def widened(block: Block, b: Branch, share: float, placed: Placed) -> Branch:
     """Half of the error on each pin, along the line between them."""
     end = placed.options["end"]
     for one in ("proximal", "distal") if end == "both" else (end,):
-        apart, i = width(block, one), end_index(b, one)
+        apart, i = width(block, one), ends(b)[one]
         size = share * placed.values["error"] * (1.0 if one == "proximal" else -1.0)
         pin = b.elements[i]
         assert isinstance(pin, Offset)

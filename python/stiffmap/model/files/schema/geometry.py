@@ -19,16 +19,13 @@ _NAME = {"enum": sorted(NAMED)}
 _VECTOR = {"type": "array", "items": _NUMBER, "minItems": 3, "maxItems": 3}
 
 
-def _is_number(value: object) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool)
-
-
 def read_axis(value: Any) -> tuple[float, float, float]:
     """Unit vector of ``x``, ``-y`` ... or of three numbers."""
     if isinstance(value, str) and value in NAMED:
         a, b, c = NAMED[value]
         return (a, b, c)
-    if not isinstance(value, (list, tuple)) or len(value) != 3 or not all(map(_is_number, value)):
+    numbers = value if isinstance(value, (list, tuple)) else ()
+    if [isinstance(v, (int, float)) and not isinstance(v, bool) for v in numbers] != [True] * 3:
         raise ValueError(f"expected an axis: x, y, z, -x, -y, -z or three numbers; found {describe(value)}")
     length = sum(float(v) ** 2 for v in value) ** 0.5
     if not 0.0 < length < float("inf"):
@@ -41,15 +38,12 @@ def read_axis(value: Any) -> tuple[float, float, float]:
 
 
 def _read_permutation(value: Any) -> list[str]:
-    names = re.findall(r"-?[xyz]", value) if isinstance(value, str) else value
-    text = value if isinstance(value, str) else "".join(map(str, value)) if isinstance(value, list) else ""
-    if not isinstance(names, list) or "".join(map(str, names)) != text or len(names) != 3:
-        names = None
-    if names is None or sorted(str(n)[-1] for n in names) != ["x", "y", "z"]:
+    names = re.findall(r"-?[xyz]", "".join(map(str, value)) if isinstance(value, list) else str(value))
+    if value not in (names, "".join(names)) or sorted(n[-1] for n in names) != ["x", "y", "z"]:
         raise ValueError(
             f"expected the base axes that are local x, y, z, such as yzx or z-yx; found {describe(value)}"
         )
-    return [str(n) for n in names]
+    return names
 
 
 Axis = Annotated[
