@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from stiffmap.common.broadcasting import Floats
-from stiffmap.common.errors import FileError, StiffmapError, needed
+from stiffmap.common.errors import FileError, StiffmapError, needed, reading
 from stiffmap.common.tables.named import Known, read_named
 from stiffmap.common.tables.workbook import TABLES
 from stiffmap.workspace.vibration.response import Complex
@@ -52,7 +52,7 @@ def read_responses(path: str | PathLike[str]) -> list[MeasuredResponse]:
     Raises FileError naming file, row and what was expected: frequencies that do not rise, a coherence outside 0 to 1, units.
     """
     p = Path(path)
-    if not p.is_file():
+    if not p.exists():
         raise FileError("no such file of frequency responses", file=str(path))
     found = [_table(p)] if p.suffix.lower() in TABLES else _universal(p)
     for one in found:
@@ -104,10 +104,21 @@ QUANTITIES = {
 def _universal(path: Path) -> list[MeasuredResponse]:
     with needed("reading universal files", "vibration"):
         import pyuff  # type: ignore[import-untyped]
+    with reading(path):
+        marks = len(re.findall(rb"    -1 *(?=[\r\n]|\Z)", path.read_bytes()))  # may follow binary numbers
     try:
-        sets = pyuff.UFF(str(path)).read_sets()
+        file = pyuff.UFF(str(path))
+        count, sets = file.get_n_sets(), file.read_sets()
     except Exception as problem:  # the reader raises whatever its parsing meets
         raise FileError(f"expected a universal file with data sets 58; {problem}", file=str(path)) from None
+    marks = len(
+        re.findall(rb"    -1 *(?=[\r\n]|\Z)", path.read_bytes())
+    )  # the last may follow binary numbers
+    if marks != 2 * count:
+        raise FileError(
+            f"expected every data set between two marks '    -1'; found {marks} marks for {count} whole data sets: the "
+            "file is cut off, or a line is lost", file=str(path)
+        )  # fmt: skip
     base: dict[str, Any] = {}
     functions = []
     for s in sets if isinstance(sets, list) else [sets]:
@@ -118,10 +129,14 @@ def _universal(path: Path) -> list[MeasuredResponse]:
             functions.append((s, base))
     responses = [(s, base) for s, base in functions if s["func_type"] == RESPONSE]
     if not responses:
-        raise FileError("no frequency response (data set 58, function type 4) in it", file=str(path))
-    coherence = {_ends(s): s for s, _ in functions if s["func_type"] == COHERENCE}
+        found = ", ".join(dict.fromkeys(f"function type {s['func_type']}" for s, _ in functions))
+        raise FileError(
+            f"no frequency response (data set 58, function type 4) in it; found {found or 'no data set 58'}",
+            file=str(path),
+        )
+    coherence = _coherence(responses, [s for s, _ in functions if s["func_type"] == COHERENCE], path)
     out = []
-    for s, base in responses:
+    for (s, base), of in zip(responses, coherence, strict=True):
         name = f"response {s.get('id1', '')}".strip()
         x = np.asarray(s["x"], dtype=float)
         try:
@@ -129,7 +144,6 @@ def _universal(path: Path) -> list[MeasuredResponse]:
         except StiffmapError as problem:
             raise FileError(f"{name}: {problem}", file=str(path)) from None
         response, reference = _ends(s)
-        of = coherence.get((response, reference))
         if of is not None and not np.array_equal(of["x"], x):
             raise FileError(
                 f"{name}: expected its coherence at the same {len(f)} frequencies; found {len(of['x'])}, which are others",
@@ -143,6 +157,23 @@ def _universal(path: Path) -> list[MeasuredResponse]:
                 np.asarray(known, dtype=float), response, reference,
             )
         )  # fmt: skip
+    return out
+
+
+def _coherence(
+    responses: list[tuple[dict[str, Any], dict[str, Any]]], given: list[dict[str, Any]], path: Path
+) -> list[dict[str, Any] | None]:
+    """The coherence of each response: of several between the same ends one after the other, or one for all."""
+    ends = [_ends(s) for s, _ in responses]
+    out: list[dict[str, Any] | None] = []
+    for k, own in enumerate(ends):
+        of = [c for c in given if _ends(c) == own]
+        if len(of) > 1 and len(of) != ends.count(own):
+            raise FileError(
+                f"expected one coherence for each response at {own[0]} to a force at {own[1]}, or one for all; found {len(of)} "
+                f"for {ends.count(own)}", file=str(path)
+            )  # fmt: skip
+        out.append(of[ends[:k].count(own) % len(of)] if of else None)
     return out
 
 
@@ -237,6 +268,11 @@ def _check_whole(s: dict[str, Any], path: Path) -> None:
     lost = [k for k, v in whole.items() if not isinstance(v, int)]
     if lost:
         raise FileError(f"{name}: expected a whole number for {', '.join(lost)} in its head", file=str(path))
+    if s["func_type"] == RESPONSE and not np.iscomplexobj(s.get("data")):
+        raise FileError(
+            f"{name}: expected a response with real and imaginary part (ordinate data type 5 or 6); found real numbers only",
+            file=str(path),
+        )
     x, data = np.atleast_1d(s.get("x", ())), np.atleast_1d(s.get("data", ()))
     s["x"], s["data"] = x, data = _without_padding(s, x), _without_padding(s, data)
     if not len(x) == len(data) == s["num_pts"]:
