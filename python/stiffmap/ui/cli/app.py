@@ -16,7 +16,6 @@ from inspect import getdoc
 from typing import Any
 
 import typer
-import typer.core
 from rich.markup import escape
 
 from stiffmap.common.errors import FileError, FileErrors, StiffmapError
@@ -101,14 +100,12 @@ def one_line(error: Exception) -> str:
 class _Once(typer.core.TyperCommand):
     """A command each of whose options with one value is given once: of two nobody would see which counts."""
 
-    def parse_args(self, ctx: typer.Context, args: list[str]) -> list[str]:
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         _, _, given = self.make_parser(ctx).parse_args(args=list(args))
         for p in given:
             single = isinstance(p, typer.core.TyperOption) and not (p.multiple or p.is_flag)
             if single and given.count(p) > 1 and not ctx.resilient_parsing:
-                raise StiffmapError(
-                    f"{max(p.opts, key=len)}: expected one value; it is given {given.count(p)} times"
-                )
+                raise StiffmapError(f"{max(p.opts, key=len)}: expected once, found {given.count(p)} times")
         return super().parse_args(ctx, args)
 
 

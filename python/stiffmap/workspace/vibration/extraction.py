@@ -101,14 +101,12 @@ class _Fit:
             misfit.append(B @ c - y)
         return coefficients, np.array(misfit)
 
-    def square(self, misfit: Floats) -> float:
-        """Sum of squares of a misfit by noise, that of the floor at least: what lies below it is no mode and no certainty."""
-        return max(float((misfit**2).sum()), self.least)
-
     def criterion(self, t: Floats) -> float:
         """Bayesian information criterion, the level of the noise being free down to its floor."""
-        square, n = self.square(self.solved(t)[1]), 2 * self.H.size
-        return float(n * np.log(square / n) + (len(t) + len(self.H) * len(t)) * np.log(n))
+        r, n = self.solved(t)[1], 2 * self.H.size
+        return float(
+            n * np.log(max((r**2).sum(), self.least) / n) + (len(t) + len(self.H) * len(t)) * np.log(n)
+        )
 
     def with_one_more(self, t: Floats) -> Floats | None:
         """Poles with one more, fitted, at the most promising place where all stay within their bounds; None: nowhere."""
@@ -138,7 +136,7 @@ class _Fit:
         c, r = self.solved(t)
         moved = [self.solved(t + 1e-5 * e) for e in np.eye(2 * n)]
         J = np.array([(m[1] - r).ravel() for m in moved]).reshape(2 * n, r.size).T / 1e-5
-        level = self.square(r) / max(1, r.size - 2 * n - len(r) * (2 * n + 2))
+        level = max((r**2).sum(), self.least) / max(1, r.size - 2 * n - len(r) * (2 * n + 2))
         C = level * np.linalg.pinv(J.T @ J)
         flexibility, u = np.zeros((n, len(r))), np.zeros((n, len(r)))
         for j, B in enumerate(self.columns(t)):

@@ -226,7 +226,7 @@ def test_an_option_with_one_value_is_given_once(
 ) -> None:
     assert main(words) == 2
     if option is not None:
-        assert f"stiffmap: {option}: expected one value; it is given 2 times" in capsys.readouterr().err
+        assert f"stiffmap: {option}: expected once, found 2 times" in capsys.readouterr().err
 
 
 def test_flags_and_lists_may_be_given_again(capsys: pytest.CaptureFixture[str]) -> None:

@@ -264,7 +264,7 @@ def test_hits_between_the_same_ends_keep_their_own_coherence(tmp_path):
         path.write_bytes(b"".join(order))
         assert [one.coherence[0] for one in read_responses(path)] == pytest.approx(expected)
     path.write_bytes(b"".join((hits[0], *known.values())))
-    with pytest.raises(sm.StiffmapError, match=r"one coherence for each response at 3 .z .* found 2 for 1"):
+    with pytest.raises(sm.StiffmapError, match=r"3 .z by 1 -x: found 2 coherences of 1 responses"):
         read_responses(path)
 
 
@@ -279,15 +279,15 @@ def test_a_universal_file_that_is_cut_off_is_one_message(cut, binary, tmp_path):
     path.write_bytes(whole)
     assert len(read_responses(path)) == 2
     path.write_bytes(whole[: -cut - 1])
-    with pytest.raises(sm.StiffmapError, match="found 3 marks for 1 whole data sets"):
+    with pytest.raises(sm.StiffmapError, match="found 3 marks -1 for 1: it is cut off"):
         read_responses(path)
 
 
 @pytest.mark.parametrize(
     ("values", "head", "message"),
     [
-        (np.abs(RECEPTANCE), {}, "expected a response with real and imaginary part"),
-        (np.abs(RECEPTANCE), {"func_type": 2}, "no frequency response .* found function type 2"),
+        (np.abs(RECEPTANCE), {}, "expected complex numbers"),
+        (np.abs(RECEPTANCE), {"func_type": 2}, "no frequency response"),
     ],
 )
 def test_a_function_without_phase_is_no_response(values, head, message, tmp_path):
