@@ -141,9 +141,7 @@ def _universal(path: Path) -> list[MeasuredResponse]:
         except StiffmapError as problem:
             raise StiffmapError(f"{name}: {problem}") from None
         if of is not None and not np.array_equal(of["x"], x):
-            raise StiffmapError(
-                f"{name}: expected its coherence at the same {len(f)} frequencies; found {len(of['x'])} others"
-            )
+            raise StiffmapError(f"{name}: expected its coherence at the same {len(f)} frequencies")
         known = np.full(len(f), np.nan) if of is None else np.real(of["data"])
         out.append(
             MeasuredResponse(
@@ -261,9 +259,7 @@ def _check_whole(s: dict[str, Any]) -> None:
     x, data = np.atleast_1d(s.get("x", ())), np.atleast_1d(s.get("data", ()))
     s["x"], s["data"] = x, data = _without_padding(s, x), _without_padding(s, data)
     if not len(x) == len(data) == s["num_pts"]:
-        raise StiffmapError(
-            f"{name}: expected {s['num_pts']} points, as its head says; found {len(data)}: a line is lost, or one too many"
-        )
+        raise StiffmapError(f"{name}: expected {s['num_pts']} points, as its head says; found {len(data)}")
     if not np.isfinite(data).all():
         k = int(np.flatnonzero(~np.isfinite(data))[0])
         raise StiffmapError(f"{name}: expected finite numbers; point {k + 1} has {data[k]}")
