@@ -98,10 +98,10 @@ def axis_errors(
         raise StiffmapError(f"axis: {machine.name} does not command {axis}")
     if position is None:
         low, high = machine.workspace
-        position = np.linspace(low[i], high[i], max(points, 2))
+        position = np.linspace(low[i], high[i], max(points, 1))
     nodes = real_array(position, "position")
     if nodes.ndim != 1 or nodes.size < 2 or not (np.diff(nodes) > 0).all():
-        raise StiffmapError("position: expected two or more rising numbers (m)")
+        raise StiffmapError("points, position: expected two or more rising numbers (m)")
     point = real_array(machine.description.home.p if through is None else through, "through")
     if point.shape != (3,) or not np.isfinite(point).all():
         raise StiffmapError("through: expected a position of three numbers (m)")

@@ -55,7 +55,9 @@ def _apart(a: Pose, b: Pose) -> float:
 
 def _origins(description: MachineDescription, model: UrdfModel) -> tuple[dict[str, Pose], Pose]:
     """Origin of each joint of the file that the arm's declared geometry speaks of, and what follows the last of them."""
-    known = {plain_name(j.name): j for j in model.above.values()}
+    said = re.search(r" to (\S+)", description.source)  # the tip, as the import writes it
+    way = model.way(said[1] if said else "")
+    known = {plain_name(j.name): j for j in way or model.above.values()}
     out: dict[str, Pose] = {}
     here, after = "", Pose()
     for e in (*description.base, *description.legs[0].elements, *description.platform):
@@ -77,8 +79,7 @@ def _origins(description: MachineDescription, model: UrdfModel) -> tuple[dict[st
             out[here] = out[here] @ e.nominal
         else:
             after = after @ e.nominal
-    said = re.search(r" to (\S+)", description.source)  # the tip, as the import writes it
-    for joint in model.way(said[1] if said else ""):
+    for joint in way:
         if joint.name not in out and joint.kind == "fixed" and joint.parent == model.joints[[*out][-1]].child:
             out[joint.name], after = after, Pose()
     return out, after

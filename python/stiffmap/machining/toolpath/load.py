@@ -37,6 +37,8 @@ def load_path(
 
     feed (m/s) and spindle (rad/s): of a built-in outline. offsets: work offsets of G-code by name, m. progress: called with the number of lines read. Raises FileError.
     """
+    if offsets and Path(name_or_file).suffix.lower() not in GCODE:
+        raise FileError("offsets: only a program in G-code takes them", file=str(name_or_file))
     if str(name_or_file) in outline_names():
         speeds = {"feed": feed, "rpm": None if spindle is None else spindle * 30 / pi}
         return outline(str(name_or_file), size, **{k: v for k, v in speeds.items() if v is not None})

@@ -89,9 +89,15 @@ def command(
         )
     load = [*numbers(force, "force", 3), 0.0, 0.0, 0.0]
     pull = gravity_of(gravity)
+    of_map = axis is not None and machine.endswith((".nc", ".zarr"))
+    others = {"poses": poses, "urdf": urdf, "dh": dh, "check": check}
+    idle: dict[str, Any] = others if axis else {"through": through, "zero": zero}
+    idle |= {"effect": effect, "force": any(load), "gravity": gravity} if of_map else {"case": case}
+    if wrong := [name for name, value in idle.items() if value]:
+        raise StiffmapError(f"--{wrong[0]}: not with{'' if axis else 'out'} --axis{' of a map' * of_map}")
     if axis is not None:
         line: dict[str, Any] = {"through": in_si(through, "through", 3), "zero": in_si(zero)}
-        if machine.endswith((".nc", ".zarr")):
+        if of_map:
             errors = axis_errors_of_map(machine, axis, case=case, **line)
         else:
             m = machine_with(machine, effect)

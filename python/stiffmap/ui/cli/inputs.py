@@ -50,8 +50,8 @@ def pairs(given: Sequence[str] | None, name: str) -> dict[str, str]:
     out = {}
     for text in given or []:
         key, equals, value = text.partition("=")
-        if not equals or not value:
-            raise StiffmapError(f"--{name}: expected NAME=VALUE, such as dx=…; got '{text}'")
+        if not equals or not value or key.strip() in out:
+            raise StiffmapError(f"--{name}: expected NAME=VALUE, such as dx=…, each once; got '{text}'")
         out[key.strip()] = value.strip()
     return out
 

@@ -28,7 +28,7 @@ def command(
     effect: options.Effects = None,
     true_machine: str | None = option("Machine file that the program is also simulated on.", None, "--true"),
     step: float = option("Distance of the points along the path, mm.", 2.0),
-    within: float = option("Chord error of the compensated program, mm.", 0.001),
+    within: float = option("Chord error of the compensated program, mm.", 0.001, min=0),
     thickness: float | None = option("Width to trim, mm; default: the process's."),
     tolerance: float | None = option("Tolerance, mm; default: the process's."),
     passes: int = option("Passes along the same program.", 1),

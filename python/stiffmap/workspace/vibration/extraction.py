@@ -76,6 +76,7 @@ class _Fit:
 
     def __init__(self, f: Floats, H: Complex, sigma: Floats) -> None:
         self.f, self.H, self.sigma = f, H, sigma
+        self.least = 2 * float(((FLOOR * np.abs(H) / sigma) ** 2).sum())
 
     def basis(self, t: Floats) -> Complex:
         """(frequencies, 2 modes + 2): each pole with two real coefficients, modes above the band and those below it."""
@@ -101,9 +102,11 @@ class _Fit:
         return coefficients, np.array(misfit)
 
     def criterion(self, t: Floats) -> float:
-        """Bayesian information criterion, the level of the noise being free."""
+        """Bayesian information criterion, the level of the noise being free down to its floor."""
         r, n = self.solved(t)[1], 2 * self.H.size
-        return float(n * np.log((r**2).sum() / n) + (len(t) + len(self.H) * len(t)) * np.log(n))
+        return float(
+            n * np.log(max((r**2).sum(), self.least) / n) + (len(t) + len(self.H) * len(t)) * np.log(n)
+        )
 
     def with_one_more(self, t: Floats) -> Floats | None:
         """Poles with one more, fitted, at the most promising place where all stay within their bounds; None: nowhere."""
@@ -133,7 +136,7 @@ class _Fit:
         c, r = self.solved(t)
         moved = [self.solved(t + 1e-5 * e) for e in np.eye(2 * n)]
         J = np.array([(m[1] - r).ravel() for m in moved]).reshape(2 * n, r.size).T / 1e-5
-        level = (r**2).sum() / max(1, r.size - 2 * n - len(r) * (2 * n + 2))
+        level = max((r**2).sum(), self.least) / max(1, r.size - 2 * n - len(r) * (2 * n + 2))
         C = level * np.linalg.pinv(J.T @ J)
         flexibility, u = np.zeros((n, len(r))), np.zeros((n, len(r)))
         for j, B in enumerate(self.columns(t)):

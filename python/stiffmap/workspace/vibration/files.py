@@ -54,9 +54,14 @@ def read_responses(path: str | PathLike[str]) -> list[MeasuredResponse]:
     p = Path(path)
     if not p.is_file():
         raise FileError("no such file of frequency responses", file=str(path))
-    found = [_table(p)] if p.suffix.lower() in TABLES else _universal(p)
-    for one in found:
-        _check(one, str(path))
+    try:
+        found = [_table(p)] if p.suffix.lower() in TABLES else _universal(p)
+        for one in found:
+            _check(one)
+    except StiffmapError as problem:
+        if type(problem) is not StiffmapError:  # it says its file already, or what is not installed
+            raise
+        raise FileError(str(problem), file=str(path)) from None
     return found
 
 
@@ -105,38 +110,39 @@ def _universal(path: Path) -> list[MeasuredResponse]:
     with needed("reading universal files", "vibration"):
         import pyuff  # type: ignore[import-untyped]
     try:
-        sets = pyuff.UFF(str(path)).read_sets()
+        file = pyuff.UFF(str(path))
+        sets = file.read_sets()
+        marks = re.findall(
+            rb"    -1 *(?=[\r\n]|\Z)", path.read_bytes()
+        )  # not lines: one may follow binary numbers
+        if len(marks) != 2 * file.get_n_sets():
+            raise ValueError(f"found {len(marks)} marks -1 for {file.get_n_sets()}: it is cut off")
     except Exception as problem:  # the reader raises whatever its parsing meets
-        raise FileError(f"expected a universal file with data sets 58; {problem}", file=str(path)) from None
+        raise StiffmapError(f"expected a universal file with data sets 58; {problem}") from None
     base: dict[str, Any] = {}
     functions = []
     for s in sets if isinstance(sets, list) else [sets]:
         if s.get("type") == UNITS:  # those of all that follows
             base = s
         elif s.get("type") == FUNCTION:
-            _check_whole(s, path)
+            _check_whole(s)
             functions.append((s, base))
     responses = [(s, base) for s, base in functions if s["func_type"] == RESPONSE]
     if not responses:
-        raise FileError("no frequency response (data set 58, function type 4) in it", file=str(path))
-    coherence = {_ends(s): s for s, _ in functions if s["func_type"] == COHERENCE}
+        raise StiffmapError("no frequency response (data set 58, function type 4) in it")
+    ends = [_ends(s) for s, _ in responses]
+    coherence = _coherence(ends, [s for s, _ in functions if s["func_type"] == COHERENCE])
     out = []
-    for s, base in responses:
+    for (s, base), (response, reference), of in zip(responses, ends, coherence, strict=True):
         name = f"response {s.get('id1', '')}".strip()
         x = np.asarray(s["x"], dtype=float)
         try:
-            f, values = x * _hertz(s), _in_si(s, base)
+            f, (size, kind) = x * _hertz(s), _in_si(s, base)
         except StiffmapError as problem:
-            raise FileError(f"{name}: {problem}", file=str(path)) from None
-        response, reference = _ends(s)
-        of = coherence.get((response, reference))
+            raise StiffmapError(f"{name}: {problem}") from None
         if of is not None and not np.array_equal(of["x"], x):
-            raise FileError(
-                f"{name}: expected its coherence at the same {len(f)} frequencies; found {len(of['x'])}, which are others",
-                file=str(path),
-            )
+            raise StiffmapError(f"{name}: expected its coherence at the same {len(f)} frequencies")
         known = np.full(len(f), np.nan) if of is None else np.real(of["data"])
-        size, kind = values
         out.append(
             MeasuredResponse(
                 str(s.get("id1", path.stem)), f, _receptance(f, np.asarray(size * np.asarray(s["data"]), complex), kind),
@@ -144,6 +150,17 @@ def _universal(path: Path) -> list[MeasuredResponse]:
             )
         )  # fmt: skip
     return out
+
+
+def _coherence(ends: list[tuple[str, str]], given: list[dict[str, Any]]) -> list[dict[str, Any] | None]:
+    """The coherence of each response, by its ends: of several there one after the other, or one for all."""
+    of = {e: [c for c in given if _ends(c) == e] for e in ends}
+    for e, found in of.items():
+        if len(found) not in (0, 1, ends.count(e)):
+            raise StiffmapError(
+                f"{' by '.join(e)}: found {len(found)} coherences of {ends.count(e)} responses"
+            )
+    return [of[e][ends[:k].count(e) % len(of[e])] if of[e] else None for k, e in enumerate(ends)]
 
 
 def _hertz(s: dict[str, Any]) -> float:
@@ -230,23 +247,22 @@ def _base(base: dict[str, Any], what: str) -> float:
     return 1 / factor
 
 
-def _check_whole(s: dict[str, Any], path: Path) -> None:
-    """What a data set 58 promises in its head against what is in it; FileError."""
+def _check_whole(s: dict[str, Any]) -> None:
+    """What a data set 58 promises in its head against what is in it; StiffmapError."""
     name = f"data set 58 {s.get('id1', '')}".strip()
     whole = {k: s.get(k) for k in ("func_type", "num_pts", "rsp_node", "rsp_dir", "ref_node", "ref_dir")}
     lost = [k for k, v in whole.items() if not isinstance(v, int)]
     if lost:
-        raise FileError(f"{name}: expected a whole number for {', '.join(lost)} in its head", file=str(path))
+        raise StiffmapError(f"{name}: expected a whole number for {', '.join(lost)} in its head")
+    if s["func_type"] == RESPONSE and not np.iscomplexobj(s.get("data", ())):
+        raise StiffmapError(f"{name}: expected complex numbers (data type 5 or 6); found real ones")
     x, data = np.atleast_1d(s.get("x", ())), np.atleast_1d(s.get("data", ()))
     s["x"], s["data"] = x, data = _without_padding(s, x), _without_padding(s, data)
     if not len(x) == len(data) == s["num_pts"]:
-        raise FileError(
-            f"{name}: expected {s['num_pts']} points, as its head says; found {len(data)}: a line is lost, or one too many",
-            file=str(path),
-        )
+        raise StiffmapError(f"{name}: expected {s['num_pts']} points, as its head says; found {len(data)}")
     if not np.isfinite(data).all():
         k = int(np.flatnonzero(~np.isfinite(data))[0])
-        raise FileError(f"{name}: expected finite numbers; point {k + 1} has {data[k]}", file=str(path))
+        raise StiffmapError(f"{name}: expected finite numbers; point {k + 1} has {data[k]}")
 
 
 def _without_padding(s: dict[str, Any], values: Any) -> Any:
@@ -264,25 +280,24 @@ def _ends(s: dict[str, Any]) -> tuple[str, str]:
     return end("rsp"), end("ref")
 
 
-def _check(one: MeasuredResponse, file: str) -> None:
+def _check(one: MeasuredResponse) -> None:
     f, c = one.frequency, one.coherence
     where = f"response {one.name}" if one.name else "response"
     if not np.isfinite(f).all() or f[0] < 0:
-        raise FileError(f"{where}: expected finite frequencies (Hz) from 0 on", file=file)
+        raise StiffmapError(f"{where}: expected finite frequencies (Hz) from 0 on")
     fall = np.flatnonzero(np.diff(f) <= 0)
     if fall.size:
         k = int(fall[0])
-        raise FileError(
-            f"{where}: expected rising frequencies; point {k + 2} has {f[k + 1]:g} Hz after {f[k]:g} Hz",
-            file=file,
+        raise StiffmapError(
+            f"{where}: expected rising frequencies; point {k + 2} has {f[k + 1]:g} Hz after {f[k]:g} Hz"
         )
     bad = np.flatnonzero(np.isfinite(c) & ((c < 0) | (c > 1 + 1e-9)))
     if bad.size:
         k = int(bad[0])
-        raise FileError(f"{where}: expected a coherence from 0 to 1; point {k + 1} has {c[k]:g}", file=file)
+        raise StiffmapError(f"{where}: expected a coherence from 0 to 1; point {k + 1} has {c[k]:g}")
     known = c[np.isfinite(c)]
     if known.size > 2 and (known >= 1).all():
-        raise FileError(
+        raise StiffmapError(
             f"{where}: the coherence is 1 at every frequency, as that of one hit without averages is; it is no measure of "
-            "noise: leave the column out, or average several hits", file=file
-        )  # fmt: skip
+            "noise: leave the column out, or average several hits"
+        )

@@ -102,3 +102,26 @@ def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for form in FORMATS:
         with pytest.raises(FileError):
             read_table(tmp_path / "bad", form)
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["ur10", "--axis", "x", "--dh", "dh.csv"], "--dh: not with --axis"),
+        (["ur10", "poses.csv", "--axis", "x"], "--poses: not with --axis"),
+        (["ur10", "poses.csv", "--through", "0,0,1"], "--through: not without --axis"),
+        (["ur10", "poses.csv", "--case", "Fx"], "--case: not without --axis"),
+        (["ur10", "--axis", "x", "--case", "Fx"], "--case: not with --axis"),
+        (
+            ["map.nc", "--axis", "x", "--effect", "friction elbow force=1N"],
+            "--effect: not with --axis of a map",
+        ),
+        (["map.nc", "--axis", "x", "--force", "1,0,0"], "--force: not with --axis of a map"),
+        (["map.nc", "--axis", "x", "--gravity", "0,0,0"], "--gravity: not with --axis of a map"),
+        (["orthoglide-revised", "--axis", "x", "--points", "1"], "points, position: expected two or more"),
+        (["orthoglide-revised", "--axis", "x", "--points", "-3"], "points, position: expected two or more"),
+    ],
+)
+def test_an_option_that_would_be_dropped_is_refused(words, message, capsys) -> None:
+    assert main(["compensate", *words]) == 2
+    assert message in capsys.readouterr().err

@@ -154,6 +154,20 @@ def test_nothing_is_changed_without_need(tmp_path: Path) -> None:
     assert agree_tilt(tilted, file, tmp_path) < 1e-12
 
 
+@pytest.mark.parametrize("name", ["q.2", "q 4", "fl ange"])
+def test_joints_beside_the_way_may_have_names_that_are_one_in_a_machine_file(
+    name: str, tmp_path: Path
+) -> None:
+    beside = (
+        ARM.replace('name="eye"', f'name="{name}"').replace('"q4"', '"q/4"').replace('"flange"', '"fl.ange"')
+    )
+    file = tmp_path / "arm.urdf"
+    file.write_text(beside)
+    one = sm.import_urdf(file, tip="tool0").with_effect("zero_offset", element="q_4", error=2e-3)
+    wanted = beside.replace('"1e-1 0.02 0"/>', '"1e-1 0.02 0" rpy="0.002 0 0"/>')
+    assert corrected_urdf(one.description, file)[0].decode() == wanted
+
+
 def agree_tilt(machine: sm.Machine, file: Path, folder: Path) -> float:
     text, left = corrected_urdf(machine.description, file)
     assert left == []

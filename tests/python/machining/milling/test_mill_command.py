@@ -165,3 +165,20 @@ def test_the_documentation_says_first_what_the_shipped_process_cuts() -> None:
     for word in ("edge", "composite part", "diamond-coated tool"):
         assert word in sm.load_process("trimming").title
         assert word in begin
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["circle", "--offset", "G54=100,0,0"], "circle: offsets: only a program in G-code takes them"),
+        (
+            ["points.csv", "--offset", "G54=100,0,0"],
+            "points.csv: offsets: only a program in G-code takes them",
+        ),
+        (["part.ngc", "--offset", "G54=1,0,0", "--offset", "G54=2,0,0"], "each once; got 'G54=2,0,0'"),
+        (["circle", "--within", "-1"], "--within"),
+    ],
+)
+def test_what_would_be_dropped_is_refused(words, message, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["mill", "orthoglide-revised", *words, *ORTHOGLIDE]) == 2
+    assert message in capsys.readouterr().err

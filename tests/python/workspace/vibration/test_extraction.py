@@ -83,3 +83,16 @@ def test_uncertainties_are_those_of_a_curve_fit():
     np.testing.assert_allclose(
         [found.u_frequency[0], found.u_ratio[0], found.u_flexibility[0, 0] / 1e-6], u[:3], rtol=5e-3
     )
+
+
+@pytest.mark.parametrize("coherence", [np.nan, 0.999])
+@pytest.mark.parametrize("digits", [17, 6])
+@pytest.mark.parametrize(("frequency", "ratio"), [(31.831, 0.03), (31.831, 0.01), (50, 0.1), (80, 0.002)])
+def test_rounding_is_no_mode_and_no_certainty(frequency, ratio, digits, coherence):
+    f = np.linspace(0, 100, 401)
+    H = 1e-6 / (1 - (f / frequency) ** 2 + 2j * ratio * f / frequency)
+    H = np.array([complex(*(float(f"{v:.{digits - 1}e}") for v in (h.real, h.imag))) for h in H])
+    found = extract_modes([MeasuredResponse("", f, H, np.full(len(f), coherence))])
+    assert found.frequency == pytest.approx([frequency], rel=1e-6)
+    assert found.ratio == pytest.approx([ratio], rel=1e-4)
+    assert found.u_ratio[0] > 1e-7 * ratio

@@ -148,6 +148,7 @@ def universal(
         (ACCELERANCE / 9.80665, {"above": (12, "g/N")}),
         (ACCELERANCE * 4.4482216, {"below": (13, "lbf")}),
         (ACCELERANCE / 0.0254 * 4.4482216, {"above": (12, "in/s^2"), "below": (13, "lbf")}),
+        (1j * W * RECEPTANCE / 0.0254, {"above": (11, "ips")}),
         (ACCELERANCE * 1e6, {"above": (12, "mm/s²"), "below": (9, "kN")}),
         (ACCELERANCE, {"above": (1, "(1/N)*(m/s²)"), "below": (0, "NONE")}),
         (ACCELERANCE, {"above": (0, "(m/s2)/N"), "below": (0, "NONE")}),
@@ -233,3 +234,64 @@ def test_units_of_files_that_pyuff_writes(binary, tmp_path):
         ), "add",
     )  # fmt: skip
     np.testing.assert_allclose(read_responses(tmp_path / "tap.uff")[0].receptance, RECEPTANCE, rtol=2e-5)
+
+
+def _function(tmp_path, values, **head):
+    """One data set 58 as pyuff writes it."""
+    pyuff = pytest.importorskip("pyuff")
+    path, at = (
+        tmp_path / "one.uff",
+        {"rsp_node": 3, "rsp_dir": 3, "ref_node": 1, "ref_dir": -1, "func_type": 4},
+    )
+    kinds = {"ordinate_spec_data_type": 8, "orddenom_spec_data_type": 13, "abscissa_spacing": 0, "binary": 0}
+    path.unlink(missing_ok=True)  # pyuff overwrites a file with an empty one where it is binary
+    pyuff.UFF(str(path)).write_sets(
+        pyuff.prepare_58(**{**at, **kinds, "data": values, "x": F, "id1": "tap", **head}), "add"
+    )
+    return path.read_bytes()
+
+
+def test_hits_between_the_same_ends_keep_their_own_coherence(tmp_path):
+    pytest.importorskip("pyuff")
+    known = {c: _function(tmp_path, c + 0 * RECEPTANCE.real, func_type=6) for c in (0.95, 0.8)}
+    hits = [_function(tmp_path, k * RECEPTANCE, id1=f"tap {k}") for k in (1, 2)]
+    path = tmp_path / "taps.uff"
+    for order, expected in (
+        ((hits[0], known[0.95], hits[1], known[0.8]), (0.95, 0.8)),
+        ((*hits, *known.values()), (0.95, 0.8)),
+        ((*hits, known[0.95]), (0.95, 0.95)),
+    ):
+        path.write_bytes(b"".join(order))
+        assert [one.coherence[0] for one in read_responses(path)] == pytest.approx(expected)
+    path.write_bytes(b"".join((hits[0], *known.values())))
+    with pytest.raises(sm.StiffmapError, match=r"3 .z by 1 -x: found 2 coherences of 1 responses"):
+        read_responses(path)
+
+
+@pytest.mark.parametrize("binary", [0, 1])
+@pytest.mark.parametrize("cut", [1, 8, 60, 800])
+def test_a_universal_file_that_is_cut_off_is_one_message(cut, binary, tmp_path):
+    pytest.importorskip("pyuff")
+    whole = b"".join(
+        _function(tmp_path, RECEPTANCE, id1=f"tap {k}", binary=binary).rstrip() + b"\n" for k in (1, 2)
+    )
+    path = tmp_path / "taps.uff"
+    path.write_bytes(whole)
+    assert len(read_responses(path)) == 2
+    path.write_bytes(whole[: -cut - 1])
+    with pytest.raises(sm.StiffmapError, match="found 3 marks -1 for 1: it is cut off"):
+        read_responses(path)
+
+
+@pytest.mark.parametrize(
+    ("values", "head", "message"),
+    [
+        (np.abs(RECEPTANCE), {}, "expected complex numbers"),
+        (np.abs(RECEPTANCE), {"func_type": 2}, "no frequency response"),
+    ],
+)
+def test_a_function_without_phase_is_no_response(values, head, message, tmp_path):
+    path = tmp_path / "tap.uff"
+    path.write_bytes(_function(tmp_path, values, **head))
+    with pytest.raises(sm.StiffmapError, match=message):
+        read_responses(path)
