@@ -1,6 +1,6 @@
 """Tap tests of machines with one undeclared effect, made by MuJoCo, and of machines without any.
 
-    python -m bench.tap_twins --twins 20 --nulls 100
+    python -m bench.tap_twins --twins 20 --nulls 40
 
 The numbers of the machine file are off by their uncertainties (masses by 5 %) in every twin; frequencies carry 0.5 % noise,
 directions 0.05. An effect is a drive 1.5 to 6 times as soft as declared that shifts the readings by 8 standard deviations or more
@@ -23,7 +23,7 @@ from stiffmap.identification.taps.explain import fitted
 from stiffmap.identification.taps.problem import TapsProblem, shifted, uncertain_numbers
 from stiffmap.model.effects import apply_records
 
-MACHINES = ("ur10", "orthoglide-revised", "five-bar", "linear-delta", "travelling-column")
+MACHINES = ("ur10", "five-bar", "travelling-column", "linear-delta", "orthoglide-revised")
 POSES, MODES, NOISE, TURN, DEFAULT = 4, 5, 0.005, 0.05, 0.05
 VISIBLE = 8.0
 """Standard deviations."""
@@ -71,8 +71,8 @@ def drawn(machine, rng):
 def main() -> None:
     """Run and print."""
     parser = argparse.ArgumentParser()
-    parser.add_argument("--twins", type=int, default=30)
-    parser.add_argument("--nulls", type=int, default=100)
+    parser.add_argument("--twins", type=int, default=20)
+    parser.add_argument("--nulls", type=int, default=40)
     parser.add_argument("--seed", type=int, default=1)
     given = parser.parse_args()
     rng = np.random.default_rng(given.seed)
