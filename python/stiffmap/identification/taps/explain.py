@@ -44,6 +44,8 @@ FACTORS = (-1.5, -0.8, -0.4, -0.15, 0.15, 0.4, 0.8, 1.3, 1.8, 2.4)
 """Logarithms of a factor at which its changes are predicted."""
 SIZES = (-10.0, -3.0, -1.0, 1.0, 3.0, 10.0, 30.0)
 """The same of a number whose null is zero, in typical sizes."""
+REFINED = 4
+"""Causes in the stead of one, and starts of the fit without any, that are fitted; effort only."""
 BETWEEN = 16
 """Sizes from one of these to the next, both among them."""
 
@@ -161,8 +163,9 @@ def explain_taps(
         """Whether further causes leave nothing to explain, or explain nothing more."""
         before = least()
         fits.extend(fitted(problem, s) for s in _searched(problem, tried, at))
-        # without causes other modes may be paired from here than from the declared machine
-        fits.append(fitted(problem, (), least().lines.x))
+        # without causes other modes may be paired from there than from the declared machine
+        near = sorted((f for f in fits if f.named), key=lambda f: f.chi2)[:REFINED]
+        fits.extend([fitted(problem, (), f.lines.x) for f in near])
         return least().explains or (at is before and least() is before)
 
     if null.chi2 > price and not search(replace(null, lines=declared)) and not search(null):
@@ -229,7 +232,7 @@ def _searched(problem: TapsProblem, tried: Sequence[Candidate], at: FittedCauses
     own = _values([n.chosen for n in named])
     sets = [own]
     for k, n in enumerate(named):
-        instead = _values([put_instead(search.best.fit, n.chosen, p) for p in n.equivalents])
+        instead = _values([put_instead(search.best.fit, n.chosen, p) for p in n.equivalents[:REFINED]])
         sets += [[*own[:k], v, *own[k + 1 :]] for v in instead]
     some = (part for s in sets for k in range(1, len(s) + 1) for part in combinations(s, k))
     both = (s for part in some for s in (part, (*at.causes, *part)))
