@@ -135,7 +135,7 @@ MAPS: dict[str, tuple[str, ...]] = {
     "show": (".legs", ".elements"),
     "solve": (".actuator_effort", ".leg_wrench", ".joint_coordinates", ".spring_deflection"),
     "stress": (".springs", ".joints", ".legs"),
-    "taps": (".candidates[].parameters", ".candidates[].u"),
+    "taps": (".named[].parameters", ".named[].u"),
     "wrench": (".leg_wrench", ".leg_stiffness", ".actuator_effort"),
 }  # fmt: skip
 """Places in what a command prints whose keys are names of parts, drives, channels, columns or measures, not words of ours; * is any text."""
