@@ -97,18 +97,6 @@ def one_line(error: Exception) -> str:
     return " ".join(str(error).split())
 
 
-class _Once(typer.core.TyperCommand):
-    """A command each of whose options with one value is given once: of two nobody would see which counts."""
-
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        _, _, given = self.make_parser(ctx).parse_args(args=list(args))
-        for p in given:
-            single = isinstance(p, typer.core.TyperOption) and not (p.multiple or p.is_flag)
-            if single and given.count(p) > 1 and not ctx.resilient_parsing:
-                raise StiffmapError(f"{max(p.opts, key=len)}: expected once, found {given.count(p)} times")
-        return super().parse_args(ctx, args)
-
-
 def build_app(arguments: Sequence[str]) -> typer.Typer:
     """App in which only the command that ``arguments`` name is imported; the others are their summaries."""
     wanted = next((a for a in _without_effects(arguments) if not a.startswith("-")), None)
@@ -122,7 +110,7 @@ def build_app(arguments: Sequence[str]) -> typer.Typer:
     for command in COMMANDS:
         if command.exists():
             function = load(command) if command.name == wanted else _summary(command)
-            app.command(command.name, cls=_Once, help=flowed(getdoc(function) or ""))(function)
+            app.command(command.name, help=flowed(getdoc(function) or ""))(function)
     return app
 
 

@@ -209,26 +209,3 @@ def test_missing_parts_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 def test_the_package_runs_as_the_command() -> None:
     done = subprocess.run([sys.executable, "-m", "stiffmap", "--version"], capture_output=True, text=True)
     assert done.returncode == 0 and done.stdout.strip()
-
-
-@pytest.mark.parametrize(
-    ("words", "option"),
-    [
-        (["solve", "ur10", "--force", "1,0,0", "--force=2,0,0"], "--force"),
-        (["solve", "ur10", "--at", "0", "0", "1", "--json", "--at", "0", "0", "2"], "--at"),
-        (["check", "ur10", "--json", "-o", "a", "--output", "b"], None),
-        (["map", "ur10", "-o", "a", "--output", "b"], "--output"),
-        (["lobes", "ur10", "--process", "slot", "--process", "slot"], "--process"),
-    ],
-)
-def test_an_option_with_one_value_is_given_once(
-    words: list[str], option: str | None, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(words) == 2
-    if option is not None:
-        assert f"stiffmap: {option}: expected once, found 2 times" in capsys.readouterr().err
-
-
-def test_flags_and_lists_may_be_given_again(capsys: pytest.CaptureFixture[str]) -> None:
-    effects = ["--effect", "zero_offset elbow error=1mrad", "--effect", "zero_offset shoulder error=1mrad"]
-    assert main(["solve", "ur10", "--json", "--json", *effects]) == 0, capsys.readouterr().err
