@@ -19,7 +19,7 @@ import stiffmap as sm
 from stiffmap.identification.taps import TapTest, explain_taps
 from stiffmap.identification.taps.causes import causes
 from stiffmap.identification.taps.causes import term as change
-from stiffmap.identification.taps.explain import fitted
+from stiffmap.identification.taps.fit import fitted
 from stiffmap.identification.taps.problem import TapsProblem, shifted, uncertain_numbers
 from stiffmap.model.effects import apply_records
 

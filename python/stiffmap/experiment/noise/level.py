@@ -109,20 +109,26 @@ def contradictions(experiment: Experiment) -> list[str]:
     ]
 
 
-def against_the_load(experiment: Experiment) -> str:
-    """What to say where most readings of a deflection go against a force along their own axis; empty where they do not.
-
-    A machine yields along the force: another sign is one of the load's or of the readings', or of a gauge that was not at zero.
-    """
+def not_at_zero(experiment: Experiment) -> str:
+    """What to say where a deflection is read without a load; empty where none is, or where its zero is unknown."""
     e = experiment
     without = np.all(e.wrench == 0, axis=1, keepdims=True)
     idle = without & (np.abs(e.reading) > LOUD * np.nan_to_num(e.sigma, nan=np.inf))
-    if e.quantity == "deflection" and e.unloaded != "unknown" and idle.any():
-        row, axis = np.argwhere(idle)[0]
-        return (
-            f"rows without a load do not read zero (row {e.ids[row]}: {e.channels[axis].name} {e.reading[row, axis]:.4g} in SI): where "
-            "the gauge was not set to zero, write 'unloaded: unknown' into experiment.yaml, and the zero of each pose is fitted"
-        )
+    if e.quantity != "deflection" or e.unloaded == "unknown" or not idle.any():
+        return ""
+    row, axis = np.argwhere(idle)[0]
+    return (
+        f"rows without a load do not read zero (row {e.ids[row]}: {e.channels[axis].name} {e.reading[row, axis]:.4g} in SI): where "
+        "the gauge was not set to zero, write 'unloaded: unknown' into experiment.yaml, and the zero of each pose is fitted"
+    )
+
+
+def against_the_load(experiment: Experiment) -> str:
+    """What to say where most readings of a deflection go against a force along their own axis; empty where they do not.
+
+    A machine yields along the force: another sign is one of the load's or of the readings'.
+    """
+    e = experiment
     alone = np.count_nonzero(e.wrench, axis=1) == 1
     work = e.wrench[:, :3] * np.where(np.isfinite(e.reading[:, :3]), e.reading[:, :3], 0.0)
     clear = (

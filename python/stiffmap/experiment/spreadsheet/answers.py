@@ -135,8 +135,8 @@ class Meant(Answers):
 
     def _next_to(self, column: int) -> str:
         """The unit in the cells of the next column, where these mean nothing and hold nothing else."""
-        beside = self.guessed[column + 1 : column + 2]
-        if not beside or beside[0].meaning != "note":
+        following = self.guessed[column + 1 : column + 2]
+        if not following or following[0].meaning != "note":
             return ""
         cells = self.sheet.columns[column + 1]
         if any(cell and unit_of(cell) is None for cell in cells):

@@ -70,7 +70,8 @@ def _find(m: Meant, name: str, number: int, header: str | None) -> int | None:
     if header is not None:
         return m.index(header)
     own = [re.escape(n) for n in (name, name.split(".")[-1]) if n.lower() not in ("x", "y", "z")]
-    found = (m.sheet.find(pattern, quaternion(m.sheet)) for pattern in (*own, NUMBERED.format(number)))
+    turns = quaternion(m.sheet)
+    found = (m.sheet.find(pattern, turns) for pattern in (*own, NUMBERED.format(number)))
     return next((i for i in found if i is not None), None)
 
 

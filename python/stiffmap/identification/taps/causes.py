@@ -132,3 +132,8 @@ def scaled(p: Parameter) -> tuple[Callable[[float], float], float, float]:
             float(np.log(p.upper)),
         )
     return (lambda t: float(np.clip(t * p.scale, p.lower, p.upper))), p.lower / p.scale, p.upper / p.scale
+
+
+def unscaled(p: Parameter, value: float) -> float:
+    """The free number behind a value of a parameter: the other way of `scaled`."""
+    return float(np.log(value)) if p.null == 1.0 else value / p.scale

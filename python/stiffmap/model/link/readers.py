@@ -50,8 +50,8 @@ def known_columns(
     usually written; other columns are left alone. Raises FileError."""
     if not Path(path).is_file():
         raise FileError("no such file", file=str(path))
-    has = lambda name: name.lower() in units  # noqa: E731
-    sheet = read_sheet(Path(path), None, Layout(has, strict=True, repeated=True))
+    layout = Layout(lambda name: name.lower() in units, strict=True, repeated=True)
+    sheet = read_sheet(Path(path), None, layout)
     found: dict[str, list[Floats]] = {name: [] for name in units}
     for head, cells, name in zip(sheet.header, sheet.columns, map(str.lower, sheet.names), strict=True):
         if name in units:

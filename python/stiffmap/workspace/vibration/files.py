@@ -98,6 +98,8 @@ MOTIONS = {8: 0, 11: 1, 12: 2}
 WAYS = {0: "", 1: "+x", -1: "-x", 2: "+y", -2: "-y", 3: "+z", -3: "-z", 4: "+rx", 5: "+ry", 6: "+rz", -4: "-rx", -5: "-ry", -6: "-rz"}  # fmt: skip
 RESPONSE, COHERENCE = 4, 6
 UNITS, FUNCTION = 164, 58
+MARK = re.compile(rb"    -1 *(?=[\r\n]|\Z)")
+"""Before and after each data set; not a whole line, as one may follow binary numbers."""
 UNKNOWN, FORCES, FREQUENCY = (0, 1), (9, 13), 18
 WANTED = "expected displacement, velocity or acceleration (types 8, 11, 12) by force"
 QUANTITIES = {
@@ -112,9 +114,7 @@ def _universal(path: Path) -> list[MeasuredResponse]:
     try:
         file = pyuff.UFF(str(path))
         sets = file.read_sets()
-        marks = re.findall(
-            rb"    -1 *(?=[\r\n]|\Z)", path.read_bytes()
-        )  # not lines: one may follow binary numbers
+        marks = MARK.findall(path.read_bytes())
         if len(marks) != 2 * file.get_n_sets():
             raise ValueError(f"found {len(marks)} marks -1 for {file.get_n_sets()}: it is cut off")
     except Exception as problem:  # the reader raises whatever its parsing meets

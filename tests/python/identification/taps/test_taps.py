@@ -253,17 +253,18 @@ def test_numbers_off_that_pair_other_modes_are_no_cause(seed):
 @pytest.mark.parametrize("factor", [0.5, 2.1, 9.0])
 def test_changes_between_predicted_sizes_are_those_of_the_machine(arm, factor):
     """As far as the same modes are paired; what is wrong between two pairings is mended by whole predictions."""
-    from stiffmap.identification.taps import explain
     from stiffmap.identification.taps.causes import causes, term
+    from stiffmap.identification.taps.fit import fitted
     from stiffmap.identification.taps.problem import TapsProblem
+    from stiffmap.identification.taps.search import place_of
 
     alone = tapped(arm, 6, count=1)
     problem = TapsProblem(arm, alone, None, 0.05)
-    null = explain.fitted(problem, [])
+    null = fitted(problem, [])
     a2 = next(c for c in causes(problem) if str(c) == "compliance of a2, leg arm")
     change = problem.residual(term(a2, factor), null.lines.x) - null.lines.residual
     across = [
         np.linalg.norm(change - s.directions @ (s.directions.T @ change)) / np.linalg.norm(change)
-        for s in explain._place(problem, a2, null, np.eye(len(change))).shapes
+        for s in place_of(problem, a2, null, np.eye(len(change))).shapes
     ]
     assert min(across) < 0.02
