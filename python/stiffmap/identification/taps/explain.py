@@ -14,7 +14,7 @@ from stiffmap.experiment import Experiment
 from stiffmap.identification.inference.constants import MOST_EFFECTS, ODDS
 from stiffmap.identification.inference.optimum import Optimum
 from stiffmap.identification.taps.causes import causes
-from stiffmap.identification.taps.fit import Explained, FittedCauses, fitted
+from stiffmap.identification.taps.fit import Explained, FittedCauses, best_of, fitted, price
 from stiffmap.identification.taps.predict import predict_taps
 from stiffmap.identification.taps.problem import LEAST, TapsProblem
 from stiffmap.identification.taps.search import REFINED, named_causes
@@ -83,12 +83,10 @@ def explain_taps(
     n, remarks, null = int(problem.used.sum()), _remarks(problem), fitted(problem, [])
     slopes = problem.slopes[problem.used]
     declared = Optimum(np.zeros(slopes.shape[1]), problem.residual(), slopes)
-    price = 2.0 * float(np.log(ODDS) + np.log(len(tried)))  # chi-square that an effect must be worth
     fits = [null]
 
     def least() -> FittedCauses:
-        noise = max(1.0, min(f.chi2 for f in fits) / n)
-        return min(fits, key=lambda f: f.chi2 + noise * price * len(f.named))
+        return best_of(fits, len(tried))
 
     def search(at: FittedCauses) -> bool:
         """Whether further causes leave nothing to explain, or explain nothing more."""
@@ -99,7 +97,7 @@ def explain_taps(
         fits.extend([*fresh, *(fitted(problem, (), f.lines.x) for f in near if f in fresh)])
         return least().explains or (at is before and least() is before)
 
-    if null.chi2 > price and not search(replace(null, lines=declared)) and not search(null):
+    if null.chi2 > price(len(tried)) and not search(replace(null, lines=declared)) and not search(null):
         while len(least().named) < MOST_EFFECTS and not search(least()):
             pass
     best, before = least(), min(f.chi2 for f in fits if not f.named)

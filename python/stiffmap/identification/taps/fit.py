@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,7 +10,7 @@ from scipy.stats import chi2
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.identification.candidates.candidates import Candidate
-from stiffmap.identification.inference.constants import RARE
+from stiffmap.identification.inference.constants import ODDS, RARE
 from stiffmap.identification.inference.optimum import Optimum, covariance
 from stiffmap.identification.taps.causes import Causes, scaled, together, unscaled
 from stiffmap.identification.taps.problem import TapsProblem
@@ -82,6 +83,18 @@ class FittedCauses:
     def causes(self) -> Causes:
         """SI."""
         return [(e.place, e.value) for e in self.named]
+
+
+def best_of(fits: Sequence[FittedCauses], places: int) -> FittedCauses:
+    """The set of least chi-square, of which each cause must be worth the odds of a name at any of so many places; in the noise that
+    the closest set leaves."""
+    noise = max(1.0, min(f.chi2 / len(f.lines.residual) for f in fits))
+    return min(fits, key=lambda f: f.chi2 + noise * price(places) * len(f.named))
+
+
+def price(places: int) -> float:
+    """Chi-square that a cause must be worth."""
+    return 2.0 * float(np.log(ODDS) + np.log(places))
 
 
 def fitted(problem: TapsProblem, begin: Causes, off: Floats | None = None) -> FittedCauses:

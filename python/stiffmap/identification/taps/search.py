@@ -42,7 +42,7 @@ REFINED = 4
 def named_causes(problem: TapsProblem, tried: Sequence[Candidate], at: FittedCauses) -> list[Causes]:
     """Further causes that have a name where readings follow the uncertain numbers along straight lines from a fit, and what would
     do in the stead of each; all of them, and some, with the causes of the fit and without."""
-    columns = _columns(problem, tried, at)
+    columns = columns_of(problem, tried, at)
 
     def predict(chosen: Sequence[Chosen]) -> Floats:
         try:
@@ -63,7 +63,7 @@ def named_causes(problem: TapsProblem, tried: Sequence[Candidate], at: FittedCau
     return list({frozenset(c for c, _ in s): s for s in both}.values())
 
 
-def _columns(problem: TapsProblem, tried: Sequence[Candidate], at: FittedCauses) -> Columns:
+def columns_of(problem: TapsProblem, tried: Sequence[Candidate], at: FittedCauses) -> Columns:
     """The readings, by their noise, as the inference takes them."""
     lines, taken = at.lines, [c for c, _ in at.causes]
     m = len(lines.residual)
