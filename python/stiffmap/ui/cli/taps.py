@@ -32,8 +32,9 @@ def command(
 ) -> None:
     """Which effect explains the frequencies and damping that tap tests found, typed or from measured responses.
 
-    Effects of stiffness, masses of links, dampers, and a hammer held otherwise are tried. Modes are paired by the direction in which the tool moves and by frequency. With -o: the corrected machine
-    (corrected.yaml), a table and a picture of the frequency response before and after.
+    Effects of stiffness, masses of links, dampers, and a hammer held otherwise are tried. Modes are paired by the direction in which
+    the tool moves and by frequency. With -o: the corrected machine (corrected.yaml) and a picture of the frequency response before and
+    after.
 
     Exit codes: 0 nothing is missing, 1 an effect was named or the readings do not fit, 2 bad input.
 

@@ -58,16 +58,22 @@ def test_what_is_searched_next_is_free_of_the_causes_of_a_fit(problem):
 
 
 def test_sets_are_all_causes_and_some_with_those_of_the_fit_and_without(problem, monkeypatch):
-    one, two, three = (cause(problem, name) for name in ("a1", "a2", "a3"))
+    one, two, three, four = (cause(problem, name) for name in ("a1", "a2", "a3", "a4"))
 
     def chosen(c, value):
         return SimpleNamespace(place=SimpleNamespace(candidate=c), strengths=((c.parameters[0], value),))
 
-    found = [SimpleNamespace(chosen=chosen(c, v), equivalents=()) for c, v in ((one, 2.0), (two, 3.0))]
-    monkeypatch.setattr(search, "searched", lambda columns, predict: None)
+    found = [
+        SimpleNamespace(chosen=chosen(one, 2.0), equivalents=(four,)),
+        SimpleNamespace(chosen=chosen(two, 3.0), equivalents=()),
+    ]
+    best = SimpleNamespace(best=SimpleNamespace(fit=None))
+    monkeypatch.setattr(search, "searched", lambda columns, predict: best)
+    monkeypatch.setattr(search, "put_instead", lambda fit_, c, place: chosen(place, 4.0))
     monkeypatch.setattr(search, "judged", lambda columns, found_: SimpleNamespace(named=found))
     at = fitted(problem, [(three, 1.1)])
     sets = [{str(c): v for c, v in s} for s in search.named_causes(problem, [one, two], at)]
     given = {str(three): at.named[0].value}
-    alone = [{str(one): 2.0}, {str(two): 3.0}, {str(one): 2.0, str(two): 3.0}]
-    assert len(sets) == 6 and all(s in sets for s in (*alone, *(given | s for s in alone)))
+    a, b, instead_of_a = {str(one): 2.0}, {str(two): 3.0}, {str(four): 4.0}
+    alone = [a, b, a | b, instead_of_a, instead_of_a | b]
+    assert len(sets) == 10 and all(s in sets for s in (*alone, *(given | s for s in alone)))
