@@ -8,7 +8,8 @@
 namespace stiffmap::kernel {
 
 struct Nearest {
-  static constexpr int most = 16;     // joints of a leg
+  static constexpr int most = 16;              // joints of a leg
+  static constexpr double consistent = 1e-12;  // of the length: a row that repeats others asks for the same
   static constexpr double firm = 10;  // of the closure in the matrix of joints, which makes its pivots positive
 
   const Program& P;
@@ -61,7 +62,9 @@ struct Nearest {
         L[a][b] = v;
       }
     }
-    M sound = factorise(L, n);
+    M dependent[most], sound = ~M{};
+    factorise(L, n, dependent);
+    for (int a = 0; a < n; ++a) sound &= ~dependent[a];
     for (int c = 0; c < 7; ++c) {
       for (int a = 0; a < n; ++a)
         for (int b = 0; b < a; ++b) Y[a][c] -= L[a][b] * Y[b][c];
@@ -78,9 +81,11 @@ struct Nearest {
         for (int a = 0; a < n; ++a) S[i][j] += A[i][a] * Y[a][j];
       }
     }
-    sound &= factorise(S, 6);
-    for (int i = 0; i < 6; ++i)
+    factorise(S, 6, dependent);
+    for (int i = 0; i < 6; ++i) {
       for (int j = 0; j < i; ++j) m[i] -= S[i][j] * m[j];
+      sound &= ~dependent[i] | (absolute(m[i]) < consistent * P.length);
+    }
     for (int i = 0; i < 6; ++i) m[i] *= 1.0 / S[i][i];
     for (int i = 5; i >= 0; --i)
       for (int j = i + 1; j < 6; ++j) m[i] -= S[j][i] * m[j];
@@ -92,9 +97,9 @@ struct Nearest {
     return sound;
   }
 
-  /// L D Lᵀ below the diagonal, D on it; lanes where D is positive.
-  static M factorise(V (*A)[most], int n) {
-    M sound = ~M{};
+  /// L D Lᵀ below the diagonal, D on it. Lanes where an entry of D is not positive get an infinite one, so that the row
+  /// counts for nothing: of S, a direction that those before leave no joint for (the end of a planar leg has three).
+  static void factorise(V (*A)[most], int n, M* dependent) {
     for (int i = 0; i < n; ++i) {
       const V whole = A[i][i];
       for (int k = 0; k < i; ++k)
@@ -104,9 +109,9 @@ struct Nearest {
         A[i][i] -= A[i][k] * v;
         A[i][k] = v;
       }
-      sound &= A[i][i] > 1e-12 * whole;
+      dependent[i] = ~(A[i][i] > 1e-12 * whole);
+      A[i][i] = select(dependent[i], splat(1e300), A[i][i]);
     }
-    return sound;
   }
 
   V norm() const {

@@ -18,10 +18,15 @@ struct Starts {
     double share[4] = {};
   };
 
-  /// Lagrange's weights on `points` (2 or 4) nodes around p; false outside the grid.
+  /// Lagrange's weights on `points` (1, 2 or 4) nodes around p; false outside the grid. An axis along which the
+  /// workspace is flat has one node.
   bool stencil(int axis, double p, int points, Stencil& out) const {
     const int n = P.grid_n[axis];
     const double u = (p - P.grid_low[axis]) / P.grid_step[axis];
+    if (n == 1) {
+      out = {0, {1}};
+      return u >= -0.5 && u <= 0.5;
+    }
     if (!(u >= -1e-9 && u <= n - 1 + 1e-9)) return false;
     int i = static_cast<int>(u) - (points == 4 ? 1 : 0);
     i = i < 0 ? 0 : i > n - points ? n - points : i;
@@ -39,7 +44,7 @@ struct Starts {
     return true;
   }
 
-  static int points(int nodes, bool cubic) { return cubic && nodes >= 4 ? 4 : 2; }
+  static int points(int nodes, bool cubic) { return cubic && nodes >= 4 ? 4 : nodes > 1 ? 2 : 1; }
 
   /// Row of unknowns at p: cubic, linear next to a node out of reach; false where that is one too.
   bool interpolate(const double* p, double* row) const {
@@ -57,7 +62,8 @@ struct Starts {
   template <bool All>
   bool sum(const Stencil& x, const Stencil& y, const Stencil& z, int nx, int ny, int nz, double* row) const {
     if constexpr (All) nx = ny = nz = 4;
-    const std::int64_t dx = P.grid_row, dy = dx * P.grid_n[0], dz = dy * P.grid_n[1];
+    const std::int64_t dx = P.grid_n[0] > 1 ? P.grid_row : 0, dy = std::int64_t{P.grid_row} * P.grid_n[0],
+                       dz = dy * P.grid_n[1];
     const double* corner = P.grid + x.first * dx + y.first * dy + z.first * dz;
     V doubtful = splat(0);
     for (int j = 0; j < P.grid_row; j += W) {
@@ -95,7 +101,7 @@ struct Starts {
       std::int64_t node = 0;
       double distance = 0, here[3];
       for (int k = 0; k < 3; ++k) {
-        const std::int64_t i = axis[k].first + (corner >> k & 1);
+        const std::int64_t i = axis[k].first + (P.grid_n[k] > 1 ? corner >> k & 1 : 0);
         node += i * stride[k];
         here[k] = P.grid_low[k] + static_cast<double>(i) * P.grid_step[k];
         distance += (p[k] - here[k]) * (p[k] - here[k]);

@@ -149,8 +149,8 @@ void place_grid(const Mechanism& m, const Vec3& low, const Vec3& high, int grid_
   for (int c = 0; c < 3; ++c) {
     const double size = high[c] - low[c];
     const bool flat = size < 1e-6 * m.length;
-    p.grid_n[c] = flat ? 2 : grid_nodes;
-    p.grid_low[c] = flat ? low[c] - 5e-4 * m.length : low[c];
+    p.grid_n[c] = flat ? 1 : grid_nodes;
+    p.grid_low[c] = low[c];
     p.grid_step[c] = flat ? 1e-3 * m.length : size / (grid_nodes - 1);
   }
   p.grid_row = (p.unknown_count + 7) / 8 * 8;

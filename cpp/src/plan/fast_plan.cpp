@@ -334,8 +334,9 @@ bool FastPlan::nearest_start(const Mechanism& m, const Vec3& position, VecX& x, 
   at = m.home;
   for (int k = 0; k < 3; ++k) {
     const double u = (position[k] - p.grid_low[k]) / p.grid_step[k];
-    if (!(u >= -1e-9 && u <= p.grid_n[k] - 1 + 1e-9)) return false;
-    const double i = std::round(u);
+    const double beyond = p.grid_n[k] > 1 ? 1e-9 : 0.5;
+    if (!(u >= -beyond && u <= p.grid_n[k] - 1 + beyond)) return false;
+    const double i = std::clamp(std::round(u), 0.0, p.grid_n[k] - 1.0);
     node += static_cast<std::size_t>(i) * stride;
     stride *= static_cast<std::size_t>(p.grid_n[k]);
     at.p[k] = p.grid_low[k] + i * p.grid_step[k];

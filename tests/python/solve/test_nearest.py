@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.linalg import null_space
@@ -10,6 +12,7 @@ from scipy.spatial.transform import Rotation
 from tests.python.solve.redundant_machines import ARMS, Arm
 
 import stiffmap as sm
+from stiffmap.model.description import Spring
 from stiffmap.workspace.performance.motion.closing import drive_kinematics
 
 WRENCH = np.array([40.0, -30.0, 60.0, 2.0, 3.0, -1.0])
@@ -149,3 +152,25 @@ def test_a_start_takes_the_place_of_home(arm: Arm) -> None:
     for at in found:
         still = null_space(arm.jacobian(at)[task] / units, rcond=1e-6)
         np.testing.assert_allclose(still.T @ (units * (at - other)), 0.0, atol=3e-9)
+
+
+def test_a_leg_in_a_plane_closes_in_the_lanes_too() -> None:
+    """All six components of the pose are commanded, of which the leg's plane keeps three for all of its four joints."""
+    arm = ARMS["planar_four"]()
+    d = arm.machine.description
+    (leg,) = d.legs
+    spring = Spring("link", stiffness=tuple(map(tuple, np.diag([2e6, 2e6, 1e6, 2e4, 2e4, 3e4]).tolist())))
+    task = ("x", "y", "z", "rx", "ry", "rz")
+    m = sm.Machine(replace(d, legs=(replace(leg, elements=(*leg.elements, spring)),), task=task))
+    p, r = poses(arm)
+    fast, slow = (m.solve(p, WRENCH, rotation=r, method=way) for way in ("fast", "reference"))
+    assert m.compiled.redundancy == 1 and not slow.status.any() and not fast.status.any()
+    assert not (fast.flags & sm.Flag.REFERENCE_PATH).any()
+    np.testing.assert_allclose(
+        joints(arm, m.solve(p, np.zeros(6), rotation=r).coordinates),
+        joints(arm, arm.machine.solve(p, np.zeros(6), rotation=r).coordinates),
+        atol=1e-10,
+    )
+    np.testing.assert_allclose(fast.displacement, slow.displacement, rtol=0, atol=1e-13)
+    out_of_the_plane = m.solve(p + [0.0, 0.0, 1e-4], WRENCH, rotation=r)
+    assert (out_of_the_plane.status == sm.Status.UNREACHABLE).all()
