@@ -86,6 +86,11 @@ class DeflectionBudget:
         order = np.argsort(-np.abs(self.shares), kind="stable")
         return [(self.elements[i], self.contributions[i], float(self.shares[i])) for i in order]
 
+    def as_plain(self) -> dict[str, Any]:
+        """Data of JSON, SI."""
+        shares = {n: {"share": s, "displacement": c} for n, c, s in self.ranked()}
+        return {"displacement": self.displacement, "elements": shares, "second_order": self.rest_share}
+
     def to_dataframe(self) -> pd.DataFrame:
         """Rows by element, µm and %, the largest share first."""
         import pandas as pd

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,7 +12,7 @@ from stiffmap.common.broadcasting import Floats, batch, rows, thread_count, trai
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.short import short_repr
 from stiffmap.solve.closing import commanded
-from stiffmap.solve.compiled import CompiledMachine, Status
+from stiffmap.solve.compiled import CompiledMachine, Flag, Status
 from stiffmap.solve.labels import OverPoses
 
 
@@ -52,6 +53,20 @@ class HoldingWrench(OverPoses):
     def ok(self) -> NDArray[np.bool_]:
         """(...) where the status is CONVERGED."""
         return np.asarray(self.status == Status.CONVERGED)
+
+    def as_plain(self) -> dict[str, Any]:
+        """Data of JSON of one pose, SI."""
+        return {
+            "point": self.point,
+            "status": Status(int(self.status)).name,
+            "status_without_clamp": Status(int(self.force_status)).name,
+            "flags": [f.name for f in Flag(int(self.flags))],
+            "wrench": self.wrench,
+            "leg_wrench": dict(zip(self.legs, self.leg_wrench, strict=True)),
+            "stiffness": self.stiffness,
+            "leg_stiffness": dict(zip(self.legs, self.leg_stiffness, strict=True)),
+            "actuator_effort": dict(zip(self.actuators, self.actuator_effort, strict=True)),
+        }
 
 
 def holding_wrench(

@@ -45,6 +45,17 @@ class Mobility:
         """Closure equations that follow from the others."""
         return self.equations - self.independent
 
+    def as_plain(self) -> dict[str, int]:
+        """Data of JSON."""
+        return {
+            "degrees_of_freedom": self.total,
+            "platform_freedom": self.platform,
+            "internal_freedom": self.internal,
+            "over_constraint": self.overconstraint,
+            "closure_equations": self.equations,
+            "joint_coordinates": self.joints,
+        }
+
 
 def mobility(machine: Machine, coordinates: Floats) -> Mobility:
     """Counts at coordinates that close all loops."""

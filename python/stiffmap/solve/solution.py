@@ -241,6 +241,22 @@ class Solution(OverPoses):
         """
         return solution_dataset(self, dims, coords)
 
+    def as_plain(self) -> dict[str, Any]:
+        """Data of JSON of one pose, SI."""
+        return {
+            "point": self.point,
+            "status": Status(int(self.status)).name,
+            "flags": [f.name for f in Flag(int(self.flags))],
+            "displacement": self.displacement,
+            "stiffness": self.stiffness,
+            "compliance": self.compliance,
+            "actuator_effort": dict(zip(self.actuators, self.actuator_effort, strict=True)),
+            "leg_wrench": dict(zip(self.legs, self.leg_wrench, strict=True)),
+            "joint_coordinates": self.joint_coordinates,
+            "spring_deflection": self.spring_deflection,
+            "indeterminate": list(self.indeterminate),
+        }
+
     def count(self) -> dict[str, int]:
         """Number of poses per status."""
         return counted(self.status)

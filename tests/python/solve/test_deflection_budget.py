@@ -88,7 +88,7 @@ def test_without_load_nothing_has_a_share(tmp_path: Path) -> None:
 def test_the_loaded_picture_enlarges_what_was_solved() -> None:
     machine = sm.load_machine("orthoglide-revised")
     shape = loaded_shape(machine, [0.1, 0.0, 0.1], [0, 300.0, 0, 0, 0, 0])
-    moved = shape.enlarged(7.0).tcp - shape.rest.tcp
+    moved = shape.rest.enlarged(shape.loaded, 7.0).tcp - shape.rest.tcp
     np.testing.assert_allclose(moved, 7 * shape.displacement[:3], atol=1e-12)
     assert [round_factor(0.08, d) for d in (0.08, 0.03, 1e-4, 0.0)] == [1.0, 2.0, 500.0, 1.0]
     figure = plot.loaded_figure(machine, [0.1, 0.0, 0.1], [0, 300.0, 0, 0, 0, 0])
@@ -104,7 +104,9 @@ def test_the_loaded_picture_shows_what_gravity_does(
     budget = sm.deflection_budget(machine, None, np.zeros(6), gravity=g)
     np.testing.assert_allclose(shape.displacement, budget.displacement, rtol=1e-6, atol=1e-12)
     assert abs(shape.displacement[2]) > 1e-5
-    np.testing.assert_allclose(shape.enlarged(1.0).tcp - shape.rest.tcp, shape.displacement[:3], atol=1e-12)
+    np.testing.assert_allclose(
+        shape.rest.enlarged(shape.loaded, 1.0).tcp - shape.rest.tcp, shape.displacement[:3], atol=1e-12
+    )
     drawn = []
     real = plot.loaded_figure
     monkeypatch.setattr(plot, "loaded_figure", lambda *a, **k: drawn.append(real(*a, **k)) or drawn[-1])

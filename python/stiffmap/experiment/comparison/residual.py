@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from stiffmap.common.outputs import number_cells, write_rows
 from stiffmap.common.short import short_repr
@@ -113,3 +114,50 @@ class Residual:
             "worst": [{"id": i, "channel": c, "residual": v} for i, c, v in self.worst(rows)],
             "checks": [vars(c) for c in self.checks],
         }
+
+    def lines(self, rows: int = 10) -> list[str]:
+        """The residual in words, with the worst `rows`."""
+        s, e = self.summary, self.experiment
+        lengths = {c.name: c.unit == "m" for c in e.channels}
+        floor = {c.name: float(v) for c, v in zip(e.channels, self.noise.floor, strict=True)}
+
+        def shown(name: str, value: float) -> str:
+            return _mm(value) if lengths[name] else _mrad(value)
+
+        aside = [e.ids[i] for i in self.set_aside.nonzero()[0]]
+        out = [f"{e.name}: {s.n} readings of {e.quantity} in {len(e)} rows; reading minus prediction"]
+        if np.isfinite(s.rms):
+            out.append(f"  all lengths: rms {_mm(s.rms)}, 95 % {_mm(s.p95)}, largest {_mm(s.max)}")
+        if s.rotation_rms is not None:
+            out.append(f"  all angles: rms {_mrad(s.rotation_rms)}")
+        out += [f"  found: {name} {_pose(turn, shift)}" for name, turn, shift in e.registration]
+        out += [f"  {a}: rms {shown(a, v)}, noise {shown(a, floor[a])}" for a, v in s.per_axis.items()]
+        out.append(f"  rms / noise {s.ratio:.2f}; p-value of this residual {_p_value(self.lack_of_fit)}")
+        out += [f"  unknown frames and zeros fitted: {self.nuisances}"] if self.nuisances else []
+        out.append(f"  poses beyond noise: {self.groups_off} of {int(e.groups.max()) + 1}")
+        out.append(f"  outliers (rows): {', '.join(aside) or 'none'}")
+        for c in self.checks:
+            told = f"rms/noise {c.rms:.2f}, p = {_p_value(c.p)}" if c.contrasts else c.note
+            out.append(f"  {c.name} ({c.meaning}): {told}")
+        worst = [f"{i} ({a} {shown(a, v)})" for i, a, v in self.worst(rows)]
+        out.append(f"  worst rows: {', '.join(worst) or 'none'}")
+        return out + [f"  limit: {text}" for text in self.limitations]
+
+
+def _pose(turn: Floats, shift: Floats) -> str:
+    """Where an instrument stands or a target sits."""
+    angles = np.degrees(Rotation.from_matrix(turn).as_rotvec())
+    at = ", ".join(f"{1e3 * v:.3f}" for v in shift)
+    return f"at ({at}) mm, rotation vector ({', '.join(f'{a:.4f}' for a in angles)}) deg"
+
+
+def _p_value(p: float) -> str:
+    return f"{p:.2g}" if p > 1e-99 else "below 1e-99"
+
+
+def _mm(value: float) -> str:
+    return f"{1e3 * value:.4f} mm"
+
+
+def _mrad(value: float) -> str:
+    return f"{1e3 * value:.4f} mrad"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from os import PathLike
+from typing import Any
 
 import numpy as np
 from scipy.linalg import block_diag, cholesky, solve_triangular
@@ -76,6 +77,10 @@ class Comparison:
     def common(self) -> bool:
         """Whether one set of numbers serves both: a property of the type rather than of a specimen."""
         return self.p >= ALPHA
+
+    def as_plain(self) -> dict[str, Any]:
+        """Data of JSON, SI."""
+        return {"common": self.common, "p": self.p, "changes": [vars(c) for c in self.changes]}
 
     def __str__(self) -> str:
         word = "one set of numbers serves both" if self.common else "the two differ"

@@ -80,6 +80,20 @@ class Design:
             "value_random": self.random_value,
         }
 
+    def lines(self) -> list[str]:
+        """In words, with random plans next to it."""
+        out = [
+            f"{len(self.experiment)} rows chosen; for comparison the median of 20 random plans of the same size"
+        ]
+        if self.aim == "separate":
+            far = f"{self.value:.1f} standard deviations (random {self.random_value:.1f})"
+            return [*out, f"  the two explanations differ by {far}"]
+        for n, u, s, r in zip(self.names, self.units, self.sigma, self.random_sigma, strict=True):
+            out.append(f"  {n}: u = {s:.3g} {u} (random {r:.3g})")
+        if self.aim == "map":
+            out.append(f"  map: u = {1e3 * self.value:.3g} mm rms (random {1e3 * self.random_value:.3g})")
+        return out
+
 
 def plan(
     machine: Machine | Source,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -63,6 +64,11 @@ class Estimate:
     def misfit(self) -> float:
         """Root of chi-square per degree of freedom, at least 1: what a model that does not fit adds (Birge)."""
         return float(np.sqrt(max(1.0, self.chi2 / max(self.freedom, 1))))
+
+    def as_plain(self) -> list[dict[str, Any]]:
+        """Data of JSON, SI: values and uncertainties."""
+        each = zip(self.names, self.units, self.values, self.sigma * self.misfit, strict=True)
+        return [{"name": n, "unit": s, "value": v, "u": u} for n, s, v, u in each]
 
 
 def estimate(machine: Machine, experiment: Experiment, terms: Sequence[AppliedEffect]) -> Estimate:

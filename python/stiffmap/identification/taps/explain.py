@@ -50,6 +50,21 @@ class TapDiagnosis:
             ],
         }  # fmt: skip
 
+    def modes(self, machine: Machine, taps: TapTest) -> list[dict[str, Any]]:
+        """Data of JSON: a row per mode, measured, of the machine as it is, and with what is named."""
+        before = predict_taps(machine, taps)
+        after = None if self.machine is None else predict_taps(self.machine, taps)
+        return [
+            {
+                "at_mm": (1e3 * taps.position[i]).tolist(), "measured_Hz": float(taps.frequency[i]),
+                "before_Hz": float(before.frequency[i]), "after_Hz": None if after is None else float(after.frequency[i]),
+                "mac": float(before.mac[i] if after is None else after.mac[i]),
+                "damping_percent": 100 * float(taps.ratio[i]), "damping_before_percent": 100 * float(before.ratio[i]),
+                "damping_after_percent": None if after is None else 100 * float(after.ratio[i]),
+            }
+            for i in range(len(taps))
+        ]  # fmt: skip
+
 
 @takes_machine
 @on_one_thread

@@ -10,7 +10,7 @@ import re
 import sys
 import traceback
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from inspect import getdoc
 from typing import Any
@@ -21,7 +21,7 @@ from rich.markup import escape
 from stiffmap.common.errors import FileError, FileErrors, StiffmapError
 from stiffmap.common.number_text import number_in
 from stiffmap.common.outputs.keeping import one_command
-from stiffmap.ui.cli.commands import COMMANDS, Command
+from stiffmap.ui.cli.commands import COMMANDS
 from stiffmap.ui.cli.loading import import_all, load
 from stiffmap.ui.cli.options import option
 
@@ -107,10 +107,12 @@ def build_app(arguments: Sequence[str]) -> typer.Typer:
         pretty_exceptions_enable=False,
     )
     app.callback()(_root)
-    for command in COMMANDS:
-        if command.exists():
-            function = load(command) if command.name == wanted else _summary(command)
+    for command in (c for c in COMMANDS if c.exists()):
+        if command.name == wanted:
+            function = load(command)
             app.command(command.name, help=flowed(getdoc(function) or ""))(function)
+        else:
+            app.command(command.name, help=command.summary)(lambda: None)
     return app
 
 
@@ -132,14 +134,6 @@ def styled(text: str) -> str:
 def flowed(text: str) -> str:
     """Paragraphs without the source's line breaks: the terminal breaks them at its own width."""
     return "\n\n".join(" ".join(paragraph.split()) for paragraph in text.split("\n\n"))
-
-
-def _summary(command: Command) -> Callable[[], None]:
-    def summary() -> None:
-        """Stands for a command that is not asked for."""
-
-    summary.__doc__ = command.summary
-    return summary
 
 
 def _version(wanted: bool) -> None:

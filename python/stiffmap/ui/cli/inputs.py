@@ -56,7 +56,7 @@ def pairs(given: Sequence[str] | None, name: str) -> dict[str, str]:
     return out
 
 
-def position(text: str | None, machine: Machine, name: str = "at") -> Floats:
+def position(text: str | None, machine: Machine) -> Floats:
     """A TCP position given in mm, in m: all three coordinates or those that the machine commands, the others as at home;
     the home position where none is given. StiffmapError for another value of what is not commanded."""
     home, task = machine.description.home.p, machine.description.task
@@ -64,7 +64,7 @@ def position(text: str | None, machine: Machine, name: str = "at") -> Floats:
         return home
     commanded = [i for i, axis in enumerate("xyz") if axis in task]
     few = len(text.replace(",", " ").split()) == len(commanded)
-    given = MM * numbers(text, name, len(commanded) if few else 3)
+    given = MM * numbers(text, "at", len(commanded) if few else 3)
     if few:
         out = home.copy()
         out[commanded] = given
@@ -72,7 +72,7 @@ def position(text: str | None, machine: Machine, name: str = "at") -> Floats:
     for i in {0, 1, 2} - set(commanded):
         if abs(given[i] - home[i]) > 1e-6 * MM:
             raise StiffmapError(
-                f"--{name}: {machine.name} does not command {'xyz'[i]}, which is {home[i] / MM:g} mm at home; got "
+                f"--at: {machine.name} does not command {'xyz'[i]}, which is {home[i] / MM:g} mm at home; got "
                 f"{given[i] / MM:g} (commanded: {', '.join(task)})"
             )
     return given

@@ -23,6 +23,7 @@ from stiffmap.ui.cli.map_summary import MapSummary
 from stiffmap.ui.cli.options import flag, option
 from stiffmap.ui.cli.output import failed_in_words, show, table
 from stiffmap.workspace.maps.inputs import magnitude, plane_axes
+from stiffmap.workspace.maps.statistics import statistics_rows
 
 
 def command(
@@ -186,25 +187,6 @@ def show_statistics(machine: Machine, ds: xr.Dataset, plane: str, given: str, as
     data = {"machine": machine.name, "rows": rows, "failed": failed}
     show(as_json, data, [given, _statistics_table(ds, rows), *lost])
     finish(bool(failed))
-
-
-def statistics_rows(ds: xr.Dataset, plane: str) -> list[dict[str, Any]]:
-    """A row per plane and force: largest value (m), its pose (m), percentiles (m), share of the area within."""
-    rows = []
-    for z in ds.z.values:
-        here = ds.sel(z=z)
-        for force in ("worst", "best", *map(str, ds.case.values)):
-            name = f"{force}_deflection_{plane}" if force in ("worst", "best") else f"deflection_{plane}"
-            one = here if force in ("worst", "best") else here.sel(case=force)
-            percentiles = zip(
-                ds.percentile.values.tolist(), one[f"{name}_percentile"].values.tolist(), strict=True
-            )
-            rows.append(
-                {"z": float(z), "force": force, "max": float(one[f"{name}_max"]),
-                 "at": one[f"{name}_max_position"].values.tolist(), "percentiles": dict(percentiles),
-                 "share_within": float(one[f"{name}_within"])}
-            )  # fmt: skip
-    return rows
 
 
 def _statistics_table(ds: xr.Dataset, rows: list[dict[str, Any]]) -> Table:

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.ui.cli.map_summary import MapSummary, deviation_figures, in_words, readings
+from stiffmap.ui.cli.map_summary import MapSummary, deviation_figures, in_words
 from stiffmap.ui.cli.output import as_text, write_files
+from stiffmap.workspace.maps.summary import readings
 from stiffmap.workspace.maps.table import write_map_table
 
 if TYPE_CHECKING:

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
-from stiffmap.common.errors import FileError, StiffmapError, reading
-from stiffmap.common.json_text import parse_json
+from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment import load_experiment
+from stiffmap.identification.diagnosis.report.reading import diagnosed
 from stiffmap.identification.planning.budget import budgets
 from stiffmap.identification.planning.changes import monitor
-from stiffmap.model.description import AppliedEffect
 from stiffmap.solve.machine import load_machine
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import finish
@@ -39,29 +37,10 @@ def command(
       [cyan]stiffmap monitor orthoglide-revised january june --diagnosis january/diagnosis.json --budget[/cyan]
     """
     m = load_machine(machine)
-    terms = [*(effect or ()), *(_of(diagnosis) if diagnosis else ())]
+    terms = [*(effect or ()), *(diagnosed(diagnosis) if diagnosis else ())]
     if not terms:
         raise StiffmapError("monitor: name what to follow, by --effect or --diagnosis")
     found = monitor(m, before, after, terms)
-    data = {"common": found.common, "p": found.p, "changes": [vars(c) for c in found.changes]}
     now = budgets(m, load_experiment(after), found.second) if budget and not as_json else []
-    show(as_json, data, [str(found), *map(str, now)])
+    show(as_json, found.as_plain(), [str(found), *map(str, now)])
     finish(not found.common)
-
-
-def _of(path: Path) -> list[AppliedEffect]:
-    """Effects that a diagnosis named."""
-    with reading(path):
-        try:
-            data: Any = parse_json(path.read_text(encoding="utf-8"))
-            terms = []
-            for e in data["effects"]:
-                values = tuple((n, float(v[0])) for n, v in e["parameters"].items())
-                terms.append(AppliedEffect(e["kind"], e["element"], tuple(e["legs"]), values))
-        except (ValueError, KeyError, TypeError, IndexError, AttributeError, OverflowError):
-            raise FileError(
-                "expected a diagnosis as `stiffmap diagnose --json` writes it", file=str(path)
-            ) from None
-    if not terms:
-        raise FileError("the diagnosis names no effect that could be followed", file=str(path))
-    return terms

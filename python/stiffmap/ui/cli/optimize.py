@@ -19,9 +19,8 @@ from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import finish
 from stiffmap.ui.cli.options import argument, option
 from stiffmap.ui.cli.output import show, table, write_files
-from stiffmap.ui.report.design import ChosenDesign, Report, measured
 from stiffmap.workspace.design import ParetoSet, load_design, optimize
-from stiffmap.workspace.performance.registry import get_measure
+from stiffmap.workspace.design.chosen import NOTHING, ComparedDesigns, measured
 
 
 def command(
@@ -72,20 +71,19 @@ def command(
         "design": problem.model.name,
         "evaluated": found.evaluated,
         "front": len(found.x),
-        "chosen": {k: t.as_plain() for k, t in report.tables.items()},
-        "refined": {k: refined(c) for k, c in report.chosen.items()},
+        **report.as_plain(),
         "files": files,
     }
     machines = ", ".join(f"{k}.yaml" for k in report.chosen)
     told = [
-        *(Text(line, "dim") for line in remarks(report)),
+        *(Text(line, "dim") for line in report.lines()),
         f"wrote {', '.join(map(str, files))} and the machine files {machines}",
     ]
     show(as_json, data, [as_table(found, report), *told])
     finish(not all(c.table.passed for c in report.chosen.values()))
 
 
-def _files(found: ParetoSet, report: Report) -> Iterator[tuple[str, Any]]:
+def _files(found: ParetoSet, report: ComparedDesigns) -> Iterator[tuple[str, Any]]:
     """The set and its pictures."""
     from stiffmap.ui.plot.design import beside_figure, front_figure, parallel_figure, progress_figure
     from stiffmap.ui.plot.measures import path_measures_figure
@@ -99,11 +97,7 @@ def _files(found: ParetoSet, report: Report) -> Iterator[tuple[str, Any]]:
         yield "toolpath.png", path_measures_figure(report.tables)
 
 
-NOTHING = 1e-9
-"""Of a measure: a standard deviation that is round-off."""
-
-
-def as_table(found: ParetoSet, report: Report) -> Table:
+def as_table(found: ParetoSet, report: ComparedDesigns) -> Table:
     """Measures of the reference machines and of the chosen designs, with the standard deviations that tolerances give."""
     tables = report.tables
     out = table(
@@ -131,38 +125,4 @@ def as_table(found: ParetoSet, report: Report) -> Table:
     if any(r is not None for r in shares):
         met = ("" if r is None else f"{100 * r.meets:.0f}" for r in shares)
         out.add_row("meets all (drawn) %", *[""] * len(report.beside), *met)
-    return out
-
-
-def remarks(report: Report) -> list[str]:
-    """What refinement gained, and how random machines differ from first order."""
-
-    def shown(name: str, value: float, digits: int) -> str:
-        return f"{get_measure(name).factor * value:.{digits}g}"
-
-    out = []
-    for name, c in report.chosen.items():
-        before, after = c.found.values, c.judged.values
-        gains = [
-            f"{n} {shown(n, v, 4)} → {shown(n, after[n], 4)}"
-            for n, v in before.items()
-            if abs(after[n] - v) > 1e-4 * abs(v)
-        ]
-        out.append(f"{name}, refined by gradients: {', '.join(gains) or 'nothing better nearby'}")
-        if (r := c.robust) is not None:
-            pairs = [
-                f"{n} {shown(n, r.first_order[n], 2)} ({shown(n, s, 2)} drawn)"
-                for n, s in r.drawn.items()
-                if s > NOTHING * abs(after[n])
-            ]
-            out.append(f"{name}, standard deviations by {len(r.places)} tolerances: {', '.join(pairs)}")
-    return out
-
-
-def refined(c: ChosenDesign) -> dict[str, Any]:
-    """A chosen design as plain data, SI."""
-    out: dict[str, Any] = {"found": c.found.values, "refined": c.judged.values, "x": c.x.tolist()}
-    if c.robust is not None:
-        out["deviation"] = {"first_order": c.robust.first_order, "drawn": c.robust.drawn}
-        out["meets"] = c.robust.meets
     return out

@@ -16,7 +16,7 @@ from stiffmap.common.outputs.option import written
 from stiffmap.experiment import simulate
 from stiffmap.experiment.calls import effects_of
 from stiffmap.experiment.files.save import plan_columns
-from stiffmap.identification.planning import Design, Estimate, follow, plan
+from stiffmap.identification.planning import follow, plan
 from stiffmap.identification.planning.estimate import fitted
 from stiffmap.solve.machine import Machine, load_machine
 from stiffmap.ui.cli import options
@@ -90,7 +90,7 @@ def command(
     if output is not None:
         columns = plan_columns(found.experiment)
         write_rows(output, list(columns), zip(*columns.values(), strict=True))
-    show(as_json, found.as_plain(), _lines(found))
+    show(as_json, found.as_plain(), found.lines())
 
 
 def _taps(m: Machine, count: int, tries: int, seed: int, output: Path | None, as_json: bool) -> None:
@@ -130,30 +130,11 @@ def _sequential(
     scale = np.array([p.scale for _, p in fitted(m.description, tuple(terms))])
     met = bool((last.sigma * last.misfit / scale).max() <= until)
     told = []
-    for count, e in steps:
-        each = zip(e.names, e.values, e.sigma * e.misfit, e.units, strict=True)
-        told.append(f"{count} rows: " + ", ".join(f"{n} {with_uncertainty(v, u)} {s}" for n, v, u, s in each))
+    found: list[dict[str, Any]] = [{"rows": n, "parameters": e.as_plain()} for n, e in steps]
+    for step in found:
+        each = (f"{p['name']} {with_uncertainty(p['value'], p['u'])} {p['unit']}" for p in step["parameters"])
+        told.append(f"{step['rows']} rows: {', '.join(each)}")
     told.append(
         f"stopped: every u is at most {until:g} of a typical size" if met else "stopped: rows used up"
     )
-    show(as_json, {"met": met, "steps": [{"rows": n, "parameters": _numbers(e)} for n, e in steps]}, told)
-
-
-def _numbers(e: Estimate) -> list[dict[str, object]]:
-    """Values and uncertainties of a step, SI."""
-    each = zip(e.names, e.units, e.values, e.sigma * e.misfit, strict=True)
-    return [{"name": n, "unit": s, "value": v, "u": u} for n, s, v, u in each]
-
-
-def _lines(d: Design) -> list[str]:
-    out = [f"{len(d.experiment)} rows chosen; for comparison the median of 20 random plans of the same size"]
-    if d.aim == "separate":
-        out.append(
-            f"  the two explanations differ by {d.value:.1f} standard deviations (random {d.random_value:.1f})"
-        )
-        return out
-    for n, u, s, r in zip(d.names, d.units, d.sigma, d.random_sigma, strict=True):
-        out.append(f"  {n}: u = {s:.3g} {u} (random {r:.3g})")
-    if d.aim == "map":
-        out.append(f"  map: u = {1e3 * d.value:.3g} mm rms (random {1e3 * d.random_value:.3g})")
-    return out
+    show(as_json, {"met": met, "steps": found}, told)

@@ -69,10 +69,12 @@ def command(
         if wrench is None:
             raise StiffmapError("--page: needs --load, the force under which the machine is drawn")
         write_page(m, page, p, wrench, rotation=r)
-    if wrench is not None:
-        _show_load(m, p, r, wrench, [f for f in (file, page) if f is not None], as_json)
-    else:
+    if wrench is None:
         show(as_json, as_plain(m, counts, file), _lines(m, counts, file))
+        return
+    budget = deflection_budget(m, p, wrench, rotation=r)
+    found = {"machine": m.name, "wrench": wrench} | budget.as_plain()
+    show(as_json, found, [str(budget)], [f for f in (file, page) if f is not None])
 
 
 def _draw(m: Machine, p: Any, r: Any, path: Path, view: str | None, wrench: Any) -> Path:
@@ -82,14 +84,6 @@ def _draw(m: Machine, p: Any, r: Any, path: Path, view: str | None, wrench: Any)
     if wrench is not None:
         return save(loaded_figure(m, p, wrench, rotation=r, view=looks), path)
     return save(machine_figure(m, p, rotation=r, view=looks), path)
-
-
-def _show_load(m: Machine, p: Any, r: Any, wrench: Any, files: list[Path], as_json: bool) -> None:
-    """The budget of the deflection, and the files written."""
-    budget = deflection_budget(m, p, wrench, rotation=r)
-    shares = {n: {"share": s, "displacement": c} for n, c, s in budget.ranked()}
-    found = {"machine": m.name, "wrench": wrench, "displacement": budget.displacement, "elements": shares}
-    show(as_json, found | {"second_order": budget.rest_share}, [str(budget)], files)
 
 
 def as_plain(m: Machine, counts: Mobility, file: Path | None) -> Any:
@@ -102,12 +96,7 @@ def as_plain(m: Machine, counts: Mobility, file: Path | None) -> Any:
         "effects": [effect_text(r, m.description) for r in m.description.effects],
         "actuators": list(m.actuators),
         "points": list(m.points),
-        "degrees_of_freedom": counts.total,
-        "platform_freedom": counts.platform,
-        "internal_freedom": counts.internal,
-        "over_constraint": counts.overconstraint,
-        "closure_equations": counts.equations,
-        "joint_coordinates": counts.joints,
+        **counts.as_plain(),
         "free_spins": list(m.free_spins),
         "picture": file,
     }

@@ -92,27 +92,9 @@ def command(
     told += [f"reason: {why}"] if why else []
     if int(s.status) == Status.SINGULAR and (ways := free_motions(m, s.free_twists)):
         told.append(f"free: the platform can {'; '.join(ways)}")
-    show(as_json, as_plain(m.name, s, load) | {"reason": why}, told)
+    found = {"machine": m.name, "point": point, "wrench": load} | s.as_plain()
+    show(as_json, found | {"reason": why}, told)
     finish(int(s.status) != Status.CONVERGED)
-
-
-def as_plain(name: str, s: Solution, load: Any) -> Any:
-    """A solution as JSON data (SI)."""
-    return {
-        "machine": name,
-        "point": s.point,
-        "wrench": load,
-        "status": Status(int(s.status)).name,
-        "flags": [f.name for f in Flag(int(s.flags))],
-        "displacement": s.displacement,
-        "stiffness": s.stiffness,
-        "compliance": s.compliance,
-        "actuator_effort": dict(zip(s.actuators, s.actuator_effort, strict=True)),
-        "leg_wrench": dict(zip(s.legs, s.leg_wrench, strict=True)),
-        "joint_coordinates": s.joint_coordinates,
-        "spring_deflection": s.spring_deflection,
-        "indeterminate": list(s.indeterminate),
-    }
 
 
 def _lines(m: Machine, s: Solution) -> Iterator[str | Table]:

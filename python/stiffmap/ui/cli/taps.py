@@ -10,7 +10,7 @@ import numpy as np
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment import load_experiment
-from stiffmap.identification.taps import TapDiagnosis, TapTest, explain_taps, load_taps, predict_taps
+from stiffmap.identification.taps import TapDiagnosis, TapTest, explain_taps, load_taps
 from stiffmap.identification.taps.causes import corrected
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import finish, machine_with, words
@@ -52,7 +52,7 @@ def command(
         m, measured, None if statics is None else load_experiment(statics), default_u=mass_u / 100,
         only=words(only),
     )  # fmt: skip
-    rows = compared(m, measured, found)
+    rows = found.modes(m, measured)
     files = write_files(output, _files(m, measured, found))
     data = {"machine": m.name, **found.as_plain(), "modes": rows}
     show(as_json, data, [found.sentence, *map(_row, rows)], files)
@@ -68,22 +68,6 @@ def _row(r: dict[str, Any]) -> str:
         return text
     text += f"; damping {r['damping_percent']:.2f} % measured, {r['damping_before_percent']:.2f} before"
     return text if (d := r["damping_after_percent"]) is None else f"{text}, after {d:.2f}"
-
-
-def compared(machine: Any, measured: TapTest, found: TapDiagnosis) -> list[dict[str, Any]]:
-    """A row per mode: measured, before and after."""
-    before = predict_taps(machine, measured)
-    after = None if found.machine is None else predict_taps(found.machine, measured)
-    return [
-        {
-            "at_mm": (1e3 * measured.position[i]).tolist(), "measured_Hz": float(measured.frequency[i]),
-            "before_Hz": float(before.frequency[i]), "after_Hz": None if after is None else float(after.frequency[i]),
-            "mac": float(before.mac[i] if after is None else after.mac[i]),
-            "damping_percent": 100 * float(measured.ratio[i]), "damping_before_percent": 100 * float(before.ratio[i]),
-            "damping_after_percent": None if after is None else 100 * float(after.ratio[i]),
-        }
-        for i in range(len(measured))
-    ]  # fmt: skip
 
 
 def _files(machine: Any, measured: TapTest, found: TapDiagnosis) -> Iterator[tuple[str, Any]]:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
-from stiffmap.solve.status import Flag, Status
+from stiffmap.solve.status import Status
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import MM, finish, machine_at, numbers
 from stiffmap.ui.cli.options import option
@@ -35,26 +37,10 @@ def command(
     m, place, how = machine_at(machine, effect, at, turned, gravity_)
     displacement = np.r_[MM * numbers(by, "by", 3), np.deg2rad(numbers(turn, "turn", 3))]
     held = m.wrench(place, displacement, point=point, **how)
-    legs = dict(zip(held.legs, held.leg_wrench, strict=True))
-    free = Status(int(held.force_status))
-    data = {
-        "machine": m.name,
-        "point": point,
-        "displacement": displacement,
-        "status": Status(int(held.status)).name,
-        "status_without_clamp": free.name,
-        "flags": [f.name for f in Flag(int(held.flags))],
-        "wrench": held.wrench,
-        "leg_wrench": legs,
-        "stiffness": held.stiffness,
-        "leg_stiffness": dict(zip(held.legs, held.leg_stiffness, strict=True)),
-        "actuator_effort": dict(zip(held.actuators, held.actuator_effort, strict=True)),
-    }
-    told = [f"status {Status(int(held.status)).name.lower()}; without the clamp: {free.name.lower()}"]
-    for name, w in {
-        "whole machine": held.wrench,
-        **{f"leg {n} on platform": w for n, w in legs.items()},
-    }.items():
+    data: dict[str, Any] = {"machine": m.name, "point": point, "displacement": displacement} | held.as_plain()
+    told = [f"status {data['status'].lower()}; without the clamp: {data['status_without_clamp'].lower()}"]
+    parts = {f"leg {n} on platform": w for n, w in data["leg_wrench"].items()}
+    for name, w in {"whole machine": held.wrench, **parts}.items():
         force, moment = (", ".join(f"{v:.4f}" for v in part) for part in (w[:3], w[3:]))
         told.append(f"{name}: force ({force}) N, moment about {point} ({moment}) N m")
     show(as_json, data, told)

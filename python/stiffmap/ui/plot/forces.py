@@ -36,10 +36,8 @@ def polar_figure(
     many = [diagrams] if isinstance(diagrams, xr.Dataset) else list(diagrams)
     with paper(max(2.6 * len(many) + 0.4, 4.0), 3.3) as figure:
         unit, factor = length_unit(max(float(np.nanmax(p[variable].values, initial=0.0)) for p in many))
-        for i, pol in enumerate(many):
-            ax: Any = figure.add_subplot(1, len(many), i + 1, projection="polar")
+        for ax, pol in zip(_panels(figure, many, projection="polar"), many, strict=True):
             draw_polar(ax, pol, variable, tolerance, factor)
-            ax.set_title(f"{panel(i, len(many))} {place_text(pol.position.values)}".strip())
         headline(figure, f"{many[0].attrs['machine']}: deflection, {unit}, under {force_text(many[0])}")
     return figure
 
@@ -66,10 +64,8 @@ def ellipse_figure(
     """Displacement of the TCP in the plane (mm) as the force turns; one panel per Dataset of `polar`."""
     many = [diagrams] if isinstance(diagrams, xr.Dataset) else list(diagrams)
     with paper(max(2.5 * len(many) + 0.4, 4.0), 3.2) as figure:
-        axes = figure.subplots(1, len(many), squeeze=False)[0]
-        for i, (ax, pol) in enumerate(zip(axes, many, strict=True)):
+        for ax, pol in zip(_panels(figure, many), many, strict=True):
             draw_ellipse(ax, pol, plane, tolerance)
-            ax.set_title(f"{panel(i, len(many))} {place_text(pol.position.values)}".strip())
         headline(figure, f"{many[0].attrs['machine']}: displacement under {force_text(many[0])}")
     return figure
 
@@ -103,13 +99,12 @@ def sweep_figure(
     """
     many = [panels] if isinstance(panels, Mapping) else list(panels)
     with paper(max(2.3 * len(many) + 0.6, 4.0), 3.1) as figure:
-        axes = figure.subplots(1, len(many), squeeze=False)[0]
-        for i, (ax, lines) in enumerate(zip(axes, many, strict=True)):
+        first = [next(iter(lines.values())) for lines in many]
+        axes = _panels(figure, first)
+        for ax, lines in zip(axes, many, strict=True):
             draw_sweeps(ax, lines, variable, tolerance)
-            one = next(iter(lines.values()))
-            ax.set_title(f"{panel(i, len(many))} {place_text(one.position.values)}".strip())
         axes[0].set_ylabel(f"{in_words(variable)}, mm")
-        headline(figure, f"{one.attrs['machine']}: deflection against force")
+        headline(figure, f"{first[-1].attrs['machine']}: deflection against force")
     return figure
 
 
@@ -133,6 +128,14 @@ def draw_sweeps(ax: Axes, lines: Mapping[str, xr.Dataset], variable: str, tolera
     ax.set_xlabel("force, N")
     ax.set_ylim(0 if min(float(s[variable].min()) for s in lines.values()) >= 0 else None, None)
     ax.margins(x=0)
+
+
+def _panels(figure: Figure, many: Sequence[xr.Dataset], **how: Any) -> Any:
+    """Axes side by side, each titled by where its Dataset is."""
+    axes = figure.subplots(1, len(many), squeeze=False, subplot_kw=how)[0]
+    for i, (ax, ds) in enumerate(zip(axes, many, strict=True)):
+        ax.set_title(f"{panel(i, len(many))} {place_text(ds.position.values)}".strip())
+    return axes
 
 
 def in_words(variable: str) -> str:

@@ -60,10 +60,6 @@ class LoadedShape:
     displacement: Floats
     force: Floats
 
-    def enlarged(self, factor: float | None = None) -> Skeleton:
-        """The loaded shape with every frame's translation times the factor."""
-        return self.rest.enlarged(self.loaded, self.factor if factor is None else factor)
-
 
 def loaded_shape(
     machine: Machine,
@@ -136,7 +132,7 @@ def draw_loaded(
     for _, ends in shape.rest.bars:
         ax.plot(*on(ax, ends), color="0.72", lw=1.4, ls="--", zorder=1, label=label)
         label = None
-    moved = shape.enlarged()
+    moved = shape.rest.enlarged(shape.loaded, shape.factor)
     draw_skeleton(ax, moved, leg_colours(legs))
     draw_force(ax, moved.tcp, shape.force, shape.rest.extent)
     finish(ax, view)

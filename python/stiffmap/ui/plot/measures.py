@@ -262,8 +262,7 @@ def _plane(axes: Axes, row: MeasureRow, x: Floats, y: Floats, values: Floats, st
         axes.text(0.5, 0.5, "no value in this plane", transform=axes.transAxes, ha="center", va="center")
     elif len(x) > 1 and len(y) > 1:
         axes.contourf(MM * x, MM * y, values.T, levels=steps, cmap=COLOURS, extend="both")
-        inside = limit is not None and np.nanmin(values) < measure.factor * limit < np.nanmax(values)
-        if inside and limit is not None:
+        if limit is not None and np.nanmin(values) < measure.factor * limit < np.nanmax(values):
             axes.contour(MM * x, MM * y, values.T, levels=[measure.factor * limit], colors=[VERMILLION])
             told = f"required: {measure.factor * limit:.4g} {measure.shown}".rstrip()
             axes.plot([], [], color=VERMILLION, label=told)

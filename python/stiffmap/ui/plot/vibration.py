@@ -23,9 +23,7 @@ from stiffmap.ui.plot.style import (
 RPM = 60 / (2 * np.pi)
 
 
-def lobes_figure(
-    lobes: xr.Dataset, title: str, speed: float | None = None, depth: float | None = None
-) -> Figure:
+def lobes_figure(lobes: xr.Dataset, title: str, speed: float, depth: float) -> Figure:
     """Stable depth (mm) over the speed of the spindle (rpm); the cut of the process as a point."""
     with paper(6.0, 4.0, f"{title}\ndamping {lobes.attrs['damping']}") as figure:
         ax = figure.add_subplot()
@@ -42,12 +40,11 @@ def lobes_figure(
                 ax.plot([], [], color=BLACK, lw=1.4, label="border, semi-discretization")
         zero = np.where(np.isfinite(lobes.limit_zero_order), MM * lobes.limit_zero_order, np.nan)
         ax.plot(s, zero, color=VERMILLION, ls="--", lw=1, label="border, zero order")
-        if speed is not None and depth is not None:
-            at = RPM * speed, MM * depth
-            near = np.clip(at[0], s[0], s[-1]), min(at[1], d[-1])
-            beyond = "" if np.allclose(at, near) else ", beyond these axes"
-            ax.plot(*near, "o", mfc="white", mec=BLUE, mew=1.5, clip_on=False, zorder=5,
-                    label=f"the process: {at[0]:.5g} rpm, {at[1]:.3g} mm{beyond}")  # fmt: skip
+        at = RPM * speed, MM * depth
+        near = np.clip(at[0], s[0], s[-1]), min(at[1], d[-1])
+        beyond = "" if np.allclose(at, near) else ", beyond these axes"
+        ax.plot(*near, "o", mfc="white", mec=BLUE, mew=1.5, clip_on=False, zorder=5,
+                label=f"the process: {at[0]:.5g} rpm, {at[1]:.3g} mm{beyond}")  # fmt: skip
         ax.margins(0)
         ax.set_xlim(s[0], s[-1])
         ax.set_ylim(0, d[-1])

@@ -9,11 +9,12 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from stiffmap.common.errors import StiffmapError
+from stiffmap.solve.reach import assembly_modes
 from stiffmap.ui.view.moment import Moment
 from stiffmap.ui.view.numbers import ChangedNumbers, write
 from stiffmap.ui.view.outputs import Outputs
 from stiffmap.ui.view.panels import hint, legend
-from stiffmap.ui.view.place import first_plane, moves, rotation_of, turns
+from stiffmap.ui.view.place import first_plane, moves, orientation, rotation_of, turns
 from stiffmap.ui.view.quantities import QUANTITIES
 from stiffmap.ui.view.state import PLANES
 
@@ -168,7 +169,8 @@ class Controls:
 
     def _search(self) -> None:
         try:
-            found = self.viewer.now().assembly_modes()
+            moment = self.viewer.now()
+            found = assembly_modes(moment.machine, moment.state.position, orientation(moment.state))
         except StiffmapError as problem:
             self.viewer.error = str(problem)
             return

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation, Slerp
+from scipy.spatial.transform import Rotation
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
@@ -18,10 +18,10 @@ from stiffmap.common.number_text import place_text
 from stiffmap.model.addresses import listed
 from stiffmap.model.description import AppliedEffect, MachineDescription
 from stiffmap.model.effects import apply_records
-from stiffmap.solve.closing import Kinematics
-from stiffmap.solve.compiled import Role, Status
+from stiffmap.solve.compiled import Status
 from stiffmap.solve.kinematics import inverse_kinematics
 from stiffmap.solve.machine import Machine, load_machine
+from stiffmap.solve.reach import follow
 from stiffmap.ui.view.moment import Moment
 from stiffmap.ui.view.place import first_plane, orientation, rotation_of
 from stiffmap.ui.view.state import History, ViewState, checked, with_change
@@ -139,64 +139,6 @@ class ViewModel:
         except StiffmapError:
             self.declared = before
             raise
-
-
-SLICES, ROUNDS = 9, 3
-"""The way is cut in slices, the first bad one again: 8³ steps of it."""
-SLACK = 1e-9
-
-
-def follow(
-    machine: Machine,
-    start: tuple[Floats, Floats],
-    wanted: tuple[Floats, Floats],
-    mode: Floats | None = None,
-) -> tuple[Floats, Floats, str]:
-    """Straight from a pose that the machine takes (position m, rotation (3, 3)) towards a wanted one: where it comes to, and a
-    sentence about what stops it, empty where nothing does.
-
-    The pose asked for is taken at once where it is good; else the last good one on the way is.
-    """
-    reason = why_not(machine, inverse_kinematics(machine, *wanted, start=mode, threads=1))[0]
-    if not reason:
-        return *wanted, ""
-    low, high = 0.0, 1.0
-    way = wanted[0] - start[0]
-    turn = Slerp([0, 1], Rotation.from_matrix(np.array([start[1], wanted[1]])))
-    for _ in range(ROUNDS):
-        share = np.linspace(low, high, SLICES)
-        p = start[0] + share[:, None] * way
-        reasons = why_not(
-            machine, inverse_kinematics(machine, p, turn(share).as_matrix(), start=mode, threads=1)
-        )
-        bad = next((i for i, text in enumerate(reasons) if text and i > 0), None)
-        if bad is None:
-            break
-        reason, low, high = reasons[bad], float(share[bad - 1]), float(share[bad])
-    return start[0] + low * way, turn(low).as_matrix(), f"stopped: {reason}"
-
-
-def why_not(machine: Machine, k: Kinematics) -> list[str]:
-    """Of each pose: which limit it breaks, or that it cannot be reached; empty where it is good."""
-    names = machine.compiled.names
-    joints = [i for i, role in enumerate(names.roles) if role != Role.SPRING]
-    low, high = np.array(machine.compiled.limits).reshape(-1, 2)[joints].T
-    coordinates = np.atleast_2d(k.coordinates)[:, joints]
-    slack = SLACK * np.maximum(1.0, np.abs(coordinates))
-    broken = (coordinates < low - slack) | (coordinates > high + slack)
-    out = []
-    for x, over, status in zip(coordinates, broken, np.atleast_1d(k.status), strict=True):
-        if status != Status.CONVERGED:
-            out.append("the machine cannot reach further")
-        elif not over.any():
-            out.append("")
-        else:
-            i = int(over.argmax())
-            name, limit = names.coordinates[joints[i]], low[i] if x[i] < low[i] else high[i]
-            sliding = names.is_prismatic(name)
-            shown = f"{1e3 * limit:.4g} mm" if sliding else f"{np.rad2deg(limit):.4g} deg"
-            out.append(f"{name} is at its limit, {shown}")
-    return out
 
 
 EFFECTS = "effects"

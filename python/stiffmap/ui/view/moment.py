@@ -12,7 +12,6 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.budget import DeflectionBudget, deflection_budget
 from stiffmap.solve.compiled import Status
-from stiffmap.solve.kinematics import inverse_kinematics
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.solution import Solution
 from stiffmap.ui.plot.loaded import SHOWN, round_factor
@@ -25,8 +24,6 @@ from stiffmap.workspace.performance.poses import box_nodes
 
 CLOUD = 15
 """Poses of the cloud along each commanded axis."""
-BRANCHES_TRIED, ALIKE = 96, 1e-4
-"""Starts of the search for assembly modes; rad or m by which two of them differ."""
 
 
 @dataclass(frozen=True)
@@ -97,29 +94,3 @@ class Moment:
         return (
             id(m), place, idle, s.rotation, s.wrench, s.gravity, s.quantity, s.frequency, s.start, s.tolerance,
         )  # fmt: skip
-
-    def assembly_modes(self) -> list[tuple[float, ...]]:
-        """All coordinates of the ways to take this pose that a search from random joints finds, that of home first."""
-        m, s = self.machine, self.state
-        names = m.compiled.names
-        home = m.compiled.home_coordinates()
-        rng = np.random.default_rng(0)
-        starts = np.tile(home, (BRANCHES_TRIED, 1))
-        for name, i in names.joints.items():
-            spread = 0.5 * m.compiled.length if names.is_prismatic(name) else np.pi
-            starts[1:, i] += rng.uniform(-spread, spread, BRANCHES_TRIED - 1)
-        k = inverse_kinematics(m, s.position, orientation(s), start=starts)
-        found: list[Floats] = []
-        drives = [names.joints[a] for a in names.actuators]
-        angular = np.array([not names.is_prismatic(a) for a in names.actuators])
-        for x in k.coordinates[np.asarray(k.status) == Status.CONVERGED]:
-            off = [_difference(x[drives], y[drives], angular) for y in found]
-            if all(o > ALIKE for o in off):
-                found.append(x)
-        return [tuple(map(float, x)) for x in found]
-
-
-def _difference(a: Floats, b: Floats, angular: Floats) -> float:
-    d = a - b
-    turned = np.where(angular, (d + np.pi) % (2 * np.pi) - np.pi, d)
-    return float(np.abs(turned).max(initial=0.0))

@@ -190,3 +190,22 @@ class Histogram:
         chosen = bins[np.searchsorted(upto, rank)]
         zero = chosen == 0  # the first bin begins at 0; a rigid machine stays there
         return np.where(zero, 0.0, ((chosen + 1) << _SHIFT).view(np.float64))
+
+
+def statistics_rows(ds: xr.Dataset, plane: str) -> list[dict[str, Any]]:
+    """A row per plane and force: largest value (m), its pose (m), percentiles (m), share of the area within."""
+    rows = []
+    for z in ds.z.values:
+        here = ds.sel(z=z)
+        for force in ("worst", "best", *map(str, ds.case.values)):
+            name = f"{force}_deflection_{plane}" if force in ("worst", "best") else f"deflection_{plane}"
+            one = here if force in ("worst", "best") else here.sel(case=force)
+            percentiles = zip(
+                ds.percentile.values.tolist(), one[f"{name}_percentile"].values.tolist(), strict=True
+            )
+            rows.append(
+                {"z": float(z), "force": force, "max": float(one[f"{name}_max"]),
+                 "at": one[f"{name}_max_position"].values.tolist(), "percentiles": dict(percentiles),
+                 "share_within": float(one[f"{name}_within"])}
+            )  # fmt: skip
+    return rows

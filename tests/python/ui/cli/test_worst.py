@@ -10,9 +10,10 @@ import pytest
 import stiffmap as sm
 from stiffmap.common.errors import StiffmapError
 from stiffmap.ui.cli import main
-from stiffmap.ui.cli.map_summary import in_words, name_of, summary, worst_pose
+from stiffmap.ui.cli.map_summary import in_words
 from stiffmap.ui.plot import map_figure
 from stiffmap.ui.plot.error_maps import component
+from stiffmap.workspace.maps.summary import name_of, summary, worst_pose
 
 AXIS = [-0.2, 0.05, 0.3]
 

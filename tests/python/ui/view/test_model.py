@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 import stiffmap as sm
 from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.model.files.shipped import find
+from stiffmap.solve.reach import assembly_modes
 from stiffmap.ui.plot.elements import THICK, THIN, element_links, thicknesses
 from stiffmap.ui.plot.skeleton import skeleton
 from stiffmap.ui.view.model import ViewModel, addresses, changed
@@ -145,7 +146,7 @@ def test_numbers_that_cannot_be_are_refused_and_nothing_changes(machine: sm.Mach
 def test_assembly_modes_are_other_ways_to_the_same_pose() -> None:
     machine = sm.load_machine("five-bar")
     model = ViewModel(machine)
-    modes = model.moment.assembly_modes()
+    modes = assembly_modes(machine, model.state.position)
     assert len(modes) == 4
     model.put(start=modes[1])
     s, home = model.moment.solve(), machine.solve(model.state.position, model.state.wrench)

@@ -9,11 +9,12 @@ import pytest
 
 import stiffmap as sm
 from stiffmap.solve.status import Status
+from stiffmap.solve.worst_force import greatest
 from stiffmap.ui.plot.planes import levels
 from stiffmap.ui.view.colours import DARK, GREY, colours_of, plane_image, table
 from stiffmap.ui.view.model import ViewModel
 from stiffmap.ui.view.plane import dynamic_stiffness, plane_frame, plane_map
-from stiffmap.ui.view.quantities import QUANTITIES, greatest
+from stiffmap.ui.view.quantities import QUANTITIES
 from stiffmap.ui.view.state import ViewState
 
 FORCE = (120.0, -80.0, -200.0)

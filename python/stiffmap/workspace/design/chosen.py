@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import yaml
@@ -15,10 +16,13 @@ from stiffmap.workspace.design.judging import Judged, refine
 from stiffmap.workspace.design.problem import DesignProblem
 from stiffmap.workspace.design.robustness import DRAWS, Robustness, robustness
 from stiffmap.workspace.design.search import ParetoSet
+from stiffmap.workspace.performance.registry import get_measure
 from stiffmap.workspace.performance.table import MeasuresTable, measures
 
 SLIGHT = 0.01
 """Weight of the other objectives while one is refined."""
+NOTHING = 1e-9
+"""Of a measure: a standard deviation that is round-off."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,10 +37,22 @@ class ChosenDesign:
     robust: Robustness | None
     table: MeasuresTable
 
+    def as_plain(self) -> dict[str, Any]:
+        """Data of JSON, SI."""
+        out: dict[str, Any] = {
+            "found": self.found.values,
+            "refined": self.judged.values,
+            "x": self.x.tolist(),
+        }
+        if self.robust is not None:
+            out["deviation"] = {"first_order": self.robust.first_order, "drawn": self.robust.drawn}
+            out["meets"] = self.robust.meets
+        return out
+
 
 @dataclass(frozen=True, eq=False)
-class Report:
-    """Machines for comparison."""
+class ComparedDesigns:
+    """The chosen designs next to other machines, all measured in full."""
 
     beside: dict[str, MeasuresTable]
     """``start`` and the machines that the design file names."""
@@ -47,8 +63,40 @@ class Report:
         """All of them by name."""
         return {**self.beside, **{name: c.table for name, c in self.chosen.items()}}
 
+    def as_plain(self) -> dict[str, Any]:
+        """Data of JSON, SI."""
+        return {
+            "chosen": {name: t.as_plain() for name, t in self.tables.items()},
+            "refined": {name: c.as_plain() for name, c in self.chosen.items()},
+        }
 
-def measured(found: ParetoSet, place: Path, nodes: int = 21, draws: int = DRAWS) -> Report:
+    def lines(self) -> list[str]:
+        """What refinement gained, and how random machines differ from first order."""
+
+        def shown(name: str, value: float, digits: int) -> str:
+            return f"{get_measure(name).factor * value:.{digits}g}"
+
+        out = []
+        for name, c in self.chosen.items():
+            before, after = c.found.values, c.judged.values
+            gains = [
+                f"{n} {shown(n, v, 4)} → {shown(n, after[n], 4)}"
+                for n, v in before.items()
+                if abs(after[n] - v) > 1e-4 * abs(v)
+            ]
+            out.append(f"{name}, refined by gradients: {', '.join(gains) or 'nothing better nearby'}")
+            if (r := c.robust) is not None:
+                pairs = [
+                    f"{n} {shown(n, r.first_order[n], 2)} ({shown(n, s, 2)} drawn)"
+                    for n, s in r.drawn.items()
+                    if s > NOTHING * abs(after[n])
+                ]
+                told = ", ".join(pairs)
+                out.append(f"{name}, standard deviations by {len(r.places)} tolerances: {told}")
+        return out
+
+
+def measured(found: ParetoSet, place: Path, nodes: int = 21, draws: int = DRAWS) -> ComparedDesigns:
     """The machine that the search began with and each chosen design, whose machine file is written to `place`."""
     design = found.design
     names = [n for n, _ in design.constraints]
@@ -73,7 +121,7 @@ def measured(found: ParetoSet, place: Path, nodes: int = 21, draws: int = DRAWS)
         chosen[name] = ChosenDesign(
             found.judged[i], x, judged, robustness(design, x, draws=draws), full(file)
         )
-    return Report(beside, chosen)
+    return ComparedDesigns(beside, chosen)
 
 
 def _weights(design: DesignProblem, name: str) -> Floats:
