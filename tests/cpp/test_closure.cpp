@@ -7,6 +7,7 @@
 #include "machines.hpp"
 #include "numeric.hpp"
 #include "stiffmap/kinematics/charts.hpp"
+#include "stiffmap/plan/fast_plan.hpp"
 
 using namespace stiffmap;
 using namespace stiffmap::test;
@@ -29,8 +30,9 @@ Vec3 actuators(const Mechanism& m, const Pose& pose) {
   return {x[m.drives[0].coordinate], x[m.drives[1].coordinate], x[m.drives[2].coordinate]};
 }
 
-/// A rod of which only the length is driven, on a ball at either end.
-Mechanism rod_on_two_balls() {
+/// A rod of which only the length is driven, on a ball at either end; `spin` (N m/rad) resists its turning about
+/// itself.
+Mechanism rod_on_two_balls(double spin = 0) {
   const auto ball = [](const std::string& n) {
     std::vector<Joint> axes{revolute(n + "1", Vec3::UnitX()), revolute(n + "2", Vec3::UnitY()),
                             revolute(n + "3", Vec3::UnitZ())};
@@ -40,7 +42,9 @@ Mechanism rod_on_two_balls() {
   Chain rod;
   for (const Joint& j : ball("base")) rod.elements.emplace_back(j);
   rod.elements.emplace_back(actuator("length", JointType::prismatic, Vec3::UnitZ(), 1, 1e7));
-  for (const Joint& j : ball("top")) rod.elements.emplace_back(j);
+  std::vector<Joint> top = ball("top");
+  if (spin > 0) top[2].law = Law(spin);
+  for (const Joint& j : top) rod.elements.emplace_back(j);
   return assemble({{Block{"legs", {{"rod", rod}}}}}, {Vec3(0, 0, 1), Mat3::Identity()});
 }
 
@@ -135,6 +139,23 @@ BOOST_AUTO_TEST_CASE(a_ball_has_the_coordinates_of_the_nearer_of_its_two_triples
     other[first + 1] = std::numbers::pi - x[first + 1];
     other[first + 2] += std::numbers::pi;
     BOOST_TEST((by_own_axes(m, charts, x, other) - other).cwiseAbs().maxCoeff() < 1e-12);
+  }
+}
+
+BOOST_AUTO_TEST_CASE(a_rod_that_spins_has_starts_all_over_the_box) {
+  for (const double spin : {0.0, 50.0}) {
+    const Mechanism m = rod_on_two_balls(spin);
+    const Vec3 low(-0.1, -0.1, 0.9), high(0.1, 0.1, 1.1);
+    const FastPlan plan(m, low, high);
+    Random random(5);
+    for (int i = 0; i < 20; ++i) {
+      Vec3 p;
+      for (int k = 0; k < 3; ++k) p[k] = random.uniform(low[k], high[k]);
+      VecX x;
+      Pose node;
+      BOOST_TEST(plan.nearest_start(m, p, x, node));
+      BOOST_TEST((node.p - p).cwiseAbs().maxCoeff() < 0.2 / 14 + 1e-12);
+    }
   }
 }
 

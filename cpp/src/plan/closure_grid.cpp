@@ -73,10 +73,11 @@ class GridKey {
   const FastPlanData& d_;
 };
 
-/// At a folded or stretched leg Newton starts badly: such a node is no start for its neighbours.
-bool nearly_singular(const Mechanism& m, ClosureWorkspace& ws) {
+/// Motions that the closure determines where it is not nearly singular; at a folded or stretched leg Newton starts
+/// badly: such a node is no start for its neighbours.
+Index determined(ClosureWorkspace& ws) {
   ws.qr.compute(ws.A, 0.02);
-  return ws.qr.rank() < static_cast<Index>(ws.unknown.size()) - m.redundancy;
+  return ws.qr.rank();
 }
 
 std::shared_ptr<const std::vector<double>> make_grid(const Mechanism& m, const FastPlanData& d) {
@@ -88,6 +89,9 @@ std::shared_ptr<const std::vector<double>> make_grid(const Mechanism& m, const F
   std::vector<VecX> x(nodes);
   ClosureWorkspace ws(m);
   PoseCloser quick(m);
+  VecX home = VecX::Zero(m.size());
+  inverse_closure(m, m.home, ws, home);
+  const Index at_home = determined(ws);
   int steps = 0;
   for (int k = 0; k < p.grid_n[2]; ++k)
     for (int j = 0; j < p.grid_n[1]; ++j)
@@ -131,7 +135,7 @@ std::shared_ptr<const std::vector<double>> make_grid(const Mechanism& m, const F
         }
         if (lost()) continue;
         x[node] = found;
-        if (!nearly_singular(m, ws)) keep(found);
+        if (determined(ws) >= at_home) keep(found);
       }
   return grid;
 }
