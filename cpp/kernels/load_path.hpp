@@ -44,7 +44,8 @@ struct LoadPath {
       // Equilibria: is the way here proven?
       const M judged = active & looking, first = judged & fresh & finite;
       const M proven = first | (judged & ~fresh & finite & way_proven());
-      const M arrived = proven & (factor == 1.0) & ~fresh;
+      M arrived = proven & (factor == 1.0) & ~fresh;
+      if (any(first)) arrived |= first & n.unloaded_lanes();
       const V came = factor - reached;
       if (any(proven)) accept(proven, proven & ~fresh);
       if (any(arrived)) {

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tests.oracle.classes import Classes
 from tests.oracle.unseen import leaf_spring
 from tests.python.solve.compiled.agreement import TOLERANCE, displacement_gap
 
@@ -105,3 +106,20 @@ def test_the_steps_of_a_path_do_not_depend_on_its_neighbours() -> None:
         alone = machine.solve(machine.description.home.p, wrench[i : i + 1], threads=1)
         np.testing.assert_array_equal(alone.displacement[0], whole.displacement[i])
         np.testing.assert_array_equal(alone.iterations[0], whole.iterations[i])
+
+
+@pytest.mark.parametrize(("seed", "half"), [(27, 0.1), (53, 0.0)])
+def test_a_preload_that_is_far_from_the_command_needs_no_path_without_a_load(seed: int, half: float) -> None:
+    """Rests of springs, or springs outside the legs, move these machines by a tenth of their length: with nothing else to
+    bear, the first equilibrium is the answer, of which there is no doubt."""
+    description = Classes(seed).task().description
+    machine = sm.Machine(description)
+    position = description.home.p + np.random.default_rng(1).uniform(-half, half, (40, 3))
+    fast, reference = (machine.solve(position, method=way) for way in ("fast", "reference"))
+    assert (fast.status == reference.status).all()
+    ok = fast.ok
+    assert (fast.flags[ok] & sm.Flag.LOAD_STEPPED).any()
+    for answer in (fast, reference):
+        assert not (answer.flags[ok] & sm.Flag.BRANCH_UNVERIFIED).any()
+    assert not (fast.flags & sm.Flag.REFERENCE_PATH).any()
+    np.testing.assert_allclose(fast.displacement[ok], reference.displacement[ok], rtol=0, atol=1e-12)
