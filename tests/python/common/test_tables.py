@@ -23,6 +23,7 @@ SPELLINGS = {
     "decimal commas, thousands": ("x [um];y [mm];z [mm]\n50.500;0,0;700\n0;-20,25;700\n", "utf-8"),
     "blanks": ("x [mm] y [mm]  z [mm]\n50.5 0   700\n0 -20.25 700\n", "utf-8"),
     "UTF-16": ("x [mm],y [mm],z [mm]\n50.5,0,700\n0,-20.25,700\n", "utf-16"),
+    "UTF-16 without a mark": ("x [mm],y [mm],z [mm]\n50.5,0,700\n0,-20.25,700\n", "utf-16-le"),
     "Latin-1 with a remark": ("# gemessen in Köln\nx [µm],y [cm],z [m]\n50500,0,0.7\n0,-2.025,0.7\n", "latin-1"),
     "numpy.savetxt": ("# x[mm] y[mm] z[mm]\n5.05e+01 0.0e+00 7.0e+02\n0.0e+00 -2.025e+01 7.0e+02\n", "utf-8"),
     "units in a line of their own": ("X;Y;Z\nmm;mm;mm\n50.5;0;700\n0;-20.25;700\n", "utf-8"),

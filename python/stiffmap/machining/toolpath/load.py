@@ -15,7 +15,8 @@ from stiffmap.common.errors import FileError, suggestion
 from stiffmap.common.number_text import number_in
 from stiffmap.common.tables.named import Known, read_named
 from stiffmap.common.tables.workbook import TABLES
-from stiffmap.machining.toolpath.gcode.load import lines_of, load_gcode
+from stiffmap.common.texts import lines_of
+from stiffmap.machining.toolpath.gcode.load import load_gcode
 from stiffmap.machining.toolpath.outlines import outline, outline_names
 from stiffmap.machining.toolpath.path import Toolpath, path_of
 

@@ -13,6 +13,7 @@ from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.number_text import number_in
 from stiffmap.common.tables.named import Known, named
 from stiffmap.common.tables.sheet import Layout, Sheet, read_sheet
+from stiffmap.common.texts import text_of
 from stiffmap.model.link.arrays import Floats, Ints
 from stiffmap.model.link.gmshmesh import UNITS
 from stiffmap.model.link.optional import need
@@ -62,15 +63,15 @@ def known_columns(
 
 def read_dat(path: str | Path) -> Rows:
     """Node numbers (n,) and displacements (cases, n, 3), in the deck's unit, of a CalculiX or Abaqus .dat."""
-    blocks = re.split(
-        r"^\s*displacements\s*\(.*$", "\n".join(_lines(path)), flags=re.MULTILINE | re.IGNORECASE
-    )[1:]
+    blocks = re.split(r"^\s*displacements\s*\(.*$", text_of(Path(path)), flags=re.MULTILINE | re.IGNORECASE)[
+        1:
+    ]
     return _same_nodes(path, [_node_rows(block) for block in blocks])
 
 
 def read_ansys(path: str | Path) -> Rows:
     """Node numbers and displacements, in the deck's unit, of Ansys PRNSOL listings (``NODE UX UY UZ``)."""
-    blocks = re.split(r"^\s*NODE\s+UX\s+UY\s+UZ.*$", "\n".join(_lines(path)), flags=re.MULTILINE)[1:]
+    blocks = re.split(r"^\s*NODE\s+UX\s+UY\s+UZ.*$", text_of(Path(path)), flags=re.MULTILINE)[1:]
     # One load case may be printed in several pages; each page repeats the header, not the load step.
     cases: list[dict[int, list[float]]] = []
     for block in blocks:
@@ -87,7 +88,7 @@ def read_frd(path: str | Path) -> tuple[Floats, Floats]:
     nodes: dict[int, list[float]] = {}
     cases: list[dict[int, list[float]]] = []
     into: dict[int, list[float]] | None = None
-    for line in _lines(path):
+    for line in text_of(Path(path)).splitlines():
         key = line[:5].strip()
         if line.startswith("    2C"):
             into = nodes
@@ -156,18 +157,11 @@ def read_field(
     numbers, fields = read_dat(path) if suffix == ".dat" else read_ansys(path)
     if nodes is None:
         raise StiffmapError(f"{path}: it holds node numbers only; give the coordinates with --nodes")
-    place = _node_rows("\n".join(_lines(nodes)).replace(",", " "))
+    place = _node_rows(text_of(Path(nodes)).replace(",", " "))
     absent = [int(i) for i in numbers if int(i) not in place]
     if absent:
         raise StiffmapError(f"{nodes}: no coordinates for node {absent[0]} ({len(absent)} missing)")
     return UNITS[unit] * np.array([place[int(i)] for i in numbers]), UNITS[unit] * fields
-
-
-def _lines(path: str | Path) -> list[str]:
-    try:
-        return Path(path).read_text(errors="replace").splitlines()
-    except OSError:
-        raise StiffmapError(f"{path}: no such file") from None
 
 
 def _node_rows(text: str, columns: tuple[int, ...] = (4,)) -> dict[int, list[float]]:
