@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import stiffmap as sm
 from stiffmap.common.errors import FileError
 from stiffmap.common.tables.poses import read_pose_table
 from stiffmap.common.tables.sheet import read_sheet
 from stiffmap.experiment.files.table import read_table
+from stiffmap.machining.process import load_process
 from stiffmap.machining.toolpath.load import load_path
+from stiffmap.model.link.readers import read_csv_field
 from stiffmap.workspace.performance.motion.trajectory import read_points
 from stiffmap.workspace.vibration.files import read_responses
 
@@ -44,6 +49,14 @@ def test_a_table_is_the_same_in_every_spelling_and_command(name: str, tmp_path: 
     np.testing.assert_allclose(read_pose_table(file).position, POINTS, rtol=1e-12, atol=1e-15)
     np.testing.assert_allclose(load_path(file).end[-1], POINTS[-1], rtol=1e-12, atol=1e-15)
     np.testing.assert_allclose(read_points(file).position[[0, -1]], POINTS, rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "reader", [sm.load_machine, load_process, load_path, read_responses, read_csv_field, sm.import_urdf]
+)
+def test_a_folder_is_no_file(reader: Callable[[Path], object], tmp_path: Path) -> None:
+    with pytest.raises(FileError, match=rf"^{re.escape(str(tmp_path))}: .*(found a folder|Is a directory)$"):
+        reader(tmp_path)
 
 
 def test_a_workbook_is_a_table_of_every_command(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from stiffmap.common.errors import FileError, StiffmapError
+from stiffmap.common.errors import FileError, StiffmapError, refuse_folder
 from stiffmap.common.number_text import number_in
 from stiffmap.common.tables.named import Known, named
 from stiffmap.common.tables.sheet import Layout, Sheet, read_sheet
@@ -49,6 +49,7 @@ def known_columns(
 ) -> tuple[Sheet, dict[str, list[Floats]]]:
     """The table, and the numbers (SI) of each column that has one of these names, each with its SI unit and how it is
     usually written; other columns are left alone. Raises FileError."""
+    refuse_folder(path, "a table")
     if not Path(path).is_file():
         raise FileError("no such file", file=str(path))
     layout = Layout(lambda name: name.lower() in units, strict=True, repeated=True)

@@ -9,8 +9,9 @@ from pathlib import Path
 from stiffmap.common.broadcasting import given_path
 from stiffmap.common.errors import FileError, StiffmapError, suggestion
 from stiffmap.model.description import TASK, Leg, MachineDescription, Offset
+from stiffmap.model.description.tree import ENDS
 from stiffmap.model.files.save import description_text
-from stiffmap.model.urdf.chains import Chains, ball, end_pose, plain_name
+from stiffmap.model.urdf.chains import Chains, ball, end_pose, free_name, plain_name
 from stiffmap.model.urdf.model import UrdfModel
 from stiffmap.model.urdf.reader import read_urdf
 from stiffmap.model.urdf.sidecar import Sidecar, read_sidecar
@@ -122,7 +123,7 @@ def _legs(
         return (Leg("arm", chains.sequence(model.way(tip), tip)),), ()
     first = chains.sequence(model.way(body))
     at = end_pose(first)
-    legs = [Leg(plain_name(body), first)]
+    legs = [Leg(free_name(plain_name(body), ENDS), first)]
     for on_platform, end, free_to_turn in loops:
         way = model.way(end)
         both = zip(model.way(body), way, strict=False)
@@ -135,11 +136,15 @@ def _legs(
         on_body = chains.between(body, on_platform)
         if free_to_turn:
             turned = end_pose(elements).r.T @ (at @ on_body).r
-            elements = (*elements, ball(plain_name(f"{end}_ball"), turned))
-        name = plain_name(model.body_of(end))
+            elements = (
+                *elements,
+                ball(free_name(plain_name(f"{end}_ball"), (e.name for e in elements)), turned),
+            )
+        name = free_name(plain_name(model.body_of(end)), ENDS)
         taken = [leg.name for leg in legs]
         name = name if name not in taken else f"{name}_{len(legs) + 1}"
-        legs.append(Leg(name, (*elements, Offset("attach", on_body.inverse()))))
+        attach = Offset(free_name("attach", (e.name for e in elements)), on_body.inverse())
+        legs.append(Leg(name, (*elements, attach)))
     rest = model.way(tip)[len(model.way(body)) :]
     return tuple(legs), chains.sequence(rest, tip)  # type: ignore[return-value]
 
