@@ -126,6 +126,15 @@ BAD_URDF = {
     ),
     "joint q4: rpy: expected radians, found '0 90 0', as degrees are": ('rpy="0 0.4 0"', 'rpy="0 90 0"'),
     "joint q4: a zero-length axis": ('<axis xyz="1 0 0"/>', '<axis rpy="1 0 0"/>'),
+    "joint q1: expected <origin>, found <Origin>": ('<origin xyz="0 0 0.3"', '<Origin xyz="0 0 0.3"'),
+    "joint q4: expected <origin>, found <orgin>": ('<origin xyz="0.1 0 0"', '<orgin xyz="0.1 0 0"'),
+    "link fore: expected <inertial>, found <Inertial>": (
+        '<link name="fore"/>',
+        '<link name="fore"><Inertial/></link>',
+    ),
+    "link upper: expected <mass>, found <Mass>": ('<mass value="3"/>', '<Mass value="3"/>'),
+    "robot.urdf: expected <link>, found <Link>": ('<link name="fore"/>', '<Link name="fore"/>'),
+    "expected one <robot>, found another in it: 'b'": ("</robot>", '<robot name="b"/></robot>'),
     "expected one root link, found 2": ('<link name="fore"/>', '<link name="fore"/><link name="loose"/>'),
 }
 
