@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 from stiffmap.common.errors import FileError, reading
@@ -13,31 +12,24 @@ HEAD = 1 << 16
 
 
 def text_of(path: Path) -> str:
-    """A text in UTF-8, UTF-16 or Latin-1, each line ended by a line feed. Raises FileError."""
-    with _decoding(path):
-        raw = path.read_bytes()
-        encoding = _encoding(raw[:HEAD])
-        try:
-            text = raw.decode(encoding)
-        except UnicodeDecodeError:
-            if encoding != "utf-8-sig":
-                raise
-            text = raw.decode("latin-1")  # never fails
-    return text.replace("\r\n", "\n").replace("\r", "\n")
+    """A text, each line ended by a line feed. Raises FileError."""
+    return "".join(lines_of(path))
 
 
 def lines_of(path: Path, newline: str | None = None) -> Iterator[str]:
     """Lines of a text file, ended by `newline` where the file has it or, where that is None, as any system ends them; a byte-order
     mark passed over; UTF-8 or UTF-16, and a line that is neither is Latin-1. Raises FileError where it cannot be read."""
-    with _decoding(path):
-        with path.open("rb") as raw:
-            head = raw.read(HEAD)
-        encoding = _encoding(head)
-        newline = newline if "\n" in head.decode(encoding, "replace") else None
-        errors = "surrogateescape" if encoding == "utf-8-sig" else "strict"
-        with path.open(encoding=encoding, errors=errors, newline=newline) as stream:
+    with reading(path), path.open("rb") as raw:
+        head = raw.read(HEAD)
+    encoding = _encoding(head)
+    newline = newline if "\n" in head.decode(encoding, "replace") else None
+    errors = "surrogateescape" if encoding == "utf-8-sig" else "strict"
+    try:
+        with reading(path), path.open(encoding=encoding, errors=errors, newline=newline) as stream:
             for line in stream:
                 yield line if line.isascii() else _of_latin(line)
+    except UnicodeDecodeError as error:
+        raise FileError(f"begins as UTF-16 and is none ({error.reason})", file=str(path)) from error
 
 
 def _encoding(head: bytes) -> str:
@@ -48,18 +40,6 @@ def _encoding(head: bytes) -> str:
     if 3 * (high + low) > len(head) and 0 in (high, low):
         return "utf-16-be" if high else "utf-16-le"
     return "utf-8-sig"
-
-
-@contextmanager
-def _decoding(path: Path) -> Iterator[None]:
-    """FileError where a file cannot be read, or is not what it begins as."""
-    try:
-        with reading(path):
-            yield
-    except UnicodeDecodeError as error:
-        raise FileError(
-            f"begins as UTF-16 and is none ({error.reason} at byte {error.start})", file=str(path)
-        ) from error
 
 
 def _of_latin(line: str) -> str:

@@ -71,7 +71,7 @@ def import_urdf(
     )  # fmt: skip
     _check_file(description, model.file)
     for doubt in doubts(model):
-        warnings.warn(doubt, stacklevel=frames_of_this_package())
+        warnings.warn(f"{model.file}: {doubt}", stacklevel=frames_of_this_package())
     left_out = tuple(n for n in model.links if model.body_of(n) not in {*chains.heads, model.root})
     return Imported(description, left_out, tuple(sorted(motors - set(side.actuators))), end, choice)
 

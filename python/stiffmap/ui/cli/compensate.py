@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import typer
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs.option import written
@@ -43,23 +44,20 @@ USES = {"axis": {*LINE, *LOADS, "points"}, "axis of a map": {*LINE, "case"}, "po
 
 
 def command(
+    context: typer.Context,
     machine: options.Corrected,
     poses: Path | None = argument("CSV of wanted poses: x,y,z in mm, loads, approach_x …", None),
     output: Path | None = written("CSV of commands, table of --axis, or URDF."),
     effect: options.Effects = None,
-    force: str | None = option(
-        "Force at the tool in every pose, N, where the CSV has none. [default: 0,0,0]"
-    ),
+    force: str = option("Force at the tool in every pose, N, where the CSV has none.", "0,0,0"),
     gravity: options.Gravity = None,
     urdf: Path | None = option("The arm's own URDF: its joints get the corrected origins, all else is kept."),
     dh: Path | None = written(
         "Write the geometry of a serial arm as Denavit-Hartenberg rows (CSV).", None, "--dh"
     ),
     axis: str | None = option("Instead of poses: a controller's table of this axis, x, y or z."),
-    form: str | None = option(
-        "Of the table: csv, linuxcnc, siemens or heidenhain. [default: csv]", None, "--format"
-    ),
-    points: int | None = option("Positions of the table, over the workspace. [default: 21]"),
+    form: str = option("Of the table: csv, linuxcnc, siemens or heidenhain.", "csv", "--format"),
+    points: int = option("Positions of the table, over the workspace.", 21),
     through: str | None = option("A point of the table's line, mm. [default: home]"),
     case: str | None = option("Of a map with several loads: the one that the table is for, e.g. Fx."),
     zero: float | None = option("Position (mm) of the reference point: the table is zero there."),
@@ -97,19 +95,16 @@ def command(
             "--urdf: give -o FILE, the URDF to write, and no poses, whose commands go there too"
         )
     of_map = axis is not None and machine.endswith((".nc", ".zarr"))
-    told = {"poses": poses, "urdf": urdf, "dh": dh, "check": check, "effect": effect, "force": force, "gravity": gravity,
-            "case": case, "through": through, "zero": zero, "format": form, "points": points, "output": output}  # fmt: skip
-    given = [name for name, value in told.items() if value is not None]
     mode = "" if axis is None else "axis of a map" if of_map else "axis"
+    asked = {p.name: max(p.opts, key=len).lstrip("-") for p in context.command.params
+             if getattr(context.get_parameter_source(p.name or ""), "name", "") == "COMMANDLINE"}  # fmt: skip
+    given = [name for name in asked.values() if name in {*USES, *set().union(*USES.values())} - {"axis"}]
     used = set().union(*(USES[m] for m in ([mode] if mode else given) if m in USES))
     if wrong := [n for n in given if n not in used and (mode or n not in USES)]:
-        users = dict.fromkeys(
-            f"--{m.removesuffix(' of a map')}" for m, names in USES.items() if wrong[0] in names
-        )
-        raise StiffmapError(
-            f"--{wrong[0]}: not " + (f"with --{mode}" if mode else f"without {' or '.join(users)}")
-        )
-    load = [*numbers("0,0,0" if force is None else force, "force", 3), 0.0, 0.0, 0.0]
+        users = dict.fromkeys(f"--{m.split()[0]}" for m, names in USES.items() if wrong[0] in names)
+        where = f"with --{mode}" if mode else f"without {' or '.join(users)}"
+        raise StiffmapError(f"--{wrong[0]}: not {where}")
+    load = [*numbers(force, "force", 3), 0.0, 0.0, 0.0]
     pull = gravity_of(gravity)
     if axis is not None:
         line: dict[str, Any] = {"through": in_si(through, "through", 3), "zero": in_si(zero)}
@@ -117,10 +112,8 @@ def command(
             errors = axis_errors_of_map(machine, axis, case=case, **line)
         else:
             m = machine_with(machine, effect)
-            errors = axis_errors(
-                m, axis, points=21 if points is None else points, wrench=load, gravity=pull, **line
-            )
-        out = _table(errors, "csv" if form is None else form, output)
+            errors = axis_errors(m, axis, points=points, wrench=load, gravity=pull, **line)
+        out = _table(errors, form, output)
     else:
         m = machine_with(machine, effect)
         out = {} if urdf is None and dh is None else _geometry(m, urdf, dh, output)
