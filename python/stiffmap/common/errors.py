@@ -7,6 +7,8 @@ import re
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from os import PathLike
+from pathlib import Path
 from types import FrameType
 
 LONGEST_WORD, LONGEST_MESSAGE = 400, 3000  # characters
@@ -87,6 +89,12 @@ def reading(path: object) -> Iterator[None]:
         yield
     except OSError as error:
         raise FileError(f"cannot be read: {error.strerror}", file=str(path)) from error
+
+
+def refuse_folder(path: str | PathLike[str], expected: str) -> None:
+    """FileError for a folder where a file is expected."""
+    if str(path) and Path(path).is_dir():
+        raise FileError(f"expected {expected}, found a folder", file=str(path))
 
 
 def suggestion(word: str, known: Iterable[str]) -> str:

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import stiffmap as sm
 from stiffmap.common.errors import FileError
 from stiffmap.common.tables.poses import read_pose_table
 from stiffmap.common.tables.sheet import read_sheet
 from stiffmap.experiment.files.table import read_table
+from stiffmap.machining.process import load_process
 from stiffmap.machining.toolpath.load import load_path
+from stiffmap.model.link.readers import read_csv_field
 from stiffmap.workspace.performance.motion.trajectory import read_points
 from stiffmap.workspace.vibration.files import read_responses
 
@@ -23,6 +28,7 @@ SPELLINGS = {
     "decimal commas, thousands": ("x [um];y [mm];z [mm]\n50.500;0,0;700\n0;-20,25;700\n", "utf-8"),
     "blanks": ("x [mm] y [mm]  z [mm]\n50.5 0   700\n0 -20.25 700\n", "utf-8"),
     "UTF-16": ("x [mm],y [mm],z [mm]\n50.5,0,700\n0,-20.25,700\n", "utf-16"),
+    "UTF-16 without a mark": ("x [mm],y [mm],z [mm]\n50.5,0,700\n0,-20.25,700\n", "utf-16-le"),
     "Latin-1 with a remark": ("# gemessen in Köln\nx [µm],y [cm],z [m]\n50500,0,0.7\n0,-2.025,0.7\n", "latin-1"),
     "numpy.savetxt": ("# x[mm] y[mm] z[mm]\n5.05e+01 0.0e+00 7.0e+02\n0.0e+00 -2.025e+01 7.0e+02\n", "utf-8"),
     "units in a line of their own": ("X;Y;Z\nmm;mm;mm\n50.5;0;700\n0;-20.25;700\n", "utf-8"),
@@ -43,6 +49,14 @@ def test_a_table_is_the_same_in_every_spelling_and_command(name: str, tmp_path: 
     np.testing.assert_allclose(read_pose_table(file).position, POINTS, rtol=1e-12, atol=1e-15)
     np.testing.assert_allclose(load_path(file).end[-1], POINTS[-1], rtol=1e-12, atol=1e-15)
     np.testing.assert_allclose(read_points(file).position[[0, -1]], POINTS, rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "reader", [sm.load_machine, load_process, load_path, read_responses, read_csv_field, sm.import_urdf]
+)
+def test_a_folder_is_no_file(reader: Callable[[Path], object], tmp_path: Path) -> None:
+    with pytest.raises(FileError, match=rf"^{re.escape(str(tmp_path))}: .*(found a folder|Is a directory)$"):
+        reader(tmp_path)
 
 
 def test_a_workbook_is_a_table_of_every_command(tmp_path: Path) -> None:

@@ -12,10 +12,11 @@ from itertools import chain, islice
 from pathlib import Path
 from typing import NamedTuple
 
-from stiffmap.common.errors import FileError, reading
+from stiffmap.common.errors import FileError
 from stiffmap.common.number_text import number_in
 from stiffmap.common.tables.cells import BETWEEN, BLOCK, Cells, filled
 from stiffmap.common.tables.workbook import WORKBOOKS, workbook_lines
+from stiffmap.common.texts import text_of
 from stiffmap.common.units import unit_of
 
 Lines = Callable[[], Iterable[tuple[int, list[str]]]]
@@ -201,10 +202,7 @@ def is_data(cells: list[str], spelling: Spelling) -> bool:
 
 
 def _text(path: Path) -> Source:
-    with reading(path):
-        raw = path.read_bytes()
-    text = _decoded(raw, path).replace("\r\n", "\n").replace("\r", "\n")
-    del raw
+    text = text_of(path)
     lines_ = (line for line in io.StringIO(text) if line.strip() and not line.strip().startswith(COMMENTS))
     sample = list(islice(lines_, SAMPLE))
     best = max(SEPARATORS, key=lambda s: _numbers_between(s, sample))  # the first of equals
@@ -237,17 +235,3 @@ def _cut(line: str) -> list[str]:
     if len(line) > csv.field_size_limit():
         raise csv.Error("field larger than field limit")
     return BLANKS.split(MARKED.sub(r"\1", line.strip()))
-
-
-def _decoded(raw: bytes, path: Path) -> str:
-    if raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        try:
-            return raw.decode("utf-16")
-        except UnicodeDecodeError as error:
-            raise FileError(
-                f"begins as UTF-16 and is none ({error.reason} at byte {error.start})", file=str(path)
-            ) from error
-    try:
-        return raw.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        return raw.decode("latin-1")  # never fails

@@ -15,8 +15,8 @@ import numpy as np
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.outputs import write_text
+from stiffmap.common.texts import lines_of
 from stiffmap.machining.compensation.axis_errors import AxisErrors
-from stiffmap.machining.toolpath.gcode.load import lines_of
 
 MM = 1e3
 

@@ -7,7 +7,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from stiffmap.common.errors import FileError, StiffmapError, suggestion
+from stiffmap.common.errors import FileError, StiffmapError, refuse_folder, suggestion
 from stiffmap.common.yaml_text import Document, read
 from stiffmap.machining.process.build import process_of
 from stiffmap.machining.process.description import Process
@@ -32,6 +32,7 @@ def load_process(source: str | PathLike[str] | Mapping[str, Any]) -> Process:
         raise StiffmapError(f"process: expected a name, a file or a mapping; got {type(source).__name__}")
     path = FOLDER / f"{source}.yaml" if str(source) in process_names() else Path(source)
     if not path.is_file():
+        refuse_folder(source, "a process file or the name of a shipped process")
         known = process_names()
         raise FileError(
             f"no such process file, and no process of that name is shipped{suggestion(path.stem, known)}; "

@@ -11,11 +11,12 @@ from typing import NoReturn
 import numpy as np
 
 from stiffmap.common.broadcasting import Floats
-from stiffmap.common.errors import FileError, suggestion
+from stiffmap.common.errors import FileError, refuse_folder, suggestion
 from stiffmap.common.number_text import number_in
 from stiffmap.common.tables.named import Known, read_named
 from stiffmap.common.tables.workbook import TABLES
-from stiffmap.machining.toolpath.gcode.load import lines_of, load_gcode
+from stiffmap.common.texts import lines_of
+from stiffmap.machining.toolpath.gcode.load import load_gcode
 from stiffmap.machining.toolpath.outlines import outline, outline_names
 from stiffmap.machining.toolpath.path import Toolpath, path_of
 
@@ -43,6 +44,7 @@ def load_path(
         speeds = {"feed": feed, "rpm": None if spindle is None else spindle * 30 / pi}
         return outline(str(name_or_file), size, **{k: v for k, v in speeds.items() if v is not None})
     path = Path(name_or_file)
+    refuse_folder(name_or_file, "the file of a path or a built-in outline")
     if not path.is_file():
         raise FileError(
             f"no such file, and no built-in outline of that name{suggestion(path.stem, outline_names())}; "

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 
-from stiffmap.common.errors import UnknownMachineError, suggestion
+from stiffmap.common.errors import UnknownMachineError, refuse_folder, suggestion
 from stiffmap.common.yaml_text import read
 
 
@@ -48,6 +48,7 @@ def find(name_or_path: str | PathLike[str]) -> Path:
     path = Path(name_or_path)
     if path.is_file():
         return path
+    refuse_folder(name_or_path, "a machine file or the name of a shipped machine")
     text = str(name_or_path)
     looks_like_file = path.suffix in (".yaml", ".yml") or len(path.parts) > 1
     what = f"no file '{text}'" if looks_like_file else f"unknown machine '{text}'"

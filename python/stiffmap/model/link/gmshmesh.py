@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from stiffmap.common.errors import StiffmapError
+from stiffmap.common.errors import StiffmapError, refuse_folder
 from stiffmap.common.units import size_of
 from stiffmap.model.link.arrays import Ints
 from stiffmap.model.link.mesh import SolidMesh, checked_mesh
@@ -46,6 +46,7 @@ def mesh_file(path: str | Path, size: float | None = None, unit: str | None = No
         StiffmapError: no such file, unknown suffix, unit missing, no volume, elements of zero volume.
     """
     path = Path(path)
+    refuse_folder(path, "a mesh or a solid")
     if not path.is_file():
         raise StiffmapError(f"{path}: no such file")
     suffix = path.suffix.lower()

@@ -9,10 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
-from stiffmap.common.errors import FileError, StiffmapError
+from stiffmap.common.errors import FileError, StiffmapError, refuse_folder
 from stiffmap.common.number_text import number_in
 from stiffmap.common.tables.named import Known, named
 from stiffmap.common.tables.sheet import Layout, Sheet, read_sheet
+from stiffmap.common.texts import text_of
 from stiffmap.model.link.arrays import Floats, Ints
 from stiffmap.model.link.gmshmesh import UNITS
 from stiffmap.model.link.optional import need
@@ -48,6 +49,7 @@ def known_columns(
 ) -> tuple[Sheet, dict[str, list[Floats]]]:
     """The table, and the numbers (SI) of each column that has one of these names, each with its SI unit and how it is
     usually written; other columns are left alone. Raises FileError."""
+    refuse_folder(path, "a table")
     if not Path(path).is_file():
         raise FileError("no such file", file=str(path))
     layout = Layout(lambda name: name.lower() in units, strict=True, repeated=True)
@@ -62,19 +64,20 @@ def known_columns(
 
 def read_dat(path: str | Path) -> Rows:
     """Node numbers (n,) and displacements (cases, n, 3), in the deck's unit, of a CalculiX or Abaqus .dat."""
-    blocks = re.split(
-        r"^\s*displacements\s*\(.*$", "\n".join(_lines(path)), flags=re.MULTILINE | re.IGNORECASE
-    )[1:]
-    return _same_nodes(path, [_node_rows(block) for block in blocks])
+    blocks = re.split(r"^\s*displacements\s*\(.*$", text_of(Path(path)), flags=re.MULTILINE | re.IGNORECASE)[
+        1:
+    ]
+    blocks = [re.split(r"^\s*[A-Za-z]", block, flags=re.MULTILINE)[0] for block in blocks]  # another table
+    return _same_nodes(path, [_node_rows(path, block) for block in blocks])
 
 
 def read_ansys(path: str | Path) -> Rows:
     """Node numbers and displacements, in the deck's unit, of Ansys PRNSOL listings (``NODE UX UY UZ``)."""
-    blocks = re.split(r"^\s*NODE\s+UX\s+UY\s+UZ.*$", "\n".join(_lines(path)), flags=re.MULTILINE)[1:]
+    blocks = re.split(r"^\s*NODE\s+UX\s+UY\s+UZ.*$", text_of(Path(path)), flags=re.MULTILINE)[1:]
     # One load case may be printed in several pages; each page repeats the header, not the load step.
     cases: list[dict[int, list[float]]] = []
     for block in blocks:
-        rows = _node_rows(re.split(r"MAXIMUM ABSOLUTE|\*{5}", block)[0], columns=(4, 5))
+        rows = _node_rows(path, re.split(r"MAXIMUM ABSOLUTE|\*{5}", block)[0], columns=(4, 5))
         if cases and not cases[-1].keys() & rows.keys():
             cases[-1].update(rows)
         else:
@@ -87,7 +90,7 @@ def read_frd(path: str | Path) -> tuple[Floats, Floats]:
     nodes: dict[int, list[float]] = {}
     cases: list[dict[int, list[float]]] = []
     into: dict[int, list[float]] | None = None
-    for line in _lines(path):
+    for line in text_of(Path(path)).splitlines():
         key = line[:5].strip()
         if line.startswith("    2C"):
             into = nodes
@@ -98,11 +101,12 @@ def read_frd(path: str | Path) -> tuple[Floats, Floats]:
                 into = cases[-1]
         elif key.startswith("-1") and into is not None:
             try:
-                into[int(line[3:13])] = [number_in(line[13 + 12 * i : 25 + 12 * i]) for i in range(3)]
+                node, values = int(line[3:13]), [number_in(line[13 + 12 * i : 25 + 12 * i]) for i in range(3)]
             except ValueError:
                 raise StiffmapError(
                     f"{path}: expected fixed columns of twelve characters, got {line.strip()[:60]}"
                 ) from None
+            _put(path, into, node, values)
         elif line.startswith(" -3"):
             into = None
     numbers, fields = _same_nodes(path, cases)
@@ -156,29 +160,32 @@ def read_field(
     numbers, fields = read_dat(path) if suffix == ".dat" else read_ansys(path)
     if nodes is None:
         raise StiffmapError(f"{path}: it holds node numbers only; give the coordinates with --nodes")
-    place = _node_rows("\n".join(_lines(nodes)).replace(",", " "))
+    given = re.sub(r"^\*\*.*$", "", text_of(Path(nodes)), flags=re.MULTILINE)
+    sections = re.findall(r"^\*NODE\b(?!\s+[A-Z]).*\n([^*]*)", given, flags=re.MULTILINE | re.IGNORECASE)
+    place = _node_rows(nodes, "".join(sections or [given]).replace(",", " "))
     absent = [int(i) for i in numbers if int(i) not in place]
     if absent:
         raise StiffmapError(f"{nodes}: no coordinates for node {absent[0]} ({len(absent)} missing)")
     return UNITS[unit] * np.array([place[int(i)] for i in numbers]), UNITS[unit] * fields
 
 
-def _lines(path: str | Path) -> list[str]:
-    try:
-        return Path(path).read_text(errors="replace").splitlines()
-    except OSError:
-        raise StiffmapError(f"{path}: no such file") from None
-
-
-def _node_rows(text: str, columns: tuple[int, ...] = (4,)) -> dict[int, list[float]]:
+def _node_rows(path: str | Path, text: str, columns: tuple[int, ...] = (4,)) -> dict[int, list[float]]:
     """Rows "node a b c": the first three numbers behind an integer. Columns may touch: -1.0E-03-2.0E-04."""
-    rows = {}
+    rows: dict[int, list[float]] = {}
     for line in text.splitlines():
-        head = re.match(r"\s*(\d+)\s(.*)", line)
-        cells = re.findall(_NUMBER, head[2]) if head else []
-        if head and len(cells) + 1 in columns and not re.search(r"[A-CF-Za-cf-z]", line):
-            rows[int(head[1])] = [number_in(c.replace("D", "E").replace("d", "e")) for c in cells[:3]]
+        head = re.match(r"\s*(\d+)\s+(\S.*)", line)
+        if not head:
+            continue
+        cells = re.findall(_NUMBER, head[2])
+        if len(cells) + 1 not in columns or re.search(r"[A-CF-Za-cf-z]", line):
+            raise StiffmapError(f"{path}: expected a node and three numbers, found {line.strip()[:60]}")
+        _put(path, rows, int(head[1]), [number_in(c.replace("D", "E").replace("d", "e")) for c in cells[:3]])
     return rows
+
+
+def _put(path: str | Path, rows: dict[int, list[float]], node: int, values: list[float]) -> None:
+    if rows.setdefault(node, values) != values:
+        raise StiffmapError(f"{path}: node {node} is there twice, with {rows[node]} and with {values}")
 
 
 def _same_nodes(path: str | Path, cases: list[dict[int, list[float]]]) -> Rows:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,6 +26,14 @@ def plain_name(name: str) -> str:
     return re.sub(r"[^A-Za-z0-9_\-]+", "_", name)
 
 
+def free_name(name: str, taken: Iterable[str]) -> str:
+    """A name that the import makes up, with lines under its end as long as something of the file has it."""
+    taken = set(taken)
+    while name in taken:
+        name += "_"
+    return name
+
+
 @dataclass
 class Chains:
     """Makes elements of joints; knows which joints are motors and what yields."""
@@ -42,15 +51,17 @@ class Chains:
         bodies = [n for n, body in self.model.links.items() if body and self.carrier(n) in heads]
         self._refuse_alike("joint", [j.name for j in way if j.kind != "fixed" or j.origin != Pose()])
         self._refuse_alike("link", bodies)
+        taken = [plain_name(j.name) for j in way if j.kind != "fixed"]
         out: list[Element] = []
         for joint in way:
             if joint.origin != Pose():
-                out.append(Offset(plain_name(f"{joint.name}_origin"), joint.origin))
-            out += self._spring(joint.parent, end)
+                out.append(Offset(free_name(plain_name(f"{joint.name}_origin"), taken), joint.origin))
+                taken.append(out[-1].name)
+            out += self._spring(joint.parent, end, taken)
             if joint.kind != "fixed":
                 out.append(self._joint(joint))
                 out += self._bodies(joint.child)
-        return (*out, *(self._spring(end, None) if end else ()))
+        return (*out, *(self._spring(end, None, taken) if end else ()))
 
     def _refuse_alike(self, tag: str, names: list[str]) -> None:
         """FileError for two names that are one in a machine file."""
@@ -62,9 +73,11 @@ class Chains:
                                 "are of letters without accents, digits, _ and -; rename one",
                                 file=self.model.file, key=tag)  # fmt: skip
 
-    def _spring(self, link: str, end: str | None) -> tuple[Element, ...]:
+    def _spring(self, link: str, end: str | None, taken: list[str]) -> tuple[Element, ...]:
         given = self.side.springs.get(link)
-        return () if given is None or link == end else (link_spring(plain_name(link), given),)
+        if given is None or link == end:
+            return ()
+        return (link_spring(free_name(plain_name(link), taken), given),)
 
     def _joint(self, joint: UrdfJoint) -> Joint:
         self._check(joint)

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from os import PathLike, fspath
 from pathlib import Path
 
 from stiffmap.common.broadcasting import given_path
-from stiffmap.common.errors import FileError, StiffmapError, suggestion
+from stiffmap.common.errors import FileError, StiffmapError, frames_of_this_package, suggestion
 from stiffmap.model.description import TASK, Leg, MachineDescription, Offset
+from stiffmap.model.description.tree import ENDS
 from stiffmap.model.files.save import description_text
-from stiffmap.model.urdf.chains import Chains, ball, end_pose, plain_name
+from stiffmap.model.urdf.chains import Chains, ball, end_pose, free_name, plain_name
 from stiffmap.model.urdf.model import UrdfModel
+from stiffmap.model.urdf.plausible import doubts
 from stiffmap.model.urdf.reader import read_urdf
 from stiffmap.model.urdf.sidecar import Sidecar, read_sidecar
 from stiffmap.model.urdf.tip import find_tip
@@ -41,7 +44,8 @@ def import_urdf(
     `tip` is the link that is the tool, before what a sidecar says; None: the link that has the name of a tool
     (tool0, tcp, tool, ee, flange), or the only end. Raises FileError, one line, for what cannot be used: coupled
     (mimic), floating and planar joints on the way to the tip, several possible tools, unknown frames and joints,
-    loops of another topology, and what no machine file holds.
+    loops of another topology, and what no machine file holds. Warns of lengths, limits and masses that no machine has, as
+    millimetres, degrees and grams are.
     """
     model = read_urdf(given_path(urdf, "urdf", "a URDF file"))
     side = read_sidecar(None if sidecar is None else given_path(sidecar, "sidecar", "a YAML file"))
@@ -66,6 +70,8 @@ def import_urdf(
         source=f"imported from {Path(urdf).name}" + (f" with {Path(file).name}" if sidecar else "") + f" to {end}",
     )  # fmt: skip
     _check_file(description, model.file)
+    for doubt in doubts(model):
+        warnings.warn(f"{model.file}: {doubt}", stacklevel=frames_of_this_package())
     left_out = tuple(n for n in model.links if model.body_of(n) not in {*chains.heads, model.root})
     return Imported(description, left_out, tuple(sorted(motors - set(side.actuators))), end, choice)
 
@@ -122,7 +128,7 @@ def _legs(
         return (Leg("arm", chains.sequence(model.way(tip), tip)),), ()
     first = chains.sequence(model.way(body))
     at = end_pose(first)
-    legs = [Leg(plain_name(body), first)]
+    legs = [Leg(free_name(plain_name(body), ENDS), first)]
     for on_platform, end, free_to_turn in loops:
         way = model.way(end)
         both = zip(model.way(body), way, strict=False)
@@ -135,11 +141,15 @@ def _legs(
         on_body = chains.between(body, on_platform)
         if free_to_turn:
             turned = end_pose(elements).r.T @ (at @ on_body).r
-            elements = (*elements, ball(plain_name(f"{end}_ball"), turned))
-        name = plain_name(model.body_of(end))
+            elements = (
+                *elements,
+                ball(free_name(plain_name(f"{end}_ball"), (e.name for e in elements)), turned),
+            )
+        name = free_name(plain_name(model.body_of(end)), ENDS)
         taken = [leg.name for leg in legs]
         name = name if name not in taken else f"{name}_{len(legs) + 1}"
-        legs.append(Leg(name, (*elements, Offset("attach", on_body.inverse()))))
+        attach = Offset(free_name("attach", (e.name for e in elements)), on_body.inverse())
+        legs.append(Leg(name, (*elements, attach)))
     rest = model.way(tip)[len(model.way(body)) :]
     return tuple(legs), chains.sequence(rest, tip)  # type: ignore[return-value]
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import xml.etree.ElementTree as xml
 from collections import Counter
+from difflib import get_close_matches
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,8 @@ from stiffmap.model.urdf.model import Mimic, UrdfJoint, UrdfModel, tensor
 from stiffmap.model.urdf.tip import listed
 
 KINDS = {"revolute": "revolute", "continuous": "revolute", "prismatic": "prismatic", "fixed": "fixed"}
+READ = ("link", "joint", "inertial", "mass", "inertia", "origin", "axis", "parent", "child", "limit", "mimic")
+"""Elements whose content counts."""
 X, Y, Z = np.eye(3)
 MOST = 4 * np.pi
 """Angle of an origin, two turns, beyond which none is in radians."""
@@ -44,6 +47,7 @@ def read_urdf(path: Path) -> UrdfModel:
     plain = robot.tag.removesuffix("robot")
     for e in robot.iter():  # a namespace that has no prefix says nothing
         e.tag = e.tag.removeprefix(plain)
+    _check_tags(robot, file)
     links = [(_name(e, file), _body(e, file)) for e in robot.findall("link")]
     joints = [_joint(e, file) for e in robot.findall("joint")]
     _check_tree([name for name, _ in links], joints, file)
@@ -67,6 +71,18 @@ def _unexpanded(path: Path) -> FileError:
     plain = path.name.removesuffix(".xacro").removesuffix(".urdf")
     out = f"{plain}.urdf" if f"{plain}.urdf" != path.name else f"{plain}_expanded.urdf"
     return FileError(f"this is xacro, expand it with: xacro {path.name} > {out}", file=str(path))
+
+
+def _check_tags(robot: xml.Element, file: str) -> None:
+    """FileError for elements that would be passed over: a robot in the robot, and names that differ from known ones by a slip."""
+    for top in robot:
+        if top.tag == "robot":
+            raise FileError(f"expected one <robot>, found another in it: '{top.get('name', '')}'", file=file)
+        for e in (top, *top, *(e for inner in top.findall("inertial") for e in inner)):
+            meant = [] if e.tag in READ else get_close_matches(e.tag.lower(), READ, 1, 0.8)
+            if meant:
+                raise FileError(f"expected <{meant[0]}>, found <{e.tag}>", file=file,
+                                key="" if e is top else f"{top.tag} {top.get('name', '')}")  # fmt: skip
 
 
 def _name(element: xml.Element, file: str) -> str:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import typer
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs.option import written
@@ -36,8 +37,14 @@ BEYOND = "rows beyond what the machine was calibrated by"
 NAMED = 12
 """Rows that a line names."""
 
+LINE, LOADS = {"through", "zero", "format", "output"}, {"effect", "force", "gravity"}
+USES = {"axis": {*LINE, *LOADS, "points"}, "axis of a map": {*LINE, "case"}, "poses": {*LOADS, "output"},
+        "urdf": {"effect", "output"}, "dh": {"effect"}, "check": {"effect"}}  # fmt: skip
+"""The options that each way of asking uses; any other is refused."""
+
 
 def command(
+    context: typer.Context,
     machine: options.Corrected,
     poses: Path | None = argument("CSV of wanted poses: x,y,z in mm, loads, approach_x …", None),
     output: Path | None = written("CSV of commands, table of --axis, or URDF."),
@@ -87,14 +94,18 @@ def command(
         raise StiffmapError(
             "--urdf: give -o FILE, the URDF to write, and no poses, whose commands go there too"
         )
+    of_map = axis is not None and machine.endswith((".nc", ".zarr"))
+    mode = "" if axis is None else "axis of a map" if of_map else "axis"
+    asked = {p.name: max(p.opts, key=len).lstrip("-") for p in context.command.params
+             if getattr(context.get_parameter_source(p.name or ""), "name", "") == "COMMANDLINE"}  # fmt: skip
+    given = [name for name in asked.values() if name in {*USES, *set().union(*USES.values())} - {"axis"}]
+    used = set().union(*(USES[m] for m in ([mode] if mode else given) if m in USES))
+    if wrong := [n for n in given if n not in used and (mode or n not in USES)]:
+        users = dict.fromkeys(f"--{m.split()[0]}" for m, names in USES.items() if wrong[0] in names)
+        where = f"with --{mode}" if mode else f"without {' or '.join(users)}"
+        raise StiffmapError(f"--{wrong[0]}: not {where}")
     load = [*numbers(force, "force", 3), 0.0, 0.0, 0.0]
     pull = gravity_of(gravity)
-    of_map = axis is not None and machine.endswith((".nc", ".zarr"))
-    others = {"poses": poses, "urdf": urdf, "dh": dh, "check": check}
-    idle: dict[str, Any] = others if axis else {"through": through, "zero": zero}
-    idle |= {"effect": effect, "force": any(load), "gravity": gravity} if of_map else {"case": case}
-    if wrong := [name for name, value in idle.items() if value]:
-        raise StiffmapError(f"--{wrong[0]}: not with{'' if axis else 'out'} --axis{' of a map' * of_map}")
     if axis is not None:
         line: dict[str, Any] = {"through": in_si(through, "through", 3), "zero": in_si(zero)}
         if of_map:

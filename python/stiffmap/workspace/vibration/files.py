@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from stiffmap.common.broadcasting import Floats
-from stiffmap.common.errors import FileError, StiffmapError, needed
+from stiffmap.common.errors import FileError, StiffmapError, needed, refuse_folder
 from stiffmap.common.tables.named import Known, read_named
 from stiffmap.common.tables.workbook import TABLES
 from stiffmap.workspace.vibration.response import Complex
@@ -52,6 +52,7 @@ def read_responses(path: str | PathLike[str]) -> list[MeasuredResponse]:
     Raises FileError naming file, row and what was expected: frequencies that do not rise, a coherence outside 0 to 1, units.
     """
     p = Path(path)
+    refuse_folder(path, "a file of frequency responses")
     if not p.is_file():
         raise FileError("no such file of frequency responses", file=str(path))
     try:

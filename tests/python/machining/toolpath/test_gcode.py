@@ -202,6 +202,24 @@ def test_bytes_of_comments_and_a_mark_do_not_matter(tmp_path: Path, raw: bytes, 
     assert 1e3 * load_path(table).length == pytest.approx([30])
 
 
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "latin-1", "utf-16", "utf-16-le", "utf-16-be"])
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+def test_encodings_and_ends_of_lines(tmp_path: Path, encoding: str, end: str) -> None:
+    lines = ["%", "(Fräser Ø12)", "G21 G90 S6000 M3 F600", "G0 X0 Y0 Z0", "G1 X30 ; längs", "Y10", "M30", "%"]
+    file = tmp_path / "p.nc"
+    file.write_bytes((end.join(lines) + end).encode(encoding))
+    p = load_path(file)
+    assert 1e3 * p.length == pytest.approx([0, 30, 10])
+    assert p.line.tolist() == [4, 5, 6] and list(p.text) == lines
+
+
+@pytest.mark.parametrize("raw", [b"\xff\xfeG\x001\x00X", b"G\x001\x00X\x001\x00\n"])
+def test_a_program_that_is_cut_off_amid_a_letter_of_utf_16(tmp_path: Path, raw: bytes) -> None:
+    (tmp_path / "p.nc").write_bytes(raw)
+    with pytest.raises(FileError, match=r"p\.nc: begins as UTF-16 and is none \(truncated data"):
+        load_path(tmp_path / "p.nc")
+
+
 @pytest.mark.parametrize("word", ["G28", "G30", "G91 G28 Z0\nG90", "G28 G91 Z0\nG90", "G30 Z5"])
 def test_a_reference_point_is_not_known(word: str) -> None:
     p = read(f"G0 X0 Y0 Z5\nG1 X30\n{word}\nG0 X0 Y0 Z5\nG1 Y30\n{word}\n")

@@ -130,6 +130,36 @@ def test_bad_field_files(tmp_path, name, text, unit, words):
     assert "\n" not in str(error.value)
 
 
+NODES = "".join(f"{i + 1}, {a:.9g}, {b:.9g}, {c:.9g}\n" for i, (a, b, c) in enumerate(POINTS))
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])
+def test_other_tables_and_sections_of_a_deck_are_none_of_the_field(tmp_path, encoding):
+    forces = "\n forces (fx,fy,fz) for set ALL and time  0.1E+01\n\n         1  1.0E+02  2.0E+02  3.0E+02\n\n displ"
+    nodes = NODES.replace("\n5,", "\n** more\n*Node\n5,")
+    deck = f"** a part\n*NODE, NSET=ALL\n{nodes}*ELEMENT, TYPE=S3\n1, 8, 9, 10\n*NODE PRINT\nU\n"
+    (tmp_path / "a.dat").write_text(dat_text().replace("\n displ", forces) + forces[:-6], encoding=encoding)
+    (tmp_path / "a.inp").write_text(deck, encoding=encoding)
+    points, fields = read_field(tmp_path / "a.dat", "m", tmp_path / "a.inp")
+    np.testing.assert_allclose(points, POINTS, rtol=1e-8)
+    np.testing.assert_allclose(fields, U[:2], rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("row", "words"),
+    [
+        ("nan nan nan", "expected a node and three numbers, found 5 nan nan nan"),
+        ("1.0E-3 2.0E-3", "found 5 1.0E-3 2.0E-3"), ("******** ******** ********", r"found 5 \*\*\*"),
+        ("1.0 2.0 3.0\n5 1.0 2.0 4.0", r"node 5 is there twice, with \[1.0, 2.0, 3.0\] and with \[1.0, 2.0, 4.0\]"),
+    ],
+)  # fmt: skip
+def test_no_row_of_a_listing_is_passed_over(tmp_path, row, words):
+    (tmp_path / "a.dat").write_text(re.sub(r"(?m)^ +5 .*$", f"5 {row}", dat_text()))
+    (tmp_path / "a.inp").write_text(NODES)
+    with pytest.raises(StiffmapError, match=rf"a\.dat: .*{words}"):
+        read_field(tmp_path / "a.dat", "m", tmp_path / "a.inp")
+
+
 def test_missing_field_file():
     with pytest.raises(StiffmapError, match="no such file"):
         read_field("absent.csv")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -125,6 +126,15 @@ BAD_URDF = {
     ),
     "joint q4: rpy: expected radians, found '0 90 0', as degrees are": ('rpy="0 0.4 0"', 'rpy="0 90 0"'),
     "joint q4: a zero-length axis": ('<axis xyz="1 0 0"/>', '<axis rpy="1 0 0"/>'),
+    "joint q1: expected <origin>, found <Origin>": ('<origin xyz="0 0 0.3"', '<Origin xyz="0 0 0.3"'),
+    "joint q4: expected <origin>, found <orgin>": ('<origin xyz="0.1 0 0"', '<orgin xyz="0.1 0 0"'),
+    "link fore: expected <inertial>, found <Inertial>": (
+        '<link name="fore"/>',
+        '<link name="fore"><Inertial/></link>',
+    ),
+    "link upper: expected <mass>, found <Mass>": ('<mass value="3"/>', '<Mass value="3"/>'),
+    "robot.urdf: expected <link>, found <Link>": ('<link name="fore"/>', '<Link name="fore"/>'),
+    "expected one <robot>, found another in it: 'b'": ("</robot>", '<robot name="b"/></robot>'),
     "expected one root link, found 2": ('<link name="fore"/>', '<link name="fore"/><link name="loose"/>'),
 }
 
@@ -147,6 +157,25 @@ def test_two_names_that_are_one_in_a_machine_file(tmp_path: Path) -> None:
         machine(tmp_path, robots.ARM.replace('"q2"', '"关节一"').replace('"q3"', '"关节二"'))
     with pytest.raises(sm.StiffmapError, match=r"link: 'arm\.1' and 'arm/1' would both be 'arm_1'"):
         machine(tmp_path, robots.ARM.replace('"shoulder"', '"arm.1"').replace('"upper"', '"arm/1"'))
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("elbow_a", "motor_a_origin"), ("motor_b", "elbow_b_origin"), ("fore_a", "platform"), ("fore_b", "base_"),
+        ("arm_b", "attach"), ("elbow_b", "attach"), ("motor_b", "tip_b_ball"), ("arm_b", "tip_b_ball"),
+        ("arm_a", "motor_a"), ("fore_b", "motor_b"), ("fore_b", "platform"), ("tip_b", "x y/z.1"),
+    ],
+)  # fmt: skip
+def test_any_link_or_joint_may_have_a_name_that_the_import_makes_up(
+    old: str, new: str, tmp_path: Path
+) -> None:
+    urdf, side = (re.sub(rf"\b{old}\b", new, t) for t in (robots.FIVE_BAR, robots.FIVE_BAR_SIDECAR))
+    m = machine(tmp_path, urdf, side)
+    m.save(tmp_path / "m.yaml")
+    assert sm.load_machine(tmp_path / "m.yaml") == m
+    as_it_was = machine(tmp_path, robots.FIVE_BAR, robots.FIVE_BAR_SIDECAR)
+    assert (m.solve([0.05, 0.4, 0]).compliance == as_it_was.solve([0.05, 0.4, 0]).compliance).all()
 
 
 def test_a_namespace_and_an_empty_name_say_nothing(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 
@@ -276,6 +277,60 @@ def test_a_straight_wrist_is_a_singular_home(tmp_path: Path, capsys: pytest.Capt
     said = capsys.readouterr().out
     assert "cannot move along (y, rz) = (-0.484, 0.875) (m, rad): the axes of j4 and j6 are in line" in said
     assert "give `home` with j5 bent" in said
+
+
+def machine_of(length: float, mass: float, limits: str = "", kind: str = "revolute") -> str:
+    """Three joints, a length apart, which carry a mass each; its radius is a tenth of the length."""
+    inertia = mass * (length / 10) ** 2
+    ends = ["base", "a", "b", "c"]
+    parts = [
+        joint(f"q{i}", ends[i], ends[i + 1], kind, limits, at=f"0 0 {length}")
+        .replace('mass value="0.7"', f'mass value="{mass}"')
+        .replace('xyz="0.01 0.02 0.05"', f'xyz="0 0 {length / 2}"')
+        .replace('ixx="0.002" iyy="0.003" izz="0.004" ixy="1e-4" ixz="2e-4" iyz="-3e-4"',
+                 f'ixx="{inertia}" iyy="{inertia}" izz="{inertia}"')
+        for i in range(3)
+    ]  # fmt: skip
+    return robot(*parts)
+
+
+DOUBTS = {
+    "millimetres": (machine_of(400.0, 5), "joint q2: origin: found it 800 m off; expected metres, 0.8 m if these are millimetres"),
+    "inertial in millimetres": (machine_of(0.4, 5).replace('xyz="0 0 0.2"', 'xyz="0 0 200"'),
+                                "link a: inertial: found it 200 m off; expected metres, 0.2 m if these are millimetres"),
+    "degrees": (machine_of(0.4, 5, '<limit lower="-180" upper="92.5"/>'),
+                "joint q0: limit: found -180 to 92.5 rad; expected radians, -3.142 to 1.614 if these are degrees"),
+    "grams": (machine_of(0.4, 2500), "link a: mass: found 2500 kg, and 7500 kg in all that moves, in a machine of 0.8 m; expected "
+                                     "kilograms, 2.5 kg if these are grams"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", DOUBTS)
+def test_numbers_that_no_machine_has_are_warned_of(name: str, tmp_path: Path) -> None:
+    text, said = DOUBTS[name]
+    (tmp_path / "arm.urdf").write_text(text)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        sm.import_urdf(tmp_path / "arm.urdf")
+    (line,) = [str(w.message) for w in caught]
+    assert line.startswith(f"{tmp_path / 'arm.urdf'}: {said}")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        machine_of(30.0, 9e4), machine_of(1.3, 1600), machine_of(0.02, 0.1),
+        machine_of(0.4, 5, '<limit lower="-12.56" upper="12.56"/>'), machine_of(0.4, 5, '<limit lower="-1e16" upper="1e16"/>'),
+        machine_of(0.01, 1500, '<limit lower="0" upper="0.6"/>', "prismatic"),
+        robot(arm()).replace('<link name="base"/>', '<link name="map"/><link name="base"/><joint name="m" type="fixed"><parent '
+                             'link="map"/><child link="base"/><origin xyz="691000 5334000 0"/></joint>'),
+    ],
+    ids=["crane", "heavy arm", "finger", "four turns", "no limit", "machine tool", "place on a map"],
+)  # fmt: skip
+def test_real_machines_are_not_doubted(text: str, tmp_path: Path) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        imported(tmp_path, text)
 
 
 def test_robots_of_example_robot_data() -> None:

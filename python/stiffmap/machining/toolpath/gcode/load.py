@@ -9,20 +9,14 @@ from pathlib import Path
 import numpy as np
 
 from stiffmap.common.broadcasting import Floats
-from stiffmap.common.errors import FileError, reading
+from stiffmap.common.errors import FileError
+from stiffmap.common.texts import lines_of
 from stiffmap.machining.toolpath.gcode.read import ProgramReader, read_moves
 from stiffmap.machining.toolpath.gcode.state import NEVER, ModalState
 from stiffmap.machining.toolpath.path import Kind, Toolpath
 
 NUMBERS = 10
 KINDS = {"G0": Kind.RAPID, "G1": Kind.LINE, "G2": Kind.ARC, "G3": Kind.ARC}
-
-
-def lines_of(path: Path, newline: str | None = None) -> Iterator[str]:
-    """Lines of a text file, ended by `newline` or, where that is None, as any system ends them; a byte-order mark passed over; a line that is not UTF-8 is Latin-1. Raises FileError where it cannot be read."""
-    with reading(path), path.open(encoding="utf-8-sig", errors="surrogateescape", newline=newline) as stream:
-        for line in stream:
-            yield line if line.isascii() else _decoded(line)
 
 
 def load_gcode(
@@ -83,14 +77,6 @@ def load_gcode(
         actions=tuple(reader.actions),
         given=(state.given[0], state.given[1], state.given[2]),
     )
-
-
-def _decoded(line: str) -> str:
-    try:
-        line.encode()
-    except UnicodeEncodeError:
-        return line.encode("utf-8", "surrogateescape").decode("latin-1")
-    return line
 
 
 def _turns(given: Floats) -> Floats | None:
