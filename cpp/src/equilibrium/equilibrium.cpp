@@ -105,7 +105,8 @@ class LoadPath {
       factorize_at(m_, p_, state_, ws_);
     }
     note(stable_, ws_.slope_before, wrench_slope_before_);
-    if (!corners_ && ws_.slope_before.isZero(0) && wrench_slope_before_.isZero(0)) return Outcome::converged;  // no load
+    const bool unloaded = !corners_ && ws_.slope_before.isZero(0) && wrench_slope_before_.isZero(0);
+    if (unloaded) return Outcome::converged;
     falling_ = out_.falling;
     ws_.pieces_before = ws_.lin.dtau;
     for (int k = 0; k < (corners_ ? most_across : most_load_steps); ++k) {

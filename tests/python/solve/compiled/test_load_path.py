@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from tests.oracle.classes import Classes
@@ -113,8 +115,9 @@ def test_a_preload_that_is_far_from_the_command_needs_no_path_without_a_load(see
     """Rests of springs, or springs outside the legs, move these machines by a tenth of their length: with nothing else to
     bear, the first equilibrium is the answer, of which there is no doubt."""
     description = Classes(seed).task().description
-    machine = sm.Machine(description)
-    position = description.home.p + np.random.default_rng(1).uniform(-half, half, (40, 3))
+    low, high = (tuple((description.home.p + side * half).tolist()) for side in (-1, 1))
+    machine = sm.Machine(replace(description, workspace=(low, high)))
+    position = np.random.default_rng(1).uniform(low, high, (40, 3))
     fast, reference = (machine.solve(position, method=way) for way in ("fast", "reference"))
     assert (fast.status == reference.status).all()
     ok = fast.ok
