@@ -1,4 +1,4 @@
-"""Uncertainty budget of a fitted number, and positioning in the words of the standards.
+"""Uncertainty budget of a fitted number.
 
 JCGM 100 (GUM): standard uncertainties of type A (statistics of the readings) and type B (certificates, judgement)
 add in quadrature; Welch-Satterthwaite gives effective degrees of freedom; U = 2 u.
@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import t as student
 
-from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.experiment import Experiment
 from stiffmap.experiment.prediction.predict import Predictor
@@ -124,62 +123,3 @@ def budgets(
         lines += [BudgetLine(source, "B", abs(u * float(s[k])), float("inf")) for source, u, s in shifts]
         out.append(NumberBudget(name, unit, float(value), tuple(lines)))
     return out
-
-
-@dataclass(frozen=True)
-class AxisPositioning:
-    """ISO 230-2 figures of one linear axis from bidirectional approaches, m."""
-
-    targets: Floats
-    forward: Floats
-    """Mean deviation at each target, approached in the positive direction."""
-    backward: Floats
-    reversal: float
-    """B: largest difference of the two."""
-    repeatability: float
-    """R: bidirectional repeatability."""
-    systematic: float
-    """E: bidirectional systematic deviation."""
-    mean: float
-    """M: range of the mean bidirectional deviation."""
-    accuracy: float
-    """A: bidirectional accuracy."""
-
-
-def iso_230_2(targets: Floats, deviation: Floats, direction: Floats) -> AxisPositioning:
-    """Positioning of one axis: rows (n,) m of target, deviation and direction of approach (sign).
-
-    ISO 230-2:2014, 3.x: s with n - 1, coverage factor 2. Raises StiffmapError where a target lacks two
-    readings from each side.
-    """
-    places = np.unique(np.round(targets, 9))
-    means, spreads = np.empty((2, len(places))), np.empty((2, len(places)))
-    for i, at in enumerate(places):
-        for side, sign in enumerate((1.0, -1.0)):
-            here = deviation[(np.abs(targets - at) < 1e-9) & (np.sign(direction) == sign)]
-            if here.size < 2:
-                raise StiffmapError(
-                    f"iso_230_2: target {1e3 * at:g} mm has {here.size} readings approached "
-                    f"{'up' if sign > 0 else 'down'}; two or more are needed"
-                )
-            means[side, i], spreads[side, i] = here.mean(), here.std(ddof=1)
-    gap = means[0] - means[1]
-    each = np.maximum(2 * (spreads[0] + spreads[1]) + np.abs(gap), 4 * spreads.max(axis=0))
-    high, low = (means + 2 * spreads).max(), (means - 2 * spreads).min()
-    middle = means.mean(axis=0)
-    return AxisPositioning(
-        places, means[0], means[1], float(np.abs(gap).max()), float(each.max()),
-        float(means.max() - means.min()), float(np.ptp(middle)), float(high - low),
-    )  # fmt: skip
-
-
-def iso_9283(attained: Floats, commanded: Floats) -> tuple[float, float]:
-    """Pose accuracy AP and repeatability RP of a robot, m, from (n, 3) attained positions of one commanded one.
-
-    ISO 9283:1998, 7.2: AP is the distance of the barycentre, RP = mean distance from it + 3 standard deviations.
-    """
-    if len(attained) < 2:
-        raise StiffmapError("iso_9283: repeatability needs two attained poses or more")
-    centre = attained.mean(axis=0)
-    away = np.linalg.norm(attained - centre, axis=1)
-    return float(np.linalg.norm(centre - commanded)), float(away.mean() + 3 * away.std(ddof=1))

@@ -11,7 +11,7 @@ import pytest
 import stiffmap as sm
 from stiffmap.experiment import random_plan, save_experiment, simulate
 from stiffmap.experiment.calls import placed
-from stiffmap.identification.planning.budget import BudgetLine, NumberBudget, budgets, iso_230_2, iso_9283
+from stiffmap.identification.planning.budget import BudgetLine, NumberBudget, budgets
 from stiffmap.identification.planning.changes import monitor as compare
 from stiffmap.identification.planning.estimate import estimate
 from stiffmap.ui.cli.app import main
@@ -89,28 +89,6 @@ def test_welch_and_satterthwaite() -> None:
     assert b.u == pytest.approx(np.hypot(25.0, 9.7))
     assert b.freedom == pytest.approx(b.u**4 / (25.0**4 / 18 + 9.7**4 / 25.6))
     assert b.expanded == pytest.approx(2 * b.u)
-
-
-def test_positioning_in_the_words_of_iso_230_2() -> None:
-    targets = np.repeat([0.0, 0.1], 4)
-    direction = np.tile([1.0, 1.0, -1.0, -1.0], 2)
-    deviation = 1e-6 * np.array([1, 3, 5, 7, 2, 2, 4, 4])
-    found = iso_230_2(targets, deviation, direction)
-    s = np.sqrt(2.0)
-    assert found.reversal == pytest.approx(4e-6)
-    assert found.systematic == pytest.approx(4e-6)  # 6 - 2
-    assert found.mean == pytest.approx(1e-6)  # 4 - 3
-    assert found.repeatability == pytest.approx(1e-6 * (4 * s + 4))
-    assert found.accuracy == pytest.approx(1e-6 * ((6 + 2 * s) - (2 - 2 * s)))
-    with pytest.raises(sm.StiffmapError, match="target 100 mm has 1 readings"):
-        iso_230_2(targets[:-1], deviation[:-1], direction[:-1])
-
-
-def test_pose_accuracy_in_the_words_of_iso_9283() -> None:
-    attained = np.array([[1e-3, 0, 0], [1e-3, 2e-4, 0], [1e-3, 0, 2e-4], [1e-3, 2e-4, 2e-4]])
-    accuracy, repeatability = iso_9283(attained, np.zeros(3))
-    assert accuracy == pytest.approx(np.sqrt(1e-6 + 2e-8))
-    assert repeatability == pytest.approx(np.sqrt(2e-8))  # all at one distance
 
 
 def test_what_a_model_leaves_is_no_change(orthoglide: sm.Machine) -> None:
