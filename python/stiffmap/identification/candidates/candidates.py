@@ -10,6 +10,7 @@ from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.model import effects
 from stiffmap.model.description import AppliedEffect, MachineDescription
 from stiffmap.model.effects import EffectType, Parameter, registry
+from stiffmap.model.effects.types import same_part
 
 Names = tuple[str, ...]
 
@@ -117,7 +118,7 @@ def _plausible(p: Parameter) -> Parameter:
 def clash(candidate: Candidate, others: Iterable[Candidate]) -> bool:
     """Whether the candidate and one of the others exclude each other at a place that they share."""
     legs = set(candidate.legs)
-    shared = (o for o in others if o.element == candidate.element)
+    shared = (o for o in others if same_part(o.element, candidate.element))
     shared = (o for o in shared if not legs or not o.legs or legs & set(o.legs))
     return any(o.kind in _excluded(candidate.kind) or candidate.kind in _excluded(o.kind) for o in shared)
 

@@ -140,7 +140,7 @@ def coarseness(
 def _part(element: str, description: MachineDescription) -> int:
     if "." in element:
         return 4
-    found = [e for g in description.legs for s in sequences(g.elements) for e in s if e.name == element]
+    found = [e for g in description.legs for _, s in sequences(g.elements) for e in s if e.name == element]
     if any(isinstance(e, Joint) and e.actuated for e in found):
         return 0
     kinds = {type(e).__name__ for e in found}

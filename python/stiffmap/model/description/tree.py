@@ -78,13 +78,18 @@ def offset_before(elements: Sequence[Element], k: int) -> int | None:
     return i if isinstance(before, Offset) and any(before.nominal.translation) else None
 
 
-def sequences(elements: Elements) -> Iterator[Elements]:
-    """A sequence and those of the branches in it."""
-    yield elements
+def sequences(elements: Elements, name: str = "") -> Iterator[tuple[str, Elements]]:
+    """A sequence and those of the branches in it, each with the names of the branches that lead to it: ``.low``."""
+    yield name, elements
     for element in elements:
         if isinstance(element, Block):
             for branch in element.branches:
-                yield from sequences(branch.elements)
+                yield from sequences(branch.elements, f"{name}.{branch.name}")
+
+
+def in_sequence(element: str, name: str) -> str:
+    """What an element is called inside a sequence of this name: ``bar`` for ``low.bar`` in ``.low``; else the same."""
+    return element.removeprefix(f"{name[1:]}.") if name else element
 
 
 def edit_named(elements: Elements, name: str, edit: Callable[[Elements, str], Elements]) -> Elements:

@@ -10,7 +10,7 @@ from stiffmap.common.errors import StiffmapError, suggestion
 from stiffmap.common.kept import Kept
 from stiffmap.model.description import AppliedEffect, MachineDescription
 from stiffmap.model.effects import registry
-from stiffmap.model.effects.types import EffectType, Parameter, Place
+from stiffmap.model.effects.types import EffectType, Parameter, Place, same_part
 
 Numbers = tuple[tuple[str, float], ...]
 Words = tuple[tuple[str, str], ...]
@@ -115,7 +115,7 @@ def check_exclusion(new: AppliedEffect, records: Sequence[AppliedEffect]) -> Non
     """Raises StiffmapError where an effect added before excludes the new one."""
     for old in records:
         shared = set(new.legs) & set(old.legs)
-        meet = new.element == old.element and (shared or not new.legs or not old.legs)
+        meet = same_part(new.element, old.element) and (shared or not new.legs or not old.legs)
         if not meet:
             continue
         where = new.element + (f", leg {', '.join(sorted(shared))}" if shared else "")

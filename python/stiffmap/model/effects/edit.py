@@ -8,15 +8,32 @@ from typing import Any
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.model.description import MachineDescription, Offset, Pose
-from stiffmap.model.description.tree import ENDS, Edit, Elements, edit_all, edit_sequences
+from stiffmap.model.description.tree import (
+    ENDS,
+    Edit,
+    Elements,
+    edit_all,
+    edit_named,
+    in_sequence,
+)
 
 Sites = Callable[[Elements], dict[str, tuple[int, ...]]]
 Change = Callable[[Any], Elements]
 
 
-def edit_legs(description: MachineDescription, legs: tuple[str, ...], edit: Edit) -> MachineDescription:
-    """``edit`` on every sequence of the legs named; without legs on those of base and platform."""
-    return edit_chains(description, legs or ENDS, lambda elements: edit_sequences(elements, edit))
+def edit_legs(
+    description: MachineDescription,
+    legs: tuple[str, ...],
+    element: str,
+    edit: Callable[[Elements, str], Elements],
+) -> MachineDescription:
+    """``edit`` on every sequence of the legs named, with what the element is called there; without legs on those of base and
+    platform."""
+
+    def inside(elements: Elements, name: str) -> Elements:
+        return edit(elements, in_sequence(element, name))
+
+    return edit_chains(description, legs or ENDS, lambda elements: edit_named(elements, "", inside))
 
 
 def edit_chains(description: MachineDescription, chains: tuple[str, ...], edit: Edit) -> MachineDescription:
@@ -29,13 +46,13 @@ def change_sites(
 ) -> MachineDescription:
     """Each element that ``sites`` finds under the name becomes the elements that ``change`` gives."""
 
-    def edit(elements: Elements) -> Elements:
+    def edit(elements: Elements, name: str) -> Elements:
         out = elements
-        for i in reversed(sites(elements).get(element, ())):
+        for i in reversed(sites(elements).get(name, ())):
             out = splice(out, i, change(elements[i]))
         return out
 
-    return edit_legs(description, legs, edit)
+    return edit_legs(description, legs, element, edit)
 
 
 def splice(elements: Elements, i: int, piece: Elements) -> Elements:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -17,7 +18,7 @@ from stiffmap.model.description import (
     Offset,
     Spring,
 )
-from stiffmap.model.description.tree import ENDS, Elements, chains, offset_before, sequences
+from stiffmap.model.description.tree import ENDS, Elements, chains, in_sequence, offset_before, sequences
 from stiffmap.model.effects.edit import Sites, change_sites
 from stiffmap.model.effects.types import Place, Placed, Places
 
@@ -97,7 +98,14 @@ def lengths(elements: Elements) -> dict[str, tuple[int, ...]]:
 
 def names(elements: Elements, sites: Sites) -> list[str]:
     """Names that a leg has for these sites, in their order, once each."""
-    return list(dict.fromkeys(name for seq in sequences(elements) for name in sites(seq)))
+    return list(dict.fromkeys(name for _, seq in sequences(elements) for name in sites(seq)))
+
+
+def in_branches(elements: Elements, sites: Sites) -> list[str]:
+    """Names that several branches of a leg have, each in one branch alone: ``low.bar``."""
+    found = [(branch, name) for branch, seq in sequences(elements) for name in sites(seq)]
+    count = Counter(name for _, name in found)
+    return [f"{branch[1:]}.{name}" for branch, name in found if branch and count[name] > 1]
 
 
 def found(
@@ -105,11 +113,13 @@ def found(
 ) -> list[Element]:
     """The elements that a name stands for in these legs; without legs in base and platform."""
     there = [elements for name, elements in chains(description) if name in (legs or ENDS)]
-    return [seq[i] for c in there for seq in sequences(c) for i in sites(seq).get(element, ())]
+    inside = ((seq, in_sequence(element, name)) for c in there for name, seq in sequences(c))
+    return [seq[i] for seq, name in inside for i in sites(seq).get(name, ())]
 
 
-def at_sites(sites: Sites) -> Places:
-    """Each name in each leg alone, then in all legs that have it; then those of base and platform."""
+def at_sites(sites: Sites, apart: Sites = lambda _: {}) -> Places:
+    """Each name in each leg alone, then in all legs that have it; then those of base and platform; at last those of `apart` in one
+    branch of one leg alone, where several branches have them."""
 
     def find(description: MachineDescription) -> list[Place]:
         having: dict[str, list[str]] = {}
@@ -118,7 +128,8 @@ def at_sites(sites: Sites) -> Places:
                 having.setdefault(name, []).append(leg.name)
         out = [place for name, legs in having.items() for place in _alone_and_together(name, legs)]
         trunk = names((*description.base, *description.platform), sites)
-        return out + [(name, ()) for name in trunk if name not in having]
+        out += [(name, ()) for name in trunk if name not in having]
+        return out + [(n, (leg.name,)) for leg in description.legs for n in in_branches(leg.elements, apart)]
 
     return find
 
@@ -127,13 +138,15 @@ def _alone_and_together(name: str, legs: list[str]) -> list[Place]:
     return [(name, (leg,)) for leg in legs] + ([(name, tuple(legs))] if len(legs) > 1 else [])
 
 
-def each(sites: Sites, change: Callable[[Any, Placed], Elements]) -> dict[str, Any]:
-    """``places`` and ``apply`` of an effect that makes other elements of each one at its place."""
+def each(
+    sites: Sites, change: Callable[[Any, Placed], Elements], apart: Sites = lambda _: {}
+) -> dict[str, Any]:
+    """``places`` and ``apply`` of an effect that makes other elements of each one at its place; `apart`: as in `at_sites`."""
 
     def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
         return change_sites(description, placed.legs, placed.element, sites, lambda e: change(e, placed))
 
-    return {"places": at_sites(sites), "apply": apply}
+    return {"places": at_sites(sites, apart), "apply": apply}
 
 
 def at(element: str) -> Places:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
@@ -27,11 +28,22 @@ class Placed:
 
 def is_revolute(description: MachineDescription, element: str) -> bool:
     """Whether the joint of that name, or the spring's direction (``foot.k44``), turns."""
-    name, _, entry = element.partition(".")
-    named = [e for _, e in all_elements(description) if e.name == name]
-    if entry and any(isinstance(e, Spring) for e in named):
-        return int(entry[1]) > 3
+    whole, entry = entry_of(element)
+    named = [e for _, e in all_elements(description) if e.name == whole.rpartition(".")[2]]
+    if entry is not None and any(isinstance(e, Spring) for e in named):
+        return entry > 2
     return any(isinstance(e, Joint) and e.kind != "prismatic" for e in named)
+
+
+def same_part(one: str, other: str) -> bool:
+    """Whether two names stand for the same element, or one of them for that of all branches of which the other names one."""
+    return one == other or one.endswith(f".{other}") or other.endswith(f".{one}")
+
+
+def entry_of(element: str) -> tuple[str, int | None]:
+    """The name of a spring and the number of the diagonal entry that ``foot.k22`` names; None: none of them."""
+    match = re.fullmatch(r"(.+)\.k([1-6])\2", element)
+    return (match[1], int(match[2]) - 1) if match else (element, None)
 
 
 Apply = Callable[[MachineDescription, Placed], MachineDescription]

@@ -6,7 +6,15 @@ from dataclasses import replace
 
 from stiffmap import load_machine
 from stiffmap.model.description import Body, Joint, MachineDescription, Offset, Spring
-from stiffmap.model.description.tree import all_elements, edit, find, joints, point_names, sequences
+from stiffmap.model.description.tree import (
+    all_elements,
+    edit,
+    find,
+    in_sequence,
+    joints,
+    point_names,
+    sequences,
+)
 from stiffmap.model.files import description_from_text
 
 TEXT = """
@@ -100,5 +108,11 @@ def test_an_edit_that_finds_nothing_says_so() -> None:
 
 def test_sequences_open_every_block() -> None:
     (a, b) = nested().legs
-    assert [len(s) for s in sequences(a.elements)] == [2, 4, 2, 1, 2]
+    found = list(sequences(a.elements))
+    assert [len(s) for _, s in found] == [2, 4, 2, 1, 2]
+    assert found[0][0] == "" and all(name.startswith(".") for name, _ in found[1:])
+    for name, sequence in found:
+        for e in sequence:
+            assert find(nested(), f"a{name}.{e.name}"), name
+            assert in_sequence(f"{name}.{e.name}".lstrip("."), name) == e.name
     assert len(list(sequences(b.elements))) == 1

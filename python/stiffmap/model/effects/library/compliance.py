@@ -12,7 +12,7 @@ from stiffmap.model.description import Element, Joint, Law, MachineDescription, 
 from stiffmap.model.description.strokes import as_rows
 from stiffmap.model.description.tree import Elements
 from stiffmap.model.effects.sites import each, elastic_joints, found, springs
-from stiffmap.model.effects.types import EffectType, Parameter, Placed
+from stiffmap.model.effects.types import EffectType, Parameter, Placed, entry_of
 
 SCALE = Parameter("scale", "1", 1e-3, 1e3, 1.0, 0.1, "factor on the nominal compliance")
 VALUE = Parameter(
@@ -30,9 +30,14 @@ VALUE = Parameter(
 
 def sites(elements: Elements) -> dict[str, tuple[int, ...]]:
     """Elastic joints, link springs, and single entries of these by names such as ``foot.k11``."""
-    whole = springs(elements)
-    entries = {f"{n}.k{i}{i}": at for n, at in whole.items() for i in range(1, 7) if _has(elements[at[0]], i)}
-    return {**elastic_joints(elements), **whole, **entries}
+    named = springs(elements)
+    entries = {f"{n}.k{i}{i}": at for n, at in named.items() for i in range(1, 7) if _has(elements[at[0]], i)}
+    return {**whole(elements), **entries}
+
+
+def whole(elements: Elements) -> dict[str, tuple[int, ...]]:
+    """Elastic joints and link springs."""
+    return {**elastic_joints(elements), **springs(elements)}
 
 
 def _has(e: Element, i: int) -> bool:
@@ -45,8 +50,8 @@ def softened(e: Any, placed: Placed) -> Elements:
         return (_joint(e, placed),)
     if "value" in placed.values:
         raise StiffmapError("value is for elements with one direction; use scale for a 6x6 spring")
-    entry, scale = placed.element.partition(".")[2], placed.values["scale"]
-    return (_entry(e, int(entry[1]) - 1, scale) if entry else _whole(e, scale),)
+    entry, scale = entry_of(placed.element)[1], placed.values["scale"]
+    return (_whole(e, scale) if entry is None else _entry(e, entry, scale),)
 
 
 def _joint(e: Joint, placed: Placed) -> Joint:
@@ -93,14 +98,14 @@ def lowest_scale(e: Spring, i: int) -> float:
 def at(description: MachineDescription, element: str, legs: tuple[str, ...]) -> tuple[Parameter, ...]:
     """rad/(N·m) for a revolute joint; the bound of a single entry; no value for a 6x6 spring."""
     there = found(description, legs, element, sites)
-    entry = element.partition(".")[2]
+    entry = entry_of(element)[1]
     first = there[0] if there else None
     if isinstance(first, Joint):
         return (SCALE, VALUE if first.kind == "prismatic" else replace(VALUE, unit=VALUE.angular))
-    if not entry:
+    if entry is None:
         return (SCALE, VALUE)
     # a hair above the limit, where the matrix would have a rigid direction
-    lowest = max(lowest_scale(e, int(entry[1]) - 1) for e in there if isinstance(e, Spring)) + 1e-3
+    lowest = max(lowest_scale(e, entry) for e in there if isinstance(e, Spring)) + 1e-3
     return (replace(SCALE, lower=max(SCALE.lower, lowest)), VALUE)
 
 
@@ -119,10 +124,11 @@ EFFECT = EffectType(
     title="compliance other than nominal",
     doc=(
         "The nominal compliance of a drive, an elastic joint or a link times `scale`; on a 6x6 spring the "
-        "whole matrix, or one diagonal entry of it (element `foot.k11`), its couplings staying as they are."
+        "whole matrix, or one diagonal entry of it (element `foot.k11`), its couplings staying as they are. "
+        "One bar of several in a block is named with its branch (element `low.bar`)."
     ),
     parameters=(SCALE, VALUE),
-    **each(sites, softened),
+    **each(sites, softened, apart=whole),
     frame="local axes of the spring or joint",
     one_of=("scale", "value"),
     at=at,

@@ -11,20 +11,20 @@ from stiffmap.model.description import Joint, Law, MachineDescription, Spring
 from stiffmap.model.description.tree import Elements
 from stiffmap.model.effects.edit import change_sites
 from stiffmap.model.effects.sites import at_sites, elastic_directions, elastic_drives
-from stiffmap.model.effects.types import Placed
+from stiffmap.model.effects.types import Placed, entry_of
 
 
 def change_law(
     description: MachineDescription, placed: Placed, change: Callable[[Law], Law]
 ) -> MachineDescription:
     """The machine with another law at each joint or spring direction of the place."""
-    entry = placed.element.partition(".")[2]
+    i = entry_of(placed.element)[1]
 
     def element(e: Any) -> Elements:
         if isinstance(e, Joint):
             assert e.law is not None
             return (replace(e, law=change(e.law)),)
-        i = int(entry[1]) - 1
+        assert i is not None
         laws = {**dict(e.laws), i: change(dict(e.laws).get(i) or Law(_stiffness(e, i)))}
         return (replace(e, laws=tuple(sorted(laws.items(), key=lambda pair: pair[0]))),)
 

@@ -29,17 +29,22 @@ def insert(
 ) -> MachineDescription:
     """``piece`` on the link's side of each pin: behind the pin unless the link comes before it."""
 
-    def edit(elements: Elements) -> Elements:
-        link = springs(elements).get(placed.element)
+    def edit(elements: Elements, name: str) -> Elements:
+        link = springs(elements).get(name)
         out = elements
-        for i in reversed(pins(elements).get(placed.element, ())):
+        for i in reversed(pins(elements).get(name, ())):
             pin = elements[i]
             assert isinstance(pin, Joint)
             new = tuple(replace(e, name=f"{pin.name}_{e.name}") for e in piece(pin))
             out = splice(out, i, (*new, pin) if link and i > link[0] else (pin, *new))
         return out
 
-    return edit_legs(description, placed.legs, edit)
+    return edit_legs(description, placed.legs, placed.element, edit)
+
+
+def bars(elements: Elements) -> dict[str, tuple[int, ...]]:
+    """The pins at both ends of a link."""
+    return {name: at for name, at in pins(elements).items() if name in springs(elements)}
 
 
 def apply(description: MachineDescription, placed: Placed) -> MachineDescription:
@@ -55,10 +60,10 @@ EFFECT = EffectType(
     doc=(
         "An isotropic spring in translation and rotation between a passive joint and the link that it "
         "carries. A link's name stands for the pins at both of its ends, a joint's name for that joint "
-        "alone."
+        "alone; one link of several in a block is named with its branch (`low.bar`)."
     ),
     parameters=PARAMETERS,
-    places=at_sites(pins),
+    places=at_sites(pins, apart=bars),
     apply=apply,
     pivot="centre of the joint",
     frame="axes of the link (isotropic)",
