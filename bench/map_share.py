@@ -15,7 +15,7 @@ from collections.abc import Callable
 import numpy as np
 
 import stiffmap as sm
-from stiffmap.workspace.maps.tiles import POSES_AT_ONCE
+from stiffmap.workspace.maps.block import POSES_AT_ONCE
 
 ROUNDS = 7
 

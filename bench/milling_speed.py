@@ -13,9 +13,8 @@ from collections.abc import Iterator
 import numpy as np
 
 import stiffmap as sm
-from stiffmap.machining.milling.equilibrium import commanded, equilibrium
+from stiffmap.machining.milling.equilibrium import Plant, commanded, equilibrium
 from stiffmap.machining.milling.placement import PlacementSearch
-from stiffmap.machining.milling.plant import Plant
 from stiffmap.machining.milling.setting import setting
 from stiffmap.machining.toolpath import outline, sampled
 from stiffmap.machining.toolpath.gcode.load import load_gcode

@@ -17,7 +17,6 @@ from stiffmap.experiment.files.table import read_table
 from stiffmap.machining.process import load_process
 from stiffmap.machining.toolpath.load import load_path
 from stiffmap.model.link.readers import read_csv_field
-from stiffmap.workspace.performance.motion.trajectory import read_points
 from stiffmap.workspace.vibration.files import read_responses
 
 SPELLINGS = {
@@ -48,7 +47,6 @@ def test_a_table_is_the_same_in_every_spelling_and_command(name: str, tmp_path: 
     file.write_text(text, encoding=encoding)
     np.testing.assert_allclose(read_pose_table(file).position, POINTS, rtol=1e-12, atol=1e-15)
     np.testing.assert_allclose(load_path(file).end[-1], POINTS[-1], rtol=1e-12, atol=1e-15)
-    np.testing.assert_allclose(read_points(file).position[[0, -1]], POINTS, rtol=1e-9, atol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -98,7 +96,7 @@ def test_a_workbook_is_a_table_of_every_command(tmp_path: Path) -> None:
 def test_every_command_names_line_and_column(text: str, words: str, tmp_path: Path) -> None:
     file = tmp_path / "points.csv"
     file.write_text(text, encoding="utf-8")
-    for read in (read_pose_table, load_path, read_points):
+    for read in (read_pose_table, load_path):
         with pytest.raises(FileError, match=words):
             read(file)
 

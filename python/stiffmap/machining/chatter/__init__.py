@@ -1,6 +1,6 @@
 """Chatter: stability lobes of a cut on a machine, by zero order and by semi-discretization, and mode coupling."""
 
-from stiffmap.machining.chatter.floquet import floquet_multiplier
+from stiffmap.machining.chatter.cut import floquet_multiplier
 from stiffmap.machining.chatter.lobes import stability_lobes
 from stiffmap.machining.chatter.workspace import vibration_map
 from stiffmap.machining.chatter.zero_order import limiting_depth

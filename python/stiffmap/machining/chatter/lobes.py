@@ -14,8 +14,7 @@ from numpy.typing import ArrayLike
 from stiffmap.common.broadcasting import Floats, real_array, whole_number
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.tasks import workers
-from stiffmap.machining.chatter.cut import GivenProcess, cut_axes, milling_process
-from stiffmap.machining.chatter.floquet import multiplier_map
+from stiffmap.machining.chatter.cut import GivenProcess, cut_axes, milling_process, multiplier_map
 from stiffmap.machining.chatter.modes import ToolModes, mode_rows, modes_of_machine
 from stiffmap.machining.chatter.zero_order import (
     FEED,

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from math import pi
 from typing import Any
 
@@ -17,6 +16,7 @@ from stiffmap.common.broadcasting import Floats, real_array
 from stiffmap.common.errors import StiffmapError, frames_of_this_package
 from stiffmap.machining.chatter.cut import GivenProcess, cut_axes, mean_chips, milling_process, spindle_speed
 from stiffmap.machining.chatter.modes import ToolModes, mode_rows
+from stiffmap.machining.process import Process
 
 Response = Callable[[Floats], np.ndarray]
 """Receptance (frequencies, 3, 3) m/N in the axes of the cut at (frequencies,) Hz."""
@@ -169,40 +169,23 @@ def at_periods(frequency: Floats, depth: Floats, angle: Floats, period: Floats) 
     return np.asarray(np.min(between, axis=(-2, -3)))
 
 
-@dataclass(frozen=True, eq=False)
-class ModeCoupling:
-    """Eigenvalues of the cut at one depth."""
-
-    square: np.ndarray
-    """(modes,) of M and K - Kp f n', (rad/s)²: complex or negative ones are unstable without damping."""
-    growth: float
-    """1/s, largest real part with damping: above zero unstable."""
-
-    @property
-    def unstable(self) -> bool:
-        """Without damping: a pair that is complex, or a square that is negative."""
-        size = np.abs(self.square).max()
-        return bool((np.abs(self.square.imag) > 1e-9 * size).any() or (self.square.real < 0).any())
-
-
-def mode_coupling(modes: ToolModes | Iterable[Any], process: GivenProcess, depth: float) -> ModeCoupling:
-    """At a depth of cut (m); modes in the axes of the cut. Raises StiffmapError for bad input."""
-    m, chip = mode_rows(modes), mean_chips(milling_process(process))
+def coupled_growth(m: ToolModes, p: Process, depth: float) -> float:
+    """1/s, largest real part of the eigenvalues of the cut at a depth (m), with damping: above zero unstable."""
     own = 2 * np.pi * m.frequency
-    square = np.diag(own**2) - depth * (m.way @ chip @ m.way[:, :2].T) / m.mass[:, None]
+    square = np.diag(own**2) - depth * (m.way @ mean_chips(p) @ m.way[:, :2].T) / m.mass[:, None]
     first = np.block([[np.zeros_like(square), np.eye(len(m))], [-square, -np.diag(2 * m.ratio * own)]])
-    return ModeCoupling(np.linalg.eigvals(square).astype(complex), float(np.linalg.eigvals(first).real.max()))
+    return float(np.linalg.eigvals(first).real.max())
 
 
 def coupling_depth(modes: ToolModes | Iterable[Any], process: GivenProcess) -> float:
     """m: least depth at which modes couple with damping, to 1e-6 of it; infinite where there is none up to 1 m."""
     m, p = mode_rows(modes), milling_process(process)
     depths = np.geomspace(1e-6, DEEPEST, 400)
-    bad = next((i for i, a in enumerate(depths) if mode_coupling(m, p, a).growth > 0), None)
+    bad = next((i for i, a in enumerate(depths) if coupled_growth(m, p, a) > 0), None)
     if bad is None:
         return float("inf")
     low, high = (0.0 if bad == 0 else depths[bad - 1]), depths[bad]
     while high - low > 1e-6 * high:
         middle = (low + high) / 2
-        low, high = (low, middle) if mode_coupling(m, p, middle).growth > 0 else (middle, high)
+        low, high = (low, middle) if coupled_growth(m, p, middle) > 0 else (middle, high)
     return float(high)

@@ -3,9 +3,15 @@
 from stiffmap.machining.compensation.axis_errors import AxisErrors, axis_errors, axis_errors_of_map
 from stiffmap.machining.compensation.check import CompensationCheck, check_compensation
 from stiffmap.machining.compensation.commands import Commands, compensate
-from stiffmap.machining.compensation.geometry import DhRow, corrected_geometry, dh_list, write_dh
+from stiffmap.machining.compensation.geometry import (
+    DhRow,
+    corrected_geometry,
+    corrected_urdf,
+    dh_list,
+    write_dh,
+    write_urdf,
+)
 from stiffmap.machining.compensation.tables import FORMATS, compensation_table, read_table, write_table
-from stiffmap.machining.compensation.urdf import corrected_urdf, write_urdf
 
 __all__ = [
     "FORMATS",

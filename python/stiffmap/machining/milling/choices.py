@@ -12,9 +12,8 @@ from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
-from stiffmap.machining.milling.equilibrium import equilibrium
+from stiffmap.machining.milling.equilibrium import Plant, equilibrium
 from stiffmap.machining.milling.placement import Placements, placements
-from stiffmap.machining.milling.plant import Plant
 from stiffmap.machining.milling.redundancy import Redundancy
 from stiffmap.machining.milling.redundancy import redundancy as best_turns
 from stiffmap.machining.milling.setting import Setting, setting

@@ -14,11 +14,9 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.machining.milling.choices import Choices, choices
 from stiffmap.machining.milling.dataset import along, dataset_of, verdict
-from stiffmap.machining.milling.equilibrium import Equilibrium, commanded, equilibrium
-from stiffmap.machining.milling.limits import Warned, warned
-from stiffmap.machining.milling.plant import Plant
+from stiffmap.machining.milling.equilibrium import Equilibrium, Plant, commanded, equilibrium
+from stiffmap.machining.milling.limits import Warned, must_reach, warned
 from stiffmap.machining.milling.program import WITHIN, Program, program
-from stiffmap.machining.milling.reach import must_reach
 from stiffmap.machining.milling.setting import Setting, setting
 from stiffmap.machining.milling.speed import Feeds, best_feeds
 from stiffmap.machining.milling.stability import PathStability, path_stability

@@ -13,7 +13,7 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.tasks import workers
 from stiffmap.machining.milling.equilibrium import RANGES, wall_errors
-from stiffmap.machining.milling.reach import followed, must_follow
+from stiffmap.machining.milling.limits import followed, must_follow
 from stiffmap.machining.milling.setting import Setting, setting
 from stiffmap.machining.process.description import Process
 from stiffmap.machining.toolpath import Placement, Toolpath, sampled

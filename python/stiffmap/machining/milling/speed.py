@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
-from stiffmap.machining.milling.equilibrium import equilibrium
+from stiffmap.machining.milling.equilibrium import Plant, equilibrium
 from stiffmap.machining.milling.limits import drive_speeds, fastest
-from stiffmap.machining.milling.plant import Plant
 from stiffmap.machining.milling.setting import Setting
 from stiffmap.machining.process.description import Process
 from stiffmap.solve.status import Flag

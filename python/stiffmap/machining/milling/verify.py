@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
-from stiffmap.machining.milling.equilibrium import Equilibrium, equilibrium
-from stiffmap.machining.milling.plant import Plant
+from stiffmap.machining.milling.equilibrium import Equilibrium, Plant, equilibrium
 from stiffmap.machining.milling.program import Program
 from stiffmap.machining.milling.setting import Setting, setting
 from stiffmap.machining.toolpath import Engagement, Points, Toolpath

@@ -2,7 +2,7 @@
 
 from stiffmap.machining.process.description import EndMill, Kienzle, Process
 from stiffmap.machining.process.force import CuttingForce, cutting_force
-from stiffmap.machining.process.identify import IdentifiedLaw, identify_process
+from stiffmap.machining.process.identify.law import IdentifiedLaw, identify_process
 from stiffmap.machining.process.load import load_process
 
 __all__ = [

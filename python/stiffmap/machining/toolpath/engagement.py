@@ -21,7 +21,7 @@ OUTMOST = np.radians(170.0)
 
 @dataclass(frozen=True, eq=False)
 class Box:
-    """Stock as a box: (3,) m lowest and highest corner, axes of the part. A plate is a box without ends in x and y."""
+    """Stock as a box: (3,) m lowest and highest corner, axes of the part."""
 
     low: Floats
     high: Floats
@@ -33,11 +33,6 @@ def box(low: ArrayLike, high: ArrayLike) -> Box:
     if a.shape != (3,) or b.shape != (3,) or not (a < b).all():
         raise StiffmapError(f"stock: expected two corners (3,) in m, the lower first; got {low!r}, {high!r}")
     return Box(a, b)
-
-
-def plate(top: float, bottom: float) -> Box:
-    """Stock without ends in x and y between two heights, m."""
-    return box([-1e3, -1e3, bottom], [1e3, 1e3, top])
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,8 +8,8 @@ import numpy as np
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
+from stiffmap.machining.toolpath.gcode.codes import AXES, CENTRES, PLANES
 from stiffmap.machining.toolpath.gcode.load import load_gcode
-from stiffmap.machining.toolpath.gcode.state import AXES, CENTRES, PLANES
 from stiffmap.machining.toolpath.gcode.words import decimal
 from stiffmap.machining.toolpath.path import Kind, Toolpath
 

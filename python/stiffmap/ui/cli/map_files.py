@@ -11,8 +11,8 @@ import numpy as np
 from stiffmap.common.errors import StiffmapError
 from stiffmap.ui.cli.map_summary import MapSummary, deviation_figures, in_words
 from stiffmap.ui.cli.output import as_text, write_files
+from stiffmap.workspace.maps.files import write_map_table
 from stiffmap.workspace.maps.summary import readings
-from stiffmap.workspace.maps.table import write_map_table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

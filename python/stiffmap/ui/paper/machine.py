@@ -13,9 +13,9 @@ from stiffmap.solve.kinematics import inverse_kinematics
 from stiffmap.solve.machine import Machine
 from stiffmap.ui.paper.results import Results
 from stiffmap.ui.paper.statement import Statement, StatementVerdict, judge, of_section_5_3, rounds_to
+from stiffmap.workspace.maps.inputs import box_nodes
 from stiffmap.workspace.performance.motion.closing import drive_kinematics
 from stiffmap.workspace.performance.motion.velocity import singular_values
-from stiffmap.workspace.performance.poses import box_nodes
 
 LOW, HIGH = 0.5, 2.0
 

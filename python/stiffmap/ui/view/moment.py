@@ -20,7 +20,7 @@ from stiffmap.ui.view.place import box_of, moves, orientation, solved
 from stiffmap.ui.view.plane import FINE, NO_LINES, PlaneMap, plane_map, values_at
 from stiffmap.ui.view.quantities import QUANTITIES
 from stiffmap.ui.view.state import ViewState
-from stiffmap.workspace.performance.poses import box_nodes
+from stiffmap.workspace.maps.inputs import box_nodes
 
 CLOUD = 15
 """Poses of the cloud along each commanded axis."""

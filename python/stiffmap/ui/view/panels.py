@@ -24,7 +24,7 @@ from stiffmap.ui.view.place import turns
 from stiffmap.ui.view.plane import PlaneMap
 from stiffmap.ui.view.quantities import QUANTITIES, tolerance_level
 from stiffmap.ui.view.scene import DARK, GHOST, GREY
-from stiffmap.workspace.performance.motion.scaling import drive_table
+from stiffmap.workspace.performance.motion.closing import drive_table
 
 RED = "#B00020"
 Row = tuple[str, float, str, str]

@@ -27,7 +27,7 @@ from stiffmap.workspace.cables.structure import (
     scaled,
     weight,
 )
-from stiffmap.workspace.performance.poses import read_box
+from stiffmap.workspace.maps.inputs import read_box
 
 ROOMY = 1e4  # N: room above the lowest tension where no highest is declared
 

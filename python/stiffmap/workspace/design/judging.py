@@ -12,7 +12,7 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.machine import Machine
 from stiffmap.workspace.design.problem import DesignProblem
-from stiffmap.workspace.performance.poses import read_box
+from stiffmap.workspace.maps.inputs import read_box
 from stiffmap.workspace.performance.registry import Case, Measure, get_measure
 from stiffmap.workspace.performance.requirements import Bound
 

@@ -1,8 +1,7 @@
 """Labelled results over a workspace: error maps, polar diagrams, force sweeps (xarray, SI)."""
 
-from stiffmap.workspace.maps.estimate import map_estimate
-from stiffmap.workspace.maps.grid_map import error_map
-from stiffmap.workspace.maps.polar_diagram import polar
+from stiffmap.workspace.maps.extremes import polar
+from stiffmap.workspace.maps.grid_map import error_map, map_estimate
 from stiffmap.workspace.maps.statistics import map_statistics
 from stiffmap.workspace.maps.sweep_line import sweep
 from stiffmap.workspace.maps.sweep_of_numbers import design_sweep

@@ -18,9 +18,9 @@ from stiffmap.solve.labels import meaning, status_attrs
 from stiffmap.solve.machine import Machine, as_machine
 from stiffmap.solve.options import keywords_of
 from stiffmap.solve.status import Status
+from stiffmap.workspace.maps.block import Tiles, tiles_of, work_of
 from stiffmap.workspace.maps.plan import MapPlan, Variable, map_plan
 from stiffmap.workspace.maps.progress import track
-from stiffmap.workspace.maps.tiles import Tiles, tiles_of, work_of
 
 NODE = ("x", "y", "z")
 DEFLECTION = re.compile(r"(worst_|best_)?deflection(_xy|_xz|_yz)?")

@@ -22,10 +22,10 @@ from numpy.typing import NDArray
 from stiffmap.common.errors import FileError
 from stiffmap.common.json_text import parse_json
 from stiffmap.common.outputs import add_lines, put_folder, write_text
+from stiffmap.workspace.maps.block import Tiles, tiles_of
 from stiffmap.workspace.maps.files import write_zarr, zarr_package
 from stiffmap.workspace.maps.plan import MapPlan
 from stiffmap.workspace.maps.store import kept_attributes, refuse_another_map
-from stiffmap.workspace.maps.tiles import Tiles, tiles_of
 
 JOURNAL = "journal.jsonl"
 FILL = {"u1": 255, "u4": 0, "f8": np.nan}

@@ -15,6 +15,7 @@ from stiffmap.common.python_file import modules_of
 from stiffmap.common.tasks import workers
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.solution import Solution
+from stiffmap.workspace.maps.inputs import box_nodes
 from stiffmap.workspace.performance import kinds
 from stiffmap.workspace.performance.motion.closing import (
     CHUNK,
@@ -25,7 +26,6 @@ from stiffmap.workspace.performance.motion.closing import (
 from stiffmap.workspace.performance.motion.motion_files import Motion
 from stiffmap.workspace.performance.motion.velocity import VelocityTransmission, transmission_of
 from stiffmap.workspace.performance.motion.zonotopes import inverse_rows
-from stiffmap.workspace.performance.poses import box_nodes
 
 
 @dataclass(eq=False)

@@ -19,10 +19,9 @@ from stiffmap.common.short import short_repr
 from stiffmap.common.tasks import client_of
 from stiffmap.solve.machine import Machine, takes_machine
 from stiffmap.solve.status import Status
-from stiffmap.workspace.maps.inputs import magnitude
+from stiffmap.workspace.maps.inputs import box_nodes, magnitude, read_box
 from stiffmap.workspace.performance.motion.closing import drive_kinematics
 from stiffmap.workspace.performance.motion.motion_files import Motion, load_motion
-from stiffmap.workspace.performance.poses import box_nodes, read_box
 from stiffmap.workspace.performance.registry import Case, Found, Measure, all_measures, get_measure
 from stiffmap.workspace.performance.requirements import Bound, Requirements, load_requirements
 

@@ -14,7 +14,7 @@ from stiffmap.common.number_text import number_in
 from stiffmap.common.outputs import guarded, unguarded, write_rows
 from stiffmap.experiment import load_experiment
 from stiffmap.ui.cli import main
-from stiffmap.workspace.maps.table import write_map_table
+from stiffmap.workspace.maps.files import write_map_table
 
 FORMULAS = ["=1+1", "+cmd|' /C calc'!A0", "-2+3", "@SUM(A1)", "\t=1", "\r=1", "'=1", "''=1", "=", "-", "+1-1"]
 PLAIN = ["1", "-1.5", "+2e-3", "-.5", "a=1", "", "it's", "'quoted'", "µm", "-1.", "1e5", " =1"]

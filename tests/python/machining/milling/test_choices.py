@@ -14,10 +14,9 @@ import stiffmap as sm
 from stiffmap.common.errors import StiffmapError
 from stiffmap.machining.milling import mill, mill_job
 from stiffmap.machining.milling.choices import choices, part_lies
-from stiffmap.machining.milling.equilibrium import equilibrium
+from stiffmap.machining.milling.equilibrium import Plant, equilibrium
 from stiffmap.machining.milling.limits import drive_speeds
 from stiffmap.machining.milling.placement import PlacementSearch, placements
-from stiffmap.machining.milling.plant import Plant
 from stiffmap.machining.milling.redundancy import Steps, best_sequence, redundancy
 from stiffmap.machining.milling.setting import Setting, setting
 from stiffmap.machining.milling.speed import best_feeds, other_side

@@ -10,11 +10,10 @@ from tests.python.machining.milling.gantry import gantry
 
 import stiffmap as sm
 from stiffmap.machining.milling import mill_job, verdict
-from stiffmap.machining.milling.equilibrium import equilibrium
+from stiffmap.machining.milling.equilibrium import Plant, equilibrium
 from stiffmap.machining.milling.job import ripple
-from stiffmap.machining.milling.plant import Plant
 from stiffmap.machining.milling.setting import setting
-from stiffmap.machining.process.revolution import revolution
+from stiffmap.machining.process.force import revolution
 from stiffmap.machining.toolpath import path_of, sampled
 from stiffmap.model.description import Body
 from stiffmap.solve.status import Status

@@ -12,8 +12,7 @@ import stiffmap as sm
 from stiffmap.common.errors import StiffmapError
 from stiffmap.machining.milling import mill_job, sizes
 from stiffmap.machining.milling.choices import best_entry
-from stiffmap.machining.milling.equilibrium import equilibrium
-from stiffmap.machining.milling.plant import Plant
+from stiffmap.machining.milling.equilibrium import Plant, equilibrium
 from stiffmap.machining.milling.setting import setting
 from stiffmap.machining.toolpath import box, load_path, outline, sampled
 from stiffmap.machining.toolpath.entry import entered_at

@@ -11,9 +11,8 @@ from tests.python.machining.process.closed_form import by_quadrature, process, s
 
 import stiffmap as sm
 from stiffmap.machining.process.description import EndMill, Trimming
-from stiffmap.machining.process.force import force_uncertainty
+from stiffmap.machining.process.force import force_uncertainty, revolution
 from stiffmap.machining.process.mean import mean_force, slopes, tangential_force, widened
-from stiffmap.machining.process.revolution import revolution
 
 
 @pytest.mark.parametrize("teeth", [1, 2, 3, 4])

@@ -11,7 +11,7 @@ import pytest
 
 import stiffmap as sm
 from stiffmap.common.errors import StiffmapError
-from stiffmap.machining.process.revolution import revolution
+from stiffmap.machining.process.force import revolution
 
 MEASURED = {
     "feed_per_tooth_mm": [0.025, 0.05, 0.075, 0.1, 0.125],

@@ -17,7 +17,6 @@ from stiffmap.machining.toolpath import (
     outline,
     outline_names,
     path_of,
-    plate,
     sampled,
 )
 
@@ -115,7 +114,7 @@ def test_stock_says_width_and_depth() -> None:
     assert e.radial[inside] == pytest.approx(np.full(inside.sum(), 3e-3))
     assert e.axial[inside] == pytest.approx(np.full(inside.sum(), 5e-3))
     assert e.radial[np.abs(q.position[:, 0]) > 0.1001].max() == 0.0
-    e = engagement(q, p, process, plate(3e-3, 0.0))
+    e = engagement(q, p, process, box([-1e3, -1e3, 0.0], [1e3, 1e3, 3e-3]))
     assert e.axial == pytest.approx(np.full(len(q), 3e-3))
     assert (e.radial > process.tool.diameter).all()  # the tool cuts its diameter of it
     assert engagement(q, p, process, thickness=2e-3).radial[0] == 2e-3

@@ -8,7 +8,7 @@ import pytest
 import stiffmap as sm
 from stiffmap.model.description import Body
 from stiffmap.model.description.tree import all_elements
-from stiffmap.workspace.performance import moving_mass
+from stiffmap.workspace.performance.motion.inertia import moving_mass
 
 FILE = """
 name: arm

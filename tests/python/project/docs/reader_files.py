@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 import stiffmap as sm
-from stiffmap.machining.process.revolution import revolution
+from stiffmap.machining.process.force import revolution
 
 ROBOT = """<robot name="arm"><link name="base"><visual><geometry><box size="0.1 0.1 0.3"/></geometry></visual></link><link name="upper"/><link name="tool"/>
 <joint name="q1" type="revolute"><origin xyz="0 0 0.3"/><axis xyz="0 0 1"/><parent link="base"/><child link="upper"/>

@@ -20,8 +20,8 @@ from stiffmap.common.arithmetic import evaluate
 from stiffmap.model.files.shipped import find
 from stiffmap.workspace.design import load_design, optimize
 from stiffmap.workspace.design.judging import judge
-from stiffmap.workspace.design.store import Evaluations
-from stiffmap.workspace.performance import moving_mass
+from stiffmap.workspace.design.search import Evaluations
+from stiffmap.workspace.performance.motion.inertia import moving_mass
 
 pytest.importorskip("pymoo")
 

@@ -12,7 +12,7 @@ from stiffmap.common import fingerprints, python_file
 from stiffmap.model.files.shipped import find
 from stiffmap.workspace.design import load_design
 from stiffmap.workspace.design.judging import judge
-from stiffmap.workspace.design.store import Evaluations
+from stiffmap.workspace.design.search import Evaluations
 
 DESIGN = """
 name: linked

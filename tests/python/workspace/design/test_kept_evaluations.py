@@ -13,7 +13,7 @@ from stiffmap.common.errors import FileError
 from stiffmap.workspace.design import load_design
 from stiffmap.workspace.design.judging import Judged
 from stiffmap.workspace.design.problem import DesignProblem
-from stiffmap.workspace.design.store import Evaluations, fingerprint
+from stiffmap.workspace.design.search import Evaluations, fingerprint
 from stiffmap.workspace.performance.requirements import Bound
 
 

@@ -10,8 +10,8 @@ import pytest
 import xarray as xr
 
 import stiffmap as sm
+from stiffmap.workspace.maps import block
 from stiffmap.workspace.maps import error_map as map_module_function
-from stiffmap.workspace.maps import tiles
 from stiffmap.workspace.maps.files import read_dataset, write_dataset
 
 BOX = np.array([-0.2, 0.05, 0.3])
@@ -76,7 +76,7 @@ def interrupted_map(machine: sm.Machine, out: Path, monkeypatch: pytest.MonkeyPa
         return real(*given)  # type: ignore[arg-type]
 
     with monkeypatch.context() as patch:
-        patch.setattr(tiles, "solve_block", failing)
+        patch.setattr(block, "solve_block", failing)
         with pytest.raises(Interrupted):
             sm.error_map(machine, **SAME, out=out, chunk=3)
 
@@ -90,9 +90,9 @@ def test_resume_takes_up_an_interrupted_run(
     done = np.load(tmp_path / "m.nc.partial" / "done.npy")
     assert done.tolist() == [True] * 4 + [False] * 2
     solved: list[slice] = []
-    real = tiles.solve_block
+    real = block.solve_block
     with monkeypatch.context() as patch:
-        patch.setattr(tiles, "solve_block", lambda p, rows: (solved.append(rows), real(p, rows))[1])
+        patch.setattr(block, "solve_block", lambda p, rows: (solved.append(rows), real(p, rows))[1])
         with sm.error_map(machine, **SAME, out=out, resume=True, chunk=3) as resumed:
             assert resumed.load().identical(ds)
     assert [(r.start, r.stop) for r in solved] == [(4, 5), (5, 6)]

@@ -10,7 +10,7 @@ import pytest
 import stiffmap as sm
 from stiffmap.common.errors import StiffmapError
 from stiffmap.ui.cli.app import main
-from stiffmap.workspace.maps.table import write_map_table
+from stiffmap.workspace.maps.files import write_map_table
 
 pd = pytest.importorskip("pandas")
 pytest.importorskip("openpyxl")

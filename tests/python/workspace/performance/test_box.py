@@ -9,13 +9,13 @@ import pytest
 
 import stiffmap as sm
 from stiffmap.model.files.shipped import find
-from stiffmap.workspace.performance import drive_kinematics
 from stiffmap.workspace.performance.box.box import best_orientation
 from stiffmap.workspace.performance.box.box_search import BoxSearch
 from stiffmap.workspace.performance.box.cells import shrink
 from stiffmap.workspace.performance.box.proof import enclose, judge_cells, sample
 from stiffmap.workspace.performance.limits.bars import segment_distance
 from stiffmap.workspace.performance.limits.limits import Bounds, Limit
+from stiffmap.workspace.performance.motion.closing import drive_kinematics
 
 EDGE = 1 / np.sqrt(18) + 1 / np.sqrt(6)  # of the cube within 0.5…2, times L
 
@@ -110,14 +110,14 @@ def test_linear_delta_with_and_without_transmission_ends_within_its_work():
 
 def test_cube_factors_as_limits():
     """At the isotropic point the farthest vertex is sqrt(3) away, so that 1.7 holds nowhere near it."""
-    bounds = Bounds(sm.load_machine("orthoglide-revised"), transmission=(0.5, 2.5), factors="cube")
+    bounds = Bounds(sm.load_machine("orthoglide-revised"), transmission=(0.5, 2.5), norm="cube")
     rng = np.random.default_rng(2)
     centre, half = rng.uniform(-0.1, 0.1, (20, 3)), np.full((20, 3), 2e-3)
     cells = enclose(bounds, centre, half, np.eye(3))
     v = sm.velocity_transmission(bounds.machine, centre)
     good = (v.cube_max <= 2.5) & (v.cube_min >= 0.5)
     assert cells.inside.any() and (good | ~cells.inside).all() and (cells.inside | ~good).mean() > 0.7
-    tight = Bounds(bounds.machine, transmission=(0.1, 1.7), factors="cube")
+    tight = Bounds(bounds.machine, transmission=(0.1, 1.7), norm="cube")
     assert enclose(tight, np.zeros((1, 3)), np.full((1, 3), 1e-4), np.eye(3)).broken.all()
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import stiffmap as sm
-from stiffmap.workspace.performance import drive_kinematics
 from stiffmap.workspace.performance.kinds.transmission import TYPES
+from stiffmap.workspace.performance.motion.closing import drive_kinematics
 from stiffmap.workspace.performance.motion.velocity import distances
 
 

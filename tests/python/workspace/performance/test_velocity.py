@@ -7,7 +7,7 @@ import pytest
 
 import stiffmap as sm
 from stiffmap.model.files.shipped import machine_names
-from stiffmap.workspace.performance import drive_kinematics
+from stiffmap.workspace.performance.motion.closing import drive_kinematics
 
 RNG = np.random.default_rng(15)
 

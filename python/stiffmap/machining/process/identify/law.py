@@ -20,7 +20,6 @@ from stiffmap.common.outputs import write_text
 from stiffmap.common.short import short_repr
 from stiffmap.common.yaml_text import text_of
 from stiffmap.machining.process.description import EndMill, Process
-from stiffmap.machining.process.identify.columns import COLUMNS
 from stiffmap.machining.process.identify.models import (
     BEND,
     KIENZLE,
@@ -29,10 +28,11 @@ from stiffmap.machining.process.identify.models import (
     Fitted,
     ForceModel,
     Number,
+    Runout,
     fit,
+    runout_of,
 )
-from stiffmap.machining.process.identify.runout import Runout, runout_of
-from stiffmap.machining.process.identify.table import ForceTable, read_table
+from stiffmap.machining.process.identify.table import COLUMNS, ForceTable, read_table
 from stiffmap.machining.process.load import load_process
 
 SIGNIFICANT = 0.01

@@ -1,13 +1,100 @@
-"""What each code does to the state, and which words of a line go together."""
+"""What lines before have set, what each code does to that, and which words of a line go together (RS-274, as LinuxCNC's
+documentation has it)."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from math import pi
 from typing import NoReturn
 
-from stiffmap.machining.toolpath.gcode import state as meaning
-from stiffmap.machining.toolpath.gcode.state import AXES, INCH, MM, ModalState
 from stiffmap.machining.toolpath.gcode.words import fail
+
+MM, INCH = 1e-3, 25.4e-3
+NEVER = 2**62
+"""Line at which an axis is given that never is."""
+AXES = "XYZ"
+MOTIONS = {0.0: "G0", 1.0: "G1", 2.0: "G2", 3.0: "G3", 80.0: "G80"}
+PLANES = {17.0: 2, 18.0: 1, 19.0: 0}
+OFFSETS = (54.0, 55.0, 56.0, 57.0, 58.0, 59.0, 59.1, 59.2, 59.3)
+CENTRES = {2: "IJ", 1: "IK", 0: "JK"}
+"""Words of an arc's centre by the axis that it turns about."""
+STARTS = {"distance": "G90", "feed mode": "G94", "plane": "G17", "centres": "G91.1", "offset": "G54"}
+"""What is taken where a program says nothing; a controller may stand otherwise, so that a written program says it."""
+IGNORED_G = {40.0, 49.0, 61.0, 61.1, 64.0, 97.0, 98.0, 99.0}
+"""Without meaning for the path: modes of tracking, cancelled compensation and cycles."""
+IGNORED_M = {7.0, 8.0, 9.0, 48.0, 49.0}
+BREAKS_M = {0.0, 1.0, 6.0, 60.0}
+"""Stops and the change of a tool: somebody may move the axes meanwhile."""
+ENDS = {2.0, 30.0}
+REFERENCES = {"G28", "G30"}
+"""Moves to points of the machine that nobody tells: the axes are not known after them."""
+GROUPS = {
+    **dict.fromkeys(MOTIONS, "motion"), **dict.fromkeys(PLANES, "plane"), **dict.fromkeys(OFFSETS, "offset"),
+    20.0: "unit", 21.0: "unit", 90.0: "distance", 91.0: "distance", 90.1: "centres", 91.1: "centres",
+    93.0: "feed mode", 94.0: "feed mode", 61.0: "tracking", 61.1: "tracking", 64.0: "tracking", 43.0: "length", 49.0: "length",
+    40.0: "compensation", 97.0: "speed", 98.0: "return", 99.0: "return", 4.0: "one line", 28.0: "one line", 30.0: "one line", 53.0: "one line",
+}  # fmt: skip
+"""Of two G words of one group in a line nobody knows which one holds."""
+GROUPS_M = {
+    **dict.fromkeys((0.0, 1.0, 2.0, 30.0, 60.0), "stop"), **dict.fromkeys((3.0, 4.0, 5.0), "spindle"),
+    **dict.fromkeys((7.0, 8.0, 9.0), "coolant"), **dict.fromkeys((48.0, 49.0), "override"), 6.0: "tool",
+}  # fmt: skip
+REFUSED_G = {
+    5.0: "splines", 5.1: "splines", 5.2: "NURBS", 10.0: "tables set by the program", 28.1: "reference points set by the program",
+    30.1: "reference points set by the program", 33.0: "threads", 38.2: "probing", 41.0: "cutter radius compensation (write the path of the centre, G40)",
+    42.0: "cutter radius compensation (write the path of the centre, G40)", 92.0: "offsets set by the program",
+    95.0: "feed per revolution (write G94)", 96.0: "constant surface speed",
+    **dict.fromkeys((73.0, 76.0, 81.0, 82.0, 83.0, 84.0, 85.0, 86.0, 87.0, 88.0, 89.0), "drilling cycles"),
+}  # fmt: skip
+REFUSED_M = {98.0: "subprograms", 99.0: "subprograms", 97.0: "subprograms"}
+
+
+@dataclass
+class ModalState:
+    """Modal words; lengths of the program become m by `unit`."""
+
+    unit: float = 0.0
+    """0: neither G20 nor G21 stood yet."""
+    motion: str = ""
+    plane: int = 2
+    absolute: bool = True
+    absolute_centres: bool = False
+    inverse_time: bool = False
+    feed: float | None = None
+    """As written: per minute, or moves per minute under G93."""
+    speed: float | None = None
+    """rpm."""
+    spindle: int | None = None
+    """1 clockwise, -1 counter-clockwise, 0 off, None: never said."""
+    offset: str = "G54"
+    length: int | None = None
+    """Register of the tool's length (G43 H)."""
+    position: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
+    given: list[int] = field(default_factory=lambda: [NEVER, NEVER, NEVER])
+    """Line that first gives each axis by an absolute word."""
+    said: set[str] = field(default_factory=set)
+    """Groups of modal words of which one stood (`GROUPS`)."""
+    lost: set[str] = field(default_factory=set)
+    """Axes that a move to a reference point left where nobody knows."""
+    breaks: int = 0
+    """How often it ceased to be sure where the axes stand: another offset or length, a change of tool, a stop, an optional line."""
+    turn: float = float("nan")
+    """rad of the tool about its axis (C)."""
+    ended: bool = False
+
+    @classmethod
+    def unknown(cls, start: Sequence[float]) -> ModalState:
+        """A controller that stands where nobody knows (NaN in `start`, m) and otherwise than programs take for granted."""
+        return cls(0.0, "", 0, False, True, True, offset="", position=list(start))
+
+    @property
+    def rate(self) -> float:
+        """rad/s of the spindle; 0 off, NaN where the program never says."""
+        if self.spindle is None:
+            return float("nan") if self.speed is None else 0.0
+        return self.spindle * (self.speed or 0.0) * pi / 30 if self.spindle else 0.0
+
 
 LETTERS = frozenset("XYZCIJKRFSTHPQN")
 MOVING = "XYZCIJKR"
@@ -53,7 +140,7 @@ class Codes:
             if moving:
                 self.fail("a dwell (G4) and a motion in one line: expected two lines")
             self.actions.append((f"G4 P{values['P']:g}", self.moves))
-        for word in sorted(own & meaning.REFERENCES):
+        for word in sorted(own & REFERENCES):
             if motion:
                 self.fail(f"{word} and {motion} in one line: both take the axes")
             if not values.keys().isdisjoint("IJKR"):
@@ -72,7 +159,7 @@ class Codes:
         groups: dict[str, str] = {}
         for letter, value in words:
             if letter == "G" or letter == "M":
-                group = (meaning.GROUPS if letter == "G" else meaning.GROUPS_M).get(value)
+                group = (GROUPS if letter == "G" else GROUPS_M).get(value)
                 if group:
                     word = f"{letter}{value:g}"
                     if group in groups:
@@ -80,7 +167,7 @@ class Codes:
                         self.fail(f"{what} in one line: {groups[group]} and {word}")
                     groups[group] = word
                 if group == "motion":
-                    motion = meaning.MOTIONS[value]
+                    motion = MOTIONS[value]
                 elif letter == "G":
                     self._g(value, own)
                 else:
@@ -101,8 +188,8 @@ class Codes:
 
     def _g(self, value: float, own: set[str]) -> None:
         s = self.state
-        if value in meaning.PLANES:
-            s.plane = meaning.PLANES[value]
+        if value in PLANES:
+            s.plane = PLANES[value]
         elif value in (20.0, 21.0):
             unit = INCH if value == 20.0 else MM
             if s.unit and s.feed is not None and not s.inverse_time:
@@ -114,39 +201,39 @@ class Codes:
             s.absolute_centres = value == 90.1
         elif value in (93.0, 94.0):
             s.inverse_time, s.feed = value == 93.0, None
-        elif value in meaning.OFFSETS:
+        elif value in OFFSETS:
             s.breaks += s.offset != f"G{value:g}" or "offset" not in s.said
             s.offset = f"G{value:g}"
             if self.offsets and s.offset not in self.offsets:
                 self.fail(f"no work offset {s.offset}; given: {', '.join(self.offsets)}")
         elif value in (4.0, 28.0, 30.0, 43.0, 53.0):
             own.add(f"G{value:g}")
-        elif value not in meaning.IGNORED_G:
-            why = meaning.REFUSED_G.get(value)
+        elif value not in IGNORED_G:
+            why = REFUSED_G.get(value)
             self.fail(
                 f"G{value:g}: {why or 'unknown word'}{' are not read' if why and '(' not in why else ''}",
             )
         elif value in (61.0, 61.1, 64.0):
             self.note(f"G{value:g}: how closely the controller tracks corners is not simulated")
-        if (group := meaning.GROUPS.get(value)) in meaning.STARTS:
+        if (group := GROUPS.get(value)) in STARTS:
             s.said.add(group)
 
     def _m(self, value: float, turning: bool) -> None:
-        if meaning.GROUPS_M.get(value) == "stop":
+        if GROUPS_M.get(value) == "stop":
             self._stops.append(f"M{value:g}")
         else:
             self.actions.append((f"M{value:g}", self.moves))
         if value in (3.0, 4.0, 5.0):
             self.state.spindle = {3.0: 1, 4.0: -1, 5.0: 0}[value]
-        elif value in meaning.ENDS:
+        elif value in ENDS:
             self.state.ended = True
-        elif value in meaning.BREAKS_M:
+        elif value in BREAKS_M:
             self.state.breaks += 1
             if value == 6.0 and self.state.spindle and not turning:
                 self.state.spindle = 0  # a change of tool stops it, unless its line turns it on
-        elif value in meaning.REFUSED_M:
-            self.fail(f"M{value:g}: {meaning.REFUSED_M[value]} are not read")
-        elif value not in meaning.IGNORED_M:
+        elif value in REFUSED_M:
+            self.fail(f"M{value:g}: {REFUSED_M[value]} are not read")
+        elif value not in IGNORED_M:
             self.fail(f"unknown word: M{value:g}")
 
     def _numbers(self, values: dict[str, float], own: set[str], motion: str, groups: dict[str, str]) -> None:

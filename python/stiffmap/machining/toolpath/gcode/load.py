@@ -11,8 +11,8 @@ import numpy as np
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError
 from stiffmap.common.texts import lines_of
+from stiffmap.machining.toolpath.gcode.codes import NEVER, ModalState
 from stiffmap.machining.toolpath.gcode.read import ProgramReader, read_moves
-from stiffmap.machining.toolpath.gcode.state import NEVER, ModalState
 from stiffmap.machining.toolpath.path import Kind, Toolpath
 
 NUMBERS = 10

@@ -7,8 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from math import atan2, copysign, hypot, isfinite, nan, pi, radians, sqrt
 from typing import NamedTuple
 
-from stiffmap.machining.toolpath.gcode.codes import MOVING, STRAIGHT, Codes
-from stiffmap.machining.toolpath.gcode.state import AXES, CENTRES, REFERENCES
+from stiffmap.machining.toolpath.gcode.codes import AXES, CENTRES, MOVING, REFERENCES, STRAIGHT, Codes
 from stiffmap.machining.toolpath.gcode.words import bare, read_block
 
 Point = tuple[float, float, float]

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiffmap.common.broadcasting import Floats
+from stiffmap.machining.toolpath.gcode.codes import AXES, CENTRES, INCH, STARTS, ModalState
 from stiffmap.machining.toolpath.gcode.read import ProgramReader, read_moves
-from stiffmap.machining.toolpath.gcode.state import AXES, CENTRES, INCH, STARTS, ModalState
 from stiffmap.machining.toolpath.gcode.words import bare, decimal, plain, tokens_of
 from stiffmap.machining.toolpath.path import Kind, Toolpath
 from stiffmap.machining.toolpath.pieces import MovedPiece

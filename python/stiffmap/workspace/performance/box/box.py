@@ -17,11 +17,10 @@ from stiffmap.common.short import short_repr
 from stiffmap.model.files.load import Source
 from stiffmap.solve.machine import Machine, as_machine
 from stiffmap.solve.options import keywords_of
-from stiffmap.workspace.maps.inputs import magnitude
+from stiffmap.workspace.maps.inputs import magnitude, read_region
 from stiffmap.workspace.performance.box.box_search import BoxSearch
 from stiffmap.workspace.performance.box.proof import judge_on
-from stiffmap.workspace.performance.limits.limits import Bounds, bounds_of
-from stiffmap.workspace.performance.poses import read_region
+from stiffmap.workspace.performance.limits.limits import Bounds
 
 WORK = 100_000
 """Cells and poses at most; when they are used up, the bounds stay as far apart as they are."""
@@ -73,7 +72,7 @@ class LargestBox:
         return np.stack([local - self.edges / 2, local + self.edges / 2])
 
 
-@keywords_of(bounds_of)
+@keywords_of(Bounds)
 def largest_box(
     machine: Machine | Source,
     proportions: ArrayLike = (1.0, 1.0, 1.0),
@@ -137,7 +136,7 @@ def largest_box(
         raise StiffmapError(f"proportions: expected 3 positive numbers, got {proportions!r}")
     magnitude(tolerance, "tolerance", "m")
     whole_number(max_evaluations, "max_evaluations", 1)
-    bounds = bounds_of(machine, transmission=transmission, **limits)
+    bounds = Bounds(machine, transmission=transmission, **limits)
     space, shape = _region(machine, region, shape / shape[0])
     if isinstance(orientation, str):
         if orientation != "search":

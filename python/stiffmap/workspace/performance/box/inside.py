@@ -13,8 +13,12 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.model.description.machine import TASK
 from stiffmap.solve.status import Status
 from stiffmap.workspace.performance.limits.limits import Bounds
-from stiffmap.workspace.performance.motion.closing import DriveKinematics, drive_kinematics, kernel_starts
-from stiffmap.workspace.performance.motion.scaling import weighted
+from stiffmap.workspace.performance.motion.closing import (
+    DriveKinematics,
+    drive_kinematics,
+    kernel_starts,
+    weighted,
+)
 from stiffmap.workspace.performance.motion.velocity import distances, transmission_of
 
 NEIGHBOURS = 8

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from stiffmap.common.broadcasting import Floats, thread_count
 from stiffmap.common.tasks import workers
 from stiffmap.workspace.performance.limits.limits import Bounds, factor_limits
-from stiffmap.workspace.performance.motion.closing import kernel_starts
-from stiffmap.workspace.performance.motion.scaling import revolute_drives
+from stiffmap.workspace.performance.motion.closing import kernel_starts, revolute_drives
 from stiffmap.workspace.performance.motion.zonotopes import corners
 
 BOX = np.array(list(product((-1.0, 1.0), repeat=3)))
@@ -125,7 +124,7 @@ def enclose(bounds: Bounds, centre: Floats, half: Floats, axes: Floats) -> Prove
     drives = list(compiled.drives)
     wide = bounds.transmission is not None and len(drives) == 6
     watched = bounds.bars.nodes if bounds.clearance is not None else ()
-    rotation = compiled.home_rotation if bounds.rotation is None else bounds.rotation
+    rotation = compiled.home_rotation if bounds.rotation is None else np.asarray(bounds.rotation, dtype=float)
     start = kernel_starts(bounds.machine, centre, bounds.rotation, bounds.threads)
     e = compiled.enclose(
         np.ascontiguousarray(centre), np.ascontiguousarray(half), axes, rotation, start=start,
@@ -163,7 +162,7 @@ def enclose(bounds: Bounds, centre: Floats, half: Floats, axes: Floats) -> Prove
         change = e["change"][:, :, drives] * scale
         slack = np.linalg.norm(e["slack"][:, drives] * scale, axis=(1, 2))
         for name, value, rest, bound, corner in _factors_over(
-            w, change * half[:, :, None, None], slack, bounds.transmission, bounds.factors
+            w, change * half[:, :, None, None], slack, bounds.transmission, bounds.norm
         ):
             add(name, value, rest, bound, BOX[corner] * half)
     table, sure = np.stack(most), np.stack(least)

@@ -15,11 +15,11 @@ from stiffmap.common.short import short_repr
 from stiffmap.model.files.load import Source
 from stiffmap.solve.machine import Machine, as_machine
 from stiffmap.solve.options import keywords_of
+from stiffmap.workspace.maps.inputs import read_region
 from stiffmap.workspace.performance.box.cells import halved
 from stiffmap.workspace.performance.box.inside import Inside, JudgedPoses
 from stiffmap.workspace.performance.box.proof import Judge, judge_on
-from stiffmap.workspace.performance.limits.limits import bounds_of
-from stiffmap.workspace.performance.poses import read_region
+from stiffmap.workspace.performance.limits.limits import Bounds
 
 CELLS = {3: 24, 2: 120, 1: 1000}
 """Along each edge, by the number of axes."""
@@ -61,7 +61,7 @@ class Workspace:
         return self.ask(real_array(position, "position").reshape(-1, 3), self.drawn)
 
 
-@keywords_of(bounds_of)
+@keywords_of(Bounds)
 def workspace_volume(
     machine: Machine | Source,
     *,
@@ -107,7 +107,7 @@ def workspace_volume(
     if cells is not None:
         whole_number(cells, "cells", 2, what="a whole number, 2 or more along each edge")
     whole_number(prove, "prove", 0)
-    bounds = bounds_of(machine, **limits)
+    bounds = Bounds(machine, **limits)
     ask = Inside(bounds, singularity)
     rng = random_numbers(seed)
     axes = [i for i, name in enumerate("xyz") if name in machine.description.task]

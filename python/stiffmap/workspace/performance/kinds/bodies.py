@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.solve.status import Status
+from stiffmap.workspace.maps.inputs import box_nodes
 from stiffmap.workspace.performance.motion.closing import drive_kinematics
 from stiffmap.workspace.performance.motion.inertia import (
     moving_mass,
@@ -14,7 +15,6 @@ from stiffmap.workspace.performance.motion.inertia import (
     need_masses,
     total_mass,
 )
-from stiffmap.workspace.performance.poses import box_nodes
 from stiffmap.workspace.performance.registry import Case, Found, Measure, over_poses
 
 

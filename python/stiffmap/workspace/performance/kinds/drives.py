@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from stiffmap.workspace.maps.inputs import plane_axes
+from stiffmap.workspace.performance.motion.closing import drive_values
 from stiffmap.workspace.performance.motion.efforts import acceleration_of
 from stiffmap.workspace.performance.motion.force import accuracy_of
-from stiffmap.workspace.performance.motion.inertia import need_masses, rest_efforts
-from stiffmap.workspace.performance.motion.scaling import drive_values
+from stiffmap.workspace.performance.motion.inertia import rest_efforts
 from stiffmap.workspace.performance.motion.tensions import PUSHES, held, in_cables
 from stiffmap.workspace.performance.motion.zonotopes import inner_radius
 from stiffmap.workspace.performance.registry import Case, Found, Measure, over_poses
@@ -37,9 +37,8 @@ def force(case: Case) -> Found:
 
 def acceleration(case: Case) -> Found:
     """Over a coarse grid of the box, drives within the efforts that the machine file declares."""
-    need_masses(case.machine, "acceleration")
-    a = acceleration_of(case.machine, case.coarse_kinematics, gravity=case.gravity)
-    return over_poses(case.coarse_positions, a.smallest, "high")
+    reached = acceleration_of(case.machine, case.coarse_kinematics, gravity=case.gravity)
+    return over_poses(case.coarse_positions, reached, "high")
 
 
 def accuracy(case: Case) -> Found:

@@ -6,8 +6,8 @@ import numpy as np
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.status import Status
+from stiffmap.workspace.performance.motion.closing import drive_values
 from stiffmap.workspace.performance.motion.efforts import drive_efforts
-from stiffmap.workspace.performance.motion.scaling import drive_values
 from stiffmap.workspace.performance.registry import Case, Found, Measure, over_poses
 
 MOST, QUICK = 201, 25

@@ -13,9 +13,8 @@ from stiffmap.common.short import short_repr
 from stiffmap.solve.machine import Machine, takes_machine
 from stiffmap.solve.solution import Solution
 from stiffmap.solve.status import Status
-from stiffmap.workspace.maps.inputs import magnitude, plane_axes
+from stiffmap.workspace.maps.inputs import box_nodes, magnitude, plane_axes, read_box
 from stiffmap.workspace.maps.loading import Loading
-from stiffmap.workspace.performance.poses import box_nodes, read_box
 
 TURNS = 12
 REFINEMENTS = 4

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -18,8 +18,13 @@ from stiffmap.solve.machine import Machine
 from stiffmap.solve.status import Status
 from stiffmap.workspace.maps.inputs import magnitude
 from stiffmap.workspace.performance.limits.bars import Bars
-from stiffmap.workspace.performance.motion.closing import DriveKinematics, drive_kinematics, kernel_starts
-from stiffmap.workspace.performance.motion.scaling import characteristic_length, weighted
+from stiffmap.workspace.performance.motion.closing import (
+    DriveKinematics,
+    characteristic_length,
+    drive_kinematics,
+    kernel_starts,
+    weighted,
+)
 from stiffmap.workspace.performance.motion.zonotopes import inverse_rows, worst_corner
 
 UNLIMITED = 1e299
@@ -54,21 +59,25 @@ class Bounds:
     """What a workspace asks of a pose; see `stiffmap.workspace.performance.largest_box`."""
 
     machine: Machine
-    rotation: Floats | None = None
-    transmission: tuple[float, float] | None = None
-    factors: str = "sphere"
+    counter: list[int] = field(default_factory=lambda: [0])
+    known: list[tuple[Floats, Floats]] = field(default_factory=list)
+    """Positions and coordinates of poses that were closed, as starts for others: none or one entry."""
+    _: KW_ONLY
+    norm: str = "sphere"
     length: float | None = None
     ranges: bool = True
     joints: bool = True
     clearance: float | None = None
     deflection: tuple[float, str | None, float] | None = None
     """N, plane, m: force in its worst direction there, and the largest deflection."""
+    rotation: ArrayLike | None = None
+    """(3, 3); None: as at home."""
     threads: int | None = None
-    counter: list[int] = field(default_factory=lambda: [0])
-    known: list[tuple[Floats, Floats]] = field(default_factory=list)
-    """Positions and coordinates of poses that were closed, as starts for others: none or one entry."""
+    transmission: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
+        if self.rotation is not None:
+            object.__setattr__(self, "rotation", as_rotations(real_array(self.rotation, "rotation")))
         if self.transmission is not None:
             ends = real_array(self.transmission, "transmission", "(lowest, highest)")
             if ends.shape != (2,):
@@ -78,9 +87,9 @@ class Bounds:
                 raise StiffmapError(
                     f"transmission: expected (lowest, highest) with 0 <= lowest < highest, got ({low}, {high})"
                 )
-        if self.factors not in ("sphere", "cube"):
+        if self.norm not in ("sphere", "cube"):
             raise StiffmapError(
-                f"norm: expected 'sphere' (singular values) or 'cube' (each drive within its limit), got {self.factors!r}"
+                f"norm: expected 'sphere' (singular values) or 'cube' (each drive within its limit), got {self.norm!r}"
             )
         if self.clearance is not None:
             magnitude(self.clearance, "clearance", "m")
@@ -159,8 +168,8 @@ class Bounds:
         assert self.transmission is not None
         j = weighted(self.machine, k.jacobian, self.size, "all")
         low, high = self.transmission
-        sphere, out = self.factors == "sphere", list[Limit]()
-        below, above = factor_limits(self.factors, self.transmission)
+        sphere, out = self.norm == "sphere", list[Limit]()
+        below, above = factor_limits(self.norm, self.transmission)
         if np.isfinite(high):
             most = convex(above, j, high, closed, spectral if sphere else vertices)
             # the change of a corner is at most sqrt(d) times that of the matrix
@@ -209,24 +218,6 @@ class Bounds:
             )  # fmt: skip
             value[closed] = np.where(np.isfinite(d.values), d.values, np.inf)
         return plain("deflection", value, most)
-
-
-def bounds_of(
-    machine: Machine,
-    *,
-    norm: str = "sphere",
-    length: float | None = None,
-    ranges: bool = True,
-    joints: bool = True,
-    clearance: float | None = None,
-    deflection: tuple[float, str | None, float] | None = None,
-    rotation: ArrayLike | None = None,
-    threads: int | None = None,
-    transmission: tuple[float, float] | None = None,
-) -> Bounds:
-    """By the arguments of `largest_box`; one rotation (3, 3), None: as at home. StiffmapError for bad input."""
-    given = None if rotation is None else as_rotations(real_array(rotation, "rotation"))
-    return Bounds(machine, given, transmission, norm, length, ranges, joints, clearance, deflection, threads)
 
 
 def plain(name: str, value: Floats, most: float) -> Limit:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
@@ -14,8 +12,12 @@ from stiffmap.common.number_text import place_text
 from stiffmap.solve.machine import Machine, takes_machine
 from stiffmap.workspace.performance.motion.closing import (
     DriveKinematics,
+    declared,
     drive_kinematics,
+    drive_table,
+    drive_values,
     refuse_failed,
+    revolute_drives,
 )
 from stiffmap.workspace.performance.motion.inertia import (
     motion_friction,
@@ -23,10 +25,8 @@ from stiffmap.workspace.performance.motion.inertia import (
     rest_efforts,
     rigid_dynamics,
 )
-from stiffmap.workspace.performance.motion.scaling import declared, drive_table, drive_values, revolute_drives
 from stiffmap.workspace.performance.motion.tensions import (
     as_tensions,
-    farthest,
     held,
     in_cables,
     inertia_columns,
@@ -128,66 +128,26 @@ def _dataset(
     )
 
 
-@dataclass(frozen=True, eq=False)
-class PeakAcceleration:
-    """Accelerations of the TCP that the drives reach from rest, at poses (...)."""
-
-    smallest: Floats
-    """(...) m/s², reached in every direction."""
-    largest: Floats
-    """(...) m/s², in the best direction: the farthest vertex."""
-
-
-def peak_acceleration(
-    machine: Machine,
-    position: ArrayLike,
-    rotation: ArrayLike | None = None,
-    *,
-    efforts: ArrayLike | None = None,
-    gravity: ArrayLike | None = None,
-    threads: int | None = None,
-) -> PeakAcceleration:
-    """Largest acceleration of the tool in any direction, from rest, orientation kept, at poses (..., 3) m.
-
-    efforts: limits of the drives, N or N·m (one or one each); None: the machine file's. Gravity counts
-    against them. StiffmapError where masses are missing.
-    """
-    need_masses(machine, "acceleration")
-    k = drive_kinematics(machine, position, rotation, threads=threads)
-    return acceleration_of(machine, k, efforts=efforts, gravity=gravity)
-
-
 def acceleration_of(
     machine: Machine,
     k: DriveKinematics,
     *,
     efforts: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
-) -> PeakAcceleration:
-    """The same from kinematics that are at hand."""
+) -> Floats:
+    """(...) m/s²: acceleration of the tool that the drives reach in every direction, from rest, orientation kept.
+
+    efforts: limits of the drives, N or N·m (one or one each); None: the machine file's. Gravity counts
+    against them. StiffmapError where masses are missing.
+    """
+    need_masses(machine, "acceleration")
     most = drive_values(machine, "force", efforts, "N or N·m")
     shape, n = k.status.shape, len(most)
     if (h := in_cables(machine, "acceleration")) is not None:
-        found = held(machine, h, k, inertia_columns(h, k.rotation), most, gravity)
-        return PeakAcceleration(inner_radius(*found), farthest(found))
+        return inner_radius(*held(machine, h, k, inertia_columns(h, k.rotation), most, gravity))
     bias = rest_efforts(machine, k, gravity=gravity, velocity=None)
     flat = k.coordinates.reshape(-1, k.coordinates.shape[-1])
     zero = np.zeros((len(flat), 6))
     mass = rigid_dynamics(machine, flat, zero, zero, zero, np.zeros(3))["mass"].reshape((*shape, n, n))
     needed = mass @ inverse_rows(k.jacobian)[..., :3]  # effort per acceleration of the TCP
-    return PeakAcceleration(inner_radius(needed, most, bias), _farthest(needed, most, bias))
-
-
-def _farthest(needed: Floats, most: Floats, bias: Floats) -> Floats:
-    """Largest |a| with |needed a + bias| <= most: a vertex, where three drives are at their limits."""
-    from itertools import combinations, product
-
-    best = np.zeros(needed.shape[:-2])
-    for chosen in combinations(range(len(most)), min(3, len(most))):
-        rows = needed[..., chosen, :]
-        inverse = np.linalg.pinv(np.nan_to_num(rows))
-        for signs in product((1.0, -1.0), repeat=len(chosen)):
-            a = (inverse @ (np.array(signs) * most[list(chosen)] - bias[..., chosen])[..., None])[..., 0]
-            held = np.abs((needed @ a[..., None])[..., 0] + bias) <= most * (1 + 1e-9)
-            best = np.where(held.all(axis=-1), np.maximum(best, np.linalg.norm(a, axis=-1)), best)
-    return np.where(np.isfinite(needed).all(axis=(-2, -1)), best, np.nan)
+    return inner_radius(needed, most, bias)

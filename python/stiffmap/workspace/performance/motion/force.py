@@ -15,14 +15,15 @@ from stiffmap.solve.kinematics import forward_kinematics
 from stiffmap.solve.labels import OverPoses
 from stiffmap.solve.machine import Machine, takes_machine
 from stiffmap.workspace.maps.inputs import plane_axes
-from stiffmap.workspace.performance.motion.closing import DriveKinematics, drive_kinematics
-from stiffmap.workspace.performance.motion.inertia import rest_efforts
-from stiffmap.workspace.performance.motion.scaling import (
+from stiffmap.workspace.performance.motion.closing import (
+    DriveKinematics,
     characteristic_length,
+    drive_kinematics,
     drive_limits,
     drive_values,
     weighted,
 )
+from stiffmap.workspace.performance.motion.inertia import rest_efforts
 from stiffmap.workspace.performance.motion.tensions import PUSHES, as_tensions, held, in_cables
 from stiffmap.workspace.performance.motion.velocity import of_motions, singular_values
 from stiffmap.workspace.performance.motion.zonotopes import (

@@ -23,8 +23,7 @@ from stiffmap.solve.compiled.machine import CompiledMachine
 from stiffmap.solve.compiled.names import Role
 from stiffmap.solve.labels import OverPoses
 from stiffmap.solve.machine import Machine, takes_machine
-from stiffmap.workspace.performance.motion.closing import DriveKinematics
-from stiffmap.workspace.performance.motion.scaling import declared, revolute_drives
+from stiffmap.workspace.performance.motion.closing import DriveKinematics, declared, revolute_drives
 from stiffmap.workspace.performance.motion.sharing import drive_weights, followed
 
 

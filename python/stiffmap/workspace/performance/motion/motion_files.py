@@ -19,12 +19,12 @@ from stiffmap.common.yaml_text import Document, read
 from stiffmap.model.files.report import validated
 from stiffmap.model.files.schema.base import FileModel, Name
 from stiffmap.solve.machine import Machine
-from stiffmap.workspace.performance.motion.timing import fastest
 from stiffmap.workspace.performance.motion.trajectory import (
     Path,
     Trajectory,
     at_feed,
     circle,
+    fastest,
     line,
     through,
     timed,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial import HalfspaceIntersection
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
@@ -13,7 +12,7 @@ from stiffmap.solve.machine import Machine
 from stiffmap.workspace.cables.structure import Hanging, hanging, lines, matrix, nearest, scaled, weight
 from stiffmap.workspace.performance.motion.closing import DriveKinematics
 from stiffmap.workspace.performance.motion.sharing import drive_weights, sides
-from stiffmap.workspace.performance.motion.zonotopes import inner_radius, inverse_rows
+from stiffmap.workspace.performance.motion.zonotopes import inverse_rows
 
 Held = tuple[Floats, Floats, Floats]
 """Rows (..., f, c), limits (..., f), offsets (..., f): what is held is all v with |rows v + offsets| <= limits."""
@@ -57,27 +56,6 @@ def inertia_columns(h: Hanging, rotation: Floats) -> Floats:
     turning = skew(np.einsum("...ij,j->...i", rotation, h.com))
     linear = np.broadcast_to(np.eye(3), turning.shape)
     return np.asarray(h.mass * np.concatenate([linear, turning], axis=-2))
-
-
-def farthest(found: Held) -> Floats:
-    """(...) the largest |v| of what is held, 0 where 0 is not inside."""
-    rows, most, offset = found
-    shape = rows.shape[:-2]
-    out = np.zeros(int(np.prod(shape, dtype=int)))
-    inside = inner_radius(*found).reshape(-1)
-    r, m, o = (v.reshape(len(out), *v.shape[len(shape) :]) for v in (rows, most, offset))
-    for i in range(len(out)):
-        if not inside[i] > 0:
-            out[i] = inside[i]
-            continue
-        feel = np.linalg.norm(r[i], axis=1) > 1e-12
-        _, size, axes = np.linalg.svd(r[i][feel])
-        # a guide holds the other directions
-        inner = r[i][feel] @ axes[: int((size > 1e-9 * size[0]).sum())].T
-        sides = [np.column_stack([s * inner, s * o[i][feel] - m[i][feel]]) for s in (1.0, -1.0)]
-        corners = HalfspaceIntersection(np.vstack(sides), np.zeros(inner.shape[1])).intersections
-        out[i] = np.linalg.norm(corners, axis=1).max()
-    return out.reshape(shape)
 
 
 def as_tensions(

@@ -15,9 +15,10 @@ from stiffmap.solve.labels import OverPoses
 from stiffmap.solve.machine import Machine, as_machine, takes_machine
 from stiffmap.solve.options import keywords_of
 from stiffmap.workspace.maps.inputs import plane_axes
-from stiffmap.workspace.performance.motion.closing import DriveKinematics, drive_kinematics
-from stiffmap.workspace.performance.motion.scaling import (
+from stiffmap.workspace.performance.motion.closing import (
+    DriveKinematics,
     characteristic_length,
+    drive_kinematics,
     drive_limits,
     weighted,
 )
