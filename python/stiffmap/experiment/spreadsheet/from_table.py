@@ -130,7 +130,7 @@ def experiment_from_table(
         raise StiffmapError(f"record: expected one of {', '.join(sorted(RECORD))}; got '{wrong[0]}'")
     chosen = {k: v.split("|") for k, v in (columns or {}).items()}
     given = Answers(chosen, dict(units or {}), dict(constants or {}), dict(noise or {}))
-    rows = None if dh is None else read_dh(read_sheet(Path(dh)), given.units)
+    rows = None if dh is None else read_dh(read_sheet(Path(dh)), given.units, dh_convention)
     drives = drives if rows is None else {f"{LEG}.{r.name}": r.slides for r in rows}
     numbered = any(h.strip("+-").isdigit() for many in chosen.values() for h in many)
     layout = Layout(has_meaning, tuple(header), numbered, which)

@@ -81,6 +81,6 @@ def _of_table(file: Path, convention: str, unit: list[str] | None) -> Imported:
     from stiffmap.experiment.spreadsheet.dh import arm, read_dh
 
     name = re.sub(r"[^A-Za-z0-9_\-]+", "-", file.stem)
-    rows = read_dh(read_sheet(file), pairs(unit, "unit"))
+    rows = read_dh(read_sheet(file), pairs(unit, "unit"), convention)
     description = arm(rows, convention, name, f"from {file.name}")
     return Imported(description, (), tuple(r.name for r in rows))
