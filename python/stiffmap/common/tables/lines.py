@@ -73,7 +73,11 @@ def lines_of(path: Path, sheet: str | None = None) -> Source:
 
     Text: cells are separated by ; tab | , or blanks; UTF-8, UTF-16 and Latin-1 are read. Raises FileError.
     """
-    return Source(*workbook_lines(path, sheet), "") if path.suffix.lower() in WORKBOOKS else _text(path)
+    if path.suffix.lower() in WORKBOOKS:
+        return Source(*workbook_lines(path, sheet), "")
+    if sheet:
+        raise FileError(f"no sheet '{sheet}': a text has none", file=str(path))
+    return _text(path)
 
 
 def kept(lines: Iterable[tuple[int, list[str]]]) -> Iterator[tuple[int, list[str]]]:

@@ -48,7 +48,8 @@ def command(
       [cyan]stiffmap import arm.urdf --tip tool -o tool.yaml[/cyan]
     """
     table = urdf.suffix.lower() in (*TABLES, ".txt")
-    for name, given in {"--sidecar": sidecar, "--tip": tip}.items() if table else [("--unit", unit)]:
+    of_table = {"--unit": unit, "--dh-convention": dh_convention != "standard"}
+    for name, given in {"--sidecar": sidecar, "--tip": tip}.items() if table else of_table.items():
         if given:
             expected, other = ("URDF", "table") if table else ("table", "URDF")
             raise FileError(
