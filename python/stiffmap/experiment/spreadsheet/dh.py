@@ -71,7 +71,7 @@ def read_dh(given: Sheet, units: Mapping[str, str], convention: str) -> list[DHR
     sheet = replace(given, header=tuple(INDEX.sub(r"\1", h) for h in header))
     columns = {n: sheet.find(pattern) for n, pattern in (NUMBERS | WORDS).items()}
     at = {n: i for n, i in columns.items() if i is not None}
-    before = [i for i, h in enumerate(header) if h[0] in "aAαΑ" and (m := INDEX.match(h)) and m[2]]
+    before = [i for i, h in enumerate(header) if h[0] in "aAαΑ" and (found := INDEX.match(h)) and found[2]]
     if "a" not in at and (r := sheet.find("r")) is not None and len({*NUMBERS} & {*at}) == 3:
         before += _with_r(at, r, sheet)
     if before and convention != "modified":

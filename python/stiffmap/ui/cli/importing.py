@@ -8,7 +8,7 @@ from pathlib import Path
 
 from rich.text import Text
 
-from stiffmap.common.errors import FileError
+from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.outputs import new_file
 from stiffmap.common.outputs.option import written
 from stiffmap.common.tables.workbook import TABLES
@@ -79,9 +79,12 @@ def _remarks(found: Imported) -> Iterator[Text]:
 def _of_table(file: Path, convention: str, unit: list[str] | None) -> Imported:
     """The arm of a table of Denavit and Hartenberg."""
     from stiffmap.common.tables.sheet import read_sheet
-    from stiffmap.experiment.spreadsheet.dh import arm, read_dh
+    from stiffmap.experiment.spreadsheet.dh import QUANTITIES, arm, read_dh
 
     name = re.sub(r"[^A-Za-z0-9_\-]+", "-", file.stem)
-    rows = read_dh(read_sheet(file), pairs(unit, "unit"), convention)
+    units = pairs(unit, "unit")
+    if wrong := [n for n in units if n not in {*QUANTITIES, *QUANTITIES.values()}]:
+        raise StiffmapError(f"--unit {wrong[0]}: expected one of {', '.join(QUANTITIES)}")
+    rows = read_dh(read_sheet(file), units, convention)
     description = arm(rows, convention, name, f"from {file.name}")
     return Imported(description, (), tuple(r.name for r in rows))

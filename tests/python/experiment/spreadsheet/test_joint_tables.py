@@ -237,6 +237,11 @@ def test_tables_of_joints_that_lack_something(
 ) -> None:
     assert main(["import", write(tmp_path, "dh.csv", text), "-o", str(tmp_path / "a.yaml")]) == 2
     assert asked in " ".join(capsys.readouterr().err.split())
+    assert (
+        main(["import", write(tmp_path, "dh.csv", table()), "--unit", "b=mm", "-o", str(tmp_path / "a.yaml")])
+        == 2
+    )
+    assert "--unit b: expected one of theta, d, a, alpha" in capsys.readouterr().err
     poses, _, _ = session(tmp_path)
     assert main(["experiment", "new", poses, "-o", str(tmp_path / "e")]) == 2
     assert "either --machine or --dh" in capsys.readouterr().err

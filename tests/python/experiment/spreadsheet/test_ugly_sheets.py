@@ -292,3 +292,17 @@ def test_a_workbook_of_old_excel(tmp_path: Path) -> None:
         == 0
     )
     matches(sm.load_experiment(tmp_path / "e"), Ugly(""))
+
+
+@pytest.mark.parametrize(
+    ("unit", "message"),
+    [
+        ("dy=mm", "--unit dy: no column has this name or meaning; columns: Nr, x [mm]"),
+        ("length=parsec", "--unit length: the unit 'parsec' is not known; known: m, cm, mm"),
+    ],
+)
+def test_a_unit_of_nothing_is_refused(
+    unit: str, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert imported(Ugly(CLEAN, more=("--set", "z=0", "--unit", unit)), tmp_path)[0] == 2
+    assert message in capsys.readouterr().err
