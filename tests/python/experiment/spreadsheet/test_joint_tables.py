@@ -286,4 +286,8 @@ def test_gauges_that_say_target_minus_actual(tmp_path: Path, capsys: pytest.Capt
     arguments = ["experiment", "new", file, "--machine", "five-bar", "--quantity", "position"]
     assert main([*arguments, "-o", str(tmp_path / "e"), "--difference", "target-minus-actual"]) == 0
     assert "less dx" in capsys.readouterr().out
+    file = write(tmp_path, "p.csv", "x [mm],y [mm],z [mm],px [mm],py [mm],pz [mm]\n0,416,0,0,416,0\n")
+    arguments = ["experiment", "new", file, "--machine", "five-bar", "--quantity", "position"]
+    assert main([*arguments, "-o", str(tmp_path / "f"), "--difference", "target-minus-actual"]) == 2
+    assert "--difference: no column is a difference" in capsys.readouterr().err
     assert sm.load_experiment(tmp_path / "e").reading[:, 0] == pytest.approx([-5e-6, -7e-6])
