@@ -8,11 +8,22 @@ from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise, zip_longest
 
 from stiffmap.common.errors import FileError
+from stiffmap.common.tables.lines import COMMENTS
 from stiffmap.common.units import name_and_unit, unit_of
 
 Line = tuple[int, list[str]]
 MOST_LINES = 4
 """Lines above the data that may be of the header."""
+BEHIND = [
+    re.compile(pattern)
+    for pattern in (
+        r"(.*?\S)(?:\s+in)?[\s,;]+((?:1/|0[.,]0*1\s?)\d*\s?(?:mm|in)?|(?:mm|in)/1\d+)\s*",
+        r"(.*?[^\s,;/])(?:\s+in)?[\s_](k?N)\s*",
+        r"(.+?)(?:\s*[/,;]\s*|\s+in\s+)(\S+)\s*",
+        r"(.*\S)[\s_](?!(?i:in)\s*$)(\S{2,})\s*",
+    )
+]
+"""A name, and behind it a unit without brackets: parts of a millimetre, N and kN in capitals, behind a sign or a word, behind a blank."""
 
 
 def header_of(
@@ -91,7 +102,7 @@ def _plain(cell: str) -> str:
 
 
 def _commented(above: Sequence[Line], number: int) -> bool:
-    return any(n == number and c[0].strip().startswith(("#", "%", "//")) for n, c in above)
+    return any(n == number and c[0].strip().startswith(COMMENTS) for n, c in above)
 
 
 def fits(cells: Sequence[str], width: int) -> bool:
@@ -158,18 +169,6 @@ def split_unit(header: str) -> tuple[str, str]:
     name, unit = name_and_unit(header)
     if name != header.strip():
         return name, unit
-    part = re.match(
-        r"^(.*?\S)(?:\s+in)?[\s,;]+((?:1/|0[.,]0*1\s?)\d*\s?(?:mm|in)?|(?:mm|in)/1\d+)\s*$", header
-    )
-    if part and unit_of(part[2]):
-        return part[1].strip(), part[2].strip()
-    said = re.match(r"^(.*?)(?:\s*[/,;]\s*|\s+in\s+)(\S+)\s*$", header)
-    bare = re.match(r"^(.*\S)[\s_](\S{2,})\s*$", header)
-    newton = re.match(r"^(.*?[^\s,;/])(?:\s+in)?[\s_](k?N)\s*$", header)
-    if newton:
-        return newton[1].strip(), newton[2]
-    if said and said[1] and unit_of(said[2]) and not unit_of(header):
-        return said[1].strip(), said[2]
-    if bare and bare[2].lower() != "in" and unit_of(bare[2]):
-        return bare[1].strip(), bare[2]
-    return header.strip(), ""
+    found = (pattern.fullmatch(header) for pattern in BEHIND)
+    match = next((m for m in found if m and unit_of(m[2]) and not unit_of(header)), None)
+    return (match[1].strip(), match[2].strip()) if match else (header.strip(), "")

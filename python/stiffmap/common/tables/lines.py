@@ -30,7 +30,10 @@ MARKED = re.compile(r"^(#|%|//)\s+")
 THOUSANDS = re.compile(r"[+-]?\d{1,3}(\.\d{3})+")
 """``1.000`` is a thousand in a table with decimal commas."""
 COMMA = re.compile(r"^[ \t]*[+-]?[\d.]*,\d+[ \t]*$", re.M)
-POINT = re.compile(r"^[ \t]*[+-]?\d*\.\d+[ \t]*$", re.M)
+QUOTED = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
+POINT = re.compile(r"^[ \t]*[+-]?[\d,]*\.\d+[ \t]*$", re.M)
+ODD_SIGNS = str.maketrans("−", "-", "\u00a0\u2007\u2009\u202f")
+"""Blanks within a number go, and a minus is that of a keyboard."""
 SAMPLE = 2_000
 """Lines by which the separator is found."""
 NUMBER = re.compile(r"\s*[+-]?(\d+[.,]?\d*|[.,]\d+)([eEdD][+-]?\d+)?\s*")
@@ -73,7 +76,11 @@ def lines_of(path: Path, sheet: str | None = None) -> Source:
 
     Text: cells are separated by ; tab | , or blanks; UTF-8, UTF-16 and Latin-1 are read. Raises FileError.
     """
-    return Source(*workbook_lines(path, sheet), "") if path.suffix.lower() in WORKBOOKS else _text(path)
+    if path.suffix.lower() in WORKBOOKS:
+        return Source(*workbook_lines(path, sheet), "")
+    if sheet:
+        raise FileError(f"no sheet '{sheet}': a text has none", file=str(path))
+    return _text(path)
 
 
 def kept(lines: Iterable[tuple[int, list[str]]]) -> Iterator[tuple[int, list[str]]]:
@@ -123,7 +130,7 @@ def finite_number(cell: str, blank: Sequence[str] = ()) -> float:
 
 
 def plain(text: str) -> str:
-    return text.replace("\u00a0", "").replace("−", "-")
+    return text if text.isascii() else text.translate(ODD_SIGNS)
 
 
 def with_point(text: str) -> str:
@@ -141,15 +148,18 @@ def with_points(cells: Cells) -> Cells:
     return Cells(blocks, len(cells))
 
 
-def decimal_comma(rows: Iterable[list[str]]) -> bool:
-    """Whether numbers have commas and none has a point."""
+def decimal_comma(rows: Iterable[list[str]], separator: str) -> bool:
+    """Whether numbers have commas and none has a point; where cells stand between commas, ``"1,500"`` does not tell."""
     commas = points = False
     while block := list(islice(rows, BLOCK)):
         text = "\n".join(chain.from_iterable(block))
         if text.count("\n") != sum(map(len, block)) - 1:
             text = "\n".join(c.replace("\n", " ") for row in block for c in row)
         text = plain(text)
-        commas = commas or ("," in text and COMMA.search(text) is not None)
+        commas = commas or (
+            "," in text
+            and any(separator != "," or not QUOTED.fullmatch(m[0].strip()) for m in COMMA.finditer(text))
+        )
         points = points or (
             "." in text and any(not THOUSANDS.fullmatch(m[0].strip()) for m in POINT.finditer(text))
         )

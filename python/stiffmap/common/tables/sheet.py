@@ -41,8 +41,10 @@ from stiffmap.common.tables.lines import (
 from stiffmap.common.units import unit_of
 
 STATISTICS = re.compile(
-    r"(mean|average|avg|mittel(wert)?e?|mw|ø|sum|summe|total|gesamt|std\.?( ?dev\.?)?|stdev|stabw|s|sigma|σ|min(imum)?|"
-    r"max(imum)?|median|range|spannweite|rms|durchschnitt|standardabweichung|streuung)\.?:?( .*)?",
+    r"(mean|average|avg|mittel(wert)?e?|mw|ø|sum|summe|total|gesamt|std\.?( ?dev\.?)?|stdev|stabw|s|sigma|σ|m[ií]n(imum|imo|i)?|"
+    r"m[aá]x(imum|imo|i)?|median|range|spannweite|rms|durchschnitt|standardabweichung|streuung|[1-6] ?(sigma|σ|s)|count|anzahl|n|uncertainty|unsicherheit|toleran(ce|z)|"
+    r"varian(ce|z|za)|deviation|moyenne|somme|m[ée]diane|[ée]cart([ -]?type)?|[ée]tendue|promedio|media|mediana|suma|desviación|"
+    r"desv(est)?|rango|somma|totale|deviazione|scarto|massimo|minimo)\.?:?( .*)?",
     re.IGNORECASE,
 )
 """First cell of a row that is no reading but what a spreadsheet computed of them."""
@@ -158,7 +160,9 @@ def read_sheet(path: Path, sheet: str | None = None, layout: Layout = PLAIN) -> 
     page, lines, separator = lines_of(path, sheet)
     for units in (False, True):  # cells such as 12.5 µm only where no row is plain: 100 N may head a column
         cells_only = (c for _, c in kept(lines()))
-        comma = decimal_comma([parted(c)[0] for c in row] if units else row for row in cells_only)
+        comma = decimal_comma(
+            ([parted(c)[0] for c in row] if units else row for row in cells_only), separator
+        )
         spelling, above = Spelling(comma, units), list[Line]()
         rows = iter(lines() if layout.table is None else _one_table(lines(), spelling, layout, str(path)))
         first = next(_above(rows, spelling, above), None)

@@ -106,7 +106,9 @@ def read_table(path: Path, expected: int | None = None) -> Table:
     refuse_twice(header, str(path), 1)
     below = even(below, len(header), str(path), source.separator)
     columns = packed(numbered(below, lines), len(header))
-    if source.separator not in ("", ",") and decimal_comma(c for _, c in islice(rows(), 1, None)):
+    if source.separator not in ("", ",") and decimal_comma(
+        (c for _, c in islice(rows(), 1, None)), source.separator
+    ):
         columns = tuple(map(with_points, columns))
     if not lines:
         raise FileError("expected a header line and at least one row", file=str(path))

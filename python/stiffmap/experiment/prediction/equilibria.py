@@ -131,11 +131,9 @@ class Solver:
         bare = self.plan.without_load
         if is_sided(self.machine.description, self.plan):
             sides = signs(self.machine, bare)
-            return _in_parts(bare, sides, lambda part, side: self._equilibria(self._lagging(side), part))
+            behind = partial(lagging, self.machine, weighs=bool(self.plan.gravity))
+            return _in_parts(bare, sides, lambda part, side: self._equilibria(behind(side), part))
         return self._equilibria(self.machine, bare)
-
-    def _lagging(self, side: Floats) -> Machine:
-        return lagging(self.machine, side, bool(self.plan.gravity))
 
     def _equilibria(self, machine: Machine, plan: Experiment) -> tuple[Floats, int]:
         if not plan.wrench.any() and not moves_unloaded(machine, plan):

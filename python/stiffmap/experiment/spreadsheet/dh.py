@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import math
 import re
+import unicodedata
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -23,14 +24,18 @@ from stiffmap.model.description import Drive, Element, Joint, Leg, MachineDescri
 
 CONVENTIONS = ("standard", "modified")
 NUMBERS = {
-    "theta": r"(theta|θ|offset|theta[ _-]?(offset|0)|q[ _-]?offset)[ _-]?(i)?(_?\(?offset\)?)?",
-    "d": r"d[ _-]?(i)?",
-    "a": r"(a|r)[ _-]?(i|i-1|\(i-1\)|i_1)?",
-    "alpha": r"(alpha|α)[ _-]?(i|i-1|\(i-1\)|i_1)?",
+    "theta": r"theta|θ|offset|theta[ _-]?(offset|0|\(offset\))|q[ _-]?offset",
+    "d": "d",
+    "a": "a",
+    "alpha": "alpha|α",
 }
+INDEX = re.compile(
+    r"^(theta|θ|alpha|α|sigma|σ|[adr])[ _-]*[({\[]?[ijkn]( ?[-−–_] ?1)?[)}\]]?(?![^\W_])", re.IGNORECASE
+)
+"""``theta_i``, ``d(i)``, ``aᵢ₋₁``: the symbol, and whether it is of the link before."""
 WORDS = {
     "name": r"name|joint|axis|achse|gelenk|id|link",
-    "type": r"type|kind|art",
+    "type": r"type|kind|art|sigma|σ",
     "low": r"low|min|lower",
     "high": r"high|max|upper",
 }
@@ -57,25 +62,35 @@ class DHRow:
     range: tuple[float, float] | None
 
 
-def read_dh(sheet: Sheet, units: Mapping[str, str]) -> list[DHRow]:
+def read_dh(given: Sheet, units: Mapping[str, str], convention: str) -> list[DHRow]:
     """Rows of a table; `units` (theta, d, a, alpha -> unit) for columns without brackets.
 
-    Raises StiffmapError that names the column which is missing or has no unit.
+    Raises StiffmapError that names the column which is missing or has no unit, or the columns of another convention.
     """
+    header = [unicodedata.normalize("NFKC", h) for h in given.header]
+    sheet = replace(given, header=tuple(INDEX.sub(r"\1", h) for h in header))
     columns = {n: sheet.find(pattern) for n, pattern in (NUMBERS | WORDS).items()}
     at = {n: i for n, i in columns.items() if i is not None}
+    before = [i for i, h in enumerate(header) if h[0] in "aAαΑ" and (found := INDEX.match(h)) and found[2]]
+    if "a" not in at and (r := sheet.find("r")) is not None and len({*NUMBERS} & {*at}) == 3:
+        before += _with_r(at, r, sheet)
+    if before and convention != "modified":
+        raise StiffmapError(
+            f"{sheet.file}: {', '.join(repr(given.header[i]) for i in before)}: of the link before its joint, which is the "
+            "modified convention; say --dh-convention modified"
+        )
     lost = [n for n in NUMBERS if n not in at]
     if lost:
         raise StiffmapError(
             f"{sheet.file}: no column is {', '.join(lost)}: a table of Denavit and Hartenberg has theta, d, a and alpha, one "
-            f"row a joint; found {', '.join(sheet.header)}"
+            f"row a joint; found {', '.join(given.header)}"
         )
     m = Meant(units=dict(units), sheet=sheet)
     units_of = {n: m.unit(at[n], n, quantity=q).size for n, q in QUANTITIES.items()}
     numbers = {n: units_of[n] * np.nan_to_num(sheet.numbers(at[n])) for n in NUMBERS}
     count = len(sheet.lines)
     words = {n: list(sheet.columns[at[n]]) for n in ("name", "type") if n in at}
-    slides = [w.strip().lower()[:1] in ("p", "t", "s", "l") for w in words.get("type", ["r"] * count)]
+    slides = [w.strip().lower()[:1] in ("p", "t", "s", "l", "1") for w in words.get("type", ["r"] * count)]
     names = [_named(w, i) for i, w in enumerate(words.get("name", [""] * count))]
     if len(set(names)) < count:
         raise StiffmapError(f"{sheet.file}: joints of the same name: {', '.join(names)}")
@@ -88,6 +103,22 @@ def read_dh(sheet: Sheet, units: Mapping[str, str]) -> list[DHRow]:
         theta, d, a, alpha = (float(numbers[n][i]) for n in NUMBERS)
         out.append(DHRow(names[i], theta, d, a, alpha, slides[i], range_ if known else None))
     return out
+
+
+def _with_r(at: dict[str, int], r: int, sheet: Sheet) -> list[int]:
+    """Which of d and r is the length a: each convention writes theta next to the shift along its axis. The columns of Khalil's
+    d and alpha, which are of the link before; none where r is a, as in d, theta, r, alpha."""
+    order = sorted((at["theta"], at["d"], at["alpha"], r))
+    half = {i: k // 2 for k, i in enumerate(order)}
+    if half[at["theta"]] == half[at["d"]]:
+        at["a"] = r
+        return []
+    if half[at["theta"]] != half[r]:
+        raise StiffmapError(
+            f"{sheet.file}: columns 'd' and 'r': one is the length along x, the other the shift along z; write a and d"
+        )
+    at["a"], at["d"] = at["d"], r
+    return [at["alpha"], at["a"]]
 
 
 def arm(

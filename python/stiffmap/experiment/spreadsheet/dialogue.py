@@ -25,6 +25,13 @@ from stiffmap.experiment.spreadsheet.together import together
 
 Ask = Callable[[str], str]
 Made = TypeVar("Made")
+KEPT: dict[str, Callable[[Any], Any]] = {
+    "map": lambda v: list(map(str, v)),
+    "unit": str,
+    "set": float,
+    "noise": float,
+}
+"""Keys of a file of answers, in the order of `Answers`, and what their values are."""
 MOST = 30
 """Questions about one sheet."""
 ASKED = {
@@ -58,12 +65,7 @@ def remembered(sheet: Sheet) -> Answers | None:
         return None
     data = read(file).data
     try:
-        return Answers(
-            {k: [str(h) for h in v] for k, v in data.get("map", {}).items()},
-            {k: str(v) for k, v in data.get("unit", {}).items()},
-            {k: float(v) for k, v in data.get("set", {}).items()},
-            {k: float(v) for k, v in data.get("noise", {}).items()},
-        )
+        return Answers(*({k: of(v) for k, v in data.get(key, {}).items()} for key, of in KEPT.items()))
     except (AttributeError, TypeError, ValueError):
         raise FileError(
             "expected the mappings map, unit, set and noise; delete the file", file=str(file)
@@ -74,8 +76,7 @@ def remember(sheet: Sheet, a: Answers) -> Path:
     """Keep answers; returns the file. Raises FileError."""
     file = profile_file(sheet)
     make_folder(file.parent)
-    data: dict[str, Any] = {"map": a.chosen, "unit": a.units, "set": a.constants, "noise": a.noise}
-    write_text(file, text_of({k: v for k, v in data.items() if v}))
+    write_text(file, text_of({key: v for key, v in zip(KEPT, vars(a).values(), strict=False) if v}))
     return file
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from os import PathLike
@@ -17,12 +17,13 @@ from stiffmap.common.short import short_repr
 from stiffmap.common.tables.header import RECORD
 from stiffmap.common.tables.sheet import Layout, Sheet, column_letter, read_sheet
 from stiffmap.common.tables.workbook import WORKBOOKS, sheet_names
+from stiffmap.common.units import SPELLINGS, known, unit_of
 from stiffmap.experiment.experiment import Experiment
 from stiffmap.experiment.files.load import load_experiment
 from stiffmap.experiment.noise.level import against_the_load, contradictions, not_at_zero
 from stiffmap.experiment.spreadsheet.answers import Answers, Meant, Question
 from stiffmap.experiment.spreadsheet.convert import ImportedSheet, write_folder
-from stiffmap.experiment.spreadsheet.dh import LEG, arm, read_dh
+from stiffmap.experiment.spreadsheet.dh import LEG, QUANTITIES, arm, read_dh
 from stiffmap.experiment.spreadsheet.dialogue import (
     Ask,
     Unanswered,
@@ -39,6 +40,8 @@ from stiffmap.experiment.spreadsheet.sockets import seated
 from stiffmap.experiment.spreadsheet.together import oriented, together
 from stiffmap.solve.machine import Machine, load_machine
 
+CIRCULAR = ("deviation",)
+"""What a ball bar reads, by the name that its mapping file has for it."""
 Understand = Callable[[str | None, Ask | None], tuple[Meant, ImportedSheet]]
 """What is meant by a sheet of that name, with answers to its questions."""
 
@@ -130,7 +133,7 @@ def experiment_from_table(
         raise StiffmapError(f"record: expected one of {', '.join(sorted(RECORD))}; got '{wrong[0]}'")
     chosen = {k: v.split("|") for k, v in (columns or {}).items()}
     given = Answers(chosen, dict(units or {}), dict(constants or {}), dict(noise or {}))
-    rows = None if dh is None else read_dh(read_sheet(Path(dh)), given.units)
+    rows = None if dh is None else read_dh(read_sheet(Path(dh)), given.units, dh_convention)
     drives = drives if rows is None else {f"{LEG}.{r.name}": r.slides for r in rows}
     numbered = any(h.strip("+-").isdigit() for many in chosen.values() for h in many)
     layout = Layout(has_meaning, tuple(header), numbered, which)
@@ -139,6 +142,7 @@ def experiment_from_table(
     )
     m, found = _fitting(file, sheet, understood, ask)
     own = m.sheet
+    _refuse_units(given.units, m, drives, () if rows is None else QUANTITIES)
     if rows is not None and not m.columns:
         raise StiffmapError(f"{file}: no column commands a joint; the arm has {', '.join(drives)}")
     quantity = "position" if m.placed or "ll" in found.units else quantity
@@ -159,6 +163,27 @@ def experiment_from_table(
     warnings = tuple(line for line in (of_loads, *contradictions(made)) if line)
     remarks = (*m.said, *(f"left out: {text}" for text in own.aside))
     return FromTable(made, output, declared, warnings, remarks, own, found, m if m.columns else None)
+
+
+def _refuse_units(units: Mapping[str, str], m: Meant, drives: Iterable[str], more: Iterable[str]) -> None:
+    """StiffmapError for a unit that nobody knows, or of nothing that is there."""
+    names = {
+        *(c.meaning for c in m.guessed),
+        *m.sheet.names,
+        *m.sheet.header,
+        *SPELLINGS,
+        *more,
+        "joints",
+        *CIRCULAR,
+    }
+    names |= {part for d in drives for part in (d, d.split(".")[-1])}
+    for name, unit in units.items():
+        if name not in names:
+            raise StiffmapError(
+                f"--unit {name}: no column has this name or meaning; columns: {', '.join(m.sheet.header)}"
+            )
+        if unit_of(unit) is None:
+            raise StiffmapError(f"--unit {name}: the unit '{unit}' is not known; known: {known()}")
 
 
 def _fitting(

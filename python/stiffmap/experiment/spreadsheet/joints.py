@@ -24,6 +24,7 @@ MEASURED = r"([xyz])[ _.-]?meas(?:ured|\.)?"
 MOST_TURNS = 4.0 * math.pi
 """Of a joint; larger numbers are degrees."""
 DIFFERENCES = ("actual-minus-target", "target-minus-actual")
+NO_DIFFERENCE = "{}: --difference: no column is a difference; say --map dx='HEADER' where one is"
 
 
 def drives_of(machine: Machine) -> dict[str, bool]:
@@ -104,6 +105,8 @@ def as_seen(m: Meant, difference: str) -> None:
             "in rows one below the other, with a column 'Target' that names the target"
         )
     of = {k.meaning: k for k in m.guessed if k.repeat == 0}
+    if difference != DIFFERENCES[0] and ({*SEEN, "ll"} & {*of}):
+        raise StiffmapError(NO_DIFFERENCE.format(m.sheet.file))
     if any(s in of for s in SEEN):
         for s in SEEN:
             if s in of and m.written_unit(of[s].index, s) != "mm":
@@ -140,6 +143,8 @@ def turned(m: Meant, difference: str) -> None:
             name = f"less {with_unit(c.name, c.unit)}"
             m.sheet = m.sheet.with_column(name, -m.sheet.numbers(c.index))
             chosen.setdefault(c.meaning, []).append(name)
+    if not chosen:
+        raise StiffmapError(NO_DIFFERENCE.format(m.sheet.file))
     m.chosen |= chosen
 
 

@@ -41,7 +41,11 @@ def read_csv_field(path: str | Path) -> tuple[Floats, Floats]:
             file=table.file, line=table.top,
         )  # fmt: skip
     points = np.stack([found[a][0] for a in "xyz"], axis=-1)
-    return points, np.stack([np.array(found[a]) for a in ("ux", "uy", "uz")], axis=-1)
+    fields = np.stack([np.array(found[a]) for a in ("ux", "uy", "uz")], axis=-1)
+    rows: dict[int, list[float]] = {}
+    for node, point, moved in zip(*found["node"][:1], points, fields.swapaxes(0, 1), strict=False):
+        _put(path, rows, int(node), [*point.tolist(), *moved.ravel().tolist()])
+    return points, fields
 
 
 def known_columns(

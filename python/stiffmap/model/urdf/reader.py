@@ -22,6 +22,8 @@ from stiffmap.model.urdf.tip import listed
 KINDS = {"revolute": "revolute", "continuous": "revolute", "prismatic": "prismatic", "fixed": "fixed"}
 READ = ("link", "joint", "inertial", "mass", "inertia", "origin", "axis", "parent", "child", "limit", "mimic")
 """Elements whose content counts."""
+ATTRIBUTES = {"limit": ("lower", "upper", "effort", "velocity"), "mimic": ("joint", "multiplier", "offset")}
+SHORT = {"min": "lower", "max": "upper"}
 X, Y, Z = np.eye(3)
 MOST = 4 * np.pi
 """Angle of an origin, two turns, beyond which none is in radians."""
@@ -83,6 +85,12 @@ def _check_tags(robot: xml.Element, file: str) -> None:
             if meant:
                 raise FileError(f"expected <{meant[0]}>, found <{e.tag}>", file=file,
                                 key="" if e is top else f"{top.tag} {top.get('name', '')}")  # fmt: skip
+            names = ATTRIBUTES.get(e.tag, ())
+            for k in (k for k in e.attrib if names and k not in names):
+                close = [SHORT[k]] if k in SHORT else get_close_matches(k.lower(), names, 1, 0.8)
+                if close:
+                    raise FileError(f"{e.tag}: expected {close[0]}, found {k}='{e.get(k)}'", file=file,
+                                    key=f"{top.tag} {top.get('name', '')}")  # fmt: skip
 
 
 def _name(element: xml.Element, file: str) -> str:

@@ -6,18 +6,21 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+import typer
+
 from stiffmap.common.outputs import make_folder, write_picture, write_text
 from stiffmap.common.outputs.option import written
 from stiffmap.identification.diagnosis import Diagnosis, diagnose
 from stiffmap.identification.diagnosis.report.sentences import next_step
 from stiffmap.identification.numbers import Tolerances
 from stiffmap.ui.cli import options
-from stiffmap.ui.cli.inputs import finish
+from stiffmap.ui.cli.inputs import finish, refuse_unused
 from stiffmap.ui.cli.options import flag, option
 from stiffmap.ui.cli.output import show
 
 
 def command(
+    context: typer.Context,
     machine: options.Declared,
     data: options.Experiment,
     output: Path | None = written("Folder for report and files."),
@@ -44,6 +47,7 @@ def command(
 
       [cyan]stiffmap diagnose ur10 tracker --exclude sensor_gain --budget 60[/cyan]
     """
+    refuse_unused(context, {"without output": "date"})
     silent = quiet or as_json or not sys.stderr.isatty()
     result = diagnose(
         machine,

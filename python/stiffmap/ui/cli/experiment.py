@@ -18,7 +18,7 @@ from stiffmap.common.outputs.option import written
 from stiffmap.experiment.noise.level import unknown
 from stiffmap.experiment.spreadsheet.from_table import FromTable, experiment_from_table
 from stiffmap.ui.cli import options
-from stiffmap.ui.cli.inputs import pairs
+from stiffmap.ui.cli.inputs import pairs, refuse_unused
 from stiffmap.ui.cli.options import argument, flag, option
 from stiffmap.ui.cli.output import show
 from stiffmap.ui.cli.output import table as table_of
@@ -86,6 +86,7 @@ def command(
     """
     if action != "new":
         raise StiffmapError(f"experiment: expected 'new', got '{action}'")
+    refuse_unused(context, {"without dh": "dh_convention"})
     made = experiment_from_table(
         machine, file, output, columns=pairs(mapped, "map"), units=pairs(unit, "unit"),
         constants=_numbers(constant, "set"), noise=_numbers(noise, "noise"), dh=dh, dh_convention=dh_convention,

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from rich.text import Text
 
-from stiffmap.common.errors import FileError
+from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.outputs import new_file
 from stiffmap.common.outputs.option import written
 from stiffmap.common.tables.workbook import TABLES
@@ -48,7 +48,8 @@ def command(
       [cyan]stiffmap import arm.urdf --tip tool -o tool.yaml[/cyan]
     """
     table = urdf.suffix.lower() in (*TABLES, ".txt")
-    for name, given in {"--sidecar": sidecar, "--tip": tip}.items() if table else [("--unit", unit)]:
+    of_table = {"--unit": unit, "--dh-convention": dh_convention != "standard"}
+    for name, given in {"--sidecar": sidecar, "--tip": tip}.items() if table else of_table.items():
         if given:
             expected, other = ("URDF", "table") if table else ("table", "URDF")
             raise FileError(
@@ -78,9 +79,12 @@ def _remarks(found: Imported) -> Iterator[Text]:
 def _of_table(file: Path, convention: str, unit: list[str] | None) -> Imported:
     """The arm of a table of Denavit and Hartenberg."""
     from stiffmap.common.tables.sheet import read_sheet
-    from stiffmap.experiment.spreadsheet.dh import arm, read_dh
+    from stiffmap.experiment.spreadsheet.dh import QUANTITIES, arm, read_dh
 
     name = re.sub(r"[^A-Za-z0-9_\-]+", "-", file.stem)
-    rows = read_dh(read_sheet(file), pairs(unit, "unit"))
+    units = pairs(unit, "unit")
+    if wrong := [n for n in units if n not in {*QUANTITIES, *QUANTITIES.values()}]:
+        raise StiffmapError(f"--unit {wrong[0]}: expected one of {', '.join(QUANTITIES)}")
+    rows = read_dh(read_sheet(file), units, convention)
     description = arm(rows, convention, name, f"from {file.name}")
     return Imported(description, (), tuple(r.name for r in rows))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -130,6 +130,18 @@ def machine_with(name: str, effects: Sequence[str] | None) -> Machine:
         return machine
     records = [parse_effect(text, machine.description) for text in effects]
     return Machine(apply_records(machine.description, records))
+
+
+def refuse_unused(context: typer.Context, unused: Mapping[str, str]) -> None:
+    """StiffmapError for an option that is given and not used: ``{"with taps": "rows noise"}``, ``{"without until": "twin"}``."""
+    flags = {p.name or "": max(p.opts, key=len) for p in context.command.params}
+    for case, names in unused.items():
+        word, _, other = case.partition(" ")
+        if bool(context.params[other]) != (word == "with"):
+            continue
+        for name in names.split():
+            if getattr(context.get_parameter_source(name), "name", "") == "COMMANDLINE":
+                raise StiffmapError(f"{flags[name]}: not {word} {flags[other]}")
 
 
 def finish(found: bool) -> None:

@@ -17,13 +17,18 @@ from stiffmap.common.outputs.option import written
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.status import Status
 from stiffmap.ui.cli import options
-from stiffmap.ui.cli.inputs import MM, finish, force_given, gravity, machine_with
+from stiffmap.ui.cli.inputs import MM, finish, force_given, gravity, machine_with, refuse_unused
 from stiffmap.ui.cli.map_files import write_map_files
 from stiffmap.ui.cli.map_summary import MapSummary
 from stiffmap.ui.cli.options import flag, option
 from stiffmap.ui.cli.output import failed_in_words, show, table
 from stiffmap.workspace.maps.inputs import magnitude, plane_axes
 from stiffmap.workspace.maps.statistics import statistics_rows
+
+STORED = "zarr resume tables own_scales compliance uncertainty"
+"""Options of what a stored map holds, and of its files."""
+UNUSED = {"with toolpath": f"x y z points plane tolerance directions estimate statistics scheduler {STORED}",
+          "with statistics": f"output formats {STORED}", "without pictures": "formats own_scales"}  # fmt: skip
 
 
 def command(
@@ -101,6 +106,7 @@ def command(
     """
     import stiffmap
 
+    refuse_unused(context, UNUSED)
     kinds = named_formats(formats, "--format", ("png", "svg", "pdf")) if pictures else []
     sheets = named_formats(tables, "--table", ("csv", "xlsx")) if tables else []
     m = machine_with(machine, effect)

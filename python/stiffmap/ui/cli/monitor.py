@@ -41,6 +41,6 @@ def command(
     if not terms:
         raise StiffmapError("monitor: name what to follow, by --effect or --diagnosis")
     found = monitor(m, before, after, terms)
-    now = budgets(m, load_experiment(after), found.second) if budget and not as_json else []
-    show(as_json, found.as_plain(), [str(found), *map(str, now)])
+    now = budgets(m, load_experiment(after), found.second) if budget else []
+    show(as_json, found.as_plain() | ({"budgets": now} if budget else {}), [str(found), *map(str, now)])
     finish(not found.common)

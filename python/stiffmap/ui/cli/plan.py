@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import typer
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import with_uncertainty
@@ -20,12 +21,16 @@ from stiffmap.identification.planning import follow, plan
 from stiffmap.identification.planning.estimate import fitted
 from stiffmap.solve.machine import Machine, load_machine
 from stiffmap.ui.cli import options
-from stiffmap.ui.cli.inputs import MM, in_si, numbers
+from stiffmap.ui.cli.inputs import MM, in_si, numbers, refuse_unused
 from stiffmap.ui.cli.options import argument, flag, option
 from stiffmap.ui.cli.output import show
 
+UNUSED = {"with taps": "rival for_map at rows quantity force read noise frame tool until twin", "with until": "output rival for_map at",
+          "without until": "twin", "without for_map": "at"}  # fmt: skip
+
 
 def command(
+    context: typer.Context,
     machine: str = argument("Machine: shipped name or machine file."),
     identify: list[str] | None = option(
         "Effect whose numbers are to be identified, at the value given; repeatable.", None, "--identify"
@@ -67,6 +72,7 @@ def command(
 
       [cyan]stiffmap plan orthoglide-revised --identify 'compliance actuator scale=1' --until 0.05 --twin 'compliance actuator scale=1.4'[/cyan]
     """
+    refuse_unused(context, UNUSED)
     m = load_machine(machine)
     if (taps is None) == (not identify):
         raise StiffmapError(

@@ -7,11 +7,13 @@ import webbrowser
 from pathlib import Path
 from typing import Any
 
+import typer
+
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import number_in
 from stiffmap.common.outputs.option import written
 from stiffmap.ui.cli import options
-from stiffmap.ui.cli.inputs import MM, in_si, machine_with, numbers
+from stiffmap.ui.cli.inputs import MM, in_si, machine_with, numbers, refuse_unused
 from stiffmap.ui.cli.options import option
 from stiffmap.ui.cli.output import show
 
@@ -20,7 +22,12 @@ LOCAL = "127.0.0.1"
 DEGREE = math.pi / 180
 
 
+UNUSED = {"with link": "at rotation force moment gravity plane quantity tolerance frequency magnify changes start",
+          "with html": "port host browser", "with picture": "port host browser"}  # fmt: skip
+
+
 def command(
+    context: typer.Context,
     machine: options.Machine,
     at: options.At = None,
     rotation: options.Rotation = None,
@@ -75,6 +82,7 @@ def command(
 
       [cyan]stiffmap view orthoglide-revised --set x.foot/beam.EIx=4000 --no-browser --port 8090[/cyan]
     """
+    refuse_unused(context, UNUSED)
     from stiffmap.ui.view.serving import need_viser
 
     need_viser()

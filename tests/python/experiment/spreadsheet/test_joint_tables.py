@@ -221,6 +221,15 @@ def test_units_of_joints_and_of_places_are_said(tmp_path: Path) -> None:
         ("joint,theta [deg],d [mm],a [mm]\n1,0,0,0\n", "no column is alpha"),
         ("theta [deg],d,a [mm],alpha [deg]\n0,0,0,0\n", "say --unit d=mm"),
         ("name,theta [deg],d [mm],a [mm],alpha [deg]\nj,0,1,0,0\nj,0,1,0,90\n", "joints of the same name"),
+        (
+            "alpha_i-1 [deg],a_i-1 [mm],theta [deg],d_i [mm]\n0,0,0,0\n",
+            "'alpha_i-1 [deg]', 'a_i-1 [mm]': of the link before its joint, which is the modified convention; say --dh-convention modified",
+        ),
+        ("alpha_j [deg],d_j [mm],theta_j [deg],r_j [mm]\n0,0,0,0\n", "say --dh-convention modified"),
+        (
+            "theta [deg],alpha [deg],r [mm],d [mm]\n0,0,0,0\n",
+            "columns 'd' and 'r': one is the length along x",
+        ),
     ],
 )
 def test_tables_of_joints_that_lack_something(
@@ -228,9 +237,48 @@ def test_tables_of_joints_that_lack_something(
 ) -> None:
     assert main(["import", write(tmp_path, "dh.csv", text), "-o", str(tmp_path / "a.yaml")]) == 2
     assert asked in " ".join(capsys.readouterr().err.split())
+    assert (
+        main(["import", write(tmp_path, "dh.csv", table()), "--unit", "b=mm", "-o", str(tmp_path / "a.yaml")])
+        == 2
+    )
+    assert "--unit b: expected one of theta, d, a, alpha" in capsys.readouterr().err
     poses, _, _ = session(tmp_path)
     assert main(["experiment", "new", poses, "-o", str(tmp_path / "e")]) == 2
     assert "either --machine or --dh" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("header", "order", "convention"),
+    [
+        ("alpha_j,d_j,theta_j,r_j", "alpha a theta d", "modified"),
+        ("alpha(i-1),a(i-1),theta(i),d(i)", "alpha a theta d", "modified"),
+        ("αᵢ₋₁,aᵢ₋₁,θᵢ,dᵢ", "alpha a theta d", "modified"),
+        ("d,theta,r,alpha", "d theta a alpha", "standard"),
+        ("theta,d,r,alpha", "theta d a alpha", "standard"),
+        ("theta(i),d(i),a(i),alpha(i)", "theta d a alpha", "standard"),
+    ],
+)
+def test_letters_of_several_books(header: str, order: str, convention: str, tmp_path: Path) -> None:
+    """Khalil's d is the length along x and his r the shift along z; Wikipedia's r is the length along x."""
+    keys = order.split()
+    rows = [dict(zip(("theta", "d", "a", "alpha"), r[1:], strict=True)) for r in UR10]
+    text = "\n".join([header, *(",".join(str(r[k]) for k in keys) for r in rows)])
+    units = [u for k in keys for u in ("--unit", _unit_of(k))]
+    machines = []
+    for name, table_, more in (("own", table(), []), ("other", text, units)):
+        file = write(tmp_path, f"{name}.csv", table_)
+        out = str(tmp_path / f"{name}.yaml")
+        assert main(["import", file, "--dh-convention", convention, *more, "-o", out]) == 0
+        machines.append(sm.load_machine(out))
+    q = np.linspace(-0.5, 0.7, 6)
+    one, other = (sm.forward_kinematics(m, q) for m in machines)
+    np.testing.assert_allclose(other.position, one.position, atol=1e-12)
+    np.testing.assert_allclose(other.rotation, one.rotation, atol=1e-12)
+
+
+def _unit_of(key: str) -> str:
+    """Of a column by the name that the table of Denavit and Hartenberg gives it."""
+    return f"{key}={'deg' if key in ('theta', 'alpha') else 'mm'}"
 
 
 def test_gauges_that_say_target_minus_actual(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -238,4 +286,8 @@ def test_gauges_that_say_target_minus_actual(tmp_path: Path, capsys: pytest.Capt
     arguments = ["experiment", "new", file, "--machine", "five-bar", "--quantity", "position"]
     assert main([*arguments, "-o", str(tmp_path / "e"), "--difference", "target-minus-actual"]) == 0
     assert "less dx" in capsys.readouterr().out
+    file = write(tmp_path, "p.csv", "x [mm],y [mm],z [mm],px [mm],py [mm],pz [mm]\n0,416,0,0,416,0\n")
+    arguments = ["experiment", "new", file, "--machine", "five-bar", "--quantity", "position"]
+    assert main([*arguments, "-o", str(tmp_path / "f"), "--difference", "target-minus-actual"]) == 2
+    assert "--difference: no column is a difference" in capsys.readouterr().err
     assert sm.load_experiment(tmp_path / "e").reading[:, 0] == pytest.approx([-5e-6, -7e-6])

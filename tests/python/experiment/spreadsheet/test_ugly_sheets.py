@@ -12,7 +12,7 @@ import stiffmap as sm
 from stiffmap.common.units import unit_of
 from stiffmap.ui.cli import main
 
-from .ugly import LATER, STILL, UGLY, Ugly
+from .ugly import LATER, STILL, TRUTH, UGLY, Ugly
 
 CLEAN = "Nr;x [mm];y [mm];fx [N];dx [µm]\n1;0;400;100;12.5\n2;50;400;100;14.0\n"
 
@@ -90,6 +90,36 @@ def test_what_is_left_out_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[
     out = capsys.readouterr().out
     assert "left out: row 6, 'Mean', is no reading" in out
     assert "left out: row 8 is a remark: Signed: Miller" in out
+
+
+@pytest.mark.parametrize(
+    "word", ["Moyenne", "Écart-type", "Promedio", "Media", "Desviación", "Máximo", "Totale", "Anzahl", "n", "3 sigma", "Toleranz"]
+)  # fmt: skip
+def test_what_is_computed_is_no_reading_in_any_language(word: str, tmp_path: Path) -> None:
+    rows = "".join(f"P{i};{x};{y};{fx};{dx};{dy}\n" for i, (x, y, fx, dx, dy) in enumerate(TRUTH))
+    text = f"Nr;x [mm];y [mm];fx [N];dx [um];dy [um]\n{rows}{word};1;2;3;4;5\n"
+    code, e = imported(Ugly(text), tmp_path)
+    assert code == 0 and e is not None
+    matches(e, Ugly(text))
+
+
+@pytest.mark.parametrize("blank", ["\u00a0", "\u2009", "\u202f", "\u2007", " "])
+def test_thousands_behind_any_blank(blank: str, tmp_path: Path) -> None:
+    text = (
+        f"x [mm];y [mm];fx [N];dx [um]\n0,0;400,0;1{blank}234,5;12,5\n0,0;400,0;\u22121{blank}000,0;-10,0\n"
+    )
+    _, e = imported(Ugly(text), tmp_path)
+    assert e is not None and e.wrench[:, 0].tolist() == [1234.5, -1000.0]
+
+
+@pytest.mark.parametrize("first", ['"1,000.5"', "0"])
+def test_a_thousand_in_quotes_is_refused(
+    first: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Next to a point or between commas it is no decimal comma, which would be off by a thousand."""
+    text = f'x [mm],y [mm],fx [N],dx [um]\n{first},400,"1,500",12\n0,400,"-1,500",-12\n'
+    assert imported(Ugly(text), tmp_path)[0] == 2
+    assert "column 'fx [N]': expected a number; found '1,500'" in capsys.readouterr().err
 
 
 def test_points_that_are_read_again_have_names_of_their_own(tmp_path: Path) -> None:
@@ -262,3 +292,17 @@ def test_a_workbook_of_old_excel(tmp_path: Path) -> None:
         == 0
     )
     matches(sm.load_experiment(tmp_path / "e"), Ugly(""))
+
+
+@pytest.mark.parametrize(
+    ("unit", "message"),
+    [
+        ("dy=mm", "--unit dy: no column has this name or meaning; columns: Nr, x [mm]"),
+        ("length=parsec", "--unit length: the unit 'parsec' is not known; known: m, cm, mm"),
+    ],
+)
+def test_a_unit_of_nothing_is_refused(
+    unit: str, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert imported(Ugly(CLEAN, more=("--set", "z=0", "--unit", unit)), tmp_path)[0] == 2
+    assert message in capsys.readouterr().err

@@ -116,6 +116,12 @@ def write(tmp_path, name, text):
             None,
             "line 4: node: expected a number, found 'two'",
         ),
+        (
+            "a.csv",
+            csv_text() + csv_text().splitlines()[-1].rpartition(",")[0] + ",9\n",
+            None,
+            "node 10 is there twice, with",
+        ),
         ("a.csv", csv_text() + "11.0,1\n", None, "line 13: expected 22 values, found 2"),
         ("a.dat", dat_text(), None, "no units; give --unit"),
         ("a.dat", dat_text(), "mm", "give the coordinates with --nodes"),

@@ -135,6 +135,11 @@ BAD_URDF = {
     "link upper: expected <mass>, found <Mass>": ('<mass value="3"/>', '<Mass value="3"/>'),
     "robot.urdf: expected <link>, found <Link>": ('<link name="fore"/>', '<Link name="fore"/>'),
     "expected one <robot>, found another in it: 'b'": ("</robot>", '<robot name="b"/></robot>'),
+    "joint q2: limit: expected lower, found min='-2'": (
+        'lower="-2" upper="2" effort="100"',
+        'min="-2" max="2" effort="100"',
+    ),
+    "joint q3: limit: expected upper, found Uper='2'": ('upper="2" effort="80"', 'Uper="2" effort="80"'),
     "expected one root link, found 2": ('<link name="fore"/>', '<link name="fore"/><link name="loose"/>'),
 }
 

@@ -209,3 +209,35 @@ def test_missing_parts_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 def test_the_package_runs_as_the_command() -> None:
     done = subprocess.run([sys.executable, "-m", "stiffmap", "--version"], capture_output=True, text=True)
     assert done.returncode == 0 and done.stdout.strip()
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ("map five-bar --toolpath trim --points 5", "--points: not with --toolpath"),
+        ("map five-bar --statistics --table csv", "--table: not with --statistics"),
+        ("map five-bar --no-pictures --format svg", "--format: not without --pictures"),
+        ("plan ur10 --taps 3 --rows 8", "--rows: not with --taps"),
+        ("plan ur10 --identify x --until 0.1 -o p.csv", "--output: not with --until"),
+        ("plan ur10 --identify x --twin y", "--twin: not without --until"),
+        ("plan ur10 --identify x --at 0,0,0", "--at: not without --map"),
+        ("view ur10 --link a --at 0,0,0", "--at: not with --link"),
+        ("view ur10 --html a.html --port 80", "--port: not with --html"),
+        ("diagnose ur10 e --date 2026-01-01", "--date: not without --output"),
+        ("experiment new t.csv --machine ur10 --dh-convention modified -o e", "--dh-convention: not without --dh"),
+        ("import a.urdf --dh-convention modified", "--dh-convention: expected a table with this option"),
+        ("experiment new t.csv --machine ur10 --sheet A -o e", "t.csv: no sheet 'A': a text has none"),
+    ],
+)  # fmt: skip
+def test_options_that_would_not_be_used(
+    words: str,
+    message: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("t.csv").write_text("x [mm],y [mm]\n1,2\n")
+    assert main(words.split()) == 2
+    assert message in capsys.readouterr().err
+    assert [p.name for p in tmp_path.iterdir()] == ["t.csv"]
