@@ -105,8 +105,7 @@ class LoadPath {
       factorize_at(m_, p_, state_, ws_);
     }
     note(stable_, ws_.slope_before, wrench_slope_before_);
-    const bool unloaded = !corners_ && ws_.slope_before.isZero(0) && wrench_slope_before_.isZero(0);
-    if (unloaded) return Outcome::converged;
+    if (!corners_ && unloaded()) return Outcome::converged;
     falling_ = out_.falling;
     ws_.pieces_before = ws_.lin.dtau;
     for (int k = 0; k < (corners_ ? most_across : most_load_steps); ++k) {
@@ -159,6 +158,11 @@ class LoadPath {
   double stable_ = 0;  ///< at the start of the step: falling directions, or the determinant's sign
   Index falling_ = 0;
   VecX wrench_slope_, wrench_slope_before_;  ///< of the loops
+
+  bool unloaded() const {
+    const auto none = [](const Vec6& w) { return w.isZero(0); };
+    return p_.gravity.isZero(0) && std::all_of(p_.wrenches.begin(), p_.wrenches.end(), none);
+  }
 
   /// A share of the load at once: from the command, or from the last step.
   bool take(double share, bool cold, bool trusting) {
