@@ -43,7 +43,8 @@ def read_csv_field(path: str | Path) -> tuple[Floats, Floats]:
     points = np.stack([found[a][0] for a in "xyz"], axis=-1)
     fields = np.stack([np.array(found[a]) for a in ("ux", "uy", "uz")], axis=-1)
     rows: dict[int, list[float]] = {}
-    for node, point, moved in zip(*found["node"][:1], points, fields.swapaxes(0, 1), strict=False):
+    nodes = found["node"][0] if found["node"] else np.zeros(0)
+    for node, point, moved in zip(nodes, points, fields.swapaxes(0, 1), strict=False):
         _put(path, rows, int(node), [*point.tolist(), *moved.ravel().tolist()])
     return points, fields
 

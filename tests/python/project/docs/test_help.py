@@ -31,6 +31,7 @@ MADE_SMALLER = {  # the last word counts
         f"map orthoglide-revised --{more}": ("--points", "5", "--no-pictures")
         for more in ("force", "gravity", "points")
     },
+    "map orthoglide-revised --toolpath": (),
     "map orthoglide": ("--points", "5"),
     "map my_machine": ("--points", "5", "--no-pictures"),
     "map tripteron": ("--points", "5", "--no-pictures"),

@@ -7,6 +7,7 @@ import pytest
 
 import stiffmap as sm
 from stiffmap.workspace.performance import in_pieces
+from stiffmap.workspace.performance.motion.inertia import total_mass
 
 CHAIN = """
 name: chain
@@ -95,9 +96,7 @@ def test_links_of_shipped_machines_in_pieces(name):
     first = []
     for n in (1, 2, 4, 8):
         m = in_pieces(whole, n)
-        assert sm.workspace.performance.total_mass(m) == pytest.approx(
-            sm.workspace.performance.total_mass(whole), rel=1e-12
-        )
+        assert total_mass(m) == pytest.approx(total_mass(whole), rel=1e-12)
         np.testing.assert_allclose(
             m.solve(p).compliance, whole.solve(p).compliance, rtol=1e-7, atol=1e-9 * 1e-5
         )

@@ -9,6 +9,7 @@ import stiffmap as sm
 from stiffmap.workspace.design import load_design
 from stiffmap.workspace.design.judging import judge
 from stiffmap.workspace.performance import load_requirements
+from stiffmap.workspace.performance.motion.motion_files import Motion
 
 GANTRY = """
 name: gantry
@@ -52,7 +53,7 @@ def test_the_orthoglide_by_more_force():
     machine = sm.load_machine("orthoglide-revised")
     force = np.array([200.0, -120.0, 60.0])
     path = sm.workspace.performance.line([-0.15, -0.1, 0.0], [0.2, 0.25, 0.1], 41)
-    motion = sm.workspace.performance.Motion("cut", path, None, 1.0, np.inf, force)
+    motion = Motion("cut", path, None, 1.0, np.inf, force)
     found = sm.measures(machine, only=["path_compliance"], toolpath=motion)["path_compliance"].found
     unit = force / np.linalg.norm(force)
     moved = [
