@@ -25,7 +25,7 @@ from stiffmap.machining.compensation import (
 )
 from stiffmap.solve.machine import Machine
 from stiffmap.ui.cli import options
-from stiffmap.ui.cli.inputs import finish, in_si, machine_with, numbers
+from stiffmap.ui.cli.inputs import finish, flags_of, in_si, machine_with, numbers, options_given
 from stiffmap.ui.cli.inputs import gravity as gravity_of
 from stiffmap.ui.cli.options import argument, option
 from stiffmap.ui.cli.output import show
@@ -96,9 +96,8 @@ def command(
         )
     of_map = axis is not None and machine.endswith((".nc", ".zarr"))
     mode = "" if axis is None else "axis of a map" if of_map else "axis"
-    asked = {p.name: max(p.opts, key=len).lstrip("-") for p in context.command.params
-             if getattr(context.get_parameter_source(p.name or ""), "name", "") == "COMMANDLINE"}  # fmt: skip
-    given = [name for name in asked.values() if name in {*USES, *set().union(*USES.values())} - {"axis"}]
+    asked = [flags_of(context)[name].lstrip("-") for name in options_given(context)]
+    given = [name for name in asked if name in {*USES, *set().union(*USES.values())} - {"axis"}]
     used = set().union(*(USES[m] for m in ([mode] if mode else given) if m in USES))
     if wrong := [n for n in given if n not in used and (mode or n not in USES)]:
         users = dict.fromkeys(f"--{m.split()[0]}" for m, names in USES.items() if wrong[0] in names)

@@ -134,14 +134,25 @@ def machine_with(name: str, effects: Sequence[str] | None) -> Machine:
 
 def refuse_unused(context: typer.Context, unused: Mapping[str, str]) -> None:
     """StiffmapError for an option that is given and not used: ``{"with taps": "rows noise"}``, ``{"without until": "twin"}``."""
-    flags = {p.name or "": max(p.opts, key=len) for p in context.command.params}
+    flags, given = flags_of(context), options_given(context)
     for case, names in unused.items():
         word, _, other = case.partition(" ")
         if bool(context.params[other]) != (word == "with"):
             continue
         for name in names.split():
-            if getattr(context.get_parameter_source(name), "name", "") == "COMMANDLINE":
+            if name in given:
                 raise StiffmapError(f"{flags[name]}: not {word} {flags[other]}")
+
+
+def flags_of(context: typer.Context) -> dict[str, str]:
+    """How the parameters of a command are written, by their names."""
+    return {p.name or "": max(p.opts, key=len) for p in context.command.params}
+
+
+def options_given(context: typer.Context) -> list[str]:
+    """The parameters whose value the command line gives, be it that of the default."""
+    source = context.get_parameter_source
+    return [n for n in flags_of(context) if getattr(source(n), "name", "") == "COMMANDLINE"]
 
 
 def finish(found: bool) -> None:

@@ -17,7 +17,15 @@ from stiffmap.common.outputs.option import written
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.status import Status
 from stiffmap.ui.cli import options
-from stiffmap.ui.cli.inputs import MM, finish, force_given, gravity, machine_with, refuse_unused
+from stiffmap.ui.cli.inputs import (
+    MM,
+    finish,
+    force_given,
+    gravity,
+    machine_with,
+    options_given,
+    refuse_unused,
+)
 from stiffmap.ui.cli.map_files import write_map_files
 from stiffmap.ui.cli.map_summary import MapSummary
 from stiffmap.ui.cli.options import flag, option
@@ -140,8 +148,9 @@ def command(
 def assumptions(context: typer.Context, force: str, tolerance: float) -> str:
     """The force and the tolerance, and where they come from: the command line, or the default."""
     values = {"force": f"({force}) N" if "," in force else f"{force} N", "tolerance": f"{tolerance:g} mm"}
-    taken = [n for n in values if getattr(context.get_parameter_source(n), "name", "") == "DEFAULT"]
-    own = [f"{n} {v}" for n, v in values.items() if n not in taken]
+    given = options_given(context)
+    taken = [n for n in values if n not in given]
+    own = [f"{n} {v}" for n, v in values.items() if n in given]
     text = f"{_sentence(own)} as given. " if own else ""
     if not taken:
         return text.rstrip()

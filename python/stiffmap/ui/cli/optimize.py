@@ -124,5 +124,5 @@ def as_table(found: ParetoSet, report: ComparedDesigns) -> Table:
     shares = [c.robust for c in report.chosen.values()]
     if any(r is not None for r in shares):
         met = ("" if r is None else f"{100 * r.meets:.0f}" for r in shares)
-        out.add_row("meets all (drawn) %", *[""] * len(report.beside), *met)
+        out.add_row("meets all (drawn) %", *[""] * len(report.others), *met)
     return out
