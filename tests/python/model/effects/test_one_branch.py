@@ -76,6 +76,15 @@ def test_single_bars_are_tried_in_one_leg_at_a_time() -> None:
     assert not any(e.count(".") and not e.rpartition(".")[2].startswith("k") for e in tree)
 
 
+def test_a_bar_that_one_branch_alone_has_needs_no_branch() -> None:
+    named = edit(machine().description, "x.low.bar", lambda e: replace(e, name="rod"))
+    assert named is not None
+    places = [c.place[1:] for c in of_kind(get("compliance"), named)]
+    assert ("rod", ("x",)) in places and ("bar", ("x",)) in places
+    assert not [p for p in places if p in (("low.rod", ("x",)), ("low.bar", ("x",)), ("high.bar", ("x",)))]
+    assert ("low.bar", ("y",)) in places
+
+
 def test_a_file_and_a_line_have_it_too(tmp_path: Path) -> None:
     given = machine().with_effect("compliance", element="low.bar", legs="x", scale=2.5)
     given.save(tmp_path / "machine.yaml")
