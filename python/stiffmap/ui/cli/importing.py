@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
+import typer
 from rich.text import Text
 
 from stiffmap.common.errors import FileError, StiffmapError
@@ -15,12 +16,13 @@ from stiffmap.common.tables.workbook import TABLES
 from stiffmap.model.urdf import Imported, import_urdf
 from stiffmap.solve.machine import Machine
 from stiffmap.ui.cli import options
-from stiffmap.ui.cli.inputs import pairs
+from stiffmap.ui.cli.inputs import flags_of, options_given, pairs
 from stiffmap.ui.cli.options import argument, option
 from stiffmap.ui.cli.output import show
 
 
 def command(
+    context: typer.Context,
     urdf: Path = argument("URDF file, or a table of Denavit and Hartenberg (.csv, .txt, .xlsx, .ods)."),
     sidecar: Path | None = option("YAML with what a URDF lacks: loops, motors, compliances."),
     output: Path | None = written("Machine file to write. [default: NAME.yaml]"),
@@ -48,21 +50,20 @@ def command(
       [cyan]stiffmap import arm.urdf --tip tool -o tool.yaml[/cyan]
     """
     table = urdf.suffix.lower() in (*TABLES, ".txt")
-    of_table = {"--unit": unit, "--dh-convention": dh_convention != "standard"}
-    for name, given in {"--sidecar": sidecar, "--tip": tip}.items() if table else of_table.items():
-        if given:
-            expected, other = ("URDF", "table") if table else ("table", "URDF")
-            raise FileError(
-                f"{name}: expected a {expected} with this option, found a {other}", file=str(urdf)
-            )
-    found = _of_table(urdf, dh_convention, unit) if table else import_urdf(urdf, sidecar, tip=tip)
-    machine = Machine(found.description)
+    expected, found, others = (
+        ("URDF", "table", "sidecar tip") if table else ("table", "URDF", "unit dh_convention")
+    )
+    for name in set(others.split()) & set(options_given(context)):
+        flag = flags_of(context)[name]
+        raise FileError(f"{flag}: expected a {expected} with this option, found a {found}", file=str(urdf))
+    read = _of_table(urdf, dh_convention, unit) if table else import_urdf(urdf, sidecar, tip=tip)
+    machine = Machine(read.description)
     file = new_file(output or urdf.with_name(f"{machine.name}.yaml"), overwrite)
     machine.save(file)
-    data = {"file": file, "name": machine.name, "legs": machine.legs, "actuators": machine.actuators, "tip": found.tip,
-            "left_out": found.left_out, "rigid": found.rigid}  # fmt: skip
+    data = {"file": file, "name": machine.name, "legs": machine.legs, "actuators": machine.actuators, "tip": read.tip,
+            "left_out": read.left_out, "rigid": read.rigid}  # fmt: skip
     told = [f"wrote {file}: legs {', '.join(machine.legs)}; {len(machine.actuators)} actuators"]
-    show(as_json, data, [*told, *_remarks(found)])
+    show(as_json, data, [*told, *_remarks(read)])
 
 
 def _remarks(found: Imported) -> Iterator[Text]:

@@ -24,6 +24,7 @@ DEGREE = math.pi / 180
 
 UNUSED = {"with link": "at rotation force moment gravity plane quantity tolerance frequency magnify changes start",
           "with html": "port host browser", "with picture": "port host browser"}  # fmt: skip
+PICTURE_ALONE = {"with picture": "port host browser experiment diagnosis path"}
 
 
 def command(
@@ -82,7 +83,7 @@ def command(
 
       [cyan]stiffmap view orthoglide-revised --set x.foot/beam.EIx=4000 --no-browser --port 8090[/cyan]
     """
-    refuse_unused(context, UNUSED)
+    refuse_unused(context, UNUSED | (PICTURE_ALONE if html is None else {}))
     from stiffmap.ui.view.serving import need_viser
 
     need_viser()

@@ -225,7 +225,9 @@ def test_the_package_runs_as_the_command() -> None:
         ("view ur10 --html a.html --port 80", "--port: not with --html"),
         ("diagnose ur10 e --date 2026-01-01", "--date: not without --output"),
         ("experiment new t.csv --machine ur10 --dh-convention modified -o e", "--dh-convention: not without --dh"),
-        ("import a.urdf --dh-convention modified", "--dh-convention: expected a table with this option"),
+        ("import a.urdf --dh-convention standard", "--dh-convention: expected a table with this option"),
+        ("import t.csv --tip tool0", "--tip: expected a URDF with this option, found a table"),
+        ("view ur10 --picture a.png --experiment e", "--experiment: not with --picture"),
         ("experiment new t.csv --machine ur10 --sheet A -o e", "t.csv: no sheet 'A': a text has none"),
     ],
 )  # fmt: skip
