@@ -6,14 +6,13 @@ import hashlib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from pathlib import Path
-from typing import Any
 
 from stiffmap.common.errors import reading
 from stiffmap.common.python_file import code_run
 from stiffmap.common.version import __version__
 
 
-def digest(*parts: Any) -> str:
+def digest(*parts: object) -> str:
     """Of plain data, arrays and dataclasses in any nesting: the same for the same values, another for any other."""
     out = hashlib.sha256()
     for part in parts:
@@ -33,7 +32,7 @@ def code() -> list[str]:
     return [__version__, *code_run()]
 
 
-def named_files(data: Any, folder: Path) -> list[tuple[str, str]]:
+def named_files(data: object, folder: Path) -> list[tuple[str, str]]:
     """Names and digests of the files that plain data names, relative to a folder: link files, meshes, requirements."""
     found = {}
     for word in _words(data):
@@ -46,7 +45,7 @@ def named_files(data: Any, folder: Path) -> list[tuple[str, str]]:
     return sorted(found.items())
 
 
-def _words(data: Any) -> Iterator[str]:
+def _words(data: object) -> Iterator[str]:
     if isinstance(data, str):
         yield data
     elif isinstance(data, Mapping):
@@ -58,7 +57,7 @@ def _words(data: Any) -> Iterator[str]:
             yield from _words(value)
 
 
-def _pieces(value: Any) -> Iterator[bytes]:
+def _pieces(value: object) -> Iterator[bytes]:
     """Bytes that say type and value; what is nested is preceded by its size."""
     import numpy as np
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 
-def plain(value: Any) -> Any:
+def plain(value: object) -> Any:
     """Data that JSON can hold: arrays as lists, paths as text, what is not finite as null."""
     if is_dataclass(value) and not isinstance(value, type):
         return {k: plain(v) for k, v in asdict(value).items()}
@@ -27,7 +27,7 @@ def plain(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def json_text(data: Any) -> str:
+def json_text(data: object) -> str:
     """Data as JSON: keys in the order given, what is not finite as null."""
     return json.dumps(plain(data), indent=2, ensure_ascii=False, allow_nan=False)
 

@@ -248,7 +248,7 @@ def _rams(machine: Machine, path: str | PathLike[str]) -> Iterator[str]:
                 )
 
 
-def _along(value: Any) -> Floats | None:
+def _along(value: object) -> Floats | None:
     """Unit vector of an axis as a file writes it."""
     if isinstance(value, str) and value.strip("-") in tuple(NAMES):
         named: Floats = np.eye(3)[NAMES.index(value[-1])]
@@ -262,12 +262,12 @@ def _along(value: Any) -> Floats | None:
     return unit if size else None
 
 
-def _plain(value: Any) -> float | None:
+def _plain(value: object) -> float | None:
     value = value.get("value") if isinstance(value, dict) else value
     return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else None
 
 
-def _walk(data: Any, key: str) -> Iterator[tuple[str, Any]]:
+def _walk(data: object, key: str) -> Iterator[tuple[str, Any]]:
     """A file's data and everything in it, each with its key."""
     yield key, data
     inside = data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ()
@@ -275,7 +275,7 @@ def _walk(data: Any, key: str) -> Iterator[tuple[str, Any]]:
         yield from _walk(value, f"{key}.{name}".strip("."))
 
 
-def _sequences(data: Any) -> Iterator[tuple[str, list[Any]]]:
+def _sequences(data: object) -> Iterator[tuple[str, list[Any]]]:
     """Lists of mappings, such as those of elements."""
     for key, value in _walk(data, ""):
         if isinstance(value, list) and value and all(isinstance(v, dict) for v in value):

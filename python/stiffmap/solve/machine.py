@@ -231,7 +231,12 @@ class Machine:
         return holding_wrench(self._compiled, position, displacement, rotation, point, gravity, threads)
 
     def with_effect(
-        self, kind: str, *, element: str | None = None, legs: Sequence[str] | None = None, **parameters: Any
+        self,
+        kind: str,
+        *,
+        element: str | None = None,
+        legs: Sequence[str] | None = None,
+        **parameters: object,
     ) -> Machine:
         """A new machine with an effect added; see `stiffmap.model.effects`."""
         return Machine(
@@ -289,9 +294,9 @@ class Machine:
         frequency: float | None = None,
         start: ArrayLike | None = None,
         changes: Mapping[str, float] | None = None,
-        experiment: Any = None,
-        diagnosis: Any = None,
-        path: Any = None,
+        experiment: object = None,
+        diagnosis: object = None,
+        path: object = None,
         meshes: str | PathLike[str] | None = None,
     ) -> Any:
         """Look at the machine and its map live in a browser; the view that is open is returned (``close()`` ends it).

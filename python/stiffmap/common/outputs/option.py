@@ -11,7 +11,7 @@ from stiffmap.common.outputs.alone import reserved
 from stiffmap.common.outputs.keeping import check_replaceable
 
 
-def written(help: str, default: Any = None, *names: str) -> Any:
+def written(help: str, default: object = None, *names: str) -> Any:
     """Option for a file or folder that a command writes: no other job writes there while the command runs.
 
     `default` and `names` as of ``typer.Option``; ``-o, --output`` where there are no names.

@@ -16,7 +16,7 @@ RUN = re.compile(r"'*[=+\-@\t\r]")
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 
 
-def guarded(cell: Any) -> Any:
+def guarded(cell: object) -> Any:
     """Text that a spreadsheet would run as a formula, with a ``'`` before it; numbers and other text as they are."""
     if isinstance(cell, str) and RUN.match(cell) and not NUMBER.fullmatch(cell):
         return f"'{cell}"

@@ -149,7 +149,7 @@ def stability_lobes(
     return ds
 
 
-def flange(machine: Any, rotation: ArrayLike | None) -> Floats:
+def flange(machine: object, rotation: ArrayLike | None) -> Floats:
     """(3,) from a tool's tip to its holder, base axes, the tool along z of the machine's tool frame: z points out of an arm's flange,
     and up, to the spindle, where at home it points up."""
     if not isinstance(machine, Machine):
@@ -220,7 +220,7 @@ def multipliers_at(
     depth: Floats,
     intervals: int | None,
     threads: int | None,
-    scheduler: Any = None,
+    scheduler: object = None,
 ) -> Floats:
     """(speeds, depths) multipliers; parts of a tooth period: `intervals`, or as many as the fastest mode needs, 40, 80, 160 or 320."""
     waves = modes.frequency.max() * 2 * pi / (p.tool.teeth * speed)

@@ -101,7 +101,7 @@ def frequencies_of(own: Floats) -> Floats:
     return np.unique(np.concatenate([close.ravel(), np.geomspace(low, high, 4 * AROUND)]))
 
 
-def least_depth(frequency: Floats, response: Response, process: Any) -> float:
+def least_depth(frequency: Floats, response: Response, process: GivenProcess) -> float:
     """m: least limit of a receptance over all frequencies, first of some (Hz), then ever closer to the least; infinite: none."""
     least = np.inf
     for _ in range(ZOOMS):

@@ -71,7 +71,7 @@ def choices(
     reverse: bool = False,
     entry: float | Literal["best"] | None = None,
     redundancy: int | None = None,
-    scheduler: Any = None,
+    scheduler: object = None,
     progress: Callable[[int], None] | None = None,
     step: float,
     thickness: float | None,

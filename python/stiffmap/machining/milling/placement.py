@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy.optimize import minimize
@@ -82,7 +81,7 @@ def placements(
     count: int = 1000,
     points: int = 500,
     threads: int | None = None,
-    scheduler: Any = None,
+    scheduler: object = None,
 ) -> Placements:
     """Search for the placement with the smallest largest error across the wall, before compensation.
 

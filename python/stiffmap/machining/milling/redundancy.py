@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,7 +51,7 @@ def redundancy(
     *,
     fastest: float | None = FASTEST,
     threads: int | None = None,
-    scheduler: Any = None,
+    scheduler: object = None,
 ) -> Redundancy:
     """Turns (m,) rad that make the largest error smallest, and of these the smallest sum of squares.
 

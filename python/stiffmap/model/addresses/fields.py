@@ -74,7 +74,7 @@ def field_of(element: Element, key: str) -> Field | None:
     return fields(element).get(key)
 
 
-def declared(holder: Any, angular: bool = False) -> Fields:
+def declared(holder: object, angular: bool = False) -> Fields:
     """The numbers that a dataclass declares and has."""
     out: Fields = {}
     for n in numbers_of(holder):

@@ -19,7 +19,7 @@ def add_effect(
     *,
     element: str | None = None,
     legs: Sequence[str] | None = None,
-    **parameters: Any,
+    **parameters: object,
 ) -> MachineDescription:
     """The machine with one more effect; the order in which effects are added does not matter.
 

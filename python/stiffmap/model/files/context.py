@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, NoReturn, TypeVar
+from typing import NoReturn, TypeVar
 
 from stiffmap.common.errors import FileError, together
 from stiffmap.common.number_text import LARGEST, SMALLEST
@@ -71,7 +71,7 @@ class Context:
         """Raise an error at this place."""
         raise self.error(message)
 
-    def attempt(self, build: Callable[..., T], *given: Any) -> T | None:
+    def attempt(self, build: Callable[..., T], *given: object) -> T | None:
         """What ``build`` makes of what is given; None where it fails, its problem kept for the end."""
         try:
             return build(*given)

@@ -127,7 +127,7 @@ def _drive(joint: Joint) -> Plain:
     return plain
 
 
-def dump_numbers(holder: Any) -> Plain:
+def dump_numbers(holder: object) -> Plain:
     """The numbers that a dataclass declares and has, under the keys of a file."""
     plain: Plain = {}
     for n in numbers_of(holder):
@@ -172,7 +172,7 @@ def _stroke(spring: Spring) -> Plain:
     return {}
 
 
-def dump_matrix(rows: Any) -> Any:
+def dump_matrix(rows: object) -> Any:
     """Diagonal, entries of the upper triangle, or all rows where the triangles differ by rounding."""
     matrix = np.array(rows, dtype=float)
     if np.any(matrix != matrix.T):

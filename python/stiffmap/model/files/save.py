@@ -154,5 +154,5 @@ def _different_homes(elements: Elements, template: Elements) -> Plain:
     }
 
 
-def _lists(value: Any) -> Any:
+def _lists(value: object) -> Any:
     return [_lists(v) for v in value] if isinstance(value, (tuple, list)) else value

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal, NamedTuple
+from collections.abc import Callable
+from typing import Literal, NamedTuple
 
 import numpy as np
 from scipy.sparse import csc_matrix, csr_matrix, kron
@@ -70,7 +71,7 @@ def solve_skfem(mesh: SolidMesh, material: Material, setup: Setup, wrenches: Flo
     return _field(_held(K, held, f), mesh)
 
 
-def _held(K: Any, held: Ints, f: Floats) -> Floats:
+def _held(K: csc_matrix, held: Ints, f: Floats) -> Floats:
     """(3 n, cases) m under the forces f, with these degrees of freedom at zero."""
     free = np.setdiff1d(np.arange(len(f)), held)
     u = np.zeros_like(f)
@@ -78,7 +79,7 @@ def _held(K: Any, held: Ints, f: Floats) -> Floats:
     return u
 
 
-def stiffness_matrix(mesh: SolidMesh, material: Material) -> Any:
+def stiffness_matrix(mesh: SolidMesh, material: Material) -> csc_matrix:
     """Sparse (3 n, 3 n) stiffness in N/m, node-major; four-point rule, as CalculiX's C3D10."""
     skfem = need("skfem")
     elasticity = need("skfem.models.elasticity")
@@ -92,7 +93,7 @@ def stiffness_matrix(mesh: SolidMesh, material: Material) -> Any:
     return theirs.tocsr()[order][:, order].tocsc()
 
 
-def _solve_soft(mesh: SolidMesh, K: Any, setup: Setup, f: Floats) -> Floats:
+def _solve_soft(mesh: SolidMesh, K: csc_matrix, setup: Setup, f: Floats) -> Floats:
     """Reaction linear over the fixed face; its mean motion is then taken out of the field."""
     centre = mesh.nodes[mesh.face_nodes(setup.fixed)].mean(axis=0)
     modes = design_matrix(mesh.nodes, centre).reshape(-1, 6)
@@ -102,7 +103,7 @@ def _solve_soft(mesh: SolidMesh, K: Any, setup: Setup, f: Floats) -> Floats:
     return _less_mean_motion(mesh, setup.fixed, centre, _field(u, mesh))
 
 
-def _solve_bed(mesh: SolidMesh, K: Any, material: Material, setup: Setup, f: Floats) -> Floats:
+def _solve_bed(mesh: SolidMesh, K: csc_matrix, material: Material, setup: Setup, f: Floats) -> Floats:
     """Springs of E/sqrt(area) under the fixed face, about those of a neighbour of the same material."""
     face = mesh.face(setup.fixed)
     area, centre = face_area_centre(mesh.nodes, face)
@@ -128,7 +129,7 @@ def _three_two_one(mesh: SolidMesh) -> Ints:
     return np.array([3 * a, 3 * a + 1, 3 * a + 2, *first, 3 * c + last])
 
 
-def _rigid_head(mesh: SolidMesh, setup: Setup, free: Ints) -> Any:
+def _rigid_head(mesh: SolidMesh, setup: Setup, free: Ints) -> csr_matrix:
     """Sparse map from the free degrees of freedom and the twist of the reference point to all."""
     head = mesh.face_nodes(setup.loaded)
     inner = np.setdiff1d(free, _dofs(head))
@@ -139,7 +140,7 @@ def _rigid_head(mesh: SolidMesh, setup: Setup, free: Ints) -> Any:
     return csr_matrix((values, (rows, columns)), shape=(3 * len(mesh.nodes), len(inner) + 6))
 
 
-def _factorised(K: Any) -> Any:
+def _factorised(K: csc_matrix) -> Callable[[Floats], Floats]:
     K = csc_matrix(K)
     try:
         lu = splu(K, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})

@@ -112,7 +112,7 @@ class CompiledMachine:
             raise StiffmapError(f"gravity: expected 3 finite numbers (m/s², base axes), got {given!r}")
         return g
 
-    def solve_one(self, position: Any, wrench: Any) -> _core.OneAnswer | None:
+    def solve_one(self, position: object, wrench: object) -> _core.OneAnswer | None:
         """One pose under one wrench at the tcp by the kernels; None for inputs that are not plain numbers."""
         return self._one.solve(position, wrench)
 

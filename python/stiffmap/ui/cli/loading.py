@@ -25,7 +25,7 @@ def load(command: Command) -> Callable[..., Any]:
         function: Callable[..., Any] = getattr(import_module(command.module), command.function)
 
     @wraps(function)
-    def called(*args: Any, **options: Any) -> None:
+    def called(*args: object, **options: object) -> None:
         with _all_installed(command):
             import_all()
         function(*args, **options)
@@ -55,10 +55,10 @@ class _Waits:
     def __getattr__(self, name: str) -> Any:
         return getattr(imported(self), name)
 
-    def __call__(self, *args: Any, **options: Any) -> Any:
+    def __call__(self, *args: object, **options: object) -> Any:
         return imported(self)(*args, **options)
 
-    def __getitem__(self, key: Any) -> Any:
+    def __getitem__(self, key: object) -> Any:
         return imported(self)[key]
 
     def __iter__(self) -> Iterator[Any]:

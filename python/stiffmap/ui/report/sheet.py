@@ -10,7 +10,6 @@ from functools import cache
 from io import BytesIO
 from os import PathLike
 from pathlib import Path
-from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from matplotlib.figure import Figure
@@ -55,7 +54,7 @@ def _environment() -> Environment:
     )
 
 
-def render(template: str, /, **values: Any) -> str:
+def render(template: str, /, **values: object) -> str:
     """A template filled in; values are escaped."""
     return _environment().get_template(template).render(**values)
 

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError, needed
@@ -25,7 +24,7 @@ class Meshes:
     MissingPartError without the extra ``[view]``.
     """
 
-    def __init__(self, api: Any, machine: Machine, urdf: Path) -> None:
+    def __init__(self, api: object, machine: Machine, urdf: Path) -> None:
         with needed("drawing meshes of a URDF", "view"):
             import yourdfpy
             from viser.extras import ViserUrdf

@@ -117,16 +117,16 @@ class View:
 
 def open_view(
     machine: Machine,
-    position: Any = None,
+    position: object = None,
     *,
     port: int | None = None,
     browser: bool = True,
     file: str | PathLike[str] | None = None,
-    experiment: Any = None,
-    diagnosis: Any = None,
-    path: Any = None,
+    experiment: object = None,
+    diagnosis: object = None,
+    path: object = None,
     meshes: str | PathLike[str] | None = None,
-    **state: Any,
+    **state: object,
 ) -> View:
     """See `Machine.view`."""
     data = data_of(machine, experiment, diagnosis, path)
@@ -166,10 +166,10 @@ def data_of(machine: Machine, experiment: Any = None, diagnosis: Any = None, pat
 
 def model_of(
     machine: Machine,
-    position: Any = None,
+    position: object = None,
     file: str | PathLike[str] | None = None,
     meshes: str | PathLike[str] | None = None,
-    **state: Any,
+    **state: object,
 ) -> ViewModel:
     """A model in a state given by keywords; StiffmapError for bad ones."""
     model = ViewModel(
@@ -183,7 +183,7 @@ def model_of(
     return ViewModel(machine, from_plain(as_plain(model.state) | given), file=model.file, meshes=model.meshes)
 
 
-def _listed(value: Any) -> Any:
+def _listed(value: object) -> Any:
     return value.tolist() if hasattr(value, "tolist") else list(value) if isinstance(value, tuple) else value
 
 

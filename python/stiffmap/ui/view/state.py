@@ -73,7 +73,7 @@ def as_plain(state: ViewState) -> dict[str, Any]:
     return {k: v for k, v in plain.items() if k == "position" or v != getattr(default, k)}
 
 
-def from_plain(data: Any) -> ViewState:
+def from_plain(data: object) -> ViewState:
     """The state that JSON data say; StiffmapError naming the key for anything else."""
     if not isinstance(data, Mapping):
         raise StiffmapError(f"view: expected a mapping of the state, got {type(data).__name__}")
@@ -129,7 +129,7 @@ def _value(name: str, value: Any) -> Any:
     return tuple(_number(name, v) for v in value)
 
 
-def _number(name: str, value: Any) -> float:
+def _number(name: str, value: object) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < math.inf:
         raise StiffmapError(f"{name}: expected finite numbers, got {value!r}")
     return float(bounded(value))

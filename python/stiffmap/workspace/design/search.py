@@ -164,7 +164,7 @@ def optimize(
     generations: int | None = None,
     processes: int | None = None,
     progress: Progress | None = None,
-    scheduler: Any = None,
+    scheduler: object = None,
 ) -> ParetoSet:
     """Pareto set of a design problem; the same for the same seed, on any number of processes or machines.
 

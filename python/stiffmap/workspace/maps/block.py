@@ -219,7 +219,7 @@ class Work:
             yield from cluster.as_done((rows.start, rows.stop) for rows in parts)
 
 
-def work_of(chunk: int | None, scheduler: Any) -> Work:
+def work_of(chunk: int | None, scheduler: object) -> Work:
     """By the arguments `chunk` and `scheduler` of `stiffmap.error_map`."""
     return Work(POSES_AT_ONCE if chunk is None else whole_number(chunk, "chunk", 1), scheduler)
 

@@ -70,7 +70,7 @@ def _flat(attrs: Mapping[str, Any]) -> dict[str, Any]:
     return {k: v for k, v in {**plain, **call}.items() if k not in LEFT_OUT}
 
 
-def _both(old: Any, new: Any) -> str:
+def _both(old: object, new: object) -> str:
     if isinstance(old, list) and isinstance(new, list) and old and new and not isinstance(old[0], list):
         return f"was {len(old)} numbers from {old[0]} to {old[-1]}, is {len(new)} from {new[0]} to {new[-1]}"
     texts = [json.dumps(v, ensure_ascii=False) for v in (old, new)]

@@ -245,7 +245,7 @@ def critical_variables(
     return over, {"coordinate": ("coordinate", np.array(names))}
 
 
-def _joint(names: list[str], roles: Any, sizes: Floats) -> str:
+def _joint(names: list[str], roles: object, sizes: Floats) -> str:
     """Joint, drive or spring coordinate that moves most; joints go before springs."""
     joints = np.where(roles != Role.SPRING, sizes, 0.0)
     pick = joints if joints.max(initial=0.0) > 0.1 * sizes.max() else sizes

@@ -124,7 +124,7 @@ def measures(
     clearance: float | None = None,
     deflection: float | None = None,
     threads: int | None = None,
-    scheduler: Any = None,
+    scheduler: object = None,
 ) -> MeasuresTable:
     """Table of all measures of §3: worst and best pose, requirement, margin, pass or fail.
 

@@ -197,7 +197,7 @@ def one_of(model: FileModel, keys: tuple[str, ...], *, required: bool = False) -
         raise ValueError(f"give {how} of {', '.join(keys)}; found {', '.join(given) or 'none'}")
 
 
-def sort_of(data: Any) -> str | None:
+def sort_of(data: object) -> str | None:
     """Sort of an element, as plain data or read; None where it has no key that says it, or several."""
     found = [k for k in SORTS if (k in data if isinstance(data, dict) else hasattr(data, k))]
     return found[0] if len(found) == 1 else None

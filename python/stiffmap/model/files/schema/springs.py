@@ -27,7 +27,7 @@ class Matrix(FileModel):
     entries: dict[Literal[ENTRIES], Number] | None = None  # type: ignore[valid-type]
 
     @classmethod
-    def as_mapping(cls, data: Any) -> Any:
+    def as_mapping(cls, data: object) -> Any:
         """Rows, diagonal or entries under their key."""
         if isinstance(data, list):
             nested = bool(data) and isinstance(data[0], list)

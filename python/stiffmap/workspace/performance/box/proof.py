@@ -7,7 +7,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import product
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,7 +50,7 @@ def judge_cells(bounds: Bounds) -> Judge:
 
 
 @contextmanager
-def judge_on(bounds: Bounds, scheduler: Any = None) -> Iterator[Judge]:
+def judge_on(bounds: Bounds, scheduler: object = None) -> Iterator[Judge]:
     """The judge of cells; on a cluster the same cells get the same answer. Nodes are judged here: they begin at each other."""
     if scheduler is None or bounds.unproven:
         yield judge_cells(bounds)
