@@ -113,15 +113,15 @@ def test_readings_are_the_same_in_every_spelling(text: str, tmp_path: Path) -> N
     file = tmp_path / "data.csv"
     file.write_text(text, encoding="utf-8")
     table = read_table(file)
-    np.testing.assert_array_equal(table.numbers("x"), [50.5, -1.25])
-    np.testing.assert_array_equal(table.numbers("dx", blank=True), [1.0, np.nan])
+    np.testing.assert_array_equal(table.si("x"), [50.5, -1.25])
+    np.testing.assert_array_equal(table.si("dx", blank=True), [1.0, np.nan])
 
 
 def test_a_thousand_in_quotes_is_no_decimal_comma(tmp_path: Path) -> None:
     file = tmp_path / "data.csv"
     file.write_text('id,x,dx\n1,"1,000",1\n', encoding="utf-8")
     with pytest.raises(FileError, match="line 2: column 'x': expected a number; found '1,000'"):
-        read_table(file).numbers("x")
+        read_table(file).si("x")
 
 
 ROWS = "x [mm],fx [N],dx [um]\n0,100,40\n1,200,80\n"

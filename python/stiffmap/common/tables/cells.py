@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from array import array
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from itertools import chain, islice
 
 import numpy as np
@@ -26,8 +27,7 @@ class Cells:
     @staticmethod
     def of(cells: Iterable[str]) -> Cells:
         """A column of its cells."""
-        (out,) = packed(((c,) for c in cells), 1)
-        return out
+        return packed(enumerate((c,) for c in cells), 1)[0][0]
 
     def __len__(self) -> int:
         return self._count
@@ -44,54 +44,33 @@ class Cells:
         out = np.empty(self._count)
         start = 0
         for block, cells in zip(self.blocks, self.parts(), strict=True):
-            stop = start + len(cells)
-            out[start:stop] = self._block(block, cells, one, start)
-            start = stop
-        return out
-
-    @staticmethod
-    def _block(block: str, cells: list[str], one: Callable[[str, int], float], start: int) -> Floats:
-        if "_" in block or not block.isascii():
-            return np.array([one(c, start + i) for i, c in enumerate(cells)])
-        try:
-            filled = "" not in cells
-            out = np.array(
-                list(map(float, cells)) if filled else [float(c) if c else math.nan for c in cells]
-            )
-        except ValueError:
-            return np.array([one(c, start + i) for i, c in enumerate(cells)])
-        out[np.abs(out) < SMALLEST] = 0.0
-        for i in np.flatnonzero(~(np.abs(out) <= LARGEST)):
-            out[i] = one(cells[i], start + int(i))
+            values = out[start : start + len(cells)]
+            values[:] = math.nan
+            if block.isascii() and "_" not in block:
+                with suppress(ValueError):
+                    values[:] = [float(c or "nan") for c in cells]
+            values[np.abs(values) < SMALLEST] = 0.0
+            for i in np.flatnonzero(~(np.abs(values) <= LARGEST)):
+                values[i] = one(cells[i], start + int(i))
+            start += len(cells)
         return out
 
 
-def packed(rows: Iterable[Sequence[str]], width: int) -> tuple[Cells, ...]:
-    """Columns of rows of `width` cells each."""
-    out = tuple(Cells() for _ in range(width))
+def packed(rows: Iterable[tuple[int, Sequence[str]]], width: int) -> tuple[tuple[Cells, ...], array[int]]:
+    """Columns of rows of `width` cells each, and the numbers of their lines, which take eight bytes each."""
+    out, lines = tuple(Cells() for _ in range(width)), array("q")
     source = iter(rows)
     while block := list(islice(source, BLOCK)):
-        for column, cells in zip(out, zip(*block, strict=True), strict=True):
+        lines.extend(n for n, _ in block)
+        for column, cells in zip(out, zip(*(c for _, c in block), strict=True), strict=True):
             text = BETWEEN.join(map(str.strip, cells))
             if text.count(BETWEEN) != len(block) - 1:
                 text = BETWEEN.join(c.replace(BETWEEN, " ").strip() for c in cells)
             column.blocks.append(text)
             column._count += len(block)
-    return out
+    return out, lines
 
 
 def filled(row: Sequence[str]) -> bool:
     """Whether anything stands in a row."""
     return bool(row) and (bool(row[0].strip()) or any(c.strip() for c in row))
-
-
-def row_numbers() -> array[int]:
-    """An empty list of line numbers that takes eight bytes each."""
-    return array("q")
-
-
-def numbered(rows: Iterable[tuple[int, Sequence[str]]], numbers: array[int]) -> Iterator[Sequence[str]]:
-    """Cells of rows; `numbers` gathers those of their lines."""
-    for n, cells in rows:
-        numbers.append(n)
-        yield cells

@@ -52,16 +52,6 @@ NOTHING = {
 DASHES = re.compile(r"[-–—_.· ]+")
 
 
-class Source(NamedTuple):
-    """Where lines come from."""
-
-    page: str
-    """Of a workbook; empty for a text."""
-    lines: Lines
-    separator: str
-    """Empty for a workbook."""
-
-
 class Spelling(NamedTuple):
     """How a table writes numbers."""
 
@@ -71,13 +61,13 @@ class Spelling(NamedTuple):
     """A unit may follow in the cell, as in ``12.5 µm``."""
 
 
-def lines_of(path: Path, sheet: str | None = None) -> Source:
-    """Lines of a text, or of a workbook's first or named sheet.
+def lines_of(path: Path, sheet: str | None = None) -> tuple[str, Lines, str]:
+    """A workbook's first or named sheet: its name, its lines, nothing. A text: nothing, its lines, what separates its cells.
 
     Text: cells are separated by ; tab | , or blanks; UTF-8, UTF-16 and Latin-1 are read. Raises FileError.
     """
     if path.suffix.lower() in WORKBOOKS:
-        return Source(*workbook_lines(path, sheet), "")
+        return *workbook_lines(path, sheet), ""
     if sheet:
         raise FileError(f"no sheet '{sheet}': a text has none", file=str(path))
     return _text(path)
@@ -211,7 +201,7 @@ def is_data(cells: list[str], spelling: Spelling) -> bool:
     return numeric >= 2 and 2 * numeric >= sum(bool(c.strip()) for c in cells)
 
 
-def _text(path: Path) -> Source:
+def _text(path: Path) -> tuple[str, Lines, str]:
     text = text_of(path)
     lines_ = (line for line in io.StringIO(text) if line.strip() and not line.strip().startswith(COMMENTS))
     sample = list(islice(lines_, SAMPLE))
@@ -228,7 +218,7 @@ def _text(path: Path) -> Source:
         except csv.Error as error:
             raise FileError(f"is no table: {error}", file=str(path), line=reader.line_num) from error
 
-    return Source("", lines, best)
+    return "", lines, best
 
 
 def _numbers_between(separator: str, lines: Sequence[str]) -> tuple[int, int]:

@@ -20,7 +20,8 @@ from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.tables.header import split_unit
 from stiffmap.common.tables.lines import Spelling, finite_number, number
 from stiffmap.common.tables.meaning import meaning_of
-from stiffmap.common.tables.sheet import Layout, Sheet, read_sheet
+from stiffmap.common.tables.sheet import Layout, read_sheet
+from stiffmap.common.tables.table import Table
 from stiffmap.common.units import QUANTITIES, unit_of
 from stiffmap.common.value_units import read_value
 
@@ -68,6 +69,9 @@ class NamedTable:
     values: dict[str, Any]
     """Name -> numbers (n,), or words."""
 
+    def __len__(self) -> int:
+        return len(self.lines)
+
     def fail(self, message: str, name: str = "", row: int | None = None) -> NoReturn:
         """Raise FileError at a column and, where one is given, a row."""
         line = self.first or None if row is None else self.lines[row]
@@ -75,15 +79,14 @@ class NamedTable:
 
     def block(self, names: Sequence[str], missing: float = 0.0) -> Floats:
         """(n, names); `missing` where there is no column."""
-        return np.stack([self.values.get(c, np.full(len(self.lines), missing)) for c in names], axis=1)
+        return np.stack([self.values.get(c, np.full(len(self), missing)) for c in names], axis=1)
 
-    def check(self, name: str, good: Any, expected: str) -> None:
-        """FileError at the first row where a condition (n,) does not hold and a number is there."""
-        value = np.asarray(self.values[name])
-        wrong = np.flatnonzero(~np.asarray(good) & ~np.isnan(value))
+    def check(self, name: str, good: Callable[[Floats], Any], expected: str) -> None:
+        """FileError at the first row whose number, in the unit of the table, is not good; where there is none, it is."""
+        value = np.asarray(self.values.get(name, ())) / self.size.get(name, 1.0)
+        wrong = np.flatnonzero(~np.asarray(good(value)) & ~np.isnan(value))
         if wrong.size:
-            found = float(value[wrong[0]] / self.size.get(name, 1.0))
-            self.fail(f"expected {expected}, found {found:.12g}", name, int(wrong[0]))
+            self.fail(f"expected {expected}, found {value[wrong[0]]:.12g}", name, int(wrong[0]))
 
 
 def read_named(path: Path, known: Known, sheet: str | None = None) -> NamedTable:
@@ -91,7 +94,7 @@ def read_named(path: Path, known: Known, sheet: str | None = None) -> NamedTable
     return named(read_sheet(path, sheet, Layout(known.has, strict=True)), known)
 
 
-def named(sheet: Sheet, known: Known) -> NamedTable:
+def named(sheet: Table, known: Known) -> NamedTable:
     """Columns of a sheet by their known names; raises FileError."""
     out = NamedTable(sheet.file, list(sheet.lines), sheet.top, {}, {}, {}, {})
     for i, head in enumerate(sheet.header):
@@ -108,7 +111,7 @@ def named(sheet: Sheet, known: Known) -> NamedTable:
     return out
 
 
-def _numbers(sheet: Sheet, column: int, name: str, table: NamedTable, blank: bool) -> Floats:
+def _numbers(sheet: Table, column: int, name: str, table: NamedTable, blank: bool) -> Floats:
     def one(cell: str, row: int) -> float:
         value = number(cell, Spelling())
         if value is None or (value != value and not blank):
@@ -119,12 +122,7 @@ def _numbers(sheet: Sheet, column: int, name: str, table: NamedTable, blank: boo
                 table.fail(f"expected {expected}, found {found}", name, row)
         return value
 
-    cells = sheet.with_points(column)
-    out = cells.numbers(one)
-    if not blank and np.isnan(out).any():
-        row = int(np.argmax(np.isnan(out)))
-        one(list(cells)[row], row)
-    return out
+    return sheet.with_points(column).numbers(one)
 
 
 def _joined(name: str) -> str:

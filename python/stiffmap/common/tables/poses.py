@@ -28,9 +28,6 @@ KNOWN = Known(COLUMNS, {n: f"{n} [{USUAL.get(si, si)}]" for n, si in COLUMNS.ite
 class PoseTable(NamedTable):
     """Columns (n,) in SI by name, and the line of each row in the file."""
 
-    def __len__(self) -> int:
-        return len(self.lines)
-
     @property
     def position(self) -> Floats:
         """(n, 3) m."""

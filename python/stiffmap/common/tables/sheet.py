@@ -3,18 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
-from functools import cached_property
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import ArrayLike
-
-from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError
-from stiffmap.common.tables.cells import Cells, filled, numbered, packed, row_numbers
+from stiffmap.common.tables.cells import Cells, filled, packed
 from stiffmap.common.tables.header import (
     Line,
     fits,
@@ -36,8 +31,8 @@ from stiffmap.common.tables.lines import (
     lines_of,
     number,
     parted,
-    with_points,
 )
+from stiffmap.common.tables.table import Table
 from stiffmap.common.units import unit_of
 
 STATISTICS = re.compile(
@@ -49,84 +44,6 @@ STATISTICS = re.compile(
 )
 """First cell of a row that is no reading but what a spreadsheet computed of them."""
 LONGEST_HEADER, MOST_COLUMNS = 300, 1000
-
-
-@dataclass(frozen=True)
-class Sheet:
-    """Header and rows of a table; cells are text, numbers with a decimal point."""
-
-    file: str
-    header: tuple[str, ...]
-    columns: tuple[Cells, ...]
-    lines: Sequence[int]
-    """Line of each row in the file, from 1."""
-    decimal_comma: bool
-    record: tuple[tuple[str, str], ...] = ()
-    """Operator, instrument and the like, from the lines above the table."""
-    aside: tuple[str, ...] = ()
-    """What was left out: rows of means, remarks below the table."""
-    top: int = 0
-    """Line of the names, from 1; 0: in no file."""
-    _read: dict[int, Floats] = field(default_factory=dict, init=False, repr=False, compare=False)
-
-    @property
-    def rows(self) -> Iterator[tuple[str, ...]]:
-        """The rows, one by one."""
-        return zip(*self.columns, strict=True)
-
-    @cached_property
-    def names(self) -> tuple[str, ...]:
-        """The header without units."""
-        return tuple(split_unit(h)[0] for h in self.header)
-
-    def unit(self, column: int) -> str:
-        """The unit that stands in a column's header, or nothing."""
-        return split_unit(self.header[column])[1]
-
-    def find(self, pattern: str, besides: Collection[int] = ()) -> int | None:
-        """The first column, `besides` some, whose name, without its unit, is all of a regular expression in any case."""
-        at = (i for i, n in enumerate(self.names) if re.fullmatch(pattern, n, re.IGNORECASE))
-        return next((i for i in at if i not in besides), None)
-
-    def with_cells(self, name: str, cells: Iterable[str]) -> Sheet:
-        """The sheet and one column more."""
-        return replace(self, header=(*self.header, name), columns=(*self.columns, Cells.of(cells)))
-
-    def with_column(self, name: str, values: ArrayLike) -> Sheet:
-        """The sheet and one column of numbers (rows,) more, empty where they are NaN."""
-        cells = ["" if v != v else repr(v) for v in np.asarray(values, dtype=float).tolist()]
-        return self.with_cells(name, (c.replace(".", ",") for c in cells) if self.decimal_comma else cells)
-
-    def with_points(self, column: int) -> Cells:
-        """A column of numbers as text, with decimal points."""
-        return with_points(self.columns[column]) if self.decimal_comma else self.columns[column]
-
-    def numbers(self, column: int) -> Floats:
-        """A column; NaN where nothing was read. FileError names the line of what is no number."""
-        if column not in self._read:
-            self._read[column] = self.with_points(column).numbers(
-                lambda cell, row: self._number(cell, column, self.lines[row])
-            )
-        return self._read[column]
-
-    def _number(self, cell: str, column: int, line: int) -> float:
-        value = number(cell, Spelling())
-        if value is None:
-            raise FileError(
-                f"column '{self.header[column]}': expected a number; found {cell!r} "
-                f"(cell {column_letter(column)}{line})",
-                file=self.file,
-                line=line,
-            )
-        return value
-
-    def is_numeric(self, column: int) -> bool:
-        """Whether all cells of a column are numbers or say that nothing was read."""
-        try:
-            self.numbers(column)
-        except FileError:
-            return False
-        return True
 
 
 @dataclass(frozen=True)
@@ -150,7 +67,7 @@ class Layout:
 PLAIN = Layout()
 
 
-def read_sheet(path: Path, sheet: str | None = None, layout: Layout = PLAIN) -> Sheet:
+def read_sheet(path: Path, sheet: str | None = None, layout: Layout = PLAIN) -> Table:
     """Cells of an Excel workbook (its first sheet, or the named one) or of a text table.
 
     Text: separators ; tab | , blanks and decimal points or commas are found out, UTF-8, UTF-16 and Latin-1 are read.
@@ -188,16 +105,17 @@ def read_sheet(path: Path, sheet: str | None = None, layout: Layout = PLAIN) -> 
         refuse_twice(names, str(path), number_)
     width = len(names)
     said = [*header, *(c.strip() for _, cells in above for c in cells)]
-    lines_, aside = row_numbers(), list[str]()
+    aside = list[str]()
     data = _data(chain([first], kept(rows)), header, said, spelling, aside, layout, str(path))
     data = even(data, width, str(path), separator, None if layout.strict else aside)
-    columns = list(packed(numbered(data, lines_), width))
+    cells_of, lines_ = packed(data, width)
+    columns = list(cells_of)
     file = f"{path}, sheet '{page}'" if page else str(path)
     if aside and layout.strict:
         raise FileError(f"expected rows of numbers alone below the header; {aside[0]}", file=file)
     for i in range(width):
         names[i], columns[i] = _united(names[i], columns[i], file, lines_)
-    return Sheet(file, tuple(names), tuple(columns), lines_, comma, record_of(above), tuple(aside), number_)
+    return Table(file, tuple(names), tuple(columns), lines_, number_, comma, record_of(above), tuple(aside))
 
 
 def _united(name: str, cells: Cells, file: str, lines: Sequence[int]) -> tuple[str, Cells]:
@@ -322,9 +240,3 @@ def _data(
             aside.append(f"row {n} {'repeats the header' if again else f'is a remark: {first[:40]}'}")
         else:
             yield n, cells
-
-
-def column_letter(index: int) -> str:
-    """``A`` for 0, ``AB`` for 27, as spreadsheets name columns."""
-    before, last = divmod(index, 26)
-    return (column_letter(before - 1) if before else "") + chr(65 + last)

@@ -13,6 +13,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from stiffmap.common.errors import FileError
+from stiffmap.common.tables.table import Table
 from stiffmap.experiment.channels import Channel
 from stiffmap.experiment.experiment import BRANCHES, Floats, Integers, Mask
 from stiffmap.experiment.files.fields import (
@@ -30,7 +31,6 @@ from stiffmap.experiment.files.fields import (
     VECTOR,
 )
 from stiffmap.experiment.files.schema import ExperimentFile, NoiseModel, OrientationModel
-from stiffmap.experiment.files.table import Table
 from stiffmap.experiment.files.units import Units
 from stiffmap.experiment.readings import kind_of
 
@@ -239,7 +239,7 @@ def whole(table: Table, column: str) -> Integers | None:
     """Whole numbers."""
     if column not in table:
         return None
-    values = table.numbers(column)
+    values = table.si(column)
     good = (values == np.round(values)) & (np.abs(values) <= 2**53)
     table.check(good, lambda _: f"column '{column}': expected whole numbers")
     return values.astype(np.intp)

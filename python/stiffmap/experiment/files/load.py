@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from stiffmap.common.errors import FileError, MissingColumnError
+from stiffmap.common.tables.table import Table
 from stiffmap.common.units import name_and_unit
 from stiffmap.common.yaml_text import read as read_yaml
 from stiffmap.experiment.channels import AXIS_CHANNELS, Channel
@@ -17,7 +18,7 @@ from stiffmap.experiment.experiment import ASKED, AXES, WRENCH, Experiment, Floa
 from stiffmap.experiment.files import columns as read_columns
 from stiffmap.experiment.files.fields import POSE, SEEN, SEEN_QUATERNION, SEEN_TURNED, absolute, known, read
 from stiffmap.experiment.files.schema import ExperimentFile, file_model
-from stiffmap.experiment.files.table import Table, read_table
+from stiffmap.experiment.files.table import read_table
 from stiffmap.experiment.files.units import ANGLES, Units
 from stiffmap.experiment.readings import kinds
 from stiffmap.model.files.report import validated
@@ -99,7 +100,7 @@ def _readings(
     reading = table.block([c.name for c in channels], blank=True)
     seen, seen_rotation = read_columns.seen(table), read_columns.seen_rotation(model, table)
     of_kinds = {
-        k.name: table.numbers(k.absolute, blank=True) for k in kinds() if k.absolute and k.absolute in table
+        k.name: table.si(k.absolute, blank=True) for k in kinds() if k.absolute and k.absolute in table
     }
     _above_zero(table, of_kinds)
     _promise(reading, channels, table, seen, seen_rotation, of_kinds)
@@ -135,7 +136,7 @@ def rows_of(model: ExperimentFile, table: Table) -> dict[str, Any]:
         "other_command": read_columns.command(model, table, "2"),
         "approach": read_columns.approach(table),
         "repeat": read_columns.whole(table, "repeat"),
-        **{c: table.numbers(c) if c in table else None for c in ("order", "hours", "temperature")},
+        **{c: table.si(c) if c in table else None for c in ("order", "hours", "temperature")},
         "branch": read_columns.branch(table),
         **{c: read_columns.words(table, c) for c in ("setup", "instrument", "target")},
         "points": read_columns.words(table, "point", model.point),

@@ -35,14 +35,6 @@ class ExperimentUnitsModel(FileModel):
     angle: Angle | None = None
     temperature: Literal["degC", "K"] | None = None
 
-    def common(self) -> dict[str, str]:
-        """Units of all columns of a quantity."""
-        return self.model_dump(exclude_none=True, include={"length", "force", "angle"})
-
-    def own(self) -> dict[str, str]:
-        """Units of single columns."""
-        return self.model_dump(exclude_none=True, exclude={"length", "force", "angle", "temperature"})
-
 
 class NoiseModel(FileModel):
     """One standard deviation per axis or kind of reading, in the units of the file."""

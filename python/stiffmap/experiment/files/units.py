@@ -7,12 +7,14 @@ from dataclasses import replace
 
 from stiffmap.common.errors import FileError
 from stiffmap.common.tables.header import refuse_twice
+from stiffmap.common.tables.table import Table
 from stiffmap.common.units import known, name_and_unit, size_of, unit_of
 from stiffmap.experiment.files.fields import base_of, quantity_of
 from stiffmap.experiment.files.fields import known as known_columns
 from stiffmap.experiment.files.schema import ExperimentFile
-from stiffmap.experiment.files.table import Table
 
+COMMON = ("length", "force", "angle")
+"""Quantities whose columns have one unit, where a column has none of its own."""
 ANGLES = ("rad", "mrad", "deg")
 TIMES = {"hours": ("h", "hour", "hours"), "temperature": ("°c", "degc", "c")}
 
@@ -22,12 +24,13 @@ class Units:
 
     def __init__(self, model: ExperimentFile, file: str) -> None:
         self.file = file
-        self.common = {name: size_of(u) for name, u in model.units.common().items()}
+        given = model.units.model_dump(exclude_none=True, exclude={"temperature"})
+        self.common = {name: size_of(given.pop(name)) for name in COMMON if name in given}
         if "force" in self.common:
             self.common["moment"] = self.common["force"] * self.common["length"]
         joints = {f"{name}2": c.unit for name, c in model.command.items()}
         joints |= {name: c.unit for name, c in (model.joints | model.command).items()}
-        self.own = {name: size_of(u) for name, u in (model.units.own() | joints).items()}
+        self.own = {name: size_of(u) for name, u in (given | joints).items()}
         self.joints = {name: "angle" if unit in ANGLES else "length" for name, unit in joints.items()}
 
     def of_header(self, table: Table, whole: Collection[str] = ()) -> Table:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.tables.header import with_unit
-from stiffmap.common.tables.sheet import Sheet, column_letter
+from stiffmap.common.tables.table import Table, column_letter
 from stiffmap.common.units import Unit, known, unit_of
 from stiffmap.experiment.files.fields import quantity_of
 from stiffmap.experiment.spreadsheet.guess import READINGS, Column, find_column, guess
@@ -54,7 +54,7 @@ class Answers:
 class Meant(Answers):
     """A sheet with the columns that were made of others, and what they mean."""
 
-    sheet: Sheet = field(kw_only=True)
+    sheet: Table = field(kw_only=True)
     said: list[str] = field(default_factory=list)
     """What the reader must know, in words."""
     head: dict[str, Any] = field(default_factory=dict)
@@ -69,7 +69,7 @@ class Meant(Answers):
     """Whether a person has answered a question."""
 
     @staticmethod
-    def of_sheet(sheet: Sheet, answers: Answers) -> Meant:
+    def of_sheet(sheet: Table, answers: Answers) -> Meant:
         """A sheet as it was read, with what is said of it."""
         own = (deepcopy(getattr(answers, f.name)) for f in fields(Answers))
         return Meant(*own, sheet=sheet)
@@ -80,7 +80,7 @@ class Meant(Answers):
             self.spent[name] = self.constants.pop(name)
         return self.spent.get(name, 0.0)
 
-    def to_remember(self, sheet: Sheet, given: Answers) -> Answers:
+    def to_remember(self, sheet: Table, given: Answers) -> Answers:
         """The answers without columns that were made, which the next sheet of this form has not got, but as `given`."""
         there = {*sheet.header, *(f"{sign}{h}" for h in sheet.header for sign in "+-")}
         own = {k: v for k, v in self.chosen.items() if set(v) <= there}

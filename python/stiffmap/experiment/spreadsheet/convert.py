@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import repeat
@@ -10,8 +11,7 @@ from typing import Any
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs import make_folder, only_job, write_rows, write_text
-from stiffmap.common.tables.cells import row_numbers
-from stiffmap.common.tables.sheet import Sheet
+from stiffmap.common.tables.table import Table
 from stiffmap.common.yaml_text import text_of
 from stiffmap.experiment.channels import AXES
 from stiffmap.experiment.experiment import WRENCH
@@ -102,7 +102,7 @@ class Rows:
     """Rows of data.csv, made one by one whenever they are asked for: text, and numbers as floats."""
 
     def __init__(
-        self, sheet: Sheet, used: list[Column], constants: Mapping[str, float], factors: Mapping[str, float]
+        self, sheet: Table, used: list[Column], constants: Mapping[str, float], factors: Mapping[str, float]
     ) -> None:
         self._sheet = sheet
         self.repeats = max([c.repeat for c in used], default=0) or 1
@@ -124,12 +124,12 @@ class Rows:
             [*always, *(at.get((m, k)) for m in meanings)] for k in range(1, self.repeats + 1)
         ]
         self._name = header.index("id") if "id" in header else None
-        self.lines = row_numbers()
+        self.lines = array("q")
         """Line in the sheet of each row, once they were made."""
         self._readings = [header.index(m) for m in READINGS if m in header]
 
     def __iter__(self) -> Iterator[Sequence[Any]]:
-        self.lines = row_numbers()
+        self.lines = array("q")
         taken: set[str] = set()
         sides = zip(*map(self._side, range(self.repeats)), strict=True)
         for line, rows in zip(self._sheet.lines, sides, strict=True):

@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.tables.sheet import Sheet
+from stiffmap.common.tables.table import Table
 from stiffmap.experiment.spreadsheet.answers import Meant
 from stiffmap.model.description import Drive, Element, Joint, Leg, MachineDescription, Offset, Pose
 
@@ -62,7 +62,7 @@ class DHRow:
     range: tuple[float, float] | None
 
 
-def read_dh(given: Sheet, units: Mapping[str, str], convention: str) -> list[DHRow]:
+def read_dh(given: Table, units: Mapping[str, str], convention: str) -> list[DHRow]:
     """Rows of a table; `units` (theta, d, a, alpha -> unit) for columns without brackets.
 
     Raises StiffmapError that names the column which is missing or has no unit, or the columns of another convention.
@@ -105,7 +105,7 @@ def read_dh(given: Sheet, units: Mapping[str, str], convention: str) -> list[DHR
     return out
 
 
-def _with_r(at: dict[str, int], r: int, sheet: Sheet) -> list[int]:
+def _with_r(at: dict[str, int], r: int, sheet: Table) -> list[int]:
     """Which of d and r is the length a: each convention writes theta next to the shift along its axis. The columns of Khalil's
     d and alpha, which are of the link before; none where r is a, as in d, theta, r, alpha."""
     order = sorted((at["theta"], at["d"], at["alpha"], r))

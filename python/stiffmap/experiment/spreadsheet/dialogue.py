@@ -13,7 +13,7 @@ from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.fingerprints import digest
 from stiffmap.common.number_text import number_in
 from stiffmap.common.outputs import make_folder, write_text
-from stiffmap.common.tables.sheet import Sheet, column_letter
+from stiffmap.common.tables.table import Table, column_letter
 from stiffmap.common.units import known, unit_of
 from stiffmap.common.yaml_text import read, text_of
 from stiffmap.experiment.experiment import WRENCH
@@ -51,14 +51,14 @@ class Unanswered(StiffmapError):
     """Nobody answers a question."""
 
 
-def profile_file(sheet: Sheet) -> Path:
+def profile_file(sheet: Table) -> Path:
     """Where the answers for sheets of this form are kept: in the user's configuration folder, by the header."""
     home = os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config"
     form = digest([re.sub(r"\s+", " ", h.strip().lower()) for h in sheet.header])[:16]
     return Path(home) / "stiffmap" / "sheets" / f"{form}.yaml"
 
 
-def remembered(sheet: Sheet) -> Answers | None:
+def remembered(sheet: Table) -> Answers | None:
     """Answers for an earlier sheet of this form; None where there are none. FileError for a damaged file."""
     file = profile_file(sheet)
     if not file.is_file():
@@ -72,7 +72,7 @@ def remembered(sheet: Sheet) -> Answers | None:
         ) from None
 
 
-def remember(sheet: Sheet, a: Answers) -> Path:
+def remember(sheet: Table, a: Answers) -> Path:
     """Keep answers; returns the file. Raises FileError."""
     file = profile_file(sheet)
     make_folder(file.parent)
@@ -158,7 +158,7 @@ def _noise(m: Meant, lost: list[str], ask: Ask) -> None:
             m.answered = True
 
 
-def _column(sheet: Sheet, said: str) -> str | None:
+def _column(sheet: Table, said: str) -> str | None:
     """The header of a column that is named by its letter or by its header."""
     word = said.strip()
     letters = {column_letter(i): h for i, h in enumerate(sheet.header)}

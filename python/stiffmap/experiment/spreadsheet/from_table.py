@@ -15,7 +15,8 @@ from stiffmap.common.fingerprints import file_digest
 from stiffmap.common.outputs import new_file, putting
 from stiffmap.common.short import short_repr
 from stiffmap.common.tables.header import RECORD
-from stiffmap.common.tables.sheet import Layout, Sheet, column_letter, read_sheet
+from stiffmap.common.tables.sheet import Layout, read_sheet
+from stiffmap.common.tables.table import Table, column_letter
 from stiffmap.common.tables.workbook import WORKBOOKS, sheet_names
 from stiffmap.common.units import SPELLINGS, known, unit_of
 from stiffmap.experiment.experiment import Experiment
@@ -59,7 +60,7 @@ class FromTable:
     """What contradicts itself in the readings."""
     remarks: tuple[str, ...]
     """What was taken for granted, and what was left out."""
-    sheet: Sheet = field(repr=False)
+    sheet: Table = field(repr=False)
     understood: ImportedSheet = field(repr=False)
     commanded: Meant | None = field(repr=False)
     """Joints that the table commands."""
@@ -248,7 +249,7 @@ def _understood(
     return m, found
 
 
-def _of_sheet(error: FileError, found: ImportedSheet, sheet: Sheet, fresh: Path) -> FileError:
+def _of_sheet(error: FileError, found: ImportedSheet, sheet: Table, fresh: Path) -> FileError:
     """An error of the generated files in the words of the sheet."""
     reason = re.sub(r" \(first in line \d+\)", "", error.reason)
     columns = {c.meaning: c for c in found.columns if c.meaning != "note"}

@@ -6,8 +6,7 @@ import re
 
 import numpy as np
 
-from stiffmap.common.errors import FileError
-from stiffmap.common.tables.sheet import Sheet
+from stiffmap.common.tables.table import Table
 from stiffmap.experiment.files.fields import SEEN
 from stiffmap.experiment.spreadsheet.answers import Meant, Question
 from stiffmap.experiment.spreadsheet.guess import READINGS, Column
@@ -59,11 +58,11 @@ def _named(columns: list[Column], pattern: str) -> Column | None:
     return next((k for k in columns if k.meaning == "note" and re.fullmatch(pattern, k.name, re.I)), None)
 
 
-def _sockets(sheet: Sheet, socket: Column) -> tuple[np.ndarray[tuple[int], np.dtype[np.intp]], list[str]]:
+def _sockets(sheet: Table, socket: Column) -> tuple[np.ndarray[tuple[int], np.dtype[np.intp]], list[str]]:
     """(n,) number of each row's socket, from 0, and their names."""
     cells = [cell.strip() for cell in sheet.columns[socket.index]]
     if "" in cells:
         message = f"column '{socket.name}': expected the name or number of a socket; found an empty cell"
-        raise FileError(message, file=sheet.file, line=sheet.lines[cells.index("")])
+        sheet.fail(message, cells.index(""))
     names = sorted(set(cells), key=lambda name: (len(name), name))
     return np.array([names.index(cell) for cell in cells]), names

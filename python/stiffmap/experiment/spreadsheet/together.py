@@ -7,9 +7,8 @@ import re
 
 import numpy as np
 
-from stiffmap.common.errors import FileError
 from stiffmap.common.tables.header import split_unit
-from stiffmap.common.tables.sheet import Sheet, column_letter
+from stiffmap.common.tables.table import Table, column_letter
 from stiffmap.common.units import Unit, unit_of
 from stiffmap.experiment.channels import AXES
 from stiffmap.experiment.files.fields import EULER, POSE, QUATERNION, SEEN, SEEN_TURNED, VECTOR
@@ -181,11 +180,11 @@ def _directions(m: Meant) -> None:
         if found is not None:
             parts[row, "xyz".index(found[0])] = found[1] * size
         elif size and not np.isnan(size):
-            raise FileError(
+            m.sheet.fail(
                 f"column '{m.sheet.header[way]}': expected the direction of the load, as +x, -Z or y; found {cell.strip()!r} "
                 f"(cell {column_letter(way)}{m.sheet.lines[row]})",
-                file=m.sheet.file, line=m.sheet.lines[row],
-            )  # fmt: skip
+                row,
+            )
     common = m.units.get("force", "")
     unit = m.sheet.unit(load) or m.units.get(mapped.get(load, "force"), common)
     for axis, values in zip("xyz", parts.T, strict=True):
@@ -206,7 +205,7 @@ def _hung(m: Meant) -> None:
             return
 
 
-def quaternion(sheet: Sheet) -> list[int]:
+def quaternion(sheet: Table) -> list[int]:
     """Columns w x y z of quaternions, by their names and their length of one; empty where there are none."""
     for names in (QUATERNION, ("q1", "q2", "q3", "q4"), ("q0", "q1", "q2", "q3")):
         at = [i for i in map(sheet.find, names) if i is not None and sheet.is_numeric(i)]
@@ -252,7 +251,7 @@ def _turns(m: Meant, taken: set[int]) -> None:
     m.said.append(f"{shown} are the orientation: {words}")
 
 
-def _angles(sheet: Sheet, names: str) -> list[int]:
+def _angles(sheet: Table, names: str) -> list[int]:
     """Three columns of angles, or none."""
     at = [sheet.find(ANGLE.format(name)) for name in names.split()]
     columns = [i for i in at if i is not None and sheet.is_numeric(i)]
@@ -284,7 +283,7 @@ def _targets(m: Meant, taken: set[int]) -> None:
             return
 
 
-def weight(sheet: Sheet, index: int, explicit: bool, meaning: str, unit: Unit) -> tuple[float, str]:
+def weight(sheet: Table, index: int, explicit: bool, meaning: str, unit: Unit) -> tuple[float, str]:
     """Sign of a load along an axis, and what to say of it: a mass, and what is called a weight, pulls down."""
     values, header = sheet.numbers(index), sheet.header[index]
     hangs = unit.mass or HUNG.search(sheet.names[index])

@@ -110,14 +110,8 @@ def load_taps(path: str | PathLike[str], machine: Machine | None = None) -> TapT
             f"{', '.join(missing)}"
         )
     for name in ABOVE_ZERO:
-        if name in t.values:
-            t.check(name, t.values[name] > 0, "a number above zero")
-    if "damping" in t.values:
-        t.check(
-            "damping",
-            (t.values["damping"] >= 0) & (t.values["damping"] < 100),
-            "a number from 0 to below 100",
-        )
+        t.check(name, lambda v: v > 0, "a number above zero")
+    t.check("damping", lambda v: (v >= 0) & (v < 100), "a number from 0 to below 100")
     typed: list[dict[str, object]] = []
     measured: list[Measured] = []
     places = [(float(x), float(y), float(z)) for x, y, z in t.block(POSE)]

@@ -12,7 +12,8 @@ import numpy as np
 from stiffmap.common.errors import FileError, StiffmapError, refuse_folder
 from stiffmap.common.number_text import number_in
 from stiffmap.common.tables.named import Known, named
-from stiffmap.common.tables.sheet import Layout, Sheet, read_sheet
+from stiffmap.common.tables.sheet import Layout, read_sheet
+from stiffmap.common.tables.table import Table
 from stiffmap.common.texts import text_of
 from stiffmap.model.link.arrays import Floats, Ints
 from stiffmap.model.link.gmshmesh import UNITS
@@ -51,7 +52,7 @@ def read_csv_field(path: str | Path) -> tuple[Floats, Floats]:
 
 def known_columns(
     path: str | Path, units: Mapping[str, tuple[str, str]]
-) -> tuple[Sheet, dict[str, list[Floats]]]:
+) -> tuple[Table, dict[str, list[Floats]]]:
     """The table, and the numbers (SI) of each column that has one of these names, each with its SI unit and how it is
     usually written; other columns are left alone. Raises FileError."""
     refuse_folder(path, "a table")

@@ -178,7 +178,8 @@ def test_text_that_is_no_utf_16(raw: bytes, tmp_path: Path) -> None:
 
 def test_packed_cells_are_those_that_went_in() -> None:
     rows = [[f" a{i} ", str(i), f"x{BETWEEN}y" if i % 7 == 0 else ""] for i in range(2 * BLOCK + 5)]
-    one, two, three = packed(rows, 3)
+    (one, two, three), lines = packed(enumerate(rows, 5), 3)
+    assert lines[0] == 5 and len(lines) == len(rows)
     assert list(one) == [r[0].strip() for r in rows] and len(one) == len(rows)
     np.testing.assert_array_equal(two.numbers(lambda *_: 1 / 0), np.arange(len(rows)))
     assert list(three)[:8] == ["x y", *[""] * 6, "x y"]

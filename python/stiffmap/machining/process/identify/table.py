@@ -15,7 +15,7 @@ from stiffmap.common.broadcasting import Floats, given_path, instance_of
 from stiffmap.common.errors import FileError
 from stiffmap.common.tables.cells import Cells
 from stiffmap.common.tables.named import WORD, Known, NamedTable, named, read_named
-from stiffmap.common.tables.sheet import Sheet
+from stiffmap.common.tables.table import Table
 from stiffmap.machining.process.description import SIDES, Cut, EndMill, Process, Tool
 
 COLUMNS = {
@@ -93,7 +93,7 @@ def columns_of(
     return out
 
 
-def _of_mapping(table: Mapping[str, Any]) -> Sheet:
+def _of_mapping(table: Mapping[str, Any]) -> Table:
     """Rows counted from 1; single values stand for all rows."""
     columns = {str(k): [table[k]] if np.ndim(table[k]) == 0 else list(table[k]) for k in table}
     count = max((len(v) for v in columns.values()), default=0)
@@ -101,7 +101,7 @@ def _of_mapping(table: Mapping[str, Any]) -> Sheet:
         if len(cells) not in (1, count):
             raise FileError(f"expected {count} numbers or one, found {len(cells)}", file="table", key=name)
     full = [Cells.of(map(str, cells if len(cells) == count else cells * count)) for cells in columns.values()]
-    return Sheet("table", tuple(columns), tuple(full), range(1, count + 1), False)
+    return Table("table", tuple(columns), tuple(full), range(1, count + 1))
 
 
 FORCES = ("fx", "fy", "fz")
