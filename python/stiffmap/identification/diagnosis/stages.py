@@ -92,10 +92,11 @@ def diagnose(
             found = find_slip(predictor, plan)
             if found is None:
                 break
-            slips.append(found.slip)
-            if not found.slip.undone:
+            slip, undone = found
+            slips.append(slip)
+            if not slip.undone:
                 break
-            predictor = Predictor(declared, found.experiment, threads=threads)
+            predictor = Predictor(declared, undone, threads=threads)
             refuse(predictor.experiment, predictor())
             plan = plan_of(predictor, clock)
         times.append(time.perf_counter())
