@@ -181,30 +181,17 @@ def sensitivity_at(predictor: Predictor, s: Sensitivity, values: Floats) -> Sens
     return replace(s, columns=columns)
 
 
-def _changed(
-    predictor: Predictor, unknowns: Sequence[Unknown], values: Floats, setup: str, base: Floats
-) -> Floats:
-    """(n, c) as `predicted`, where only rows of a set-up (of all, if there is none) differ from `base`."""
-    if not setup:
-        return predicted(predictor, unknowns, values)
-    here = np.array(predictor.experiment.setup) == setup
-    out = base.copy()
-    mine = np.array([v if u.setup in ("", setup) else 0.0 for u, v in zip(unknowns, values, strict=True)])
-    out[here] = predicted(predictor.beside(rows=here), unknowns, mine)
-    return out
-
-
 def _columns(
     predictor: Predictor, unknowns: Sequence[Unknown], values: Floats, base: Floats
 ) -> Iterator[tuple[int, Floats | None, str]]:
     """Each unknown with (n, c) its slopes at `values`, where the machine shows `base`, or why there are none."""
     slopes, solved = slopes_at(predictor, unknowns, values), np.isfinite(base)
-    for k, u in enumerate(unknowns):
+    for k in range(len(unknowns)):
         try:
             column = slopes.of(k)
             if column is None:
                 moved = values + STEP * (np.arange(len(values)) == k)
-                column = (_changed(predictor, unknowns, moved, u.setup, base) - base) / STEP
+                column = (predicted(predictor, unknowns, moved) - base) / STEP
         except StiffmapError as problem:
             yield k, None, str(problem)
             continue

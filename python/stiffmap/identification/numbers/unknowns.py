@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stiffmap.experiment.experiment import Experiment, Floats
-from stiffmap.identification.numbers.certificate import INSTRUMENT, SCALE, Tolerances, frame_names
+from stiffmap.identification.numbers.certificate import INSTRUMENT, SCALE, Tolerances, frame_errors
 from stiffmap.model.description import Block, Body, Element, Joint, MachineDescription, Offset, Spring
 from stiffmap.model.with_errors import END, FRAME
 
@@ -142,7 +142,7 @@ def unknowns(
         out.append(
             Unknown("scale of the instrument", INSTRUMENT, "1", t.instrument, (((INSTRUMENT, SCALE), 1.0),))
         )
-    for name, unit in frame_names(experiment):
+    for name, unit, _ in frame_errors(experiment):
         what, u = ("turn", t.frame_direction) if unit == "rad" else ("shift", t.frame)
         if u > 0.0:
             full = f"{what} of the instrument's frame, {name}"
