@@ -56,9 +56,13 @@ def moves_of(pairs: Iterable[tuple[Unknown, float]]) -> dict[tuple[str, str], fl
     return moves
 
 
-def built(predictor: Predictor, moves: Moves) -> Machine:
-    """The machine with its own numbers off; the instrument's are left out."""
-    return Machine(with_moves(predictor.machine.description, moves), like=predictor.machine)
+def with_numbers(predictor: Predictor, moves: Moves) -> Predictor:
+    """What predicts the machine with its own numbers off; the instrument's are left out."""
+    machine = predictor.machine
+    moved = with_moves(machine.description, moves)
+    if moved is machine.description:
+        return predictor
+    return predictor.beside(machine=Machine(moved, like=machine))
 
 
 def with_moves(
@@ -84,8 +88,7 @@ def slopes_at(predictor: Predictor, unknowns: Sequence[Unknown], values: Floats)
 
     @cache
     def base() -> Predictor:
-        off = any(at != INSTRUMENT for at, _ in here)
-        return predictor.beside(machine=built(predictor, here)) if off else predictor
+        return with_numbers(predictor, here)
 
     def moved(u: Unknown, by: float) -> MachineDescription:
         more = {place: here.get(place, 0.0) + weight * u.u * by for place, weight in u.moves}
@@ -134,8 +137,7 @@ def _standing(
 
 
 def _beside(predictor: Predictor, here: Mask, moves: Moves) -> Predictor:
-    of_rows = predictor if here.all() else predictor.beside(rows=here)
-    return of_rows.beside(machine=built(predictor, moves)) if moves else of_rows
+    return with_numbers(predictor if here.all() else predictor.beside(rows=here), moves)
 
 
 def _frame_part(predictor: Predictor, pairs: Sequence[tuple[Unknown, float]]) -> Floats | float:

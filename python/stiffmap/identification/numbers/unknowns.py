@@ -179,9 +179,9 @@ def _of_part(e: Element, name: str, leg: str, t: Tolerances, given: Declared) ->
     """Of a spring its compliance, of a body its mass."""
     if isinstance(e, Spring) and not e.laws:
         u = given.spring(name, e, t.compliance)
-        yield _relative(name, leg, "link compliance", "compliance", u)
+        yield _single("compliance", name, leg, "link compliance", "ln", u)
     elif isinstance(e, Body) and e.mass > 0.0:
-        yield _relative(name, leg, "masses", "mass", given.single(name, ["mass"], t.mass, e.mass))
+        yield _single("mass", name, leg, "masses", "ln", given.single(name, ["mass"], t.mass, e.mass))
 
 
 def joint_name(element: str) -> str:
@@ -189,8 +189,8 @@ def joint_name(element: str) -> str:
     return element.removeprefix("base.").removeprefix("platform.")
 
 
-def _relative(name: str, leg: str, group: str, what: str, u: float) -> Unknown:
-    return Unknown(f"{what} of {name}", group, "ln", u, (((name, what), 1.0),), leg)
+def _single(what: str, name: str, leg: str, group: str, unit: str, u: float) -> Unknown:
+    return Unknown(f"{what} of {name}", group, unit, u, (((name, what), 1.0),), leg)
 
 
 def _of_joint(
@@ -210,31 +210,13 @@ def _of_joint(
     yield from _frame(name, leg, tuple(kept), place, t.direction, "axis positions", turned)
     if e.actuated:
         unit, u = ("m", t.zero) if slides else ("rad", t.turning_zero)
-        yield Unknown(
-            f"zero of {name}",
-            "zeros",
-            unit,
-            given.single(name, ["home", "command_errors.offset"], u),
-            (((name, "zero"), 1.0),),
-            leg,
-        )
-        yield Unknown(
-            f"gain of {name}",
-            "gains",
-            "1",
-            given.single(name, ["command_errors.slope"], t.gain),
-            (((name, "gain"), 1.0),),
-            leg,
-        )
+        u = given.single(name, ["home", "command_errors.offset"], u)
+        yield _single("zero", name, leg, "zeros", unit, u)
+        yield _single("gain", name, leg, "gains", "1", given.single(name, ["command_errors.slope"], t.gain))
     if e.law is not None and not e.law.cubic and not e.law.knots:
         group = "drive compliance" if e.actuated else "link compliance"
-        yield _relative(
-            name,
-            leg,
-            group,
-            "compliance",
-            given.single(name, ["stiffness", "law.stiffness"], t.compliance, e.law.stiffness),
-        )
+        u = given.single(name, ["stiffness", "law.stiffness"], t.compliance, e.law.stiffness)
+        yield _single("compliance", name, leg, group, "ln", u)
 
 
 def _frame(
