@@ -92,8 +92,7 @@ def budgets(
         For a number that does not exist.
     """
     predictor = Predictor(machine, experiment)
-    scale = np.array([p.scale for _, p in fitted(machine.description, found.terms)])
-    inverse = np.linalg.pinv(found.jacobian * scale) * scale[:, None]
+    inverse = np.linalg.pinv(found.jacobian * found.scale) * found.scale[:, None]
     shifts = []
     for term, given in others:
         parameters = [p for _, p in fitted(machine.description, (term,)) if p.name in given]
