@@ -106,8 +106,8 @@ def diagnose(
     steps = ("sensitivities and slips", "search", "machines and folds")
     times.append(time.perf_counter())
     seconds = {s: b - a for s, a, b in zip(steps, times, times[1:], strict=False)}
-    d = replace(d, seconds=seconds)
-    return replace(d, slips=[by_gain(s, d.effects) for s in slips], verdict="readings") if slips else d
+    named = [by_gain(s, d.effects) for s in slips]
+    return replace(d, seconds=seconds, slips=named, verdict="readings" if named else d.verdict)
 
 
 def by_gain(s: Slip, effects: Sequence[Effect]) -> Slip:
