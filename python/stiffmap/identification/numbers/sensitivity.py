@@ -15,7 +15,7 @@ from stiffmap.experiment.experiment import Experiment, Floats, Mask
 from stiffmap.experiment.prediction.ahead import Ahead
 from stiffmap.experiment.prediction.fingerprint import fingerprint
 from stiffmap.experiment.prediction.nearby import Near
-from stiffmap.experiment.prediction.predict import Predictor, Terms
+from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.identification.numbers.certificate import INSTRUMENT, SCALE, frame_columns, scaled
 from stiffmap.identification.numbers.unknowns import Unknown
 from stiffmap.model.description import AppliedEffect, MachineDescription
@@ -111,29 +111,20 @@ def predicted(
     """(n, c) readings of the machine with unknowns at `values` (p,), in standard uncertainties, and with effects."""
     pairs = [(u, float(v)) for u, v in zip(unknowns, values, strict=True) if v != 0.0]
     out = np.full(predictor.experiment.reading.shape, np.nan)
-    for here, built_so, scale in _standing(predictor, pairs):
-        out[here] = built_so([*terms, *scale])
-    return np.asarray(out + _frame_part(predictor, pairs))
-
-
-def _standing(
-    predictor: Predictor, pairs: Sequence[tuple[Unknown, float]]
-) -> Iterator[tuple[Mask, Predictor, Terms]]:
-    """The rows of each set-up that has unknowns of its own, then all others: what predicts them, and the scale of the instrument."""
     label = np.array(predictor.experiment.setup or ("",) * len(predictor.experiment))
     own = list(dict.fromkeys(u.setup for u, _ in pairs if u.setup))
-    for name in (*own, ""):
+    for name in (*own, ""):  # the rows of each set-up that has unknowns of its own, then all others
         here = label == name if name else ~np.isin(label, own)
         if not here.any():
             continue
         moves = moves_of((u, v) for u, v in pairs if u.setup in ("", name))
         scale = moves.pop((INSTRUMENT, SCALE), 0.0)
         moved = tuple((at, by) for at, by in moves.items() if at[0] != INSTRUMENT)
-        yield (
-            here,
-            predictor.kept((name, here.tobytes(), moved), partial(_beside, predictor, here, dict(moved))),
-            (scaled(predictor.machine.description, scale),) if scale else (),
-        )
+        key = (name, here.tobytes(), moved)
+        mine = predictor.kept(key, partial(_beside, predictor, here, dict(moved)))
+        of_instrument = [scaled(predictor.machine.description, scale)] if scale else []
+        out[here] = mine([*terms, *of_instrument])
+    return np.asarray(out + _frame_part(predictor, pairs))
 
 
 def _beside(predictor: Predictor, here: Mask, moves: Moves) -> Predictor:

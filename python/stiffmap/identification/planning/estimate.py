@@ -13,7 +13,7 @@ from stiffmap.common.short import short_repr
 from stiffmap.experiment.experiment import Experiment
 from stiffmap.experiment.noise.level import noise_of
 from stiffmap.experiment.noise.whitening import LinearProblem
-from stiffmap.experiment.prediction.predict import Predictor
+from stiffmap.experiment.prediction.predict import Predictor, Terms
 from stiffmap.identification.candidates.candidates import words
 from stiffmap.identification.candidates.sensitivity import step_of
 from stiffmap.identification.inference.optimum import covariance, optimum
@@ -26,7 +26,6 @@ STEP = 1e-3
 """Share of a parameter's typical size over which predictions are differenced."""
 STEPS = 30
 """Evaluations of a fit at most."""
-Terms = tuple[AppliedEffect, ...]
 
 
 @short_repr

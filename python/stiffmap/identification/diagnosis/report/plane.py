@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from stiffmap.common.broadcasting import Floats
-from stiffmap.identification.diagnosis.report.findings import Findings
+from stiffmap.identification.diagnosis.report.result import Diagnosis
 from stiffmap.solve.machine import Machine
 
 
-def worst_pose(d: Findings) -> tuple[Floats, Floats] | None:
+def worst_pose(d: Diagnosis) -> tuple[Floats, Floats] | None:
     """Position (3,) m in the plane of the maps where the corrected machine deflects most, and the wrench (6,) N, N·m.
 
     None without a force or a workspace, or where no pose of the plane has an answer.
@@ -23,7 +23,7 @@ def worst_pose(d: Findings) -> tuple[Floats, Floats] | None:
     return position[np.unravel_index(int(np.nanargmax(size)), size.shape)], force
 
 
-def plane_errors(d: Findings) -> tuple[Floats, Floats, Floats, Floats]:
+def plane_errors(d: Diagnosis) -> tuple[Floats, Floats, Floats, Floats]:
     """Positions (25, 25, 3) m in the middle plane of the workspace, the wrench (6,) N, N·m, and errors (25, 25, 3) m before and after.
 
     Of the forces used, along x, y or z, it is the one under which the machines differ most.

@@ -8,7 +8,7 @@ from typing import Any
 
 from stiffmap.common.number_text import with_uncertainty
 from stiffmap.identification.diagnosis.report.findings import Effect
-from stiffmap.identification.diagnosis.report.wording import digits, noise_size, number_text, separation_text
+from stiffmap.identification.diagnosis.report.wording import digits, number_text, separation_text
 from stiffmap.identification.diagnosis.slips.slip import Slip
 from stiffmap.model.effects import registry
 
@@ -121,7 +121,7 @@ def alias_words(a: Mapping[str, Any]) -> str:
 def _of_machine(d: Any, verdict: str) -> str:
     """The verdict on the machine; the largest share of the difference first, be it an effect or a number."""
     before, unit = d.before.size
-    size = f"{1e6 * before:.1f} µ{unit} rms, noise {1e6 * noise_size(d):.1f} µ{unit}"
+    size = f"{1e6 * before:.1f} µ{unit} rms, noise {1e6 * d.noise_size:.1f} µ{unit}"
     found = [(e.evidence.get("share", 0.0), sentence(e) + aliases(e)) for e in d.effects]
     found += [(n.share, number_text(n)) for n in (d.calibration.beyond if d.calibration else ())]
     named = "; ".join(text for _, text in sorted(found, key=lambda f: -f[0]))
