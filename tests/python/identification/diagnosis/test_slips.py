@@ -16,8 +16,13 @@ from stiffmap.experiment.experiment import Experiment
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.identification.candidates.plan import plan_of
 from stiffmap.identification.diagnosis.report.findings import Effect
-from stiffmap.identification.diagnosis.report.sentences import aliases, measured, next_step, opening
-from stiffmap.identification.diagnosis.report.wording import effect_text
+from stiffmap.identification.diagnosis.report.sentences import (
+    aliases,
+    effect_text,
+    measured,
+    next_step,
+    opening,
+)
 from stiffmap.identification.diagnosis.slips import find
 from stiffmap.identification.diagnosis.slips.find import find_slip
 from stiffmap.identification.diagnosis.slips.slip import Slip

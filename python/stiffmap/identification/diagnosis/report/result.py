@@ -6,13 +6,15 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, fields
 from html import escape
 from os import PathLike
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from stiffmap.common.errors import FileError, reading
 from stiffmap.common.from_above import from_above
 from stiffmap.common.html import titled
-from stiffmap.common.json_text import json_text, plain
+from stiffmap.common.json_text import json_text, parse_json, plain
 from stiffmap.common.number_text import percent, with_uncertainty
 from stiffmap.common.short import short_repr
 from stiffmap.experiment.comparison.summary import Summary
@@ -25,12 +27,19 @@ from stiffmap.identification.diagnosis.report.findings import (
     NoiseReport,
     Rest,
 )
-from stiffmap.identification.diagnosis.report.sentences import next_step, opening
+from stiffmap.identification.diagnosis.report.sentences import (
+    LISTED,
+    effect_text,
+    next_step,
+    number_text,
+    opening,
+    separation_text,
+)
 from stiffmap.identification.diagnosis.report.separation import Separation
-from stiffmap.identification.diagnosis.report.wording import LISTED, effect_text, number_text, separation_text
 from stiffmap.identification.diagnosis.slips.slip import Slip
 from stiffmap.identification.inference.machines import HeldOut
 from stiffmap.identification.inference.shares import largest
+from stiffmap.model.description import AppliedEffect
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.validity import Validity
 
@@ -230,3 +239,21 @@ def _limits(d: Diagnosis) -> str:
     return (
         f"could see: {len(d.detectable)} effects; could not see: {len(d.unobservable)} (listed in the report)"
     )
+
+
+def diagnosed(path: Path) -> list[AppliedEffect]:
+    """Effects that the diagnosis of a ``diagnosis.json`` names; raises `FileError` for another file, and where it names none."""
+    with reading(path):
+        try:
+            data: Any = parse_json(path.read_text(encoding="utf-8"))
+            terms = []
+            for e in data["effects"]:
+                values = tuple((n, float(v[0])) for n, v in e["parameters"].items())
+                terms.append(AppliedEffect(e["kind"], e["element"], tuple(e["legs"]), values))
+        except (ValueError, KeyError, TypeError, IndexError, AttributeError, OverflowError):
+            raise FileError(
+                "expected a diagnosis as `stiffmap diagnose --json` writes it", file=str(path)
+            ) from None
+    if not terms:
+        raise FileError("the diagnosis names no effect that could be followed", file=str(path))
+    return terms

@@ -14,16 +14,16 @@ from stiffmap.common.number_text import length_text, length_unit, place_text, ve
 from stiffmap.common.outputs import write_text
 from stiffmap.experiment.noise.checks import Check
 from stiffmap.identification.diagnosis.report.findings import Detectability, Effect, Rest
-from stiffmap.identification.diagnosis.report.plane import worst_pose
 from stiffmap.identification.diagnosis.report.result import Diagnosis
 from stiffmap.identification.diagnosis.report.sentences import (
     UNITS,
     alias_words,
+    effect_text,
     interval,
     next_step,
     opening,
+    separation_text,
 )
-from stiffmap.identification.diagnosis.report.wording import effect_text, separation_text
 from stiffmap.model.description.tree import joints
 from stiffmap.model.effects import registry
 from stiffmap.solve.budget import budget_where_stable
@@ -140,6 +140,7 @@ def _effect(e: Effect) -> dict[str, Any]:
 def _budget(d: Diagnosis) -> dict[str, Any] | None:
     """Shares of the corrected machine's deflection at the worst pose of the map in the pictures; None where it has play without load."""
     from stiffmap.ui.plot.loaded import budget_rows
+    from stiffmap.ui.report.diagnosis.pictures import worst_pose
 
     worst = worst_pose(d) if d.effects else None
     if worst is None:
