@@ -18,7 +18,6 @@ from tests.python.workspace.vibration.mujoco_frf import machine_of, modes
 import stiffmap as sm
 from stiffmap.identification.taps import TapTest, explain_taps
 from stiffmap.identification.taps.causes import causes
-from stiffmap.identification.taps.causes import term as change
 from stiffmap.identification.taps.fit import fitted
 from stiffmap.identification.taps.problem import TapsProblem, shifted, uncertain_numbers
 from stiffmap.model.effects import apply_records
@@ -52,7 +51,7 @@ def visible(problem, place, scale):
     J = problem.slopes[problem.used]
     white = np.linalg.cholesky(np.eye(len(J)) + J @ J.T)
     return float(
-        np.linalg.norm(np.linalg.solve(white, problem.residual(change(place, scale)) - problem.residual()))
+        np.linalg.norm(np.linalg.solve(white, problem.residual([(place, scale)]) - problem.residual()))
     )
 
 

@@ -114,7 +114,6 @@ def _answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, star
     verdict, wide = judged(columns, found.search), too_wide(fit)
     at_name = {r.name: r for r in rows}
     beyond = tuple(at_name[b.unknown.name] for b in verdict.beyond)
-    each = shares(columns, best.fit)
     held = made.held_out
     unseen = (held.before, held.after) if held else (before, after)
     beyond_noise = [s.ratio**2 - best.fit.noise**2 for s in unseen]
@@ -135,11 +134,11 @@ def _answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, star
         which=made.which,
         before=before,
         after=after,
-        held_out=made.held_out,
+        held_out=held,
         promise=made.promise,
         noise=found.noise.rms,
         scale=best.fit.noise,
-        shares=each,
+        shares=shares(columns, best.fit),
         rest=verdict.rest or verdict.time,
         profiles=at.profiles if at and made.which == CALIBRATED else (),
         outliers=tuple(e.ids[i] for i in np.flatnonzero(listed)),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,7 +14,6 @@ from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.noise.checks import checks
 from stiffmap.experiment.noise.nuisance import nuisance_columns
 from stiffmap.experiment.prediction.predict import Predictor
-from stiffmap.identification.candidates.candidates import Candidate
 from stiffmap.identification.clock import Clock
 from stiffmap.identification.diagnosis.report.effects import detectable, effects_of
 from stiffmap.identification.diagnosis.report.findings import (
@@ -42,7 +41,6 @@ from stiffmap.identification.inference.machines import (
 )
 from stiffmap.identification.inference.names import put_instead
 from stiffmap.identification.inference.parts import GAPS
-from stiffmap.identification.inference.places import Place
 from stiffmap.identification.inference.readings import Readings, readings
 from stiffmap.identification.inference.shares import gap_of, of_numbers, shares
 from stiffmap.identification.inference.verdict import Named, Verdict, judged, not_as_stated
@@ -67,7 +65,7 @@ def answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, cross
     best = models.get(CORRECTED)
     each, gap = shares(columns, fit), gap_of(columns, fit)
     effects = _effects(predictor, v, best, each, fit)
-    others = _alternatives(predictor, found, v, best, clock) if effects else []
+    others = list(_alternatives(predictor, found, v, best, clock)) if best and effects else []
     noise = _noise(found, made, best)
     rest = _rest(columns, fit, v, each, gap)
     return Diagnosis(
@@ -165,42 +163,32 @@ def _effects(
         }
         for n in v.named
     ]
-    same = [shows_same(n.chosen.place) for n in v.named]
-    return effects_of(predictor.machine.description, best, same, evidence)
-
-
-def shows_same(place: Place) -> tuple[Candidate, ...]:
-    """What these readings cannot distinguish from a place whatever its size."""
-    return (*place.aliases, *place.wider)
+    places = [n.chosen.place for n in v.named]
+    return effects_of(predictor.machine.description, best, places, evidence)
 
 
 def _alternatives(
     predictor: Predictor,
     found: Inferred,
     v: Verdict,
-    best: Corrected | None,
+    best: Corrected,
     clock: Clock,
-) -> list[tuple[list[Effect], Corrected]]:
+) -> Iterator[tuple[list[Effect], Corrected]]:
     """Each other place of each effect, all else refitted; those that are likeliest first, at most `RIVALS` of an effect."""
-    out: list[tuple[list[Effect], Corrected]] = []
-    if best is None:
-        return out
+    named = [n.chosen.place for n in v.named]
     for k, n in enumerate(v.named):
         for place in n.equivalents[:RIVALS]:
             if clock.over:
                 clock.leave_out("other places of the effects, fitted")
-                return out
+                return
             other = put_instead(found.search.best.fit, n.chosen, place)
             start = Term.of(place.candidate, terms([other])[0])
-            kept = [start if i == k else t for i, t in enumerate(best.terms)]
             try:
-                fitted = instead(best, kept)
+                fitted = instead(best, [*best.terms[:k], start, *best.terms[k + 1 :]])
             except StiffmapError:
                 continue
-            aliases = [shows_same(m.chosen.place if i != k else place) for i, m in enumerate(v.named)]
-            none = [dict[str, float]() for _ in v.named]
-            out.append((effects_of(predictor.machine.description, fitted, aliases, none), fitted))
-    return out
+            places = [*named[:k], place, *named[k + 1 :]]
+            yield effects_of(predictor.machine.description, fitted, places, [{} for _ in places]), fitted
 
 
 def _word(v: Verdict, effects: Sequence[Effect], rest: Sequence[Rest], cut_short: bool) -> str:

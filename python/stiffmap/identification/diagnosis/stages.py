@@ -92,10 +92,11 @@ def diagnose(
             found = find_slip(predictor, plan)
             if found is None:
                 break
-            slips.append(found.slip)
-            if not found.slip.undone:
+            slip, undone = found
+            slips.append(slip)
+            if not slip.undone:
                 break
-            predictor = Predictor(declared, found.experiment, threads=threads)
+            predictor = Predictor(declared, undone, threads=threads)
             refuse(predictor.experiment, predictor())
             plan = plan_of(predictor, clock)
         times.append(time.perf_counter())
@@ -105,8 +106,8 @@ def diagnose(
     steps = ("sensitivities and slips", "search", "machines and folds")
     times.append(time.perf_counter())
     seconds = {s: b - a for s, a, b in zip(steps, times, times[1:], strict=False)}
-    d = replace(d, seconds=seconds)
-    return replace(d, slips=[by_gain(s, d.effects) for s in slips], verdict="readings") if slips else d
+    named = [by_gain(s, d.effects) for s in slips]
+    return replace(d, seconds=seconds, slips=named, verdict="readings" if named else d.verdict)
 
 
 def by_gain(s: Slip, effects: Sequence[Effect]) -> Slip:

@@ -76,33 +76,26 @@ def scaled(description: MachineDescription, share: float) -> AppliedEffect:
     return AppliedEffect(effect.kind, element, legs, ((effect.instrument_scale, off),))
 
 
-def frame_names(experiment: Experiment) -> Iterator[tuple[str, str]]:
-    """Name and unit of what may be off of each set-up's frame, in the order of `frame_columns`."""
-    if experiment.frame == "unknown":
-        return
-    setups = np.unique(setups_of(experiment)[0])
-    for k in range(len(setups)):
-        which = f" of set-up {k + 1}" if len(setups) > 1 else ""
-        if experiment.quantity == "position" and experiment.frame == "known":
-            yield from (
-                (f"{c.name}{which}", c.unit)
-                for c, read in zip(experiment.channels[:3], experiment.axis_read[:3], strict=True)
-                if read
-            )
-        yield from ((f"about {a}{which}", "rad") for a in "xyz")
+def frame_errors(experiment: Experiment) -> Iterator[tuple[str, str, int]]:
+    """Name and unit of what may be off of each set-up's frame, and the column of an unknown frame that shows it."""
+    position, known = experiment.quantity == "position", experiment.frame == "known"
+    read = [
+        c
+        for c, shown in zip(experiment.channels, experiment.axis_read[:6], strict=False)
+        if position and shown
+    ]
+    number = 0 if experiment.frame == "unknown" else len(np.unique(setups_of(experiment)[0]))
+    for k in range(number):
+        which = f" of set-up {k + 1}" if number > 1 else ""
+        begin = k * (len(read) + 3)
+        for i, c in enumerate(read if known else ()):
+            if c.unit == "m":
+                yield f"{c.name}{which}", c.unit, begin + i
+        yield from ((f"about {a}{which}", "rad", begin + len(read) + i) for i, a in enumerate("xyz"))
 
 
 def frame_columns(experiment: Experiment, base: Floats) -> Mapping[str, Floats]:
-    """(n, c) change of the readings per metre or radian of each of `frame_names`."""
+    """(n, c) change of the readings per metre or radian of each of `frame_errors`."""
     whole = replace(experiment, frame="unknown", tool="known", unloaded="centre", surface="known")
     columns = nuisance_columns(whole, base)
-    position = experiment.quantity == "position"
-    read = int(experiment.axis_read[:6].sum()) if position else 0
-    shifts = int(experiment.axis_read[:3].sum()) if position else 0
-    kept: list[int] = []
-    for k in range(len(np.unique(setups_of(experiment)[0]))):
-        begin = k * (read + 3)
-        if position and experiment.frame == "known":
-            kept += range(begin, begin + shifts)
-        kept += range(begin + read, begin + read + 3)
-    return {name: columns[..., i] for (name, _), i in zip(frame_names(experiment), kept, strict=True)}
+    return {name: columns[..., i] for name, _, i in frame_errors(experiment)}

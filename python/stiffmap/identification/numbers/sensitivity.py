@@ -15,7 +15,7 @@ from stiffmap.experiment.experiment import Experiment, Floats, Mask
 from stiffmap.experiment.prediction.ahead import Ahead
 from stiffmap.experiment.prediction.fingerprint import fingerprint
 from stiffmap.experiment.prediction.nearby import Near
-from stiffmap.experiment.prediction.predict import Predictor, Terms
+from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.identification.numbers.certificate import INSTRUMENT, SCALE, frame_columns, scaled
 from stiffmap.identification.numbers.unknowns import Unknown
 from stiffmap.model.description import AppliedEffect, MachineDescription
@@ -56,9 +56,13 @@ def moves_of(pairs: Iterable[tuple[Unknown, float]]) -> dict[tuple[str, str], fl
     return moves
 
 
-def built(predictor: Predictor, moves: Moves) -> Machine:
-    """The machine with its own numbers off; the instrument's are left out."""
-    return Machine(with_moves(predictor.machine.description, moves), like=predictor.machine)
+def with_numbers(predictor: Predictor, moves: Moves) -> Predictor:
+    """What predicts the machine with its own numbers off; the instrument's are left out."""
+    machine = predictor.machine
+    moved = with_moves(machine.description, moves)
+    if moved is machine.description:
+        return predictor
+    return predictor.beside(machine=Machine(moved, like=machine))
 
 
 def with_moves(
@@ -84,8 +88,7 @@ def slopes_at(predictor: Predictor, unknowns: Sequence[Unknown], values: Floats)
 
     @cache
     def base() -> Predictor:
-        off = any(at != INSTRUMENT for at, _ in here)
-        return predictor.beside(machine=built(predictor, here)) if off else predictor
+        return with_numbers(predictor, here)
 
     def moved(u: Unknown, by: float) -> MachineDescription:
         more = {place: here.get(place, 0.0) + weight * u.u * by for place, weight in u.moves}
@@ -108,34 +111,24 @@ def predicted(
     """(n, c) readings of the machine with unknowns at `values` (p,), in standard uncertainties, and with effects."""
     pairs = [(u, float(v)) for u, v in zip(unknowns, values, strict=True) if v != 0.0]
     out = np.full(predictor.experiment.reading.shape, np.nan)
-    for here, built_so, scale in _standing(predictor, pairs):
-        out[here] = built_so([*terms, *scale])
-    return np.asarray(out + _frame_part(predictor, pairs))
-
-
-def _standing(
-    predictor: Predictor, pairs: Sequence[tuple[Unknown, float]]
-) -> Iterator[tuple[Mask, Predictor, Terms]]:
-    """The rows of each set-up that has unknowns of its own, then all others: what predicts them, and the scale of the instrument."""
     label = np.array(predictor.experiment.setup or ("",) * len(predictor.experiment))
     own = list(dict.fromkeys(u.setup for u, _ in pairs if u.setup))
-    for name in (*own, ""):
+    for name in (*own, ""):  # the rows of each set-up that has unknowns of its own, then all others
         here = label == name if name else ~np.isin(label, own)
         if not here.any():
             continue
         moves = moves_of((u, v) for u, v in pairs if u.setup in ("", name))
         scale = moves.pop((INSTRUMENT, SCALE), 0.0)
         moved = tuple((at, by) for at, by in moves.items() if at[0] != INSTRUMENT)
-        yield (
-            here,
-            predictor.kept((name, here.tobytes(), moved), partial(_beside, predictor, here, dict(moved))),
-            (scaled(predictor.machine.description, scale),) if scale else (),
-        )
+        key = (name, here.tobytes(), moved)
+        mine = predictor.kept(key, partial(_beside, predictor, here, dict(moved)))
+        of_instrument = [scaled(predictor.machine.description, scale)] if scale else []
+        out[here] = mine([*terms, *of_instrument])
+    return np.asarray(out + _frame_part(predictor, pairs))
 
 
 def _beside(predictor: Predictor, here: Mask, moves: Moves) -> Predictor:
-    of_rows = predictor if here.all() else predictor.beside(rows=here)
-    return of_rows.beside(machine=built(predictor, moves)) if moves else of_rows
+    return with_numbers(predictor if here.all() else predictor.beside(rows=here), moves)
 
 
 def _frame_part(predictor: Predictor, pairs: Sequence[tuple[Unknown, float]]) -> Floats | float:
@@ -181,30 +174,17 @@ def sensitivity_at(predictor: Predictor, s: Sensitivity, values: Floats) -> Sens
     return replace(s, columns=columns)
 
 
-def _changed(
-    predictor: Predictor, unknowns: Sequence[Unknown], values: Floats, setup: str, base: Floats
-) -> Floats:
-    """(n, c) as `predicted`, where only rows of a set-up (of all, if there is none) differ from `base`."""
-    if not setup:
-        return predicted(predictor, unknowns, values)
-    here = np.array(predictor.experiment.setup) == setup
-    out = base.copy()
-    mine = np.array([v if u.setup in ("", setup) else 0.0 for u, v in zip(unknowns, values, strict=True)])
-    out[here] = predicted(predictor.beside(rows=here), unknowns, mine)
-    return out
-
-
 def _columns(
     predictor: Predictor, unknowns: Sequence[Unknown], values: Floats, base: Floats
 ) -> Iterator[tuple[int, Floats | None, str]]:
     """Each unknown with (n, c) its slopes at `values`, where the machine shows `base`, or why there are none."""
     slopes, solved = slopes_at(predictor, unknowns, values), np.isfinite(base)
-    for k, u in enumerate(unknowns):
+    for k in range(len(unknowns)):
         try:
             column = slopes.of(k)
             if column is None:
                 moved = values + STEP * (np.arange(len(values)) == k)
-                column = (_changed(predictor, unknowns, moved, u.setup, base) - base) / STEP
+                column = (predicted(predictor, unknowns, moved) - base) / STEP
         except StiffmapError as problem:
             yield k, None, str(problem)
             continue

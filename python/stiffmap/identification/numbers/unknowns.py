@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stiffmap.experiment.experiment import Experiment, Floats
-from stiffmap.identification.numbers.certificate import INSTRUMENT, SCALE, Tolerances, frame_names
+from stiffmap.identification.numbers.certificate import INSTRUMENT, SCALE, Tolerances, frame_errors
 from stiffmap.model.description import Block, Body, Element, Joint, MachineDescription, Offset, Spring
 from stiffmap.model.with_errors import END, FRAME
 
@@ -45,7 +45,7 @@ class Unknown:
     """One number that may be off by a normal error with standard uncertainty `u` (SI or relative).
 
     moves
-        (full name, what is moved) -> weight, see `edit.edited` and, of the instrument, `certificate.seen`.
+        (full name, what is moved) -> weight, see `with_errors.edited` and, of the instrument, `certificate.frame_errors`.
     """
 
     name: str
@@ -65,9 +65,10 @@ class Unknown:
 
 @dataclass(frozen=True)
 class Declared:
-    """What the file says, by full name and field, SI."""
+    """What the file says, by full name and field, SI, and what holds where it says nothing."""
 
     given: dict[str, float]
+    t: Tolerances
 
     def single(self, name: str, fields: Sequence[str], default: float, size: float = 1.0) -> float:
         """Of one number, that of the first of some fields of `name` that has one, over the number's size."""
@@ -124,25 +125,25 @@ def unknowns(
     """
     t = tolerances or Tolerances()
     bare = description.declared or description
-    given = Declared({k: u for k, u in bare.uncertainty if u > 0.0})
+    given = Declared({k: u for k, u in bare.uncertainty if u > 0.0}, t)
     loaded = bool(experiment.wrench.any() or experiment.gravity or bare.gravity)
     weighs = bool(experiment.gravity or bare.gravity)
     out: list[Unknown] = []
     for leg in bare.legs:
-        found, run = _of_sequence(leg.elements, leg.name, leg.name, t, given)
+        found, run = _of_sequence(leg.elements, leg.name, leg.name, given)
         out += found
         if len(bare.legs) > 1:
             place = given.position(run, t.position)
             out += _frame(f"{leg.name}.{END}", leg.name, FRAME, place, t.direction, "axis positions")
-    out += _of_sequence(bare.base, "base", "", t, given)[0]
-    found, run = _of_sequence(bare.platform, "platform", "", t, given)
+    out += _of_sequence(bare.base, "base", "", given)[0]
+    found, run = _of_sequence(bare.platform, "platform", "", given)
     out += found
     out += _frame(f"platform.{END}", "", FRAME, given.position(run, t.tool), t.direction, "tool", "tool")
     if experiment.quantity == "position":
         out.append(
             Unknown("scale of the instrument", INSTRUMENT, "1", t.instrument, (((INSTRUMENT, SCALE), 1.0),))
         )
-    for name, unit in frame_names(experiment):
+    for name, unit, _ in frame_errors(experiment):
         what, u = ("turn", t.frame_direction) if unit == "rad" else ("shift", t.frame)
         if u > 0.0:
             full = f"{what} of the instrument's frame, {name}"
@@ -155,7 +156,7 @@ def unknowns(
 
 
 def _of_sequence(
-    elements: tuple[Element, ...], path: str, leg: str, t: Tolerances, given: Declared
+    elements: tuple[Element, ...], path: str, leg: str, given: Declared
 ) -> tuple[list[Unknown], Run]:
     """The unknowns, and the offsets behind the last joint."""
     out: list[Unknown] = []
@@ -163,25 +164,25 @@ def _of_sequence(
     for e in elements:
         name = f"{path}.{e.name}"
         if isinstance(e, Block):
-            out += _of_block(e, path, leg, t, given)
+            out += _of_block(e, path, leg, given)
             run = []
         elif isinstance(e, Joint):
-            out += _of_joint(e, name, leg, t, given, given.position(run, t.position))
+            out += _of_joint(e, name, leg, given, given.position(run, given.t.position))
             run = []
         elif isinstance(e, Offset):
             run.append((name, e))
         else:
-            out += _of_part(e, name, leg, t, given)
+            out += _of_part(e, name, leg, given)
     return out, run
 
 
-def _of_part(e: Element, name: str, leg: str, t: Tolerances, given: Declared) -> Iterator[Unknown]:
+def _of_part(e: Element, name: str, leg: str, given: Declared) -> Iterator[Unknown]:
     """Of a spring its compliance, of a body its mass."""
     if isinstance(e, Spring) and not e.laws:
-        u = given.spring(name, e, t.compliance)
-        yield _relative(name, leg, "link compliance", "compliance", u)
+        u = given.spring(name, e, given.t.compliance)
+        yield _single("compliance", name, leg, "link compliance", "ln", u)
     elif isinstance(e, Body) and e.mass > 0.0:
-        yield _relative(name, leg, "masses", "mass", given.single(name, ["mass"], t.mass, e.mass))
+        yield _single("mass", name, leg, "masses", "ln", given.single(name, ["mass"], given.t.mass, e.mass))
 
 
 def joint_name(element: str) -> str:
@@ -189,15 +190,13 @@ def joint_name(element: str) -> str:
     return element.removeprefix("base.").removeprefix("platform.")
 
 
-def _relative(name: str, leg: str, group: str, what: str, u: float) -> Unknown:
-    return Unknown(f"{what} of {name}", group, "ln", u, (((name, what), 1.0),), leg)
+def _single(what: str, name: str, leg: str, group: str, unit: str, u: float) -> Unknown:
+    return Unknown(f"{what} of {name}", group, unit, u, (((name, what), 1.0),), leg)
 
 
-def _of_joint(
-    e: Joint, name: str, leg: str, t: Tolerances, given: Declared, place: Floats
-) -> Iterator[Unknown]:
+def _of_joint(e: Joint, name: str, leg: str, given: Declared, place: Floats) -> Iterator[Unknown]:
     """Frame errors that the joint's own motion does not take up; of a drive its zero and gain."""
-    slides = e.kind == "prismatic"
+    slides, t = e.kind == "prismatic", given.t
     kept = list(FRAME)
     axes = [np.abs(np.array(a)) for a in e.axes]
     for axis in axes[:1]:
@@ -210,31 +209,13 @@ def _of_joint(
     yield from _frame(name, leg, tuple(kept), place, t.direction, "axis positions", turned)
     if e.actuated:
         unit, u = ("m", t.zero) if slides else ("rad", t.turning_zero)
-        yield Unknown(
-            f"zero of {name}",
-            "zeros",
-            unit,
-            given.single(name, ["home", "command_errors.offset"], u),
-            (((name, "zero"), 1.0),),
-            leg,
-        )
-        yield Unknown(
-            f"gain of {name}",
-            "gains",
-            "1",
-            given.single(name, ["command_errors.slope"], t.gain),
-            (((name, "gain"), 1.0),),
-            leg,
-        )
+        u = given.single(name, ["home", "command_errors.offset"], u)
+        yield _single("zero", name, leg, "zeros", unit, u)
+        yield _single("gain", name, leg, "gains", "1", given.single(name, ["command_errors.slope"], t.gain))
     if e.law is not None and not e.law.cubic and not e.law.knots:
         group = "drive compliance" if e.actuated else "link compliance"
-        yield _relative(
-            name,
-            leg,
-            group,
-            "compliance",
-            given.single(name, ["stiffness", "law.stiffness"], t.compliance, e.law.stiffness),
-        )
+        u = given.single(name, ["stiffness", "law.stiffness"], t.compliance, e.law.stiffness)
+        yield _single("compliance", name, leg, group, "ln", u)
 
 
 def _frame(
@@ -259,24 +240,23 @@ def _frame(
         )
 
 
-def _of_block(block: Block, path: str, leg: str, t: Tolerances, given: Declared) -> Iterator[Unknown]:
+def _of_block(block: Block, path: str, leg: str, given: Declared) -> Iterator[Unknown]:
     """Lengths of the offsets of a parallel block: their mean, and how its branches differ."""
     lengths = [
         [e for e in b.elements if isinstance(e, Offset) and np.linalg.norm(e.nominal.p) > 0]
         for b in block.branches
     ]
-    names = [e.name for e in lengths[0] if all(e.name in [o.name for o in other] for other in lengths)]
+    shared = [e for e in lengths[0] if all(e.name in [o.name for o in other] for other in lengths)]
     longest = max((float(np.linalg.norm(e.nominal.p)) for e in lengths[0]), default=0.0)
-    for element in names:
-        at = [(f"{path}.{b.name}.{element}", "length") for b in block.branches]
-        offset = next(e for e in lengths[0] if e.name == element)
+    for offset in shared:
+        at = [(f"{path}.{b.name}.{offset.name}", "length") for b in block.branches]
         size = float(np.linalg.norm(offset.nominal.p))
         single = given.length([name for name, _ in at], offset)
         rod = size > 0.5 * longest
-        place = f"{path}.{block.name}.{element}"
+        place = f"{path}.{block.name}.{offset.name}"
         if rod:
             common = tuple((a, 1.0) for a in at)
-            u = single / float(np.sqrt(len(at))) if single else t.length
+            u = single / float(np.sqrt(len(at))) if single else given.t.length
             yield Unknown(f"length of {place}", "link lengths", "m", u, common, leg)
         for i, other in enumerate(at[1:]):
             between = f"{block.branches[0].name} and {block.branches[i + 1].name}"
@@ -284,10 +264,10 @@ def _of_block(block: Block, path: str, leg: str, t: Tolerances, given: Declared)
                 f"difference of {place} between {between}",
                 "rod mismatch" if rod else "width",
                 "m",
-                single * float(np.sqrt(2.0)) if single else t.mismatch,
+                single * float(np.sqrt(2.0)) if single else given.t.mismatch,
                 ((at[0], -0.5), (other, 0.5)),
                 leg,
             )
     for branch in block.branches:
         for e in branch.elements:
-            yield from _of_part(e, f"{path}.{branch.name}.{e.name}", leg, t, given)
+            yield from _of_part(e, f"{path}.{branch.name}.{e.name}", leg, given)

@@ -10,7 +10,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import t as student
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.experiment import Experiment
@@ -60,14 +59,6 @@ class NumberBudget:
         """U at k = 2."""
         return K * self.u
 
-    @property
-    def interval(self) -> tuple[float, float]:
-        """95 % interval with Student's factor at the effective degrees of freedom."""
-        half = (
-            self.u * float(student.ppf(0.975, self.freedom)) if np.isfinite(self.freedom) else 1.96 * self.u
-        )
-        return self.value - half, self.value + half
-
     def __str__(self) -> str:
         head = f"{self.name}: {self.value:.5g} {self.unit}, u = {self.u:.3g}, U (k = 2) = {self.expanded:.3g}"
         rows = [f"  {line.source} ({line.kind}): {line.u:.3g}" for line in self.lines]
@@ -101,8 +92,7 @@ def budgets(
         For a number that does not exist.
     """
     predictor = Predictor(machine, experiment)
-    scale = np.array([p.scale for _, p in fitted(machine.description, found.terms)])
-    inverse = np.linalg.pinv(found.jacobian * scale) * scale[:, None]
+    inverse = np.linalg.pinv(found.jacobian * found.scale) * found.scale[:, None]
     shifts = []
     for term, given in others:
         parameters = [p for _, p in fitted(machine.description, (term,)) if p.name in given]

@@ -17,7 +17,7 @@ from stiffmap.common.short import short_repr
 from stiffmap.experiment.calls import Effects, as_experiment, effects_of
 from stiffmap.experiment.experiment import Experiment
 from stiffmap.experiment.noise.whitening import basis, readings_of
-from stiffmap.identification.inference.amplitudes import Fit, fitted
+from stiffmap.identification.inference.amplitudes import fitted
 from stiffmap.identification.inference.columns import Columns, drawn
 from stiffmap.identification.inference.free import Free
 from stiffmap.identification.inference.kernels import ReadingPoints, gaps
@@ -133,11 +133,8 @@ def difference(machine: Machine, a: Estimate, b: Estimate) -> tuple[Floats, Floa
         return shift, covariance
     numbers = block_diag(a.jacobian[:, known], b.jacobian[:, known])
     residual = np.concatenate([a.residual, b.residual])
-    fit, kernels = _gaps(machine, a, b, numbers, residual)
-    v = fit.noise**2 * np.eye(len(residual))
-    for name, kernel in kernels.items():
-        v += fit.amplitude(name) ** 2 * kernel
-    white = solve_triangular(cholesky(v, lower=True), np.column_stack([numbers, residual]), lower=True)
+    root = cholesky(_left(machine, a, b, numbers, residual), lower=True)
+    white = solve_triangular(root, np.column_stack([numbers, residual]), lower=True)
     columns, left = white[:, :-1], white[:, -1]
     spread = np.linalg.inv(columns.T @ columns)
     m = len(known)
@@ -147,11 +144,8 @@ def difference(machine: Machine, a: Estimate, b: Estimate) -> tuple[Floats, Floa
     return shift, covariance
 
 
-def _gaps(
-    machine: Machine, a: Estimate, b: Estimate, numbers: Floats, residual: Floats
-) -> tuple[Fit, dict[str, Floats]]:
-    """The amplitudes of all gaps that whitened readings (N,) of both can hold, numbers (N, 2 k) left open, and the covariance (N, N)
-    that each is of."""
+def _left(machine: Machine, a: Estimate, b: Estimate, numbers: Floats, residual: Floats) -> Floats:
+    """(N, N) covariance of noise and of all gaps that whitened readings (N,) of both can hold, numbers (N, 2 k) left open."""
     e = joined(a.experiment, b.experiment)
     read = [readings_of(x.experiment, x.problem.base) for x in (a, b)]
     rows = np.concatenate([read[0][0], read[1][0] + len(a.experiment)])
@@ -169,7 +163,9 @@ def _gaps(
             kernels[kernel.name] = shown / size
             parts.append(Part(kernel.name, kernel.kind, full=free.T @ kernels[kernel.name] @ free))
     columns = Columns.bare(e, rows, channel, spared, free.T @ residual)
-    return fitted(columns, parts), kernels
+    fit = fitted(columns, parts)
+    noise = fit.noise**2 * np.eye(len(residual))
+    return sum((fit.amplitude(name) ** 2 * kernel for name, kernel in kernels.items()), noise)
 
 
 def _some(e: Experiment) -> Experiment:

@@ -31,7 +31,7 @@ from stiffmap.common.short import short_repr
 from stiffmap.experiment.calls import Effects, as_experiment, effects_of
 from stiffmap.experiment.experiment import PER_ROW, Experiment
 from stiffmap.experiment.virtual.plans import load_set, numbered_anew, plan_of_poses, random_poses
-from stiffmap.identification.planning.estimate import Estimate, estimate, fitted
+from stiffmap.identification.planning.estimate import Estimate, estimate
 from stiffmap.identification.planning.information import (
     Information,
     exchange,
@@ -226,8 +226,7 @@ def follow(
         result = estimate(machine, data, now)
         found.append((len(data), result))
         now = result.terms
-        scale = np.array([p.scale for _, p in fitted(machine.description, now)])
-        if (result.sigma * result.misfit / scale).max() <= until:
+        if result.worst <= until:
             break
     return found
 

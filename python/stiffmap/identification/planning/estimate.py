@@ -13,7 +13,7 @@ from stiffmap.common.short import short_repr
 from stiffmap.experiment.experiment import Experiment
 from stiffmap.experiment.noise.level import noise_of
 from stiffmap.experiment.noise.whitening import LinearProblem
-from stiffmap.experiment.prediction.predict import Predictor
+from stiffmap.experiment.prediction.predict import Predictor, Terms
 from stiffmap.identification.candidates.candidates import words
 from stiffmap.identification.candidates.sensitivity import step_of
 from stiffmap.identification.inference.optimum import covariance, optimum
@@ -26,7 +26,6 @@ STEP = 1e-3
 """Share of a parameter's typical size over which predictions are differenced."""
 STEPS = 30
 """Evaluations of a fit at most."""
-Terms = tuple[AppliedEffect, ...]
 
 
 @short_repr
@@ -37,6 +36,8 @@ class Estimate:
     names: tuple[str, ...]
     """``kind of element, leg x: parameter``."""
     units: tuple[str, ...]
+    scale: Floats
+    """(k,) typical sizes."""
     values: Floats
     covariance: Floats
     """(k, k) from the noise of the readings; infinite variances of numbers that they do not determine."""
@@ -64,6 +65,11 @@ class Estimate:
     def misfit(self) -> float:
         """Root of chi-square per degree of freedom, at least 1: what a model that does not fit adds (Birge)."""
         return float(np.sqrt(max(1.0, self.chi2 / max(self.freedom, 1))))
+
+    @property
+    def worst(self) -> float:
+        """The largest standard uncertainty, misfit included, in typical sizes."""
+        return float((self.sigma * self.misfit / self.scale).max())
 
     def as_plain(self) -> list[dict[str, Any]]:
         """Data of JSON, SI: values and uncertainties."""
@@ -101,6 +107,7 @@ def estimate(machine: Machine, experiment: Experiment, terms: Sequence[AppliedEf
             f"{words(t.kind, t.element, t.legs)}: {p.name}" for t, p in ((begun[i], p) for i, p in parameters)
         ),
         tuple(p.unit for _, p in parameters),
+        scale,
         found.x * scale,
         spread * np.outer(scale, scale),
         at(found.x),

@@ -11,10 +11,10 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.experiment import Experiment, Integers
 from stiffmap.experiment.noise.nuisance import nuisance_columns
 from stiffmap.experiment.noise.whitening import LinearProblem
-from stiffmap.experiment.prediction.predict import Predictor
+from stiffmap.experiment.prediction.predict import Predictor, Terms
 from stiffmap.experiment.virtual.plans import plan_of_poses
 from stiffmap.identification.inference.optimum import covariance
-from stiffmap.identification.planning.estimate import Terms, fitted, slopes
+from stiffmap.identification.planning.estimate import fitted, slopes
 from stiffmap.solve.machine import Machine
 
 RIDGE = 1e-9

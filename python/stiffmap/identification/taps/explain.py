@@ -130,7 +130,8 @@ def explain_taps(
         same = (f for f in alike if len(f.named) == len(best.named) and known < {s.place for s in f.named})
         steads = {s.place: s for f in same for s in f.named if s.place not in {*known, e.place}}
         instead = tuple(sorted(steads.values(), key=lambda s: s.chi2))
-        named.append(replace(e.by(*(f.named[k] for f in parts)), alike=instead))
+        e = e.by(*(f.named[k] for f in parts)) if parts else e
+        named.append(replace(e, alike=instead))
     lead = "" if best.explains else "Not all is explained; "
     text = f"{lead}{_sentence(named, before, best.chi2, n)}{remarks}"
     return TapDiagnosis(before, n, tuple(named), text, best.explains, best.machine)

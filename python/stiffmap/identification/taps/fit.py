@@ -11,10 +11,16 @@ from scipy.stats import chi2
 from stiffmap.common.broadcasting import Floats
 from stiffmap.identification.candidates.candidates import Candidate
 from stiffmap.identification.inference.constants import ODDS, RARE
-from stiffmap.identification.inference.optimum import Optimum, covariance
-from stiffmap.identification.taps.causes import Causes, scaled, together, unscaled
-from stiffmap.identification.taps.problem import TapsProblem
+from stiffmap.identification.inference.optimum import Optimum, covariance, differences, optimum
+from stiffmap.identification.taps.problem import Causes, TapsProblem
+from stiffmap.model.effects import Parameter
 from stiffmap.solve.machine import Machine
+
+STEPS = 25
+STEP = 0.02
+"""Of a difference, in standard uncertainties or logarithms of a factor."""
+WIDEST = 6.0
+"""Standard uncertainties by which a number is off at most."""
 
 
 @dataclass(frozen=True)
@@ -51,10 +57,8 @@ class Explained:
         """SI."""
         return next(iter(self.u.values()))
 
-    def by(self, statics: Explained | None = None, taps: Explained | None = None) -> Explained:
-        """With its parameter by static readings alone and by frequencies alone, where there are both and each determines it."""
-        if statics is None or taps is None:
-            return self
+    def by(self, statics: Explained, taps: Explained) -> Explained:
+        """With its parameter by static readings alone and by frequencies alone, where each determines it."""
         one, two = statics.value, taps.value
         sd = float(np.hypot(statics.sd, taps.sd))
         if not np.isfinite(sd):
@@ -98,26 +102,43 @@ def price(places: int) -> float:
 
 
 def fitted(problem: TapsProblem, begin: Causes, off: Floats | None = None) -> FittedCauses:
-    """Causes near their values with the uncertain numbers free, which are not taken to be small."""
-    scales = [scaled(c.parameters[0]) for c, _ in begin]
+    """Least chi-square of causes near their values, within the bounds of these, and of the uncertain numbers near `off` (numbers,)
+    within their uncertainty, which are not taken to be small."""
+    tried, numbers = [c for c, _ in begin], [c.parameters[0] for c, _ in begin]
+    k, n, most = len(tried), int(problem.used.sum()), np.full(len(problem.numbers), WIDEST)
 
     def at(x: Floats) -> Causes:
-        return [(c, to(float(t))) for (c, _), (to, *_), t in zip(begin, scales, x, strict=True)]
+        return [(c, in_si(p, t)) for c, p, t in zip(tried, numbers, x[:k], strict=True)]
 
-    fit = problem.settled(
-        [unscaled(c.parameters[0], value) for c, value in begin],
-        lambda x: together(at(x)),
-        [low for _, low, _ in scales],
-        [high for *_, high in scales],
-        off,
+    def residual(x: Floats) -> Floats:
+        return np.concatenate([problem.residual(at(x), x[k:]), x[k:]])
+
+    start = [free_number(p, value) for p, (_, value) in zip(numbers, begin, strict=True)]
+    low = [free_number(p, p.lower) for p in numbers]
+    high = [free_number(p, p.upper) for p in numbers]
+    fit = optimum(
+        residual,
+        np.r_[start, np.zeros(len(most)) if off is None else off],
+        (np.r_[low, -most], np.r_[high, most]),
+        lambda x: differences(residual, x, STEP),
+        STEPS,
     )
-    k, n = len(begin), int(problem.used.sum())
     found = []
-    for (c, value), variance in zip(at(fit.x[:k]), np.diag(covariance(fit.jacobian)[0])[:k], strict=True):
-        p = c.parameters[0]
+    variances = np.diag(covariance(fit.jacobian)[0])[:k]
+    for (c, value), p, variance in zip(at(fit.x), numbers, variances, strict=True):
         u = float(np.sqrt(variance)) * (value if p.null == 1.0 else p.scale)
         found.append(Explained(c, {p.name: value}, {p.name: u}, fit.chi2))
-    machine, _ = problem.real(together(at(fit.x[:k])), fit.x[k:])
+    machine, _ = problem.real(at(fit.x), fit.x[k:])
     slopes = fit.jacobian[:n]
     lines = Optimum(fit.x[k:], fit.residual[:n], slopes[:, k:])
     return FittedCauses(tuple(found), fit.chi2, machine, lines, slopes[:, :k])
+
+
+def in_si(p: Parameter, free: float) -> float:
+    """A parameter by its free number, the logarithm of a factor and else in typical sizes, within its bounds."""
+    return float(np.clip(np.exp(free) if p.null == 1.0 else free * p.scale, p.lower, p.upper))
+
+
+def free_number(p: Parameter, value: float) -> float:
+    """The free number behind a value of a parameter."""
+    return float(np.log(value)) if p.null == 1.0 else value / p.scale

@@ -7,7 +7,8 @@ import numpy as np
 from stiffmap.common.broadcasting import Floats, whole_number
 from stiffmap.common.errors import StiffmapError
 from stiffmap.identification.planning.information import exchange, information_of
-from stiffmap.identification.taps.causes import causes, scaled, term
+from stiffmap.identification.taps.causes import causes
+from stiffmap.identification.taps.fit import in_si
 from stiffmap.identification.taps.problem import TapsProblem
 from stiffmap.identification.taps.table import TapTest
 from stiffmap.solve.machine import Machine, takes_machine
@@ -48,9 +49,8 @@ def where_to_tap(
     here = problem.residual()
     columns = []
     for c in causes(problem):
-        to, _, _ = scaled(c.parameters[0])
         try:
-            columns.append((problem.residual(term(c, to(STEP))) - here) / STEP)
+            columns.append((problem.residual([(c, in_si(c.parameters[0], STEP))]) - here) / STEP)
         except StiffmapError:
             continue
     A, J = np.stack(columns, axis=1), problem.slopes[problem.used]

@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.experiment import Experiment
 from stiffmap.experiment.noise.level import noise_of
 from stiffmap.experiment.prediction.predict import Predictor
-from stiffmap.identification.inference.optimum import Optimum, differences, optimum
+from stiffmap.identification.candidates.candidates import Candidate
 from stiffmap.identification.taps.predict import predict_taps
 from stiffmap.identification.taps.table import TapTest
 from stiffmap.model.addresses import moved, number
 from stiffmap.model.description import Body, MachineDescription
-from stiffmap.model.description.tree import all_elements
+from stiffmap.model.description.tree import all_elements, edit
+from stiffmap.model.effects import apply_records
 from stiffmap.solve.machine import Machine
 from stiffmap.workspace.vibration.modes import ASSUMED, damping_of
 
@@ -25,18 +28,15 @@ FELT = 0.05
 """Numbers whose uncertainty shifts no reading by more than this share of its noise are not fitted."""
 LOST = 3.0
 """Residual, relative, of a mode that a machine no longer has."""
-STEPS = 25
-STEP = 0.02
-"""Of a difference, in standard uncertainties or logarithms of a factor."""
-WIDEST = 6.0
-"""Standard uncertainties by which a number is off at most."""
 SPREAD, LEVEL = 0.5, 1.0
 """Logarithms: what damping ratios of one machine differ by from mode to mode, and what their level is off by, where none is declared."""
 LEAST = 1e-4
 """Damping ratio of a mode without a damper."""
 MODAL = "modal_damping"
-Term = Callable[[MachineDescription, TapTest], tuple[MachineDescription, TapTest]]
-"""What a cause makes of a machine and of a tap test."""
+FIELDS = {"link_mass": "mass", "damper": "damping"}
+"""Causes that add to a number of an element."""
+Causes = Sequence[tuple[Candidate, float]]
+"""Causes with their values, SI."""
 
 
 @dataclass(eq=False)
@@ -106,18 +106,21 @@ class TapsProblem:
             parts.append((Predictor(machine, self.statics)(()) - self.statics.reading)[self.keep])
         return np.concatenate(parts)
 
-    def real(self, term: Term | None, off: Floats | None = None) -> tuple[Machine, TapTest]:
-        """Machine and tap test with a cause, uncertain numbers off by so many standard uncertainties (numbers,)."""
+    def real(self, causes: Causes = (), off: Floats | None = None) -> tuple[Machine, TapTest]:
+        """Machine and tap test with causes, uncertain numbers off by so many standard uncertainties (numbers,)."""
         d, taps = self.machine.description, self.taps
-        if off is not None and len(off):
+        if off is not None:
             d = shifted(d, self.numbers, off)
-        if term is not None:
-            d, taps = term(d, taps)
+        for c, value in causes:
+            if c.kind.startswith("hammer"):
+                taps = held(taps, c, value)
+            else:
+                d = with_cause(d, c, value)
         return Machine(d, like=self.machine), taps
 
-    def residual(self, term: Term | None = None, off: Floats | None = None) -> Floats:
+    def residual(self, causes: Causes = (), off: Floats | None = None) -> Floats:
         """(n,) by noise."""
-        raw = self._raw(*self.real(term, off))
+        raw = self._raw(*self.real(causes, off))
         return np.asarray(np.where(np.isfinite(raw), raw, LOST)[self.used] / self.noise[self.used])
 
     def only(self, part: str) -> TapsProblem:
@@ -126,25 +129,29 @@ class TapsProblem:
         out.used = self.used & ((self.kind == "statics") == (part == "statics"))
         return out
 
-    def settled(
-        self,
-        start: Sequence[float] = (),
-        cause: Callable[[Floats], Term] | None = None,
-        low: Sequence[float] = (),
-        high: Sequence[float] = (),
-        off: Floats | None = None,
-    ) -> Optimum:
-        """Least chi-square with the uncertain numbers free within their uncertainty, near `off` (numbers,); the first numbers are those
-        of a cause, if any, near their start (k,) and between bounds (k,)."""
-        free, most = len(start), np.full(len(self.numbers), WIDEST)
 
-        def both(x: Floats) -> Floats:
-            term = cause(x[:free]) if cause else None
-            return np.concatenate([self.residual(term, x[free:]), x[free:]])
+def with_cause(d: MachineDescription, c: Candidate, value: float) -> MachineDescription:
+    """The description with a cause in the machine (SI)."""
+    if c.kind == "payload":
+        return replace(d, platform=(*d.platform, Body("tapped_load", value)))
+    if c.kind not in FIELDS:
+        return apply_records(d, [c.term([value])])
+    name = FIELDS[c.kind]
 
-        bounds = np.r_[low, -most], np.r_[high, most]
-        begin = np.r_[start, np.zeros(len(most)) if off is None else off]
-        return optimum(both, begin, bounds, lambda x: differences(both, x, STEP), STEPS)
+    def change(e: Any) -> Any:
+        if not hasattr(e, name):  # an offset may have the name of its body
+            return None
+        return replace(e, **{name: (getattr(e, name) or 0.0) + value})
+
+    return edit(d, ".".join((*(c.legs or ("platform",)), c.element)), change) or d
+
+
+def held(taps: TapTest, c: Candidate, value: float) -> TapTest:
+    """The tap test with a cause in how the hammer was held (SI)."""
+    way = value * np.eye(3)["xyz".index(c.element)]
+    if c.kind == "hammer_direction":
+        return replace(taps, hammer=taps.hammer @ Rotation.from_rotvec(way).as_matrix().T)
+    return replace(taps, lever=taps.lever + way)
 
 
 def uncertain_numbers(d: MachineDescription, default_u: float) -> list[tuple[str, float, float]]:

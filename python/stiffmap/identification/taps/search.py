@@ -25,9 +25,8 @@ from stiffmap.identification.inference.names import put_instead, searched
 from stiffmap.identification.inference.places import Place, shape_of
 from stiffmap.identification.inference.verdict import judged
 from stiffmap.identification.numbers.unknowns import Unknown
-from stiffmap.identification.taps.causes import Causes, scaled, together
-from stiffmap.identification.taps.fit import FittedCauses
-from stiffmap.identification.taps.problem import TapsProblem
+from stiffmap.identification.taps.fit import FittedCauses, free_number, in_si
+from stiffmap.identification.taps.problem import Causes, TapsProblem
 
 FACTORS = (-1.5, -0.8, -0.4, -0.15, 0.15, 0.4, 0.8, 1.3, 1.8, 2.4)
 """Logarithms of a factor at which its changes are predicted."""
@@ -46,7 +45,7 @@ def named_causes(problem: TapsProblem, tried: Sequence[Candidate], at: FittedCau
 
     def predict(chosen: Sequence[Chosen]) -> Floats:
         try:
-            there = problem.residual(together([*at.causes, *_values(chosen)]), at.lines.x)
+            there = problem.residual([*at.causes, *_values(chosen)], at.lines.x)
             return columns.rotated(there - at.lines.residual)
         except StiffmapError:
             return np.full(len(columns), np.nan)
@@ -79,20 +78,18 @@ def columns_of(problem: TapsProblem, tried: Sequence[Candidate], at: FittedCause
 
 def place_of(problem: TapsProblem, c: Candidate, at: FittedCauses, free: Floats) -> Place:
     """A candidate with the changes of the readings by its sizes, predicted at some and interpolated between them."""
-    lines = at.lines
-    p, (to, low, high) = c.parameters[0], scaled(c.parameters[0])
+    lines, p = at.lines, c.parameters[0]
     changes = {0.0: np.zeros(len(lines.residual))}
     for t in FACTORS if p.null == 1.0 else SIZES:
         with suppress(StiffmapError):
-            if low < t < high:
-                there = together([*at.causes, (c, to(t))])
-                changes[t] = problem.residual(there, lines.x) - lines.residual
+            if free_number(p, p.lower) < t < free_number(p, p.upper):
+                changes[t] = problem.residual([*at.causes, (c, in_si(p, t))], lines.x) - lines.residual
     knots = sorted(changes)
     sizes = np.unique([np.linspace(*ends, BETWEEN) for ends in pairwise(knots)])
     found = CubicSpline(knots, [changes[t] for t in knots])(sizes) if len(knots) > 1 else ()
     shapes = []
     for t, change in zip(sizes, found, strict=True):
-        step = (to(float(t)) - float(p.null or 0.0)) / p.scale
+        step = (in_si(p, t) - float(p.null or 0.0)) / p.scale
         if step:
             line = change[None] / step
             shapes.append(shape_of(Variant(c, line, np.array([np.sign(step)])), free.T @ line.T))

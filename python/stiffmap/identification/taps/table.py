@@ -82,10 +82,6 @@ class TapTest:
         once, back = np.unique(self.position, axis=0, return_inverse=True)
         return once, back.reshape(-1)
 
-    def rows(self, keep: NDArray[np.bool_]) -> TapTest:
-        """Some of the rows."""
-        return TapTest(*(getattr(self, f.name)[keep] for f in fields(self)))
-
 
 def load_taps(path: str | PathLike[str], machine: Machine | None = None) -> TapTest:
     """Table of tap tests from a CSV file.

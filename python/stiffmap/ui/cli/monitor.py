@@ -6,7 +6,7 @@ from pathlib import Path
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment import load_experiment
-from stiffmap.identification.diagnosis.report.reading import diagnosed
+from stiffmap.identification.diagnosis.report.result import diagnosed
 from stiffmap.identification.planning.budget import budgets
 from stiffmap.identification.planning.changes import monitor
 from stiffmap.solve.machine import load_machine

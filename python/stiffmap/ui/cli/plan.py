@@ -18,7 +18,6 @@ from stiffmap.experiment import simulate
 from stiffmap.experiment.calls import effects_of
 from stiffmap.experiment.files.save import plan_columns
 from stiffmap.identification.planning import follow, plan
-from stiffmap.identification.planning.estimate import fitted
 from stiffmap.solve.machine import Machine, load_machine
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import MM, in_si, numbers, refuse_unused
@@ -132,9 +131,7 @@ def _sequential(
         batch=rows,
         **how,
     )
-    last = steps[-1][1]
-    scale = np.array([p.scale for _, p in fitted(m.description, tuple(terms))])
-    met = bool((last.sigma * last.misfit / scale).max() <= until)
+    met = steps[-1][1].worst <= until
     told = []
     found: list[dict[str, Any]] = [{"rows": n, "parameters": e.as_plain()} for n, e in steps]
     for step in found:

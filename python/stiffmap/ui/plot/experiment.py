@@ -13,7 +13,7 @@ from scipy.stats import f as f_distribution
 
 from stiffmap.experiment.comparison.residual import Residual
 from stiffmap.experiment.experiment import Experiment, Floats
-from stiffmap.identification.diagnosis.report.findings import Findings
+from stiffmap.identification.diagnosis.report.result import Diagnosis
 from stiffmap.ui.plot.style import AFTER, BEFORE, MM, UM, new_figure
 
 NOISE = "#d9d9d9"
@@ -218,7 +218,7 @@ TREND = 1e-3
 """p-value below which residuals follow a driver, over all drivers and channels."""
 
 
-def trending(d: Findings) -> tuple[list[Driver], list[Driver]]:
+def trending(d: Diagnosis) -> tuple[list[Driver], list[Driver]]:
     """Drivers that residuals follow, before or after, and the others."""
     drivers = drivers_of(d.experiment)
     read = np.flatnonzero(d.experiment.axis_read)
@@ -250,7 +250,7 @@ def _follows(x: Floats, y: Floats) -> float:
     return float(f_distribution.sf(ratio, columns - 1, n - columns))
 
 
-def trends(d: Findings, drivers: list[Driver]) -> Figure:
+def trends(d: Diagnosis, drivers: list[Driver]) -> Figure:
     """Residual of each channel against what may drive it."""
     axes_read = [int(i) for i in np.flatnonzero(d.experiment.axis_read)]
     # a row per driver fits an upright page; its columns are the channels
@@ -282,7 +282,7 @@ def drivers_of(e: Experiment) -> list[Driver]:
     return out
 
 
-def kept(found: Residual | Findings, values: Floats) -> Floats:
+def kept(found: Residual | Diagnosis, values: Floats) -> Floats:
     """(n, k) values, NaN in rows that were set aside."""
     return np.where(found.set_aside[:, None], np.nan, values)
 

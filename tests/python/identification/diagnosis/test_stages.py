@@ -52,7 +52,7 @@ DATA = 3 * E[0] + 4 * E[1]
 
 
 def gain(*variants: Variant, of: Floats = DATA) -> float:
-    return Screen.of(problem_of(DATA), np.arange(len(DATA)), variants).gain(of)
+    return Screen.of(problem_of(DATA), variants).gain(of)
 
 
 def test_the_best_part_takes_away_the_squared_projection() -> None:

@@ -26,15 +26,15 @@ POWER = 0.95
 def effects_of(
     description: MachineDescription,
     found: Corrected,
-    aliases: Sequence[Sequence[Candidate]],
+    places: Sequence[Place],
     evidence: Sequence[dict[str, float]],
 ) -> list[Effect]:
-    """The effects of an optimum with their 95 % intervals, SI; `aliases` and `evidence` per effect."""
+    """The effects of an optimum with their 95 % intervals, SI, at their places; `evidence` per effect."""
     sd = np.sqrt(np.maximum(np.diag(found.covariance), 0.0))
     ends = np.cumsum([0, *(len(t.values) for t in found.terms)])
     return [
-        _effect(description, term, sd[a:b], same, how)
-        for term, a, b, same, how in zip(found.terms, ends[:-1], ends[1:], aliases, evidence, strict=True)
+        _effect(description, term, sd[a:b], place, how)
+        for term, a, b, place, how in zip(found.terms, ends[:-1], ends[1:], places, evidence, strict=True)
     ]
 
 
@@ -42,10 +42,10 @@ def _effect(
     description: MachineDescription,
     term: Term,
     sd: Floats,
-    aliases: Sequence[Candidate],
+    place: Place,
     evidence: dict[str, float],
 ) -> Effect:
-    c = term.candidate
+    c, e = term.candidate, registry.get(term.candidate.kind)
     scale = np.array([[p.scale] for p in c.parameters])
     low, high = (side[:, None] for side in term.bounds)
     ends = np.stack([term.values - WIDE * sd, term.values + WIDE * sd], axis=1)
@@ -55,8 +55,8 @@ def _effect(
     parameters = {p.name: (v, a, b, p.unit) for p, (v, a, b) in named}
     cut = [
         f"{p.name} {side}"
-        for p, e, i in zip(c.parameters, ends, inside, strict=True)
-        for side, x, y in zip(("lower", "upper"), e, i, strict=True)
+        for p, wide, kept in zip(c.parameters, ends, inside, strict=True)
+        for side, x, y in zip(("lower", "upper"), wide, kept, strict=True)
         if x != y and (p.null is None or y * p.scale != p.null)
     ]
     return Effect(
@@ -64,9 +64,9 @@ def _effect(
         c.element,
         c.legs,
         parameters | _derived(description, c, rows),
-        [as_place(a) for a in aliases],
+        [as_place(a) for a in (*place.aliases, *place.wider)],
         evidence,
-        definition(c),
+        f"{e.doc} Pivot: {e.pivot}. Frame: {e.frame}. Moves: {e.moves}.",
         tuple(cut),
     )
 
@@ -93,12 +93,6 @@ def _derived(
 def as_place(candidate: Candidate) -> dict[str, Any]:
     """Kind, element, legs."""
     return {"kind": candidate.kind, "element": candidate.element, "legs": list(candidate.legs)}
-
-
-def definition(candidate: Candidate) -> str:
-    """What the effect is, its pivot, frame and what moves with it."""
-    e = registry.get(candidate.kind)
-    return f"{e.doc} Pivot: {e.pivot}. Frame: {e.frame}. Moves: {e.moves}."
 
 
 def detectable(columns: Columns, fit: Fit) -> list[Detectability]:

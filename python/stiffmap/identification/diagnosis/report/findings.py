@@ -1,22 +1,11 @@
-"""The answer of a diagnosis."""
+"""What a diagnosis finds, piece by piece."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass
 from typing import Any
 
-from stiffmap.common.json_text import json_text, plain
-from stiffmap.experiment.comparison.summary import Summary
-from stiffmap.experiment.experiment import Experiment, Floats, Mask
-from stiffmap.experiment.noise.checks import Check
 from stiffmap.identification.candidates.candidates import words
-from stiffmap.identification.diagnosis.report.separation import Separation
-from stiffmap.identification.diagnosis.slips.slip import Slip
-from stiffmap.identification.inference.machines import HeldOut
-from stiffmap.solve.machine import Machine
-
-APART = ("verdict", "held_out", "shares", "machine", "declared", "experiment", "calibration", "seed")
-"""Fields that JSON has in another form, or not at all."""
 
 
 @dataclass(frozen=True)
@@ -120,72 +109,3 @@ class Detectability:
     sizes: dict[str, float | None]
     """SI change from the null value; None: not observable."""
     aliases: list[dict[str, Any]]
-
-
-@dataclass(frozen=True, eq=False)
-class Findings:
-    """What a diagnosis found; every number in SI, base axes."""
-
-    verdict: str
-    """``none``, ``effects``, ``ambiguous``, ``unattributed`` or ``effects+unattributed``; ``readings`` where a unit, a sign, a
-    swap or a shift in the readings comes first (`slips`), and all else is of readings without it."""
-    effects: list[Effect]
-    alternatives: list[list[Effect]]
-    separations: list[Separation]
-    """Per alternative the measurement that tells it from `effects` best."""
-    before: Summary
-    after: Summary
-    held_out: HeldOut | None
-    noise: NoiseReport
-    detectable: list[Detectability]
-    unobservable: list[str]
-    outliers: list[str]
-    checks_before: list[Check]
-    checks_after: list[Check]
-    unexplained: list[Rest]
-    """What is left that has no name; nothing where noise is all."""
-    limitations: list[str]
-    shares: dict[str, float]
-    """How the squares of the readings' difference from the declared machine are shared out: noise, declared numbers, each effect,
-    gaps, poses, time; together 1."""
-    machine: Machine
-    """The machine that is handed over: corrected, calibrated or as declared, whichever predicts readings best that it has not
-    seen; `after` is what it does."""
-    declared: Machine
-    experiment: Experiment
-    residual_before: Floats = field(repr=False)
-    residual_after: Floats = field(repr=False)
-    set_aside: Mask = field(repr=False)
-    gap: Floats | None = field(repr=False, default=None)
-    """(n, c) m, rad: what nobody can name, at the readings that were compared; NaN elsewhere."""
-    calibration: FoundNumbers | None = None
-    """Declared numbers, where the readings say that they are off; None where they are as declared."""
-    seconds: dict[str, float] = field(default_factory=dict)
-    """What each step took."""
-    refused: list[str] = field(default_factory=list)
-    """Effects that the readings seemed to demand and that are not named, and why."""
-    which: str = "declared"
-    """What `machine` is: ``declared``, ``calibrated`` or ``corrected``."""
-    stopped: bool = False
-    """Whether a time budget or Ctrl-C ended it early: the answer is the best so far."""
-    not_tried: list[str] = field(default_factory=list)
-    """What was left out for that."""
-    slips: list[Slip] = field(default_factory=list)
-    """Mistakes of writing or mounting that the readings show, named before any cause."""
-    seed: int | None = None
-    """Of folds and simulated noise."""
-
-    def to_json(self) -> str:
-        """All fields but arrays and machines, SI; NaN is null."""
-        return json_text(self.as_plain())
-
-    def as_plain(self) -> dict[str, Any]:
-        """JSON data."""
-        out: dict[str, Any] = {"verdict": self.verdict, "units": "SI (m, rad, N, N·m, kg), base axes"}
-        out |= {"machine": self.declared.name, "experiment": self.experiment.name}
-        out |= {f.name: plain(getattr(self, f.name)) for f in fields(self) if f.repr and f.name not in APART}
-        out["shares"] = [{"part": name, "share": share} for name, share in self.shares.items()]
-        h = self.held_out
-        out["held_out"] = {"folds": h.folds, "by": h.by} if h else None
-        out["calibration"] = plain(self.calibration)
-        return out

@@ -1,4 +1,4 @@
-"""The answer of a diagnosis in a sentence, and what to do next."""
+"""A diagnosis in words: its answer and what to do next as a workshop says it (µm); effects, numbers and measurements for the screen (mm)."""
 
 from __future__ import annotations
 
@@ -6,12 +6,16 @@ from collections.abc import Mapping, Sequence
 from math import isfinite
 from typing import Any
 
-from stiffmap.common.number_text import with_uncertainty
-from stiffmap.identification.diagnosis.report.findings import Effect
-from stiffmap.identification.diagnosis.report.wording import digits, noise_size, number_text, separation_text
+from stiffmap.common.number_text import with_uncertainty, within
+from stiffmap.identification.candidates.candidates import words
+from stiffmap.identification.diagnosis.report.findings import Effect, FoundNumber
+from stiffmap.identification.diagnosis.report.separation import Separation
 from stiffmap.identification.diagnosis.slips.slip import Slip
 from stiffmap.model.effects import registry
 
+DISPLAY_UNITS = {"m": (1e3, "mm"), "m/N": (1e3, "mm/N"), "rad": (1e3, "mrad"), "1/m": (1e-3, "1/mm")}
+LISTED = 5
+"""Steps left out, numbers, and what cannot be distinguished from an effect: how many are named."""
 UNITS = {
     "m": (1e6, "µm"),
     "m/N": (1e6, "µm/N"),
@@ -55,9 +59,9 @@ def _element(element: str, legs: Sequence[str]) -> str:
 def sentence(e: Effect) -> str:
     """One effect, with its size."""
     p = e.parameters
-    words = registry.get(e.kind).compared
-    if words and "scale" in p and p["scale"][0] > 0:
-        return _compared(e, *words)
+    compared = registry.get(e.kind).compared
+    if compared and "scale" in p and p["scale"][0] > 0:
+        return _compared(e, *compared)
     values = ", ".join(f"{n.replace('_', ' ')} {measured(*v)}" for n, v in p.items())
     return f"{registry.get(e.kind).title} at {place(e)}: {values}"
 
@@ -121,7 +125,7 @@ def alias_words(a: Mapping[str, Any]) -> str:
 def _of_machine(d: Any, verdict: str) -> str:
     """The verdict on the machine; the largest share of the difference first, be it an effect or a number."""
     before, unit = d.before.size
-    size = f"{1e6 * before:.1f} µ{unit} rms, noise {1e6 * noise_size(d):.1f} µ{unit}"
+    size = f"{1e6 * before:.1f} µ{unit} rms, noise {1e6 * d.noise_size:.1f} µ{unit}"
     found = [(e.evidence.get("share", 0.0), sentence(e) + aliases(e)) for e in d.effects]
     found += [(n.share, number_text(n)) for n in (d.calibration.beyond if d.calibration else ())]
     named = "; ".join(text for _, text in sorted(found, key=lambda f: -f[0]))
@@ -172,3 +176,43 @@ def next_step(d: Any) -> str:
     if d.which == "declared":
         return "Inspect this place, and read more poses: no corrected machine predicts unseen readings better than the declared one yet."
     return "Inspect this place; until it is mended, plan and compensate with the corrected machine file."
+
+
+def number_text(n: FoundNumber) -> str:
+    """``zero of j4: 0.81 ± 0.02 mrad off (8.1 standard uncertainties)``."""
+    factor, label = DISPLAY_UNITS.get(n.unit, (1.0, n.unit))
+    off = with_uncertainty(factor * n.value, factor * n.u)
+    many = abs(n.value) / n.sigma
+    return f"{n.name}: {off} {'' if label == '1' else label} off ({many:.2g} standard uncertainties)".replace(
+        "  ", " "
+    )
+
+
+def digits(factor: float, value: float, low: float, high: float) -> list[str]:
+    """A value and the ends of its 95 % interval, times a factor, all to the digits that the value carries."""
+    half = factor * abs(high - low) / 2 / 1.96
+    return [within(factor * v, half) for v in (value, low, high)]
+
+
+def effect_text(e: Effect) -> str:
+    """``compliance of actuator, leg z: scale 2.148 [2.137, 2.159]``."""
+    values = []
+    for name, (*numbers, unit) in e.parameters.items():
+        factor, label = DISPLAY_UNITS.get(unit, (1.0, unit))
+        at, *ends = digits(factor, *numbers)
+        text = f"{name} {at} [{', '.join(ends)}]"
+        values.append(text if label == "1" else f"{text} {label}")
+    others = list(dict.fromkeys(words(a["kind"], a["element"], a["legs"]) for a in e.aliases))
+    more = [f"{len(others) - LISTED} more"] if len(others) > LISTED else []
+    same = "; ".join([*others[:LISTED], *more])
+    same = f" (these readings cannot distinguish it from {same})" if same else ""
+    return f"{words(*e.place)}: {', '.join(values)}{same}"
+
+
+def separation_text(s: Separation) -> str:
+    """Where, load, axis, how many."""
+    where = ", ".join(f"{1e3 * v:.0f}" for v in s.position)
+    load = ", ".join(f"{v:.0f}" for v in s.force)
+    many = f"{s.readings or 'no sensible number of'} reading{'s' if s.readings != 1 else ''}"
+    gap = f"{1e3 * s.difference:.4f} mm"
+    return f"read {s.axis} at ({where}) mm under force ({load}) N: they differ by {gap}, {many}"

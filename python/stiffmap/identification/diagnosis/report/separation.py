@@ -57,22 +57,18 @@ def separation(
     return Separation((x, y, z), (fx, fy, fz), name, float(gap[row, axis]), number)
 
 
+def _kept(e: Experiment) -> list[int]:
+    """Axes of a pose and joints."""
+    return [i for i, c in enumerate(e.channels) if kind_of(c) is None]
+
+
 def _trial(e: Experiment, description: MachineDescription, seed: int) -> Experiment:
     low, high = e.position.min(axis=0), e.position.max(axis=0)
     if description.workspace is not None:
         low, high = np.array(description.workspace)
     corners = np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, -1).T
     middle = np.vstack([corners * 0.98 + 0.02 * (low + high) / 2, (low + high) / 2])
-    random = random_numbers(seed).uniform(low, high, (15, 3))
-    return _loaded(e, np.vstack([middle, random]))
-
-
-def _kept(e: Experiment) -> list[int]:
-    """Axes of a pose and joints."""
-    return [i for i, c in enumerate(e.channels) if kind_of(c) is None]
-
-
-def _loaded(e: Experiment, poses: Floats) -> Experiment:
+    poses = np.vstack([middle, random_numbers(seed).uniform(low, high, (15, 3))])
     loads = np.zeros((1, 6))
     if e.quantity == "deflection":
         size = float(np.abs(e.wrench[:, :3]).max()) or 100.0

@@ -38,15 +38,9 @@ def words(turn: Turn, what: str, plural: str) -> tuple[str, str, str]:
         signs = "signs" if len(flipped) > 1 else "sign"
         of = f"{names} of the force" if what == "force" else names
         return "sign", f"{what} {names} has the opposite sign", f"check the {signs} of {of}"
-    pair = sorted(moved)
-    if len(turn) > 1 and len(pair) == 2 and not flipped and all(turn[a][1] > 0 for a in pair):
-        a, b = (AXES[i] for i in pair)
-        if {turn[i][0] for i in pair} == set(pair):
-            return (
-                "swap",
-                f"{what}s {a} and {b} are swapped",
-                f"check which {what} is {a} and which is {b}",
-            )
+    if len(moved) == 2 and not flipped and {turn[a] for a in moved} == {(a, 1) for a in moved}:
+        a, b = (AXES[i] for i in sorted(moved))
+        return "swap", f"{what}s {a} and {b} are swapped", f"check which {what} is {a} and which is {b}"
     to = ", ".join(
         f"{AXES[a]} acts along {'-' if s < 0 else '+'}{AXES[b]}"
         for a, (b, s) in sorted(turn.items())
@@ -67,7 +61,7 @@ def gauges(e: Experiment, base: Floats) -> Iterator[Hypothesis]:
     where = _coordinates(e)
     shown = base + where
     axes = [int(a) for a in np.flatnonzero(e.axis_read[:3])]
-    for turn in turns(axes) if axes else ():
+    for turn in turns(axes):
         there = shown.copy()
         for a, (b, s) in turn.items():
             there[:, a] = s * shown[:, b]
@@ -106,20 +100,14 @@ def loads(predictor: Predictor) -> Iterator[Hypothesis]:
     """Forces with other signs or along other axes, each through the full equilibrium."""
     e = predictor.experiment
     axes = [int(a) for a in np.flatnonzero(e.wrench[:, :3].any(axis=0))]
-    for turn in turns(axes) if axes else ():
-        flips = all(a == b for a, (b, _) in turn.items())
-        swaps = (
-            len(axes) > 1
-            and all(s > 0 for _, s in turn.values())
-            and {b for b, _ in turn.values()} == set(axes)
-        )
-        if not (flips or (swaps and sum(a != b for a, (b, _) in turn.items()) == 2) or len(axes) == 1):
+    for turn in turns(axes):
+        kind, seen, check = words(turn, "force", "forces")
+        if kind == "direction" and len(axes) > 1:
             continue
         undo = partial(pulled, turn=turn)
         there = Predictor(predictor.machine, undo(e), threads=predictor.threads)()
         if len(there) != len(e) or not np.isfinite(there[e.read]).all():
             continue
-        kind, seen, check = words(turn, "force", "forces")
         yield Hypothesis(kind, seen, check, _changes(turn), there, undo)
 
 

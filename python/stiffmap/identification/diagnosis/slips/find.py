@@ -13,11 +13,11 @@ from functools import cached_property, partial
 import numpy as np
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.experiment.experiment import Experiment, Floats, Integers
+from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.noise.checks import checks
 from stiffmap.experiment.noise.level import Noise, noise_of
 from stiffmap.experiment.noise.outliers import without_suspects
-from stiffmap.experiment.noise.whitening import LinearProblem, readings_of
+from stiffmap.experiment.noise.whitening import LinearProblem
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.identification.candidates.plan import CandidatePlan
 from stiffmap.identification.candidates.sensitivity import Variant
@@ -42,39 +42,18 @@ ROWS = 400
 
 
 @dataclass(frozen=True, eq=False)
-class FoundSlip:
-    """A mistake and the experiment without it."""
-
-    slip: Slip
-    experiment: Experiment
-
-
-@dataclass(frozen=True, eq=False)
-class JudgedSlip:
-    """A mistake, and shares of the misfit beyond noise."""
-
-    hypothesis: Hypothesis
-    left: float
-    """What stays with it."""
-    beside: float
-    """What stays with it and the best single part of the machine."""
-
-
-@dataclass(frozen=True, eq=False)
 class Screen:
     """The directions of all parts of the machine in whitened readings (N,)."""
 
     problem: LinearProblem
-    use: Integers
-    """(R,) the problem's readings among those of the variants."""
     shapes: tuple[Shape, ...]
 
     @staticmethod
-    def of(problem: LinearProblem, use: Integers, variants: Sequence[Variant]) -> Screen:
+    def of(problem: LinearProblem, variants: Sequence[Variant]) -> Screen:
         """Of variants that are no fault of the measurement."""
         parts = [v for v in variants if not get(v.candidate.kind).measurement]
-        found = (shape_of(v, problem.white_lines(v.lines(use))) for v in parts)
-        return Screen(problem, use, tuple(s for s in found if s is not None))
+        found = (shape_of(v, _white(problem, v)) for v in parts)
+        return Screen(problem, tuple(s for s in found if s is not None))
 
     def gain(self, residual: Floats) -> float:
         """What the best part takes from chi-square of a residual (N,), its strengths within their bounds."""
@@ -91,9 +70,13 @@ class Screen:
         """Whether the strengths that explain most are within the bounds of their parameters."""
         if v.start is not None:
             return True
-        white = self.problem.white_lines(v.lines(self.use))
-        strengths = np.linalg.lstsq(white, residual, rcond=1e-5)[0]
+        strengths = np.linalg.lstsq(_white(self.problem, v), residual, rcond=1e-5)[0]
         return all(p.lower <= x <= p.upper for p, x in v.candidate.strengths(np.asarray(strengths)))
+
+
+def _white(problem: LinearProblem, v: Variant) -> Floats:
+    """(N, p) columns of a variant at the readings of a problem, which are the first of its own."""
+    return problem.white_lines(v.lines(np.arange(len(problem.used))))
 
 
 class SlipReadings:
@@ -109,19 +92,18 @@ class SlipReadings:
         if len(e) > ROWS:
             part = e.rows(np.arange(ROWS))
             predictor = Predictor(predictor.machine, part, threads=predictor.threads)
-        self.predictor, self.plan, self.experiment = predictor, plan, predictor.experiment
+        self.predictor, self.variants, self.experiment = predictor, plan.variants, predictor.experiment
         self.base, self.sigma, self.least = plan.base[:ROWS], noise.sigma[:ROWS], quiet(e, noise)[:ROWS]
         self.problem = LinearProblem.of(self.experiment, self.sigma, self.base)
 
     @cached_property
     def screen(self) -> Screen:
         """The parts of the machine."""
-        use = np.arange(len(readings_of(self.experiment, self.base)[0]))
-        return Screen.of(self.problem, use, self.plan.variants)
+        return Screen.of(self.problem, self.variants)
 
 
-def find_slip(predictor: Predictor, plan: CandidatePlan) -> FoundSlip | None:
-    """The mistake in the readings of an experiment, or nothing."""
+def find_slip(predictor: Predictor, plan: CandidatePlan) -> tuple[Slip, Experiment] | None:
+    """The mistake in the readings of an experiment, and the experiment without it; or nothing."""
     whole = predictor.experiment
     plain = whole.frame != "unknown" and whole.tool != "unknown" and whole.seen is None and not whole.absolute
     if not plain or not np.isfinite(plan.base[whole.read]).any():
@@ -133,44 +115,42 @@ def find_slip(predictor: Predictor, plan: CandidatePlan) -> FoundSlip | None:
     of = float(misfit @ misfit)
     if len(problem) < FEWEST or of < MISFIT * problem.freedom:
         return None
-    judged = [j for j in _judged(s, problem) if j.beside < LEFT]
+    judged = [j for j in _judged(s, problem) if j[2] < LEFT]
     if not judged:
         return None
-    best = min(j.beside for j in judged)
+    best = min(beside for *_, beside in judged)
     slack = max(SAME * best, 3.0 * (2.0 * problem.freedom) ** 0.5 / of)
-    alike = (j for j in judged if j.beside <= best + slack)
-    first, *others = sorted(alike, key=lambda j: (j.hypothesis.changes, j.left))
-    h = first.hypothesis
+    alike = (j for j in judged if j[2] <= best + slack)
+    (h, left, beside), *others = sorted(alike, key=lambda j: (j[0].changes, j[1]))
     # shifted rows look like noise where they are repeats: of that the noise of the readings holds too much
     noise = float(np.nanmedian((sigma / s.sigma) ** 2))
     possible = h.physical or h.kind != "factor"
-    if possible and first.beside > BETTER * best_part(s, noise * problem.freedom) - slack:
+    if possible and beside > BETTER * best_part(s, noise * problem.freedom) - slack:
         return None
-    also = (j.hypothesis.check for j in others if j.hypothesis.changes <= h.changes)
+    also = (o.check for o, *_ in others if o.changes <= h.changes)
     same = tuple(dict.fromkeys(check for check in also if check != h.check))[:3]
     after = h.undo(whole) if h.undo else whole
     undone, evidence = h.undo is not None, _evidence(whole, after)
-    return FoundSlip(Slip(h.kind, h.seen, h.check, same, first.left, undone, evidence, h.factor), after)
+    return Slip(h.kind, h.seen, h.check, same, left, undone, evidence, h.factor), after
 
 
-def _judged(s: SlipReadings, problem: LinearProblem) -> Iterator[JudgedSlip]:
-    """Mistakes that take away enough to be one, jointly with a fault that the machine may have as well."""
+def _judged(s: SlipReadings, problem: LinearProblem) -> Iterator[tuple[Hypothesis, float, float]]:
+    """Mistakes that take away enough to be one, and the shares of the misfit beyond noise that stay with each and with it and the best
+    single part of the machine."""
     for h in _hypotheses(s, problem):
         left = _left(h, problem)
         if left < MOST:
-            yield JudgedSlip(h, left, min(left, _beside(s, h)))
+            yield h, left, min(left, _beside(s, h))
 
 
 def _beside(s: SlipReadings, h: Hypothesis) -> float:
     """Share of the misfit beyond noise that stays with a mistake in the readings and the best part of the machine."""
     problem, e = s.problem, s.experiment
-    if h.kind == "factor" and h.factor is not None and h.undo is None:
+    if h.undo is None or h.keep is not None:
         return 1.0
-    there = h.undo(e) if h.undo is not None else e
-    if not np.array_equal(there.wrench[: len(there)], e.wrench[: len(there)]) or h.keep is not None:
-        return 1.0
+    there = h.undo(e)
     gap = there.reading - s.base
-    if not np.isfinite(gap[problem.index]).all():
+    if not (np.array_equal(there.wrench, e.wrench) and np.isfinite(gap[problem.index]).all()):
         return 1.0
     misfit = problem.residual(s.base)
     residual = problem.white(np.nan_to_num(gap))

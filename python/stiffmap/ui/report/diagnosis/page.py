@@ -13,16 +13,17 @@ from stiffmap.common.fingerprints import digest
 from stiffmap.common.number_text import length_text, length_unit, place_text, vector_text
 from stiffmap.common.outputs import write_text
 from stiffmap.experiment.noise.checks import Check
-from stiffmap.identification.diagnosis.report.findings import Detectability, Effect, Findings, Rest
-from stiffmap.identification.diagnosis.report.plane import worst_pose
+from stiffmap.identification.diagnosis.report.findings import Detectability, Effect, Rest
+from stiffmap.identification.diagnosis.report.result import Diagnosis
 from stiffmap.identification.diagnosis.report.sentences import (
     UNITS,
     alias_words,
+    effect_text,
     interval,
     next_step,
     opening,
+    separation_text,
 )
-from stiffmap.identification.diagnosis.report.wording import effect_text, five_lines, separation_text
 from stiffmap.model.description.tree import joints
 from stiffmap.model.effects import registry
 from stiffmap.solve.budget import budget_where_stable
@@ -34,7 +35,7 @@ FIRST, FOLDED = ("place", "before_after"), ("residual_others",)
 
 
 def write_report(
-    d: Findings,
+    d: Diagnosis,
     path: str | PathLike[str],
     *,
     date: str | None = None,
@@ -44,7 +45,7 @@ def write_report(
     write_text(path, html(d, date=date, inputs=inputs))
 
 
-def html(d: Findings, *, date: str | None = None, inputs: Iterable[str | PathLike[str]] = ()) -> str:
+def html(d: Diagnosis, *, date: str | None = None, inputs: Iterable[str | PathLike[str]] = ()) -> str:
     """The report as text."""
     from stiffmap.ui.report.diagnosis.pictures import CAPTIONS, figures
     from stiffmap.ui.report.sheet import inline, provenance, render
@@ -59,7 +60,7 @@ def html(d: Findings, *, date: str | None = None, inputs: Iterable[str | PathLik
         axes=", ".join(d.experiment.axes),
         opening=opening(d),
         next=next_step(d),
-        lines=[in_shop_words(line) for line in five_lines(d)[1:]],  # the headline has the verdict
+        lines=[in_shop_words(line) for line in d.lines()[1:]],  # the headline has the verdict
         effects=[_effect(e) for e in d.effects],
         rivals=[
             ("; ".join(map(effect_text, other)), separation_text(s))
@@ -104,7 +105,7 @@ def html(d: Findings, *, date: str | None = None, inputs: Iterable[str | PathLik
 
 
 def record(
-    d: Findings, date: str | None, inputs: Iterable[str | PathLike[str]] = ()
+    d: Diagnosis, date: str | None, inputs: Iterable[str | PathLike[str]] = ()
 ) -> list[tuple[str, str]]:
     """What the first page says of how the readings were taken; a blank is for the pen."""
     told = dict(d.experiment.record)
@@ -136,9 +137,10 @@ def _effect(e: Effect) -> dict[str, Any]:
     }
 
 
-def _budget(d: Findings) -> dict[str, Any] | None:
+def _budget(d: Diagnosis) -> dict[str, Any] | None:
     """Shares of the corrected machine's deflection at the worst pose of the map in the pictures; None where it has play without load."""
     from stiffmap.ui.plot.loaded import budget_rows
+    from stiffmap.ui.report.diagnosis.pictures import worst_pose
 
     worst = worst_pose(d) if d.effects else None
     if worst is None:
@@ -161,13 +163,13 @@ def _budget(d: Findings) -> dict[str, Any] | None:
     }
 
 
-def _folds(d: Findings) -> str:
+def _folds(d: Diagnosis) -> str:
     if d.held_out is None:
         return "Not held out."
     return f"{d.held_out.folds} folds by {d.held_out.by}, each predicted by the machine that the others make in the same way."
 
 
-def _noise(d: Findings) -> list[tuple[str, ...]]:
+def _noise(d: Diagnosis) -> list[tuple[str, ...]]:
     n = d.noise
     return [
         (a, *(in_axis_units(a, v[a]) for v in (n.floor, n.repeats, n.declared)), _or_none(n.consistency[a]))
@@ -193,7 +195,7 @@ def _at(p: Rest) -> str:
     return f"{place_text(p.position, '.0f')}: {in_axis_units(p.axis, p.size)} rms"
 
 
-def _seen(d: Findings) -> list[tuple[str, str, str]]:
+def _seen(d: Diagnosis) -> list[tuple[str, str, str]]:
     """What could have been found, the easiest first."""
     turning = {n for n, j in joints(d.declared.description).items() if j.kind != "prismatic"}
     return [row for _, row in sorted((_one_seen(x, turning) for x in d.detectable), key=lambda pair: pair[0])]
@@ -214,7 +216,7 @@ def _one_seen(x: Detectability, turning: set[str]) -> tuple[float, tuple[str, st
     return ease, (registry.get(x.kind).title, f"{in_shop_words(x.element)}{legs}", ", ".join(sizes))
 
 
-def _digests(d: Findings) -> dict[str, str]:
+def _digests(d: Diagnosis) -> dict[str, str]:
     """Of the machine and the readings as they were used."""
     e = d.experiment
     return {

@@ -11,9 +11,8 @@ from matplotlib.figure import Figure
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import percent
 from stiffmap.experiment.experiment import WRENCH, Floats
-from stiffmap.identification.diagnosis.report.findings import Findings
-from stiffmap.identification.diagnosis.report.plane import plane_errors, worst_pose
-from stiffmap.identification.diagnosis.report.wording import noise_size
+from stiffmap.identification.diagnosis.report.result import Diagnosis
+from stiffmap.solve.machine import Machine
 from stiffmap.ui.plot.experiment import arrow_figure, kept, pose_means, trending, trends, vector_cases
 from stiffmap.ui.plot.loaded import loaded_figure
 from stiffmap.ui.plot.style import AFTER, BEFORE, MM, UM, new_figure
@@ -41,14 +40,14 @@ LEAST_SHARE = 1e-5
 """Smaller parts are not drawn."""
 
 
-def figures(d: Findings) -> dict[str, Figure]:
+def figures(d: Diagnosis) -> dict[str, Figure]:
     """All figures by the names of their files. One that cannot be drawn says so in its place: the answer does not depend on
     its pictures."""
     return {name: drawn(make, d) for name, make in _wanted(d).items()}
 
 
-def _wanted(d: Findings) -> dict[str, Callable[[Findings], Figure]]:
-    made: dict[str, Callable[[Findings], Figure]] = {"place": place_figure, "before_after": before_after}
+def _wanted(d: Diagnosis) -> dict[str, Callable[[Diagnosis], Figure]]:
+    made: dict[str, Callable[[Diagnosis], Figure]] = {"place": place_figure, "before_after": before_after}
     if d.experiment.axis_read[:3].any():
         made["residual_vectors"] = vectors
     driven, others = trending(d)
@@ -70,7 +69,7 @@ def _wanted(d: Findings) -> dict[str, Callable[[Findings], Figure]]:
     return made
 
 
-def drawn(make: Callable[[Findings], Figure], d: Findings) -> Figure:
+def drawn(make: Callable[[Diagnosis], Figure], d: Diagnosis) -> Figure:
     """A figure, or one that says why it is not drawn."""
     try:
         return make(d)
@@ -80,7 +79,7 @@ def drawn(make: Callable[[Findings], Figure], d: Findings) -> Figure:
         return figure
 
 
-def loaded(d: Findings) -> Figure:
+def loaded(d: Diagnosis) -> Figure:
     """The corrected machine under the load where it deflects most."""
     worst = worst_pose(d)
     if worst is None:
@@ -88,7 +87,7 @@ def loaded(d: Findings) -> Figure:
     return loaded_figure(d.machine, *worst)
 
 
-def vectors(d: Findings) -> Figure:
+def vectors(d: Diagnosis) -> Figure:
     """Mean residual vector of each pose, before and after, on one scale."""
     e = d.experiment
 
@@ -105,7 +104,7 @@ def vectors(d: Findings) -> Figure:
     return figure
 
 
-def loops(d: Findings) -> Figure:
+def loops(d: Diagnosis) -> Figure:
     """Readings over the load that runs up and down, of the channel that moves most in noise floors."""
     e = d.experiment
     load = int(np.argmax(np.ptp(e.wrench, axis=0)))
@@ -135,7 +134,7 @@ def loops(d: Findings) -> Figure:
     return figure
 
 
-def shared_out(d: Findings) -> Figure:
+def shared_out(d: Diagnosis) -> Figure:
     """Bars of the shares, the largest first."""
     found = [(name, 100 * s) for name, s in sorted(d.shares.items(), key=lambda s: s[1]) if s >= LEAST_SHARE]
     figure = new_figure(7, 0.8 + 0.35 * len(found))
@@ -156,7 +155,7 @@ def _bars(figure: Figure, rows: Sequence[tuple[str, float, str, str]]) -> Axes:
     return ax
 
 
-def left(d: Findings) -> Figure:
+def left(d: Diagnosis) -> Figure:
     """What is left over the workspace that nobody can name, in the axis where it is largest."""
     assert d.gap is not None
     names = [c.name for c in d.experiment.channels]
@@ -174,10 +173,10 @@ def left(d: Findings) -> Figure:
     return figure
 
 
-def before_after(d: Findings) -> Figure:
+def before_after(d: Diagnosis) -> Figure:
     """Rms of what both machines leave of readings that no fit saw, and the noise."""
     unit = d.before.size[1]
-    values = [UM * d.before.size[0], UM * d.after.size[0], UM * noise_size(d)]
+    values = [UM * d.before.size[0], UM * d.after.size[0], UM * d.noise_size]
     figure = new_figure(4.6, 2.4)
     texts = [f"{v:#.3g} µ{unit}".replace(". ", " ") for v in values]
     named = (("your file", BEFORE), ("corrected", AFTER), ("noise", "0.7"))
@@ -190,7 +189,7 @@ def before_after(d: Findings) -> Figure:
     return figure
 
 
-def histogram(d: Findings) -> Figure:
+def histogram(d: Diagnosis) -> Figure:
     """Residuals over the noise floor, with the normal distribution that noise alone would give."""
     figure = new_figure(6, 3.4)
     ax = figure.subplots()
@@ -214,7 +213,7 @@ def histogram(d: Findings) -> Figure:
     return figure
 
 
-def maps(d: Findings) -> Figure:
+def maps(d: Diagnosis) -> Figure:
     """Error over a z-plane: the file's machine, the corrected machine, and what changes."""
     position, force, one, other = plane_errors(d)
     x, y, z = MM * position[0, :, 0], MM * position[:, 0, 1], MM * position[0, 0, 2]
@@ -233,3 +232,36 @@ def maps(d: Findings) -> Figure:
     load = "no force" if not force.any() else "force (" + ", ".join(f"{f:.0f}" for f in force[:3]) + ") N"
     figure.suptitle(f"Error of the TCP over the plane z = {z:.0f} mm, {load}")
     return figure
+
+
+def worst_pose(d: Diagnosis) -> tuple[Floats, Floats] | None:
+    """Position (3,) m in the plane of the maps where the corrected machine deflects most, and the wrench (6,) N, N·m.
+
+    None without a force or a workspace, or where no pose of the plane has an answer.
+    """
+    if d.declared.description.workspace is None:
+        return None
+    position, force, _, errors = plane_errors(d)
+    size = np.linalg.norm(errors, axis=-1)
+    if not force.any() or not np.isfinite(size).any():
+        return None
+    return position[np.unravel_index(int(np.nanargmax(size)), size.shape)], force
+
+
+def plane_errors(d: Diagnosis) -> tuple[Floats, Floats, Floats, Floats]:
+    """Positions (25, 25, 3) m in the middle plane of the workspace, the wrench (6,) N, N·m, and errors (25, 25, 3) m before and after.
+
+    Of the forces used, along x, y or z, it is the one under which the machines differ most.
+    """
+    low, high = d.declared.workspace
+    x, y, _ = np.linspace(low, high, 25).T
+    position = np.stack(np.broadcast_arrays(*np.meshgrid(x, y), (low[2] + high[2]) / 2), axis=-1)
+    size = float(np.abs(d.experiment.wrench[:, :3]).max())
+    tried = [np.append(size * axis, np.zeros(3)) for axis in np.eye(3)] if size > 0 else [np.zeros(6)]
+    found = [(position, w, _errors(d.declared, position, w), _errors(d.machine, position, w)) for w in tried]
+    return max(found, key=lambda f: float(np.max(np.abs(np.nan_to_num(f[3] - f[2])))))
+
+
+def _errors(machine: Machine, position: Floats, wrench: Floats) -> Floats:
+    solution = machine.solve(position, wrench)
+    return np.where(solution.ok[..., None], solution.displacement[..., :3], np.nan)

@@ -8,7 +8,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from stiffmap.experiment.experiment import Floats
-from stiffmap.identification.diagnosis.report.findings import Effect, Findings
+from stiffmap.identification.diagnosis.report.findings import Effect
+from stiffmap.identification.diagnosis.report.result import Diagnosis
 from stiffmap.solve.compiled import Role
 from stiffmap.solve.machine import Machine
 from stiffmap.ui.plot.elements import nodes_of
@@ -19,7 +20,7 @@ from stiffmap.ui.plot.style import new_figure
 LIT, GREY = "#d62728", "0.65"
 
 
-def place_figure(d: Findings) -> Figure:
+def place_figure(d: Diagnosis) -> Figure:
     """The declared machine at home in grey; legs of the named effects dark, their elements red."""
     machine = d.declared
     shape = standing(machine)
