@@ -20,7 +20,7 @@ from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.identification.calibration.result import Calibration, CalibrationRow
 from stiffmap.identification.candidates.plan import CandidatePlan
 from stiffmap.identification.clock import Clock, Progress
-from stiffmap.identification.inference.amplitudes import OFF, Fit, evaluated
+from stiffmap.identification.inference.amplitudes import Fit
 from stiffmap.identification.inference.columns import Columns
 from stiffmap.identification.inference.constants import ODDS
 from stiffmap.identification.inference.corrected import Corrected, corrected
@@ -33,7 +33,7 @@ from stiffmap.identification.inference.machines import (
 )
 from stiffmap.identification.inference.names import EXACT
 from stiffmap.identification.inference.readings import readings
-from stiffmap.identification.inference.shares import of_numbers, shares
+from stiffmap.identification.inference.shares import of_numbers, shares, tolerance_word, too_wide
 from stiffmap.identification.inference.verdict import judged
 from stiffmap.identification.numbers import GROUPS, Tolerances
 from stiffmap.identification.validity import covered
@@ -117,14 +117,11 @@ def _answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, star
     held = made.held_out
     unseen = (held.before, held.after) if held else (before, after)
     beyond_noise = [s.ratio**2 - best.fit.noise**2 for s in unseen]
-    if beyond:
-        word = f"beyond tolerance: {', '.join(r.name for r in beyond)}"
-    elif (verdict.rest or verdict.time) and beyond_noise[1] > 0.5 * beyond_noise[0]:
+    word = tolerance_word(", ".join(r.name for r in beyond), wide)
+    if not beyond and (verdict.rest or verdict.time) and beyond_noise[1] > 0.5 * beyond_noise[0]:
         word = "unattributed"  # more is left than taken away
-    elif exact:
+    elif not beyond and exact:
         word = "as declared"
-    else:
-        word = f"adjusted {'beyond' if wide else 'within'} tolerance"
     return Calibration(
         verdict=word,
         rows=rows,
@@ -196,17 +193,3 @@ def independent(gram: Floats) -> NDArray[np.intp]:
         kept.append(best)
         left = left - np.outer(left[best], left[best]) / left[best, best]
     return np.array(sorted(kept), dtype=np.intp)
-
-
-def too_wide(fit: Fit) -> dict[str, float]:
-    """Groups whose numbers are off by so many times their standard uncertainties (rms), where these are too small without doubt."""
-    out = {}
-    for k, p in enumerate(fit.parts):
-        t = float(fit.t[1 + k])
-        if p.kind != "number" or t <= max(0.0, OFF):
-            continue
-        other = fit.t.copy()
-        other[1 + k] = 0.0
-        if fit.score - evaluated(fit.columns, fit.parts, other, fit.weights).score > np.log(ODDS):
-            out[p.name] = float(np.exp(0.5 * t))
-    return out

@@ -15,13 +15,13 @@ from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.noise.outliers import set_aside
 from stiffmap.experiment.noise.over_time import OverTime
 from stiffmap.identification.inference.machines import HeldOut
-from stiffmap.identification.inference.shares import largest
+from stiffmap.identification.inference.shares import WideGroup, largest
 from stiffmap.identification.inference.travel import Profile
 from stiffmap.identification.inference.verdict import not_as_stated
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.validity import Validity
 
-APART = ("rows", "beyond", "wide", "shares", "profiles", "failed", "validity")
+APART = ("rows", "beyond", "shares", "profiles", "failed", "validity")
 """Fields that JSON has in another form, behind all others."""
 MOST = 6
 """Parts that a line names."""
@@ -92,8 +92,8 @@ class Calibration:
     rows: tuple[CalibrationRow, ...]
     beyond: tuple[CalibrationRow, ...]
     """Numbers that no tolerance allows."""
-    wide: Mapping[str, float]
-    """Groups whose numbers are off by so many times their standard uncertainties (rms), where that is beyond doubt."""
+    wide: tuple[WideGroup, ...]
+    """Groups whose numbers are further off than their standard uncertainties say, where that is beyond doubt."""
     shares: Mapping[str, float]
     """How the squares of the readings' difference from the declared machine are shared out."""
     profiles: tuple[Profile, ...]
@@ -118,11 +118,7 @@ class Calibration:
         out = [f"calibration: {self.verdict}{' (stopped early)' if self.stopped else ''}"]
         out += [f"  {b.name}: {measured(b.value, b.sigma, b.unit)}" for b in self.beyond]
         out += not_as_stated(self.scale)
-        out += [
-            f"{group}: {factor:.2g} times as far off (rms) as their standard uncertainties say; give those that this machine has "
-            f"(u in its file), or --tolerance {factor:.2g}"
-            for group, factor in self.wide.items()
-        ]
+        out += map(str, self.wide)
         out.append(f"identifiable from the readings: {self.rank} directions of {len(self.rows)} unknowns")
         out.append(f"shares of the squares: {'; '.join(largest(self.shares, MOST))}")
         noise = "" if math.isnan(self.noise) else f" (noise {in_display_units(self.noise, 'm')})"
@@ -167,7 +163,6 @@ class Calibration:
             {"poses": v.poses, "drives": dict(v.drives), "loads": dict(v.loads), "temperature": v.temperature}
         )
         out["shares"] = [{"part": name, "share": share} for name, share in self.shares.items()]
-        out["wide"] = [{"group": name, "factor": factor} for name, factor in self.wide.items()]
         out["beyond"], out["table"] = plain(self.beyond), plain(self.rows)
         out["travel"] = plain(self.profiles)
         out["failed"] = [list(f) for f in self.failed]

@@ -42,7 +42,7 @@ from stiffmap.identification.inference.machines import (
 from stiffmap.identification.inference.names import put_instead
 from stiffmap.identification.inference.parts import GAPS
 from stiffmap.identification.inference.readings import Readings, readings
-from stiffmap.identification.inference.shares import gap_of, of_numbers, shares
+from stiffmap.identification.inference.shares import gap_of, of_numbers, shares, tolerance_word, too_wide
 from stiffmap.identification.inference.verdict import Named, Verdict, judged, not_as_stated
 
 RIVALS = 3
@@ -275,8 +275,8 @@ def _numbers(found: Inferred, v: Verdict, best: Corrected | None, given: Reading
     off = {b.unknown.name for b in v.beyond}
     beyond = sorted((n for n in table if n.name in off), key=lambda n: -n.share)
     names = ", ".join(n.name for n in beyond)
-    word = f"beyond tolerance: {names}" if beyond else "adjusted within tolerance"
-    return FoundNumbers(word, tuple(beyond), tuple(table))
+    wide = too_wide(found.search.best.fit)
+    return FoundNumbers(tolerance_word(names, wide), wide, tuple(beyond), tuple(table))
 
 
 def _unobservable(found: Inferred) -> list[str]:

@@ -2,19 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from stiffmap.common.number_text import percents
 from stiffmap.experiment.experiment import Floats
-from stiffmap.identification.inference.amplitudes import Fit, noise_part
+from stiffmap.identification.inference.amplitudes import OFF, Fit, evaluated, noise_part
 from stiffmap.identification.inference.columns import Columns
-from stiffmap.identification.inference.constants import STANDS_OUT
+from stiffmap.identification.inference.constants import ODDS, STANDS_OUT
 from stiffmap.identification.inference.parts import GAPS, NOISE
 
 LEAST = 0.005
 """Share from which a part is named."""
+
+
+@dataclass(frozen=True)
+class WideGroup:
+    """Declared numbers whose standard uncertainties are too small without doubt."""
+
+    group: str
+    factor: float
+    """They are off by so many times their standard uncertainties (rms)."""
+
+    def __str__(self) -> str:
+        return (
+            f"{self.group}: {self.factor:.2g} times as far off (rms) as their standard uncertainties say; give those that "
+            f"this machine has (u in its file), or --tolerance {self.factor:.2g}"
+        )
 
 
 def shares(columns: Columns, fit: Fit) -> dict[str, float]:
@@ -57,3 +73,22 @@ def gap_of(columns: Columns, fit: Fit) -> Floats:
     whole = sum((fit.mean(p) for p, _ in fit.on if p.kind in GAPS), np.zeros(len(columns)))
     out[columns.rows, columns.channel] = columns.sigma * (columns.free @ whole)
     return out
+
+
+def too_wide(fit: Fit) -> tuple[WideGroup, ...]:
+    """Groups whose standard uncertainties are too small without doubt."""
+    out = []
+    for k, p in enumerate(fit.parts):
+        t = float(fit.t[1 + k])
+        if p.kind != "number" or t <= max(0.0, OFF):
+            continue
+        other = fit.t.copy()
+        other[1 + k] = 0.0
+        if fit.score - evaluated(fit.columns, fit.parts, other, fit.weights).score > np.log(ODDS):
+            out.append(WideGroup(p.name, float(np.exp(0.5 * t))))
+    return tuple(out)
+
+
+def tolerance_word(beyond: str, wide: Sequence[WideGroup]) -> str:
+    """The verdict on declared numbers that are not as declared; `beyond`: names of those that no tolerance allows."""
+    return f"beyond tolerance: {beyond}" if beyond else f"adjusted {'beyond' if wide else 'within'} tolerance"

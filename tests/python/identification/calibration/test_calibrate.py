@@ -261,7 +261,7 @@ def test_a_group_that_is_off_as_a_whole_is_said() -> None:
     machine, data, _ = drawn("ur10", 4, size=4.0, poses=100)
     c = calibrate(machine, data)
     assert c.verdict.startswith(("adjusted beyond", "beyond"))
-    assert c.wide and all(2.0 < f < 8.0 for f in c.wide.values())
+    assert c.wide and all(2.0 < w.factor < 8.0 for w in c.wide)
     assert any("--tolerance" in x for x in c.lines())
     wide = calibrate(machine, data, tolerances=Tolerances().scaled(4.0))
     assert not wide.wide and wide.verdict == "adjusted within tolerance"

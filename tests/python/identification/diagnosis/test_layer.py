@@ -19,7 +19,7 @@ LEAD = AppliedEffect("lead_error", "carriage", ("a",), (("slope", 5e-3),))
 
 
 def twin(
-    seed: int, *effects: AppliedEffect, rough: float = 0.0, poses: int | None = None
+    seed: int, *effects: AppliedEffect, rough: float = 0.0, spread: float = 1.0, poses: int | None = None
 ) -> tuple[sm.Machine, Experiment]:
     """Readings of a delta that is off everywhere, with effects and a pattern (m) that no model holds; with `poses` the same
     delta read at so many others."""
@@ -28,7 +28,7 @@ def twin(
     p = Predictor(machine, plan)
     wanted = unknowns(machine.description, p.experiment)
     rng = np.random.default_rng(seed)
-    exact = predicted(p, wanted, rng.standard_normal(len(wanted))) + p(effects) - p()
+    exact = predicted(p, wanted, spread * rng.standard_normal(len(wanted))) + p(effects) - p()
     exact[:, 2] += rough * np.sin(plan.position[:, 0] / 0.011) * np.cos(plan.position[:, 1] / 0.009)
     return machine, plan.with_readings(exact + np.nan_to_num(plan.sigma) * rng.standard_normal(exact.shape))
 
@@ -39,6 +39,14 @@ def test_no_cause_is_invented_where_every_number_is_a_little_off() -> None:
     assert d.verdict == "none" and not d.effects
     assert d.calibration is not None and d.calibration.verdict == "adjusted within tolerance"
     assert d.after.rms < 1.3 * d.noise.rms < 0.1 * d.before.rms
+
+
+def test_numbers_that_are_further_off_than_stated_are_said_to_be() -> None:
+    machine, data = twin(2, spread=5.0)
+    found = sm.diagnose(machine, data)
+    assert found.calibration is not None and all(3.0 < w.factor < 8.0 for w in found.calibration.wide)
+    assert found.calibration.verdict.startswith(("adjusted beyond tolerance", "beyond tolerance"))
+    assert any("times as far off" in line for line in found.lines())
 
 
 @pytest.mark.slow

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from stiffmap.identification.candidates.candidates import words
+from stiffmap.identification.inference.shares import WideGroup
 
 
 @dataclass(frozen=True)
@@ -76,7 +77,9 @@ class FoundNumbers:
     """What the readings say of all declared numbers together."""
 
     verdict: str
-    """``adjusted within tolerance`` or ``beyond tolerance: NAME, ...``."""
+    """``adjusted within tolerance``, ``adjusted beyond tolerance`` or ``beyond tolerance: NAME, ...``."""
+    wide: tuple[WideGroup, ...]
+    """Groups that are further off than their standard uncertainties say, whichever of their numbers it is."""
     beyond: tuple[FoundNumber, ...]
     """Those that no tolerance allows, the largest share first."""
     table: tuple[FoundNumber, ...]

@@ -189,7 +189,7 @@ def _more(d: Diagnosis) -> list[str]:
             "machine.yaml is the declared machine: none that was corrected predicts unseen readings better"
         )
     if d.calibration is not None:
-        out.append(f"declared numbers: {d.calibration.verdict}")
+        out += [f"declared numbers: {d.calibration.verdict}", *map(str, d.calibration.wide)]
     out += [f"not named: {why}" for why in d.refused]
     if d.stopped:
         more = f" and {len(d.not_tried) - LISTED} more" if len(d.not_tried) > LISTED else ""
