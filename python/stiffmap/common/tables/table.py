@@ -107,15 +107,15 @@ class Table:
 
     def text(self, column: str) -> list[str]:
         """Cells of a column by its name; raises `FileError` where there is none."""
-        return [unguarded(cell) for cell in self._named(column)]
+        return [unguarded(cell) for cell in self.columns[self._named(column)]]
 
-    def _named(self, column: str) -> Cells:
+    def _named(self, column: str) -> int:
         if column not in self:
             near = suggestion(column, self.header)
             raise MissingColumnError(
                 f"missing column '{column}'{near}; found {', '.join(self.header)}", file=self.file
             )
-        return self.columns[self.header.index(column)]
+        return self.header.index(column)
 
     def si(self, column: str, *, blank: bool = False) -> Floats:
         """A column by its name, plain numbers alone, in SI; with `blank`, empty cells are NaN (a value that was not read)."""
@@ -127,7 +127,7 @@ class Table:
                 expected, found = problem.args
                 self.fail(f"column '{column}': expected {expected}; found {found}", row)
 
-        found = self._named(column).numbers(one)
+        found = self.with_points(self._named(column)).numbers(one)
         return found * self.sizes[column] if self.sizes.get(column, 1.0) != 1.0 else found
 
     def block(self, names: Sequence[str], *, blank: bool, missing: float | None = np.nan) -> Floats:

@@ -10,7 +10,7 @@ from pathlib import Path
 from stiffmap.common.errors import FileError
 from stiffmap.common.tables.cells import filled, packed
 from stiffmap.common.tables.header import refuse_twice
-from stiffmap.common.tables.lines import decimal_comma, even, lines_of, with_points
+from stiffmap.common.tables.lines import decimal_comma, even, lines_of
 from stiffmap.common.tables.table import Table
 
 
@@ -21,19 +21,19 @@ def read_table(path: Path, expected: int | None = None) -> Table:
     def rows() -> Iterator[tuple[int, list[str]]]:
         return ((n, cells) for n, cells in read_lines() if filled(cells))
 
-    below = rows()
-    header = tuple(c.strip() for c in next(below, (1, []))[1])
+    data = rows()
+    header = tuple(c.strip() for c in next(data, (1, []))[1])
     if not header:
         raise FileError("the file is empty", file=str(path))
     refuse_twice(header, str(path), 1)
-    columns, lines = packed(even(below, len(header), str(path), separator), len(header))
-    if separator not in ("", ",") and decimal_comma((c for _, c in islice(rows(), 1, None)), separator):
-        columns = tuple(map(with_points, columns))
+    columns, lines = packed(even(data, len(header), str(path), separator), len(header))
+    cells = (c for _, c in islice(rows(), 1, None))
+    comma = separator not in ("", ",") and decimal_comma(cells, separator)
     if not lines:
         raise FileError("expected a header line and at least one row", file=str(path))
     if expected is not None:
         _whole(path, expected, len(lines))
-    return Table(str(path), header, columns, lines, 1)
+    return Table(str(path), header, columns, lines, 1, comma)
 
 
 def _whole(path: Path, expected: int, found: int) -> None:

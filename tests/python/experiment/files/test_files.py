@@ -32,6 +32,15 @@ def test_values_become_si(tmp_path: Path) -> None:
     assert e.groups[0] == e.groups[1] != e.groups[2]
 
 
+def test_decimal_commas_are_those_of_numbers_alone(tmp_path: Path) -> None:
+    """A name such as 1,2 stays as it is written."""
+    rows = "id;x;y;z;fx;fy;fz;dx\n1,1;0,5;0;0;100;0;0;0,05\n1,2;0,5;0;0;-100;0;0;-0,05\n2,1;10;0;0;100;0;0;\n"
+    e = sm.load_experiment(write(tmp_path, rows=rows))
+    assert e.ids == ("1,1", "1,2", "2,1")
+    assert e.reading[:2, 0] == pytest.approx([5e-5, -5e-5], rel=1e-12)
+    assert e.position[:, 0] == pytest.approx([5e-4, 5e-4, 0.01], rel=1e-12)
+
+
 @pytest.mark.parametrize(
     ("head", "rows", "words"),
     [
