@@ -77,7 +77,7 @@ def given_path(value: Any, name: str, what: str = "a file") -> Path:
         raise _refused(name, what, type(value).__name__) from None
 
 
-def instance_of(value: Any, kind: Any, name: str, what: str) -> Any:
+def instance_of(value: object, kind: Any, name: str, what: str) -> Any:
     """The value itself where it is of this kind; else StiffmapError with the argument's name and what is expected."""
     if not isinstance(value, kind):
         raise _refused(name, what, repr(value) if isinstance(value, str) else type(value).__name__)

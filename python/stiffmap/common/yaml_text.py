@@ -155,7 +155,7 @@ _RESERVED = frozenset(["true", "false", "null", "yes", "no", "on", "off"])
 
 
 class _Dumper(yaml.SafeDumper):
-    def ignore_aliases(self, data: Any) -> bool:
+    def ignore_aliases(self, data: object) -> bool:
         return True
 
 

@@ -57,7 +57,7 @@ def edited(
     return apply_records(built, description.effects)
 
 
-def _sequence(elements: Elements, path: str, of: Mapping[str, Mapping[str, Any]]) -> Elements:
+def _sequence(elements: Elements, path: str, of: Mapping[str, Mapping[str, object]]) -> Elements:
     out: list[Element] = []
     for e in elements:
         change = of.get(f"{path}.{e.name}", {})
@@ -72,12 +72,12 @@ def _sequence(elements: Elements, path: str, of: Mapping[str, Mapping[str, Any]]
     return tuple(out)
 
 
-def _pose(change: Mapping[str, Any]) -> Pose:
+def _pose(change: Mapping[str, object]) -> Pose:
     t, r = (np.array([change.get(k, 0.0) for k in part]) for part in (FRAME[:3], FRAME[3:]))
     return Pose.of(t, Rotation.from_rotvec(r).as_matrix())
 
 
-def _changed(e: Element, change: Mapping[str, Any]) -> Element:
+def _changed(e: Element, change: Mapping[str, object]) -> Element:
     for what, by in change.items():
         kinds, change_of = CHANGES.get(what, ((), None))
         if change_of is not None and isinstance(e, kinds):  # a body may have its joint's name

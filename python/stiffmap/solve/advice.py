@@ -210,7 +210,7 @@ def _numbers(machine: Machine, path: str | PathLike[str]) -> Iterator[str]:
         yield from _long_beams(key, sequence)
 
 
-def _long_beams(key: str, sequence: list[Any]) -> Iterator[str]:
+def _long_beams(key: str, sequence: list[object]) -> Iterator[str]:
     """Beams that are much longer than the offset before them."""
     span = None
     for e in sequence:
@@ -267,7 +267,7 @@ def _plain(value: object) -> float | None:
     return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else None
 
 
-def _walk(data: object, key: str) -> Iterator[tuple[str, Any]]:
+def _walk(data: object, key: str) -> Iterator[tuple[str, object]]:
     """A file's data and everything in it, each with its key."""
     yield key, data
     inside = data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ()

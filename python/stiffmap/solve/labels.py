@@ -29,12 +29,12 @@ STIFFNESS_UNITS = "N/m, N/rad, N m/m, N m/rad: wrench_component per component"
 WRENCH_UNITS = "N (fx, fy, fz), N m (mx, my, mz)"
 
 
-def meaning(units: str, long_name: str, **more: Any) -> dict[str, Any]:
+def meaning(units: str, long_name: str, **more: object) -> dict[str, object]:
     """Attributes of a variable."""
     return {"units": units, "long_name": long_name, **more}
 
 
-def status_attrs(of: str) -> dict[str, Any]:
+def status_attrs(of: str) -> dict[str, object]:
     """Attributes of a variable of `Status` codes."""
     return meaning(
         "1",
@@ -44,7 +44,7 @@ def status_attrs(of: str) -> dict[str, Any]:
     )
 
 
-def flag_attrs() -> dict[str, Any]:
+def flag_attrs() -> dict[str, object]:
     """Attributes of a variable of `Flag` bits."""
     return meaning(
         "1",

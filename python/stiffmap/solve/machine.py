@@ -6,14 +6,14 @@ import warnings
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from functools import cached_property, wraps
 from os import PathLike
-from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar, Unpack
+from typing import TYPE_CHECKING, Concatenate, ParamSpec, TypeVar, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError, frames_of_this_package
-from stiffmap.common.from_above import from_above
+from stiffmap.common.from_above import OpenView, from_above
 from stiffmap.common.html import machine_html
 from stiffmap.common.kept import Kept
 from stiffmap.model.addresses import Listed, listed
@@ -298,7 +298,7 @@ class Machine:
         diagnosis: object = None,
         path: object = None,
         meshes: str | PathLike[str] | None = None,
-    ) -> Any:
+    ) -> OpenView:
         """Look at the machine and its map live in a browser; the view that is open is returned (``close()`` ends it).
 
         All in SI and base axes; what is None is as `stiffmap.ui.view.ViewState` has it. In a notebook the view is shown where it is
@@ -322,9 +322,10 @@ class Machine:
             "start": start, "changes": changes, "experiment": experiment, "diagnosis": diagnosis, "path": path,
             "meshes": meshes,
         }  # fmt: skip
-        return from_above("Machine.view")(
+        opened: OpenView = from_above("Machine.view")(
             self, position, port=port, browser=browser, **{k: v for k, v in given.items() if v is not None}
         )
+        return opened
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write a machine file that loads back equal."""

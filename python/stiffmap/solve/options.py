@@ -51,7 +51,7 @@ class SolveOptions:
         return out
 
 
-def _listed(value: ArrayLike | None) -> Any:
+def _listed(value: ArrayLike | None) -> object:
     return None if value is None else np.asarray(value, dtype=float).tolist()
 
 
@@ -99,7 +99,7 @@ def spelled_out(keywords: type) -> Callable[[Callable[P, R]], Callable[P, R]]:
     )
 
 
-def keywords_of(other: Callable[..., Any]) -> Callable[[Callable[P, R]], Callable[P, R]]:
+def keywords_of(other: Callable[..., object]) -> Callable[[Callable[P, R]], Callable[P, R]]:
     """Let `help` and editors show the keywords of another function, to which this one hands its ``**call`` on."""
     return _showing(p for p in signature(other).parameters.values() if p.kind is Parameter.KEYWORD_ONLY)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -160,9 +159,9 @@ def _least(core: CompiledMachine, name: str, p: Floats, r: Floats) -> Shortfall:
         x[free] += u * units
         return x
 
-    def weighted(u: Floats, start: Floats) -> Any:
+    def weighted(u: Floats, start: Floats) -> Floats:
         pose, loops = gap(moved(u, start))
-        return np.r_[pose[:3] / core.length, TURNING * pose[3:], LOOPS * loops]
+        return np.concatenate([pose[:3] / core.length, TURNING * pose[3:], LOOPS * loops])
 
     tried = []
     for start in _starts(core, p, r):

@@ -7,7 +7,6 @@ import itertools
 import os
 import re
 from collections.abc import Iterable, Iterator, Sequence
-from typing import Any
 
 from stiffmap.common.outputs.writing import writing
 
@@ -16,7 +15,7 @@ RUN = re.compile(r"'*[=+\-@\t\r]")
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 
 
-def guarded(cell: object) -> Any:
+def guarded(cell: object) -> object:
     """Text that a spreadsheet would run as a formula, with a ``'`` before it; numbers and other text as they are."""
     if isinstance(cell, str) and RUN.match(cell) and not NUMBER.fullmatch(cell):
         return f"'{cell}"
@@ -33,14 +32,14 @@ def number_cells(values: Iterable[float]) -> list[str]:
     return ["" if v != v else f"{v:.9g}" for v in values]
 
 
-def _counted(rows: Iterable[Sequence[Any]], count: Iterator[int]) -> Iterator[Sequence[Any]]:
+def _counted(rows: Iterable[Sequence[object]], count: Iterator[int]) -> Iterator[Sequence[object]]:
     return (row for row, _ in zip(rows, count, strict=False))
 
 
 def write_rows(
     path: str | os.PathLike[str],
     header: Sequence[str],
-    rows: Iterable[Sequence[Any]],
+    rows: Iterable[Sequence[object]],
     encoding: str = "utf-8",
 ) -> int:
     """Write a CSV file: a header and rows; returns their number. Raises FileError where it cannot be written."""

@@ -81,7 +81,7 @@ class NamedTable:
         """(n, names); `missing` where there is no column."""
         return np.stack([self.values.get(c, np.full(len(self), missing)) for c in names], axis=1)
 
-    def check(self, name: str, good: Callable[[Floats], Any], expected: str) -> None:
+    def check(self, name: str, good: Callable[[Floats], object], expected: str) -> None:
         """FileError at the first row whose number, in the unit of the table, is not good; where there is none, it is."""
         value = np.asarray(self.values.get(name, ())) / self.size.get(name, 1.0)
         wrong = np.flatnonzero(~np.asarray(good(value)) & ~np.isnan(value))

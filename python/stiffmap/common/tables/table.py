@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, NoReturn
+from typing import NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -150,7 +150,7 @@ class Table:
         """Raise `FileError` that names a row, or the header."""
         raise FileError(message, file=self.file, line=(self.top or None) if row is None else self.lines[row])
 
-    def check(self, good: Any, message: Callable[[int], str]) -> None:
+    def check(self, good: object, message: Callable[[int], str]) -> None:
         """`FileError` at the first row where a condition (n,) does not hold."""
         wrong = np.flatnonzero(~np.asarray(good, dtype=bool))
         if wrong.size:

@@ -116,14 +116,14 @@ def _chosen(names: list[str], sheet: str | None, path: Path) -> str | None:
     return None if sheet is None else sheet or names[0]
 
 
-def _rows(page: Any) -> Iterable[Sequence[Any]]:
+def _rows(page: Any) -> Iterable[Sequence[object]]:
     if not hasattr(page, "iter_rows"):
         raise ValueError("the sheet is a chart")
     page.reset_dimensions()  # what the file says of them may be wrong; each row is then as long as its last cell
     return page.iter_rows(values_only=True)  # type: ignore[no-any-return]
 
 
-def _lines(rows: Iterable[Sequence[Any]], path: Path) -> list[tuple[int, list[str]]]:
+def _lines(rows: Iterable[Sequence[object]], path: Path) -> list[tuple[int, list[str]]]:
     """Number, from 1, and cells of the lines that have any."""
     out: list[tuple[int, list[str]]] = []
     cells = 0
@@ -143,7 +143,7 @@ def _lines(rows: Iterable[Sequence[Any]], path: Path) -> list[tuple[int, list[st
     return out
 
 
-def _text(value: Any) -> str:
+def _text(value: object) -> str:
     if isinstance(value, float):
         return str(int(value)) if value.is_integer() and abs(value) < WHOLE else repr(value)
     return "" if value is None else str(value)

@@ -33,7 +33,7 @@ class Workers:
     as_done: Callable[[Iterable[Any]], Iterator[tuple[int, Any]]]
     """(number, result) of each item as they come, in any order."""
 
-    def in_order(self, items: Iterable[Any]) -> list[Any]:
+    def in_order(self, items: Iterable[object]) -> list[Any]:
         """Results of all items, in their order."""
         found = dict(self.as_done(items))
         return [found[i] for i in range(len(found))]
@@ -41,7 +41,7 @@ class Workers:
 
 @contextmanager
 def workers(
-    function: Function, shared: Any, *, scheduler: Any = None, processes: int = 1
+    function: Function, shared: Any, *, scheduler: object = None, processes: int = 1
 ) -> Iterator[Workers]:
     """Who does `function(shared, item)`; the results are the same everywhere, since linear algebra has one thread.
 
@@ -69,16 +69,16 @@ def workers(
 _GIVEN: list[tuple[Function, Any]] = []
 
 
-def _begin(function: Function, shared: Any) -> None:
+def _begin(function: Function, shared: object) -> None:
     _GIVEN[:] = [(function, shared)]
 
 
-def _one(item: Any) -> Any:
+def _one(item: object) -> object:
     function, shared = _GIVEN[0]
     return on_one_thread(function)(shared, item)
 
 
-def _pooled(pool: ProcessPoolExecutor, items: Iterable[Any], waiting: int) -> Iterator[tuple[int, Any]]:
+def _pooled(pool: ProcessPoolExecutor, items: Iterable[object], waiting: int) -> Iterator[tuple[int, object]]:
     """Results of a pool, with a bounded number of items given out in advance."""
     numbered = enumerate(items)
     given = {pool.submit(_one, item): i for i, item in islice(numbered, waiting)}
@@ -92,19 +92,19 @@ def _pooled(pool: ProcessPoolExecutor, items: Iterable[Any], waiting: int) -> It
 class OnCluster:
     """Gives tasks to the workers of a client."""
 
-    def __init__(self, client: Any, function: Function, shared: Any) -> None:
+    def __init__(self, client: Any, function: Function, shared: object) -> None:
         self._client, self._function = client, function
         self._packed = pickle.dumps(shared)
         self._there = self._scattered()
 
-    def as_done(self, items: Iterable[Any]) -> Iterator[tuple[int, Any]]:
+    def as_done(self, items: Iterable[object]) -> Iterator[tuple[int, object]]:
         """(number, result) of each item as they come. A lost worker's tasks are done again by others."""
         import distributed
 
         numbered = enumerate(items)
         given: dict[Any, tuple[int, Any, int]] = {}  # of each future: number, item, how often it was lost
 
-        def submit(index: int, item: Any, lost: int = 0) -> Any:
+        def submit(index: int, item: object, lost: int = 0) -> object:
             future = self._client.submit(_do, self._function, self._there, item, pure=False, retries=RETRIES)
             given[future] = index, item, lost
             return future
@@ -144,7 +144,7 @@ class OnCluster:
 
 
 @contextmanager
-def client_of(scheduler: Any) -> Iterator[Any]:
+def client_of(scheduler: Any) -> Iterator[object]:
     """A client of the cluster; one that was given stays open.
 
     MissingPartError without dask, StiffmapError where nothing answers or no worker is there.
@@ -171,9 +171,9 @@ def client_of(scheduler: Any) -> Iterator[Any]:
 
 
 @lru_cache(maxsize=2)
-def _unpacked(packed: bytes) -> Any:
+def _unpacked(packed: bytes) -> object:
     return pickle.loads(packed)
 
 
-def _do(function: Function, packed: bytes, item: Any) -> Any:
+def _do(function: Function, packed: bytes, item: object) -> object:
     return on_one_thread(function)(_unpacked(packed), item)

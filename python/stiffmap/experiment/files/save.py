@@ -38,7 +38,7 @@ def save_experiment(experiment: Experiment, folder: str | PathLike[str], title: 
         write_text(fresh / "experiment.yaml", text_of(head))
 
 
-def _head(e: Experiment, title: str) -> dict[str, Any]:
+def _head(e: Experiment, title: str) -> dict[str, object]:
     head: dict[str, Any] = {"title": title or e.title, "machine": e.machine, "quantity": e.quantity}
     head |= {"point": e.point} | ({"load_point": e.load_point} if e.load_point != e.point else {})
     head |= {"units": {"length": "mm", "force": "N", "angle": "rad"}}
@@ -64,7 +64,7 @@ def _head(e: Experiment, title: str) -> dict[str, Any]:
     return head
 
 
-def _gravity(e: Experiment) -> Any:
+def _gravity(e: Experiment) -> object:
     """Of all rows, or of each set-up."""
     if e.gravity_of is None:
         return None if e.gravity is None else list(e.gravity)

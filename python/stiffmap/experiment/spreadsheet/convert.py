@@ -128,7 +128,7 @@ class Rows:
         """Line in the sheet of each row, once they were made."""
         self._readings = [header.index(m) for m in READINGS if m in header]
 
-    def __iter__(self) -> Iterator[Sequence[Any]]:
+    def __iter__(self) -> Iterator[Sequence[object]]:
         self.lines = array("q")
         taken: set[str] = set()
         sides = zip(*map(self._side, range(self.repeats)), strict=True)
@@ -138,7 +138,7 @@ class Rows:
                     self.lines.append(line)
                     yield self._once(row, taken)
 
-    def _once(self, row: Sequence[Any], taken: set[str]) -> Sequence[Any]:
+    def _once(self, row: Sequence[object], taken: set[str]) -> Sequence[object]:
         """A point that is read again is a repeat: its second row is called ``P1.2``."""
         if self._name is None:
             return row
@@ -150,7 +150,7 @@ class Rows:
         taken.add(free)
         return row if free == row[self._name] else [*row[: self._name], free, *row[self._name + 1 :]]
 
-    def _side(self, k: int) -> Iterator[Sequence[Any]]:
+    def _side(self, k: int) -> Iterator[Sequence[object]]:
         """Rows of one of the repeats that stand side by side."""
         columns = [self._cells(wanted) for wanted in self._wanted[k]]
         if self.repeats > 1:
@@ -159,7 +159,7 @@ class Rows:
             columns.append(self._same(k + 1))
         return zip(*columns, strict=True)
 
-    def _cells(self, wanted: int | float | None) -> Iterable[Any]:
+    def _cells(self, wanted: int | float | None) -> Iterable[object]:
         """Of a column of the sheet by its index, or of a number that is the same in all rows; None: empty ones."""
         if wanted is None or isinstance(wanted, float):
             return self._same("" if wanted is None else wanted)
@@ -167,7 +167,7 @@ class Rows:
             return self._sheet.columns[wanted]
         return ("" if v != v else v for v in map(float, self._numbers[wanted]))
 
-    def _same(self, cell: Any) -> Iterable[Any]:
+    def _same(self, cell: object) -> Iterable[object]:
         return repeat(cell, len(self._sheet.lines))
 
 

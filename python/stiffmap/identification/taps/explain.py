@@ -50,7 +50,7 @@ class TapDiagnosis:
             ],
         }  # fmt: skip
 
-    def modes(self, machine: Machine, taps: TapTest) -> list[dict[str, Any]]:
+    def modes(self, machine: Machine, taps: TapTest) -> list[dict[str, object]]:
         """Data of JSON: a row per mode, measured, of the machine as it is, and with what is named."""
         before = predict_taps(machine, taps)
         after = None if self.machine is None else predict_taps(self.machine, taps)

@@ -193,7 +193,7 @@ def _symmetric(
 ) -> dict[tuple[int, int], Field]:
     """The entries of the upper triangle by row and column; ``put`` makes the element with another matrix."""
 
-    def changed(x: float, i: int, j: int) -> Any:
+    def changed(x: float, i: int, j: int) -> object:
         rows = [list(row) for row in matrix]
         rows[i][j] = rows[j][i] = x
         return put(tuple(tuple(row) for row in rows))

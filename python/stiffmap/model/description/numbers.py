@@ -81,7 +81,7 @@ def number(key: str, doc: str = "", *, default: Any = None, **more: Any) -> Any:
     return field(default=default, metadata={"number": DeclaredNumber(key, doc, default=default, **more)})
 
 
-def required(key: str, doc: str = "", **more: Any) -> Any:
+def required(key: str, doc: str = "", **more: object) -> Any:
     """A field without a default value."""
     return number(key, doc, default=MISSING, **more)
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.description import AppliedEffect, MachineDescription
@@ -77,7 +76,7 @@ def _checked(
     kind: str,
     element: str | None,
     legs: Sequence[str] | None,
-    parameters: Mapping[str, Any],
+    parameters: Mapping[str, object],
 ) -> AppliedEffect:
     """The record of one more effect next to others; StiffmapError for what cannot be."""
     effect = registry.get(kind)

@@ -16,7 +16,7 @@ Numbers = tuple[tuple[str, float], ...]
 Words = tuple[tuple[str, str], ...]
 
 
-def split(effect: EffectType, given: Mapping[str, Any]) -> tuple[Numbers, Words]:
+def split(effect: EffectType, given: Mapping[str, object]) -> tuple[Numbers, Words]:
     """Parameters and options by their kinds, in the order of the registry."""
     known = [p.name for p in effect.parameters] + [o.name for o in effect.options]
     for name in given:

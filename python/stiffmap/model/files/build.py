@@ -151,7 +151,7 @@ def build_effect(model: EffectModel) -> AppliedEffect:
     )
 
 
-def _tuples(value: object) -> Any:
+def _tuples(value: object) -> object:
     """Lists as tuples: a description is immutable."""
     if isinstance(value, list):
         return tuple(_tuples(v) for v in value)

@@ -172,7 +172,7 @@ def _stroke(spring: Spring) -> Plain:
     return {}
 
 
-def dump_matrix(rows: object) -> Any:
+def dump_matrix(rows: object) -> object:
     """Diagonal, entries of the upper triangle, or all rows where the triangles differ by rounding."""
     matrix = np.array(rows, dtype=float)
     if np.any(matrix != matrix.T):

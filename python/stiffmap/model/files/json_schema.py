@@ -7,13 +7,12 @@ from __future__ import annotations
 
 import json
 import sys
-from typing import Any
 
 from stiffmap.common.outputs import write_text
 from stiffmap.model.files.schema import MachineFile
 
 
-def machine_schema() -> dict[str, Any]:
+def machine_schema() -> dict[str, object]:
     """JSON schema (draft 2020-12)."""
     schema = MachineFile.model_json_schema()
     return {

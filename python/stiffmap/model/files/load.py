@@ -48,7 +48,7 @@ _POWER = re.compile(r"[-+]?\d+(\.\d*)?[eE][-+]?\d+")
 """A number such as ``7.0e4``, which readers of YAML 1.1 take for text."""
 
 
-def _plain(data: object) -> Any:
+def _plain(data: object) -> object:
     """Plain data with text keys; arrays and numbers of NumPy as Python has them, every part a copy of its own."""
     if isinstance(data, Mapping):
         return {str(k): _plain(v) for k, v in data.items()}

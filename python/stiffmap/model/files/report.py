@@ -46,7 +46,7 @@ def key_text(path: KeyPath) -> str:
     return text.removeprefix(".")
 
 
-def _path(loc: tuple[Any, ...], data: Any, missing: bool) -> KeyPath:
+def _path(loc: tuple[object, ...], data: object, missing: bool) -> KeyPath:
     """Location in the *file*: without the schema's own steps (union tags, forms of a matrix)."""
     path: list[str | int] = []
     for i, step in enumerate(loc):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import fields, replace
 from os import PathLike
-from typing import Any
 
 import yaml
 
@@ -154,5 +153,5 @@ def _different_homes(elements: Elements, template: Elements) -> Plain:
     }
 
 
-def _lists(value: object) -> Any:
+def _lists(value: object) -> object:
     return [_lists(v) for v in value] if isinstance(value, (tuple, list)) else value

@@ -55,7 +55,7 @@ class _Expansion:
                 )
         self.sound = not self.problems
 
-    def leg(self, name: str, leg: Any) -> Any:
+    def leg(self, name: str, leg: Any) -> object:
         """A leg of the file with its elements written out; other legs as they are."""
         asked = leg.get("template") if isinstance(leg, dict) else None
         if not isinstance(asked, str | int) or not self.sound:
@@ -86,7 +86,7 @@ class _Expansion:
         rest = {key: value for key, value in leg.items() if key not in ("template", "with")}
         return {**rest, "elements": self._written(template["elements"], source, values)}
 
-    def _written(self, data: Any, path: KeyPath, values: Mapping[str, Any]) -> Any:
+    def _written(self, data: object, path: KeyPath, values: Mapping[str, object]) -> object:
         """Plain data with every reference replaced."""
         if isinstance(data, dict):
             return {key: self._written(value, (*path, key), values) for key, value in data.items()}
@@ -115,7 +115,7 @@ class _Expansion:
         self.problems.append(FileError(message, file=self.file, line=line, key=key_text(path)))
 
 
-def _number(name: str, values: Mapping[str, Any]) -> float:
+def _number(name: str, values: Mapping[str, object]) -> float:
     value = values[name]
     if isinstance(value, dict):  # with its uncertainty, which a formula does not keep
         value = value.get("value")

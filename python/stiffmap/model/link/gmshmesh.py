@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from types import ModuleType
 
 import numpy as np
 
@@ -21,7 +21,7 @@ _GMSH_TO_OURS = [0, 1, 2, 3, 4, 5, 6, 7, 9, 8]  # gmsh lists edge 23 before 13
 Faces = dict[str, list[int]]
 
 
-def mesh_model(build: Callable[[Any], Faces], size: float) -> SolidMesh:
+def mesh_model(build: Callable[[ModuleType], Faces], size: float) -> SolidMesh:
     """Mesh what ``build`` makes in gmsh's OpenCASCADE kernel, in mm; it returns named surface tags.
 
     Args:
@@ -65,14 +65,14 @@ def mesh_file(path: str | Path, size: float | None = None, unit: str | None = No
         return _extract(gmsh, named_surfaces(gmsh), UNITS[str(unit)])
 
 
-def default_size(gmsh: Any) -> float:
+def default_size(gmsh: ModuleType) -> float:
     """Edge length in m that suits the part: 2 V/A is half the side of a square bar, the wall of a tube."""
     volume = sum(gmsh.model.occ.getMass(*e) for e in gmsh.model.getEntities(3))
     area = sum(gmsh.model.occ.getMass(*e) for e in gmsh.model.getEntities(2))
     return float(2e-3 * volume / area)
 
 
-def named_surfaces(gmsh: Any) -> Faces:
+def named_surfaces(gmsh: ModuleType) -> Faces:
     """Surface tags by physical group name; surfaces in no named group are ``face<tag>``."""
     names: Faces = {}
     for dim, group in gmsh.model.getPhysicalGroups(2):
@@ -81,13 +81,13 @@ def named_surfaces(gmsh: Any) -> Faces:
     return with_others(gmsh, names)
 
 
-def with_others(gmsh: Any, names: Faces) -> Faces:
+def with_others(gmsh: ModuleType, names: Faces) -> Faces:
     """The named faces, and every other surface as ``face<tag>``."""
     used = {t for tags in names.values() for t in tags}
     return names | {f"face{t}": [t] for _, t in gmsh.model.getEntities(2) if t not in used}
 
 
-def _generate(gmsh: Any, size: float) -> None:
+def _generate(gmsh: ModuleType, size: float) -> None:
     gmsh.option.setNumber("Mesh.MeshSizeMax", 1e3 * size)
     gmsh.option.setNumber("Mesh.MeshSizeMin", 0.1e3 * size)
     gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", 8)
@@ -95,7 +95,7 @@ def _generate(gmsh: Any, size: float) -> None:
     gmsh.model.mesh.setOrder(2)
 
 
-def _extract(gmsh: Any, names: Faces, unit: float) -> SolidMesh:
+def _extract(gmsh: ModuleType, names: Faces, unit: float) -> SolidMesh:
     tags, xyz, _ = gmsh.model.mesh.getNodes()
     number = np.full(int(tags.max(initial=0)) + 1, -1, dtype=np.int64)
     number[tags] = np.arange(len(tags))

@@ -5,12 +5,12 @@ from __future__ import annotations
 import importlib
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
+from types import ModuleType
 
 from stiffmap.common.errors import StiffmapError
 
 
-def need(module: str) -> Any:
+def need(module: str) -> ModuleType:
     """The module, or one error that says how to install it.
 
     Raises:
@@ -30,7 +30,7 @@ def need(module: str) -> Any:
 
 
 @contextmanager
-def gmsh_session() -> Iterator[Any]:
+def gmsh_session() -> Iterator[ModuleType]:
     """A fresh, silent gmsh model; its errors become :class:`StiffmapError`.
 
     Lengths in the model are millimetres, since OpenCASCADE's tolerances are absolute.

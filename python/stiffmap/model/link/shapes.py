@@ -6,7 +6,8 @@ width along y and its height along z, a foot along -y.
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from types import ModuleType
+from typing import Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
@@ -30,7 +31,7 @@ class _Shape(BaseModel):
         """Target edge length in m."""
         raise NotImplementedError
 
-    def build(self, gmsh: Any) -> Faces:
+    def build(self, gmsh: ModuleType) -> Faces:
         """Make the solid in mm; returns the surface tags by name."""
         raise NotImplementedError
 
@@ -55,7 +56,7 @@ class Bar(_Shape):
         """Half the smaller side."""
         return min(self.width, self.height) / 2
 
-    def build(self, gmsh: Any) -> Faces:
+    def build(self, gmsh: ModuleType) -> Faces:
         """One box."""
         _box(gmsh, 0, self.length, self.width, self.height)
         gmsh.model.occ.synchronize()
@@ -78,7 +79,7 @@ class HollowBar(Bar):
         """Three times the wall: one quadratic element through it."""
         return 3 * self.wall
 
-    def build(self, gmsh: Any) -> Faces:
+    def build(self, gmsh: ModuleType) -> Faces:
         """Box less box."""
         outer = _box(gmsh, 0, self.length, self.width, self.height)
         hole = _box(gmsh, 0, self.length, self.width - 2 * self.wall, self.height - 2 * self.wall)
@@ -115,7 +116,7 @@ class ForkBar(Bar):
         """Three times the thinnest part: one quadratic element through it."""
         return 3 * min(self.prong, self.wall or self.prong)
 
-    def build(self, gmsh: Any) -> Faces:
+    def build(self, gmsh: ModuleType) -> Faces:
         """Tube, two end plates, four prongs, four pin holes."""
         occ, mm = gmsh.model.occ, 1e3
         x0, x1 = self.fork, self.length - self.fork
@@ -182,7 +183,7 @@ class Foot(_Shape):
         """Half the smallest of upright, depth and plate."""
         return min(self.upright, self.depth, self.plate) / 2
 
-    def build(self, gmsh: Any) -> Faces:
+    def build(self, gmsh: ModuleType) -> Faces:
         """Two boxes; the upright is centred on x = 0, the plate starts at its back."""
         back, side = -self.upright / 2, -self.depth / 2
         plate = _cuboid(gmsh, (back, -self.plate, side), (self.base, self.plate, self.depth))
@@ -196,18 +197,18 @@ Shape = Bar | HollowBar | ForkBar | Foot
 
 
 def _box(
-    gmsh: Any, x0: float, x1: float, width: float, height: float, y: float = 0.0
+    gmsh: ModuleType, x0: float, x1: float, width: float, height: float, y: float = 0.0
 ) -> list[tuple[int, int]]:
     """Box from x0 to x1, centred on (y, 0) in y and z."""
     return _cuboid(gmsh, (x0, y - width / 2, -height / 2), (x1 - x0, width, height))
 
 
-def _cuboid(gmsh: Any, low: Vector, size: Vector) -> list[tuple[int, int]]:
+def _cuboid(gmsh: ModuleType, low: Vector, size: Vector) -> list[tuple[int, int]]:
     """Box by its lowest corner and its size; arguments in m, the model in mm."""
     return [(3, gmsh.model.occ.addBox(*(1e3 * np.array([*low, *size]))))]
 
 
-def _end_faces(gmsh: Any, axis: int, fixed: float, loaded: float) -> Faces:
+def _end_faces(gmsh: ModuleType, axis: int, fixed: float, loaded: float) -> Faces:
     """Plane faces across an axis at two places, in mm; every other face keeps its number."""
     names: Faces = {"fixed": [], "loaded": []}
     for _, tag in gmsh.model.getEntities(2):

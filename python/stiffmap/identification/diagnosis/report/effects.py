@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from scipy.stats import norm
@@ -90,7 +89,7 @@ def _derived(
     }
 
 
-def as_place(candidate: Candidate) -> dict[str, Any]:
+def as_place(candidate: Candidate) -> dict[str, object]:
     """Kind, element, legs."""
     return {"kind": candidate.kind, "element": candidate.element, "legs": list(candidate.legs)}
 

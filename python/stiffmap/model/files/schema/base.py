@@ -45,7 +45,7 @@ class FileModel(BaseModel):
 
     @model_validator(mode="wrap")
     @classmethod
-    def _known_keys(cls, data: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
+    def _known_keys(cls, data: object, handler: ModelWrapValidatorHandler[Self]) -> Self:
         if isinstance(data, BaseModel):
             return handler(data)
         data = cls.as_mapping(data)

@@ -37,7 +37,7 @@ def read_axis(value: Any) -> tuple[float, float, float]:
     return (x, y, z)
 
 
-def _read_permutation(value: Any) -> list[str]:
+def _read_permutation(value: object) -> list[str]:
     names = re.findall(r"-?[xyz]", "".join(map(str, value)) if isinstance(value, list) else str(value))
     if value not in (names, "".join(names)) or sorted(n[-1] for n in names) != ["x", "y", "z"]:
         raise ValueError(

@@ -41,7 +41,7 @@ class Matrix(FileModel):
         return data
 
 
-def _upper(entries: dict[Any, Any]) -> dict[str, Any]:
+def _upper(entries: dict[object, object]) -> dict[str, object]:
     """Entries by their upper-triangle names; a missing diagonal term is an error, not a zero."""
     out: dict[str, Any] = {}
     for key, value in entries.items():
