@@ -5,10 +5,11 @@ from __future__ import annotations
 
 import shlex
 import tempfile
+from collections.abc import Callable
 from html import escape
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.cm import ScalarMappable
@@ -25,6 +26,7 @@ from stiffmap.ui.plot.scene import draw_box, draw_force, draw_skeleton, finish
 from stiffmap.ui.plot.style import COLOURS, MM, ORANGE, TOLERANCE, headline, leg_colours, paper
 from stiffmap.ui.view.colours import plane_image
 from stiffmap.ui.view.data import Data
+from stiffmap.ui.view.model import ViewModel
 from stiffmap.ui.view.moment import Moment
 from stiffmap.ui.view.numbers import write
 from stiffmap.ui.view.panels import (
@@ -42,6 +44,9 @@ from stiffmap.ui.view.scene import Scene, look_at_machine
 from stiffmap.ui.view.serving import HERE, need_viser, silent
 from stiffmap.ui.view.state import ViewState, as_plain, permalink
 
+if TYPE_CHECKING:
+    from viser import GuiApi, GuiButtonHandle, GuiEvent, ViserServer
+
 SHOWN = 51
 """Poses along each edge of the plane in a picture."""
 STYLE = """<style>
@@ -57,8 +62,8 @@ STYLE = """<style>
 class Outputs:
     """Buttons that hand files to the browser, and texts to copy."""
 
-    def __init__(self, viewer: Any, gui: Any) -> None:
-        self._viewer = viewer
+    def __init__(self, gui: GuiApi, model: ViewModel, data: Data | None, now: Callable[[], Moment]) -> None:
+        self._model, self._data, self._now = model, data, now
         gui.add_button("Picture (PNG)").on_click(lambda e: self._hand(e, "png"))
         gui.add_button("Picture (SVG)").on_click(lambda e: self._hand(e, "svg"))
         gui.add_button("Scene as one page (HTML)").on_click(lambda e: self._hand(e, "html"))
@@ -76,16 +81,13 @@ class Outputs:
     @property
     def source(self) -> str:
         """Shipped name, or the machine's file."""
-        file = self._viewer.model.file
-        return self._viewer.model.declared.name if file is None else str(file)
+        return self._model.declared.name if self._model.file is None else str(self._model.file)
 
-    def _hand(self, event: Any, kind: str) -> None:
+    def _hand(self, event: GuiEvent[GuiButtonHandle], kind: str) -> None:
         if event.client is None:
             return
-        moment = self._viewer.now()
-        content = (
-            page_of(moment, self._viewer.data_again()).encode() if kind == "html" else _picture(moment, kind)
-        )
+        moment = self._now()
+        content = page_of(moment, self._data).encode() if kind == "html" else _picture(moment, kind)
         event.client.send_file_download(f"{moment.machine.name}.{kind}", content, save_immediately=True)
 
 
@@ -156,7 +158,7 @@ def page_of(moment: Moment, data: Data | None = None) -> str:
     return f'{head}{STYLE}<div id="said">{said}</div></body>{tail}'
 
 
-def draw(server: Any, moment: Moment, data: Data | None = None) -> str:
+def draw(server: ViserServer, moment: Moment, data: Data | None = None) -> str:
     """The whole scene of a moment; its panels as HTML."""
     scene = Scene(server.scene, moment)
     scene.gizmo.visible = scene.force_handle.visible = False

@@ -164,7 +164,8 @@ def test_a_file_is_reloaded_or_its_error_shown(tmp_path: Path) -> None:
 @pytest.mark.parametrize("quantity", ["worst", "margin", "status", "frequency", "dynamic"])
 def test_every_quantity_is_drawn(view: View, quantity: str) -> None:
     viewer = view._viewer
-    viewer.controls.cloud, viewer.controls.surface, viewer.controls.lit = True, "ellipsoid", "x.foot"
+    controls = viewer.controls
+    controls.cloud.value, controls.surface.value, controls.light.value = True, "ellipsoid", "x.foot"
     view.set(quantity=quantity, plane="free", normal=(1.0, 0.2, 0.3))
     assert viewer.worker.idle(60) and not viewer.error
     assert viewer._plane is not None and viewer._plane.quantity == quantity
