@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
@@ -41,7 +41,7 @@ def machine_figure(
     p = machine.description.home.p if position is None else real_array(position, "position")
     shape = standing(machine, p, rotation)
     with paper(5.6, 5.2, most=4) as figure:
-        ax: Any = scene_axes(figure, shape, view)
+        ax = scene_axes(figure, shape, view)
         draw_skeleton(ax, shape, leg_colours(machine.legs))
         if machine.description.workspace is not None:
             draw_box(ax, *machine.workspace)
@@ -115,7 +115,7 @@ def loaded_figure(
     with paper(10.4, 5.0) as figure:
         grid = figure.add_gridspec(1, 2, width_ratios=(1.3, 1.0))
         left, right = grid[0, 0], grid[0, 1]
-        ax: Any = scene_axes(figure, shape.rest, view, left)
+        ax = scene_axes(figure, shape.rest, view, left)
         draw_loaded(ax, shape, machine.legs, view)
         draw_budget(figure.add_subplot(right), budget)
         size = float(np.linalg.norm(shape.displacement[:3]))
@@ -125,7 +125,7 @@ def loaded_figure(
 
 
 def draw_loaded(
-    ax: Any, shape: LoadedShape, legs: tuple[str, ...], view: tuple[float, float] | None = None
+    ax: Axes, shape: LoadedShape, legs: tuple[str, ...], view: tuple[float, float] | None = None
 ) -> None:
     """Ghost, enlarged shape, arrow of the force."""
     label: str | None = "without load"
@@ -154,7 +154,7 @@ def budget_rows(budget: DeflectionBudget) -> list[tuple[str, float, str]]:
     ]
 
 
-def draw_budget(ax: Any, budget: DeflectionBudget) -> None:
+def draw_budget(ax: Axes, budget: DeflectionBudget) -> None:
     """A bar per element, in the direction in which the tool moves."""
     rows = budget_rows(budget)
     at = np.arange(len(rows))

@@ -12,6 +12,7 @@ from typing import Any
 
 import matplotlib
 import numpy as np
+from matplotlib.backend_bases import RendererBase
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
@@ -69,9 +70,10 @@ EDGE = 0.98
 """Share of a picture's width that a title or a legend may take."""
 
 
-def _renderer(figure: Figure) -> Any:
+def _renderer(figure: Figure) -> RendererBase:
     canvas: Any = FigureCanvasAgg(figure)
-    return canvas.get_renderer()
+    renderer: RendererBase = canvas.get_renderer()
+    return renderer
 
 
 def headline(figure: Figure, text: str) -> None:

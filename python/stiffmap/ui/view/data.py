@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from html import escape
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,9 @@ from stiffmap.ui.view.colours import rgb
 from stiffmap.ui.view.moment import Moment
 from stiffmap.ui.view.place import solved
 from stiffmap.ui.view.scene import DIAGNOSED, Scene
+
+if TYPE_CHECKING:
+    from stiffmap.identification.diagnosis.report.result import Diagnosis
 
 DRAWN = 0.06
 """Of the machine's extent, the longest arrow and the widest ribbon."""
@@ -61,7 +64,7 @@ class ShownFindings:
     machine: Machine
 
 
-def findings(diagnosis: Any) -> ShownFindings:
+def findings(diagnosis: Diagnosis | str | PathLike[str]) -> ShownFindings:
     """Of a `Diagnosis`, or of the folder of one (or its ``diagnosis.json``); FileError where that cannot be read."""
     if isinstance(diagnosis, str | PathLike):
         return _from_folder(Path(diagnosis))

@@ -9,14 +9,17 @@ from collections.abc import Callable
 from html import escape
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
+from mpl_toolkits.mplot3d import Axes3D
 from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
+from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import length_text, place_text, vector_text
 from stiffmap.common.outputs import write_text
@@ -189,7 +192,7 @@ def view_figure(moment: Moment) -> Figure:
     solution, rest, found = moment.solve(), moment.rest(), moment.plane(SHOWN)
     q, limits, s = QUANTITIES[moment.state.quantity], found.range, moment.state
     with paper(9.6, 5.2, most=0) as figure:
-        ax: Any = figure.add_subplot(1, 2, 1, projection="3d")
+        ax = figure.add_subplot(1, 2, 1, projection="3d")
         draw_box(ax, *box_of(moment.machine))
         _plane(ax, found, limits)
         _lines(ax, found.isolines(limits), "white", 0.5)
@@ -209,12 +212,12 @@ def view_figure(moment: Moment) -> Figure:
     return figure
 
 
-def _lines(ax: Any, pieces: Any, colour: str, width: float) -> None:
+def _lines(ax: Axes3D, pieces: Floats, colour: str, width: float) -> None:
     if len(pieces):
         ax.add_collection3d(Line3DCollection(MM * pieces, colors=colour, linewidths=width))
 
 
-def _plane(ax: Any, found: PlaneMap, limits: tuple[float, float]) -> None:
+def _plane(ax: Axes3D, found: PlaneMap, limits: tuple[float, float]) -> None:
     p = MM * found.frame.poses(found.count)
     step = plane_image(found, limits)
     colours = step[:: len(step) // found.count, :: len(step) // found.count] / 255.0
@@ -224,7 +227,7 @@ def _plane(ax: Any, found: PlaneMap, limits: tuple[float, float]) -> None:
     )  # fmt: skip
 
 
-def _shares(ax: Any, moment: Moment) -> None:
+def _shares(ax: Axes, moment: Moment) -> None:
     try:
         draw_budget(ax, moment.shares())
     except StiffmapError as problem:
