@@ -13,7 +13,7 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.solve.solution import Solution
 from stiffmap.ui.plot.elements import thicknesses
 from stiffmap.ui.plot.scene import ARROW, FORCE, box_edges
-from stiffmap.ui.plot.skeleton import Skeleton
+from stiffmap.ui.plot.skeleton import COINCIDENT, Skeleton
 from stiffmap.ui.plot.style import BLACK, ORANGE, SKY, TOLERANCE, leg_colours
 from stiffmap.ui.view.colours import plane_image, rgb
 from stiffmap.ui.view.meshes import Meshes
@@ -53,6 +53,7 @@ class Scene:
         self.arrow_length = ARROW * self.extent
         """Of a force that is not being dragged, m."""
         self._lines: dict[str, LineSegmentsHandle] = {}
+        self._surfaces: dict[str, MeshHandle] = {}
         self._image: ImageHandle | None = None
         self._frame_size = (0.0, 0.0)
         self.lit: list[int] = []
@@ -70,8 +71,6 @@ class Scene:
             "/force", np.zeros((1, 2, 3), np.float32), rgb(FORCE), shaft_radius=0.005 * self.extent,
             head_radius=0.013 * self.extent, head_length=0.035 * self.extent, visible=False,
         )  # fmt: skip
-        self._plate: MeshHandle | None = None
-        self._surface: MeshHandle | None = None
         self.lines("/box", box_edges(*box_of(moment.machine)), GREY, 1.5, "screen")
         if len(rest.guides):
             self.lines("/travel", rest.guides, GREY, 0.006 * self.extent)
@@ -117,13 +116,17 @@ class Scene:
 
     def mesh(
         self, name: str, vertices: Floats, faces: NDArray[np.uint32], colour: str, opacity: float = 0.4
-    ) -> MeshHandle:
-        """A surface seen from both sides; without triangles it is hidden. Its handle."""
-        shown = len(faces) > 0
-        return self.api.add_mesh_simple(
-            name, np.asarray(vertices, np.float32), faces if shown else np.zeros((1, 3), np.uint32),
-            color=rgb(colour), opacity=opacity, side="double", cast_shadow=False, visible=shown,
-        )  # fmt: skip
+    ) -> None:
+        """A surface seen from both sides; without triangles it is hidden."""
+        there, shown = self._surfaces.get(name), len(faces) > 0
+        v = np.asarray(vertices, np.float32)
+        if there is None or not np.array_equal(there.faces, faces):
+            self._surfaces[name] = self.api.add_mesh_simple(
+                name, v, faces if shown else np.zeros((1, 3), np.uint32), color=rgb(colour), opacity=opacity,
+                side="double", cast_shadow=False, visible=shown,
+            )  # fmt: skip
+            return
+        there.vertices, there.visible = v, True
 
     def machine(self, rest: Skeleton, ghost: Floats) -> None:
         """Links, joints, platform, and the links of the deflected ghost."""
@@ -137,9 +140,7 @@ class Scene:
             middle = np.concatenate([rest.plate, rest.plate.mean(axis=0)[None]])
             n = len(rest.plate)
             fan = np.array([[i, (i + 1) % n, n] for i in range(n)], np.uint32)
-            if self._plate is None:
-                self._plate = self.mesh("/platform", middle, fan, DARK)
-            self._plate.vertices = np.asarray(middle, np.float32)
+            self.mesh("/platform", middle, fan, DARK)
         self.lines("/ghost", ghost, GHOST, 0.004 * self.extent)
         self.lights()
 
@@ -197,16 +198,12 @@ class Scene:
         """The polar diagram or the ellipsoid at the tool; what its size means, in words."""
         c = solution.compliance[:3, :3]
         if kind == "none" or not np.isfinite(c).all():
-            if self._surface is not None:
-                self._surface.visible = False
+            if "/surface" in self._surfaces:
+                self._surfaces["/surface"].visible = False
             return ""
         make = ellipsoid if kind == "ellipsoid" else polar_surface
         around, most = make(c, SURFACE * self.extent)
-        points = around + np.array(moment.state.position)
-        if self._surface is None:
-            self._surface = self.mesh("/surface", points, sphere()[1], SKY, 0.45)
-        self._surface.vertices = np.asarray(points, np.float32)
-        self._surface.visible = True
+        self.mesh("/surface", around + np.array(moment.state.position), sphere()[1], SKY, 0.45)
         return f"longest radius: {1e6 * most:.4g} µm/N"
 
     def marker(self, point: Floats, text: str) -> None:
@@ -219,9 +216,8 @@ def _groups(moment: Moment, rest: Skeleton) -> list[tuple[str, str, float, list[
     thick = thicknesses(moment.machine, rest)
     colours = leg_colours(moment.machine.legs) | {"": DARK}
     sets: dict[tuple[str, float], list[int]] = {}
-    lengths = np.linalg.norm(rest.links[:, 1] - rest.links[:, 0], axis=1) if len(rest.links) else []
-    for i, leg in enumerate(rest.legs):
-        if lengths[i] > 1e-9:
+    for i, (leg, (start, end)) in enumerate(zip(rest.legs, rest.links, strict=True)):
+        if np.linalg.norm(end - start) > COINCIDENT:
             sets.setdefault((leg, round(float(thick[i]), 5)), []).append(i)
     return [(f"/links/{k}", colours[leg], t, found) for k, ((leg, t), found) in enumerate(sets.items())]
 
