@@ -19,9 +19,9 @@ from matplotlib.figure import Figure
 from stiffmap.common import number_text
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.outputs import write_picture
+from stiffmap.solve.labels import WRENCH
 
 MM, UM = 1e3, 1e6
-WRENCH = ("fx", "fy", "fz", "mx", "my", "mz")
 # Okabe and Ito's palette: eight colours that the common colour blindnesses keep apart.
 BLUE, ORANGE, GREEN, PURPLE, SKY, VERMILLION, BLACK = (
     "#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#000000",

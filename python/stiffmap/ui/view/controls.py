@@ -17,7 +17,7 @@ from stiffmap.ui.view.outputs import Outputs
 from stiffmap.ui.view.panels import hint, legend
 from stiffmap.ui.view.place import first_plane, moves, orientation, rotation_of, turns
 from stiffmap.ui.view.quantities import QUANTITIES
-from stiffmap.ui.view.state import PLANES, Vector
+from stiffmap.ui.view.state import PLANES
 
 if TYPE_CHECKING:
     from viser import GuiApi, GuiCheckboxHandle, GuiDropdownHandle, GuiEvent, GuiInputHandle
@@ -45,8 +45,8 @@ class Controls:
         self._shown: list[tuple[Any, Callable[[Moment], object]]] = []
         """Controls of the state, and what each of them shows."""
         moment = viewer.model.moment
-        self._status = gui.add_html("")
-        self._bar = gui.add_html("")
+        self.status = gui.add_html("")
+        self.bar = gui.add_html("")
         self.probe = gui.add_text("Probe", "click a point of the plane", disabled=True)
         tabs = gui.add_tab_group()
         with tabs.add_tab("Tool and load"):
@@ -80,7 +80,7 @@ class Controls:
         force = gui.add_vector3("Force, N", (0, 0, 0), step=10.0, hint="on the tool, base axes")
         self.typed(force, lambda m, v: m.put(force=tuple(v)), lambda m: _round(m.state.force))
         size = gui.add_slider("Size of the force, N", 0.0, MOST_FORCE, 10.0, 0.0)
-        self.typed(size, _sized, lambda m: min(_size(m.state.force), MOST_FORCE), keep=False)
+        self.typed(size, _sized, lambda m: min(float(np.linalg.norm(m.state.force)), MOST_FORCE), keep=False)
         around = gui.add_slider("Force around z, deg", -180.0, 180.0, 1.0, 0.0)
         self.typed(around, _turned, _around, keep=False)
         moments = gui.add_vector3("Moment, N·m", (0, 0, 0), step=1.0)
@@ -197,14 +197,6 @@ class Controls:
 
     # -- what the model says ------------------------------------------------------------------------------------
 
-    def say(self, html: str) -> None:
-        """The line on top."""
-        write(self._status, "content", html)
-
-    def bar(self, html: str) -> None:
-        """The colour bar."""
-        write(self._bar, "content", html)
-
     def why(self, html: str, surface: str) -> None:
         """The panels, and what the size of the surface at the tool means."""
         write(self._why, "content", html)
@@ -244,10 +236,6 @@ def _rotation(moment: Moment) -> tuple[float, float, float]:
     return _round(np.rad2deg(turn))
 
 
-def _size(force: Vector) -> float:
-    return float(np.linalg.norm(force))
-
-
 def _around(moment: Moment) -> float:
     x, y, _ = moment.state.force
     return round(float(np.rad2deg(np.arctan2(y, x))), 3)
@@ -260,7 +248,7 @@ def _downwards(moment: Moment) -> float:
 
 def _sized(model: ViewModel, size: float) -> object:
     f = np.array(model.state.force)
-    length = _size(model.state.force)
+    length = float(np.linalg.norm(f))
     unit = f / length if length else np.array([0.0, 0.0, -1.0])
     return model.put(force=tuple(float(v) for v in float(size) * unit), keep=False)
 

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
@@ -205,7 +204,12 @@ def view_figure(moment: Moment) -> Figure:
             unit, factor = q.shown(max(map(abs, limits)))
             bar = ScalarMappable(Normalize(factor * limits[0], factor * limits[1]), COLOURS)
             figure.colorbar(bar, ax=ax, label=f"{q.title}, {unit}", shrink=0.6, location="bottom", pad=0.08)
-        _shares(figure.add_subplot(1, 2, 2), moment)
+        right = figure.add_subplot(1, 2, 2)
+        try:
+            draw_budget(right, moment.shares())
+        except StiffmapError as problem:
+            right.text(0.5, 0.5, str(problem), ha="center", wrap=True)
+            right.axis("off")
         moved = length_text(float(np.linalg.norm(solution.displacement[:3])))
         headline(figure, f"{moment.machine.name} at {place_text(s.position, '.4g')} under {vector_text(s.force, 4)} N: the tool moves {moved} "
                          f"(orange: × {moment.magnification(rest, solution):g})")  # fmt: skip
@@ -225,11 +229,3 @@ def _plane(ax: Axes3D, found: PlaneMap, limits: tuple[float, float]) -> None:
         p[..., 0], p[..., 1], p[..., 2], facecolors=colours, rcount=found.count, ccount=found.count, shade=False,
         antialiased=False, linewidth=0,
     )  # fmt: skip
-
-
-def _shares(ax: Axes, moment: Moment) -> None:
-    try:
-        draw_budget(ax, moment.shares())
-    except StiffmapError as problem:
-        ax.text(0.5, 0.5, str(problem), ha="center", wrap=True)
-        ax.axis("off")

@@ -22,6 +22,7 @@ from stiffmap.ui.view.data import Data
 from stiffmap.ui.view.hands import ProbePoint, listen, listen_to_nodes
 from stiffmap.ui.view.model import ViewModel
 from stiffmap.ui.view.moment import Moment
+from stiffmap.ui.view.numbers import write
 from stiffmap.ui.view.panels import (
     colour_bar,
     compliance_panel,
@@ -130,7 +131,7 @@ class Viewer:
                 self.scene.tool(moment)
             if found is not None:
                 self._show(found, moment.state)
-            self.controls.say(status_line(moment, s, self.model.message, self.error))
+            write(self.controls.status, "content", status_line(moment, s, self.model.message, self.error))
         self.server.flush()
 
     def fine(self) -> None:
@@ -173,7 +174,7 @@ class Viewer:
             self._held = found
         limits = self._held.range
         self.scene.plane(found, limits, state.tolerance, self.controls.isolines.value)
-        self.controls.bar(colour_bar(found, limits, state.tolerance))
+        write(self.controls.bar, "content", colour_bar(found, limits, state.tolerance))
 
     def redraw(self) -> None:
         """The plane is to be drawn again though the machine is the same."""
@@ -220,7 +221,7 @@ class Viewer:
         )
         s = self._solution
         if s is not None:
-            self.controls.say(status_line(self.now(), s, "", self.error))
+            write(self.controls.status, "content", status_line(self.now(), s, "", self.error))
 
     def renew(self) -> None:
         """The machine's file has changed: its own scene and addresses, made by the thread that draws."""
