@@ -129,7 +129,8 @@ class Data:
     @property
     def html(self) -> str:
         """What the colours mean and how large they are drawn, for the panel."""
-        return "".join(f'<p style="margin:.4em 0"><b>{k}</b>: {v}</p>' for k, v in self._said.items())
+        said = self._said.copy()  # as a page may be made of it in another thread meanwhile
+        return "".join(f'<p style="margin:.4em 0"><b>{k}</b>: {v}</p>' for k, v in said.items())
 
     def _rows(self, scene: Scene, moment: Moment, e: Experiment) -> None:
         if self._drawn == (moment.machine, scene):
