@@ -8,9 +8,12 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
+from matplotlib.collections import QuadMesh
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
+from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.ui.plot.forces import in_words
 from stiffmap.ui.plot.planes import Planes, draw_isolines, draw_tolerance, halo, hatch_failed, on_grid, planes
@@ -97,12 +100,12 @@ class Drawn:
     tolerance: float | None
     """m."""
 
-    def status(self, plane: xr.DataArray) -> Any:
+    def status(self, plane: xr.DataArray) -> NDArray[np.uint8]:
         """Status of each position of a plane (up, right)."""
         turned = self.variable.startswith(("worst_", "best_"))
         status = self._of_case(self.ds["direction_status" if turned else "status"])
         across = self.how.across
-        return status.sel({across: plane[across]}).transpose(self.how.up, self.how.right).values
+        return np.asarray(status.sel({across: plane[across]}).transpose(self.how.up, self.how.right).values)
 
     def _of_case(self, values: xr.DataArray) -> xr.DataArray:
         if "case" not in values.dims:
@@ -167,14 +170,14 @@ def component(ds: xr.Dataset, variable: str) -> xr.DataArray:
     return found
 
 
-def shares(values: Any, tolerance: float | None) -> str:
+def shares(values: Floats, tolerance: float | None) -> str:
     """How much of a panel lies beyond the tolerance (m), and has no value."""
     good = np.isfinite(values)
     words = []
     if tolerance is not None and good.any():
-        words.append(f"{_percent(np.mean(values[good] > tolerance))} beyond {MM * tolerance:g} mm")
+        words.append(f"{_percent(float(np.mean(values[good] > tolerance)))} beyond {MM * tolerance:g} mm")
     if not good.all():
-        words.append(f"{_percent(np.mean(~good))} without a value")
+        words.append(f"{_percent(float(np.mean(~good)))} without a value")
     return "\n" + "\n".join(words) if words else ""
 
 
@@ -185,7 +188,7 @@ def _percent(share: float) -> str:
     return "> 99 %" if 0.995 < share < 1 else f"{100 * share:.0f} %"
 
 
-def draw_plane(ax: Axes, m: Drawn, plane: xr.DataArray, norm: Normalize) -> Any:
+def draw_plane(ax: Axes, m: Drawn, plane: xr.DataArray, norm: Normalize) -> QuadMesh:
     """One plane: colours, tolerance, hatched failures."""
     x, y, v = MM * plane[m.how.right].values, MM * plane[m.how.up].values, m.factor * plane.values
     mesh = ax.pcolormesh(x, y, v, shading="nearest", cmap=COLOURS, norm=norm, rasterized=True)
@@ -230,7 +233,7 @@ def draw_directions(ax: Axes, m: Drawn, index: int) -> None:
     ax.plot([], [], color="white", label="direction of the force", path_effects=halo(2.5, "#444444"))
 
 
-def _spread(count: int, most: int = 9) -> Any:
+def _spread(count: int, most: int = 9) -> NDArray[np.intp]:
     """Indices of at most nine evenly spaced grid values, none at the border."""
     if count <= most:
         return np.arange(count)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.stats import f as f_distribution
 
@@ -100,7 +100,7 @@ def views(at: Floats) -> tuple[tuple[int, int], ...]:
     return tuple(v for v in all_ if not flat >= set(v)) or all_[:1]
 
 
-def _arrows(ax: Any, at: Floats, arrow: Floats, view: tuple[int, int], colour: str) -> None:
+def _arrows(ax: Axes, at: Floats, arrow: Floats, view: tuple[int, int], colour: str) -> None:
     a, b = view
     ax.quiver(
         *(at[:, a], at[:, b], arrow[:, a], arrow[:, b]),
@@ -131,7 +131,7 @@ def against(r: Residual, drivers: list[Driver], channels: list[int]) -> Figure:
     return figure
 
 
-def _scatter(ax: Any, r: Residual, channel: int, driver: Driver) -> None:
+def _scatter(ax: Axes, r: Residual, channel: int, driver: Driver) -> None:
     _, x, labels = driver
     values, band = UM * r.values[:, channel], 2 * UM * float(r.noise.floor[channel])  # µm or µrad
     ax.axhspan(-band, band, color=NOISE, lw=0)

@@ -9,6 +9,8 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.projections.polar import PolarAxes
+from numpy.typing import NDArray
 
 from stiffmap.common.number_text import place_text
 from stiffmap.solve.status import Status
@@ -42,7 +44,9 @@ def polar_figure(
     return figure
 
 
-def draw_polar(ax: Any, pol: xr.Dataset, variable: str, tolerance: float | None, factor: float = MM) -> None:
+def draw_polar(
+    ax: PolarAxes, pol: xr.Dataset, variable: str, tolerance: float | None, factor: float = MM
+) -> None:
     """One diagram on a polar axis; gaps where a direction failed."""
     angle, value = (np.append(pol[n].values, pol[n].values[0]) for n in ("angle", variable))
     ax.plot(angle, factor * value, color=BLUE, label=in_words(variable))
@@ -52,7 +56,8 @@ def draw_polar(ax: Any, pol: xr.Dataset, variable: str, tolerance: float | None,
                 label=f"tolerance {MM * tolerance:g} mm")  # fmt: skip
     ax.set_ylim(0, None)
     ax.set_rlabel_position(100)
-    ax.yaxis.get_major_locator().base.set_params(nbins=4)
+    locator: Any = ax.yaxis.get_major_locator()
+    locator.base.set_params(nbins=4)
     ax.tick_params(pad=1)
     for text in ax.get_yticklabels():
         text.set_bbox({"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 0.5})
@@ -130,9 +135,11 @@ def draw_sweeps(ax: Axes, lines: Mapping[str, xr.Dataset], variable: str, tolera
     ax.margins(x=0)
 
 
-def _panels(figure: Figure, many: Sequence[xr.Dataset], **how: Any) -> Any:
+def _panels(figure: Figure, many: Sequence[xr.Dataset], projection: str | None = None) -> NDArray[np.object_]:
     """Axes side by side, each titled by where its Dataset is."""
-    axes = figure.subplots(1, len(many), squeeze=False, subplot_kw=how)[0]
+    axes: NDArray[np.object_] = figure.subplots(
+        1, len(many), squeeze=False, subplot_kw={"projection": projection}
+    )[0]
     for i, (ax, ds) in enumerate(zip(axes, many, strict=True)):
         ax.set_title(f"{panel(i, len(many))} {place_text(ds.position.values)}".strip())
     return axes

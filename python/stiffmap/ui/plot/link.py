@@ -6,6 +6,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import SubFigure
+from mpl_toolkits.mplot3d import Axes3D
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from stiffmap.common.outputs import write_picture
 from stiffmap.model.link.arrays import Floats, Ints
@@ -42,7 +46,7 @@ def boundary_triangles(tets: Ints) -> Ints:
     return np.asarray(every[first[count == 1]])
 
 
-def _draw_residuals(figure: Any, link: Link, cases: int) -> None:
+def _draw_residuals(figure: SubFigure, link: Link, cases: int) -> None:
     """One panel per load case: residual vectors on the face, seen along its flattest direction."""
     field, residual = link.evidence.field, link.residual
     normal = int(np.argmin(np.ptp(field.points, axis=0)))
@@ -61,9 +65,7 @@ def _draw_residuals(figure: Any, link: Link, cases: int) -> None:
             axes.set_ylabel(f"{'xyz'[b]}, mm")
 
 
-def _draw_shape(axes: Any, part: PartLink, triangles: Ints, case: int) -> None:
-    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
-
+def _draw_shape(axes: Axes3D, part: PartLink, triangles: Ints, case: int) -> None:
     step = max(1, len(triangles) // MOST_TRIANGLES)
     p, u = part.mesh.nodes, part.displacements[case]
     extent = np.ptp(p, axis=0).max()
@@ -86,7 +88,7 @@ def _draw_shape(axes: Any, part: PartLink, triangles: Ints, case: int) -> None:
     )
 
 
-def _draw_entries(axes: Any, link: Link, error: Floats) -> None:
+def _draw_entries(axes: Axes, link: Link, error: Floats) -> None:
     """Entries over sqrt(kii kjj) with 95 % bars; the diagonal's values and units in the labels."""
     C, factor = link.compliance, unit_factor("mm")
     size = np.sqrt(np.abs(np.outer(np.diag(C), np.diag(C))))

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
@@ -41,7 +41,7 @@ def machine_figure(
     p = machine.description.home.p if position is None else real_array(position, "position")
     shape = standing(machine, p, rotation)
     with paper(5.6, 5.2, most=4) as figure:
-        ax: Any = scene_axes(figure, shape, view)
+        ax = scene_axes(figure, shape, view)
         draw_skeleton(ax, shape, leg_colours(machine.legs))
         if machine.description.workspace is not None:
             draw_box(ax, *machine.workspace)
@@ -114,28 +114,20 @@ def loaded_figure(
     budget = deflection_budget(machine, position, wrench, rotation=rotation, gravity=gravity)
     with paper(10.4, 5.0) as figure:
         grid = figure.add_gridspec(1, 2, width_ratios=(1.3, 1.0))
-        left, right = grid[0, 0], grid[0, 1]
-        ax: Any = scene_axes(figure, shape.rest, view, left)
-        draw_loaded(ax, shape, machine.legs, view)
-        draw_budget(figure.add_subplot(right), budget)
+        ax = scene_axes(figure, shape.rest, view, grid[0, 0])
+        label: str | None = "without load"
+        for _, ends in shape.rest.bars:
+            ax.plot(*on(ax, ends), color="0.72", lw=1.4, ls="--", zorder=1, label=label)
+            label = None
+        moved = shape.rest.enlarged(shape.loaded, shape.factor)
+        draw_skeleton(ax, moved, leg_colours(machine.legs))
+        draw_force(ax, moved.tcp, shape.force, shape.rest.extent)
+        finish(ax, view)
+        draw_budget(figure.add_subplot(grid[0, 1]), budget)
         size = float(np.linalg.norm(shape.displacement[:3]))
         headline(figure, f"{machine.name} at {place_text(budget.position)} under {vector_text(budget.wrench[:3], 4)} N: "
                          f"the tool moves {length_text(size)} (drawn × {shape.factor:g})")  # fmt: skip
     return figure
-
-
-def draw_loaded(
-    ax: Any, shape: LoadedShape, legs: tuple[str, ...], view: tuple[float, float] | None = None
-) -> None:
-    """Ghost, enlarged shape, arrow of the force."""
-    label: str | None = "without load"
-    for _, ends in shape.rest.bars:
-        ax.plot(*on(ax, ends), color="0.72", lw=1.4, ls="--", zorder=1, label=label)
-        label = None
-    moved = shape.rest.enlarged(shape.loaded, shape.factor)
-    draw_skeleton(ax, moved, leg_colours(legs))
-    draw_force(ax, moved.tcp, shape.force, shape.rest.extent)
-    finish(ax, view)
 
 
 def budget_rows(budget: DeflectionBudget) -> list[tuple[str, float, str]]:
@@ -154,7 +146,7 @@ def budget_rows(budget: DeflectionBudget) -> list[tuple[str, float, str]]:
     ]
 
 
-def draw_budget(ax: Any, budget: DeflectionBudget) -> None:
+def draw_budget(ax: Axes, budget: DeflectionBudget) -> None:
     """A bar per element, in the direction in which the tool moves."""
     rows = budget_rows(budget)
     at = np.arange(len(rows))

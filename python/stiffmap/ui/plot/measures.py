@@ -10,6 +10,7 @@ from typing import Any, cast
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from mpl_toolkits.mplot3d import Axes3D
 from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import Floats
@@ -54,7 +55,7 @@ def transmission_figure(machine: Machine, position: ArrayLike, plane: str = "xy"
     return figure
 
 
-def _ellipsoid(axes: Any, j: Floats) -> None:
+def _ellipsoid(axes: Axes3D, j: Floats) -> None:
     u, s, _ = np.linalg.svd(j, full_matrices=False)
     a, b = np.meshgrid(np.linspace(0, 2 * np.pi, 49), np.linspace(0, np.pi, 25))
     ball = np.stack([np.cos(a) * np.sin(b), np.sin(a) * np.sin(b), np.cos(b)])[: len(s)]
@@ -63,7 +64,7 @@ def _ellipsoid(axes: Any, j: Floats) -> None:
     axes.plot_wireframe(x, y, z, rstride=6, cstride=6, color=BLUE, linewidth=0.4)
 
 
-def _parallelepiped(axes: Any, j: Floats) -> None:
+def _parallelepiped(axes: Axes3D, j: Floats) -> None:
     n = j.shape[1]
     if n > 6:
         return

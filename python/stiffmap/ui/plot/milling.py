@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import xarray as xr
 from matplotlib.collections import LineCollection
@@ -54,7 +52,7 @@ def outline_figure(found: Milled) -> Figure:
         return np.insert(MM * wall[:, :2], corner + 1, np.nan, axis=0)
 
     with paper(6.4, 4.8, f"Wall of the part; errors drawn {factor:g} times larger") as figure:
-        ax: Any = figure.subplots()
+        ax = figure.subplots()
         ax.plot(*(MM * wanted[:, :2].T), color=BLACK, lw=1.0, label="wanted")
         cut = magnified(before)
         lines = LineCollection(
@@ -114,7 +112,7 @@ def machine_path_figure(found: Milled) -> Figure:
     worst = int(np.nanargmax(np.abs(np.nan_to_num(ds.error_normal.values))))
     shape = standing(job.machine, job.position[worst], job.rotation[worst])
     with paper(5.6, 5.2, f"{job.machine.name}: the tool where the error is largest", most=4) as figure:
-        ax: Any = scene_axes(figure, shape, None)
+        ax = scene_axes(figure, shape, None)
         draw_skeleton(ax, shape, leg_colours(job.machine.legs))
         ax.plot(*on(ax, job.position), color=BLACK, lw=1.6, label="path")
         finish(ax)

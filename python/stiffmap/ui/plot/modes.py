@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
+from mpl_toolkits.mplot3d import Axes3D
+from mpl_toolkits.mplot3d.art3d import Line3D
 from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import Floats
@@ -63,11 +64,11 @@ class _Scene:
         lines = [line for _, line in rest.bars]
         points = np.concatenate(lines)
         centre, self.half = (points.max(0) + points.min(0)) / 2, np.ptp(points, axis=0).max() / 2
-        self.moving: list[list[Any]] = []
+        self.moving: list[list[Line3D]] = []
         with paper_style():
             self.figure = new_figure(3.3 * count, 3.6)
             for i in range(count):
-                axes: Any = self.figure.add_subplot(1, count, i + 1, projection="3d")
+                axes = self.figure.add_subplot(1, count, i + 1, projection="3d")
                 _lines(axes, lines, {"color": "0.45", "linewidth": 0.8, "linestyle": "--"})
                 self.moving.append(_lines(axes, rest.links, {"color": BLUE, "linewidth": 1.2}))
                 axes.plot(*(MM * rest.tcp)[:, None], "o", color=VERMILLION, markersize=4)
@@ -95,5 +96,5 @@ def swung(machine: Machine, w: NaturalFrequencies, mode: int, phase: float, size
     return np.asarray(w.coordinates + size / most * np.sin(phase) * w.shape[mode])
 
 
-def _lines(axes: Any, lines: Iterable[Floats], style: dict[str, object]) -> list[Any]:
+def _lines(axes: Axes3D, lines: Iterable[Floats], style: dict[str, object]) -> list[Line3D]:
     return [axes.plot(*(MM * line.T), **style)[0] for line in lines]

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import xarray as xr
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import place_text
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.status import Status
-from stiffmap.ui.plot.scene import draw_skeleton, finish, marks, on, scene_axes
+from stiffmap.ui.plot.scene import dots, draw_skeleton, finish, on, scene_axes
 from stiffmap.ui.plot.skeleton import Skeleton, skeleton
 from stiffmap.ui.plot.style import BLACK, BLUE, GREEN, MM, VERMILLION, leg_colours, paper
 
@@ -28,7 +28,7 @@ def path_figure(path: xr.Dataset) -> Figure:
     if not path.attrs.get("end"):
         raise StiffmapError("path: expected a sweep with a limit, got one of single forces")
     with paper(4.6, 3.4, most=2) as figure:
-        ax: Any = figure.subplots()
+        ax = figure.subplots()
         for number, colour, name in ((0, BLUE, ""), (1, GREEN, "crossing branch, ")):
             _draw_branch(ax, path.isel(step=path.branch.values == number), colour, name)
         for kind, mark in MARKS.items():
@@ -42,7 +42,7 @@ def path_figure(path: xr.Dataset) -> Figure:
     return figure
 
 
-def _draw_branch(ax: Any, branch: xr.Dataset, colour: str, name: str) -> None:
+def _draw_branch(ax: Axes, branch: xr.Dataset, colour: str, name: str) -> None:
     """One branch, by stability."""
     if branch.sizes["step"] < 2:
         return
@@ -53,7 +53,7 @@ def _draw_branch(ax: Any, branch: xr.Dataset, colour: str, name: str) -> None:
         ax.plot(x, _joined(y, ~stable), color=VERMILLION, ls="--", label=f"{name}unstable")
 
 
-def _joined(values: Any, where: Any) -> Any:
+def _joined(values: Floats, where: NDArray[np.bool_]) -> Floats:
     """Values where wanted and at the neighbours of wanted points, so that lines join."""
     near = where.copy()
     near[1:] |= where[:-1]
@@ -73,7 +73,7 @@ def mode_figure(
     leg, joint = str(path.mode_leg.values[index]), str(path.mode_joint.values[index])
     with paper(5.2, 4.8, most=4) as figure:
         shape = skeleton(machine, moved)
-        ax: Any = scene_axes(figure, shape, view)
+        ax = scene_axes(figure, shape, view)
         for _, ends in skeleton(machine, at).bars:
             ax.plot(*on(ax, ends), color="0.7", lw=1.5, zorder=1)
         draw_skeleton(ax, shape, leg_colours(machine.legs))
@@ -87,7 +87,7 @@ def mode_figure(
     return figure
 
 
-def _mark(ax: Any, machine: Machine, shape: Skeleton, moved: Floats, leg: str, joint: str) -> None:
+def _mark(ax: Axes, machine: Machine, shape: Skeleton, moved: Floats, leg: str, joint: str) -> None:
     """A halo behind the leg of the mode, a ring about what moves most."""
     for of, ends in shape.bars:
         if of == leg:
@@ -96,5 +96,4 @@ def _mark(ax: Any, machine: Machine, shape: Skeleton, moved: Floats, leg: str, j
     index = core.names.coordinates.index(joint)
     node = next(i for i, (_, c) in enumerate(core.nodes) if c == index)
     at = core.frames(moved)[0][node]
-    ax.scatter(*on(ax, at), s=190, facecolor="none", edgecolor=VERMILLION, linewidth=1.8, label="moves most",
-               **marks(ax))  # fmt: skip
+    dots(ax, at, 190, facecolor="none", edgecolor=VERMILLION, linewidth=1.8, label="moves most")

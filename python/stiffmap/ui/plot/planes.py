@@ -104,7 +104,7 @@ def draw_isolines(ax: Axes, plane: xr.DataArray, how: Planes, factor: float, nor
         text.set_path_effects(halo(1.2, "#444444"))
 
 
-def draw_tolerance(ax: Axes, x: Any, y: Any, v: Any, level: float, words: str) -> None:
+def draw_tolerance(ax: Axes, x: Floats, y: Floats, v: Floats, level: float, words: str) -> None:
     """Outline and dots of what lies beyond the tolerance (unit of v)."""
     finite = v[np.isfinite(v)]
     if min(v.shape) < 2 or finite.size == 0 or not finite.max() > level:

@@ -6,7 +6,11 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.gridspec import SubplotSpec
 from matplotlib.patches import Polygon
+from mpl_toolkits.mplot3d import Axes3D
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from numpy.typing import ArrayLike
 
@@ -22,43 +26,45 @@ MARGIN = 0.06
 THINNEST = 0.3  # of the widest axis
 
 
-def scene_axes(figure: Any, shape: Skeleton, view: tuple[float, float] | None, place: Any = 111) -> Any:
+def scene_axes(
+    figure: Figure, shape: Skeleton, view: tuple[float, float] | None, place: SubplotSpec | int = 111
+) -> Axes:
     """Axes for a machine; a `view` asks for three dimensions."""
     if view is None and shape.is_flat:
         return figure.add_subplot(place)
-    return figure.add_subplot(place, projection="3d")
+    space: Axes = figure.add_subplot(place, projection="3d")
+    return space
 
 
-def dimensions(ax: Any) -> int:
-    """2 or 3."""
-    return 3 if hasattr(ax, "get_zlim") else 2
-
-
-def on(ax: Any, points: ArrayLike) -> Any:
+def on(ax: Axes, points: ArrayLike) -> Floats:
     """Coordinates (mm) of points (n, 3) or (3,) m, one array for each dimension of the axes."""
-    return (MM * np.asarray(points, dtype=float).T)[: dimensions(ax)]
+    return np.asarray((MM * np.asarray(points, dtype=float).T)[: 3 if isinstance(ax, Axes3D) else 2])
 
 
-def marks(ax: Any) -> dict[str, Any]:
-    """What a scatter of marks needs to lie above lines."""
-    return {"depthshade": False} if dimensions(ax) == 3 else {"zorder": 4}
+def dots(ax: Axes, points: ArrayLike, size: float, **look: Any) -> None:
+    """Marks above lines, at points (n, 3) or (3,) m."""
+    if isinstance(ax, Axes3D):
+        ax.scatter(*on(ax, points), s=size, depthshade=False, **look)
+    else:
+        x, y = on(ax, points)
+        ax.scatter(x, y, s=size, zorder=4, **look)
 
 
-def draw_body(ax: Any, shape: Skeleton) -> None:
+def draw_body(ax: Axes, shape: Skeleton) -> None:
     """A platform that is a plate: its area, and from its middle to the TCP."""
     if not len(shape.plate):
         return
     corners, tool = on(ax, shape.plate).T, shape.links[-1]
     look: dict[str, Any] = {"facecolor": "0.55", "edgecolor": "0.25", "label": "platform"}
-    if dimensions(ax) == 2:
-        ax.add_patch(Polygon(corners, **look, alpha=0.5, zorder=1))
-    else:
+    if isinstance(ax, Axes3D):
         ax.add_collection3d(Poly3DCollection([corners], **look, alpha=0.45))
+    else:
+        ax.add_patch(Polygon(corners, **look, alpha=0.5, zorder=1))
     if np.linalg.norm(tool[1] - tool[0]) > 1e-6:
         ax.plot(*on(ax, tool), color=BLACK, lw=1.2, zorder=1)
 
 
-def draw_skeleton(ax: Any, s: Skeleton, colours: Mapping[str, str], *, joints: bool = True) -> None:
+def draw_skeleton(ax: Axes, s: Skeleton, colours: Mapping[str, str], *, joints: bool = True) -> None:
     """Guides, links in the colours of their legs, platform, joints, TCP."""
     for ends in s.guides:
         ax.plot(*on(ax, ends), color="0.82", lw=5, solid_capstyle="butt", zorder=1)
@@ -71,12 +77,11 @@ def draw_skeleton(ax: Any, s: Skeleton, colours: Mapping[str, str], *, joints: b
         ax.plot([], [], color="0.82", lw=5, label="travel of a drive")
     draw_body(ax, s)
     if joints:
-        ax.scatter(*on(ax, s.actuators), marker="s", s=32, color=BLACK, label="actuator", **marks(ax))
+        dots(ax, s.actuators, 32, marker="s", color=BLACK, label="actuator")
     if joints and len(s.passive):
-        ax.scatter(*on(ax, s.passive), marker="o", s=12, facecolor="white", edgecolor=BLACK, linewidth=0.8,
-                   label="passive joint", **marks(ax))  # fmt: skip
-    ax.scatter(*on(ax, s.tcp), marker="*", s=110, color=ORANGE, edgecolor=BLACK, linewidth=0.5, label="TCP",
-               **marks(ax))  # fmt: skip
+        look: dict[str, Any] = {"facecolor": "white", "edgecolor": BLACK, "linewidth": 0.8}
+        dots(ax, s.passive, 12, marker="o", label="passive joint", **look)
+    dots(ax, s.tcp, 110, marker="*", color=ORANGE, edgecolor=BLACK, linewidth=0.5, label="TCP")
 
 
 def box_corners(low: Floats, high: Floats) -> Floats:
@@ -90,7 +95,7 @@ def box_edges(low: Floats, high: Floats) -> Floats:
     return np.array([[corners[c], corners[c | 1 << i]] for c in range(8) for i in range(3) if not c >> i & 1])
 
 
-def draw_box(ax: Any, low: Floats, high: Floats) -> None:
+def draw_box(ax: Axes, low: Floats, high: Floats) -> None:
     """Edges of the workspace box, m."""
     label: str | None = "workspace"
     for ends in box_edges(low, high):
@@ -99,7 +104,7 @@ def draw_box(ax: Any, low: Floats, high: Floats) -> None:
             label = None
 
 
-def draw_force(ax: Any, tip: Floats, force: Floats, extent: float) -> None:
+def draw_force(ax: Axes, tip: Floats, force: Floats, extent: float) -> None:
     """An arrow along a force (3,) N that ends at `tip` (3,) m, its length a share of the machine's extent."""
     size = float(np.linalg.norm(force))
     if not size:
@@ -107,16 +112,16 @@ def draw_force(ax: Any, tip: Floats, force: Floats, extent: float) -> None:
     arrow = ARROW * extent * np.asarray(force) / size
     look: dict[str, Any] = {"color": FORCE, "label": f"force {size:g} N"}
     start, way = on(ax, tip - arrow), on(ax, arrow)
-    if dimensions(ax) == 3:
+    if isinstance(ax, Axes3D):
         ax.quiver(*start, *way, lw=2.2, arrow_length_ratio=0.3, **look)
     elif np.linalg.norm(way) > 0.0:
         ax.quiver(*start, *way, angles="xy", scale_units="xy", scale=1, width=0.012, zorder=5, **look)
 
 
-def finish(ax: Any, view: tuple[float, float] | None = None) -> None:
+def finish(ax: Axes, view: tuple[float, float] | None = None) -> None:
     """Equal scales, direction of view, labels, and limits that leave no empty room."""
     ax.set(xlabel="x, mm", ylabel="y, mm")
-    if dimensions(ax) == 2:
+    if not isinstance(ax, Axes3D):
         ax.margins(MARGIN)
         ax.autoscale_view()
         ax.set_aspect("equal", adjustable="datalim")

@@ -12,15 +12,16 @@ from typing import Any
 
 import matplotlib
 import numpy as np
+from matplotlib.backend_bases import RendererBase
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from stiffmap.common import number_text
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.outputs import write_picture
+from stiffmap.solve.labels import WRENCH
 
 MM, UM = 1e3, 1e6
-WRENCH = ("fx", "fy", "fz", "mx", "my", "mz")
 # Okabe and Ito's palette: eight colours that the common colour blindnesses keep apart.
 BLUE, ORANGE, GREEN, PURPLE, SKY, VERMILLION, BLACK = (
     "#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#000000",
@@ -69,9 +70,10 @@ EDGE = 0.98
 """Share of a picture's width that a title or a legend may take."""
 
 
-def _renderer(figure: Figure) -> Any:
+def _renderer(figure: Figure) -> RendererBase:
     canvas: Any = FigureCanvasAgg(figure)
-    return canvas.get_renderer()
+    renderer: RendererBase = canvas.get_renderer()
+    return renderer
 
 
 def headline(figure: Figure, text: str) -> None:

@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 from os import PathLike
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from stiffmap.common.broadcasting import Floats
 from stiffmap.common.number_text import length_text, length_unit, vector_text
 from stiffmap.common.outputs import write_text
 from stiffmap.solve.budget import deflection_budget
@@ -47,7 +47,7 @@ def write_page(
     return write_text(path, text)
 
 
-def scene(shape: LoadedShape, legs: tuple[str, ...]) -> dict[str, Any]:
+def scene(shape: LoadedShape, legs: tuple[str, ...]) -> dict[str, object]:
     """Lines and points at rest and under load (mm), for the page's script."""
     colours, rest, loaded = leg_colours(legs), shape.rest, shape.loaded
     links = [
@@ -64,5 +64,5 @@ def scene(shape: LoadedShape, legs: tuple[str, ...]) -> dict[str, Any]:
     }
 
 
-def _mm(points: Any) -> list[list[float]]:
+def _mm(points: Floats) -> list[list[float]]:
     return [[float(f"{1e3 * v:.7g}") for v in p] for p in np.atleast_2d(points)]

@@ -25,7 +25,6 @@ class Swing:
 
     def __init__(self, viewer: Any) -> None:
         self._viewer = viewer
-        self.mode = 0
         self._on = threading.Event()
         self._end = False
         self._found: tuple[Moment, NaturalFrequencies | None] | None = None
@@ -58,15 +57,16 @@ class Swing:
                 return
             begun = time.perf_counter()
             found = self._found
-            if found is not None and found[1] is not None and self.mode < len(found[1].frequency):
-                self._frame(found[0], found[1], 2 * np.pi * begun / PERIOD)
+            mode = self._viewer.controls.mode.value - 1
+            if found is not None and found[1] is not None and mode < len(found[1].frequency):
+                self._frame(found[0], found[1], mode, 2 * np.pi * begun / PERIOD)
             time.sleep(max(0.0, 1 / RATE - (time.perf_counter() - begun)))
 
-    def _frame(self, moment: Moment, w: NaturalFrequencies, phase: float) -> None:
+    def _frame(self, moment: Moment, w: NaturalFrequencies, mode: int, phase: float) -> None:
         scene = self._viewer.scene
-        if not np.isfinite(w.frequency[self.mode]):
+        if not np.isfinite(w.frequency[mode]):
             return
-        at = swung(moment.machine, w, self.mode, phase, SWING * scene.extent)
+        at = swung(moment.machine, w, mode, phase, SWING * scene.extent)
         moved = skeleton(moment.machine, at).links
         scene.lines("/ghost", moved, GHOST, 0.004 * scene.extent)
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from stiffmap.common.errors import StiffmapError
@@ -18,6 +19,13 @@ from stiffmap.ui.view.place import first_plane, moves, orientation, rotation_of,
 from stiffmap.ui.view.quantities import QUANTITIES
 from stiffmap.ui.view.state import PLANES
 
+if TYPE_CHECKING:
+    from viser import GuiApi, GuiCheckboxHandle, GuiDropdownHandle, GuiEvent, GuiInputHandle
+
+    from stiffmap.ui.view.model import ViewModel
+
+T = TypeVar("T")
+H = TypeVar("H", "GuiCheckboxHandle", "GuiDropdownHandle[str]")
 MOST_FORCE, MOST_GRAVITY = 5000.0, 20.0
 HOME = "as at home"
 NONE = "none"
@@ -34,9 +42,11 @@ class Controls:
             control_layout="collapsible", control_width="large", show_logo=False, show_share_button=False
         )
         self._modes: dict[str, tuple[float, ...] | None] = {HOME: None}
+        self._shown: list[tuple[Any, Callable[[Moment], object]]] = []
+        """Controls of the state, and what each of them shows."""
         moment = viewer.model.moment
-        self._status = gui.add_html("")
-        self._bar = gui.add_html("")
+        self.status = gui.add_html("")
+        self.bar = gui.add_html("")
         self.probe = gui.add_text("Probe", "click a point of the plane", disabled=True)
         tabs = gui.add_tab_group()
         with tabs.add_tab("Tool and load"):
@@ -48,76 +58,79 @@ class Controls:
         with tabs.add_tab("Numbers"):
             self.numbers = ChangedNumbers(self, gui, moment)
         with tabs.add_tab("Out"):
-            self.outputs = Outputs(viewer, gui)
+            self.outputs = Outputs(gui, viewer.model, viewer.data, viewer.now)
         panel = gui.add_panel()
         with panel.add_tab("Legend"):
             self._legend = gui.add_html("")
         panel.float(x=12, y=-12, width=230)
-        self.map_on, self.hold, self.isolines, self.cloud = True, False, True, False
-        self.surface, self.lit = NONE, ""
 
     # -- building -----------------------------------------------------------------------------------------------
 
-    def _tool(self, gui: Any, moment: Moment) -> None:
-        self._position = gui.add_vector3(
-            "Tool, mm", (0, 0, 0), step=1.0, hint="commanded position in base axes"
+    def _tool(self, gui: GuiApi, moment: Moment) -> None:
+        self.typed(
+            gui.add_vector3("Tool, mm", (0, 0, 0), step=1.0, hint="commanded position in base axes"),
+            lambda m, v: m.put(position=tuple(1e-3 * np.array(v))),
+            lambda m: _round(1e3 * np.array(m.state.position)),
         )
-        self.typed(self._position, lambda m, v: m.put(position=tuple(1e-3 * np.array(v))))
-        self._turn = gui.add_vector3(
+        turn = gui.add_vector3(
             "Rotation, deg", (0, 0, 0), step=1.0, hint="rotation vector of the commanded orientation",
             visible=any(turns(moment.machine)),
         )  # fmt: skip
-        self.typed(self._turn, lambda m, v: m.put(rotation=tuple(np.deg2rad(v))))
-        self._force = gui.add_vector3("Force, N", (0, 0, 0), step=10.0, hint="on the tool, base axes")
-        self.typed(self._force, lambda m, v: m.put(force=tuple(v)))
-        self._size = gui.add_slider("Size of the force, N", 0.0, MOST_FORCE, 10.0, 0.0)
-        self.typed(self._size, _sized, keep=False)
-        self._around = gui.add_slider("Force around z, deg", -180.0, 180.0, 1.0, 0.0)
-        self.typed(self._around, _turned, keep=False)
-        self._moment = gui.add_vector3("Moment, N·m", (0, 0, 0), step=1.0)
-        self.typed(self._moment, lambda m, v: m.put(moment=tuple(v)))
-        self._gravity = gui.add_slider("Gravity downwards, m/s²", 0.0, MOST_GRAVITY, 0.01, 0.0)
-        self.typed(self._gravity, lambda m, v: m.put(gravity=(0.0, 0.0, -float(v)), keep=False), keep=False)
+        self.typed(turn, lambda m, v: m.put(rotation=tuple(np.deg2rad(v))), _rotation)
+        force = gui.add_vector3("Force, N", (0, 0, 0), step=10.0, hint="on the tool, base axes")
+        self.typed(force, lambda m, v: m.put(force=tuple(v)), lambda m: _round(m.state.force))
+        size = gui.add_slider("Size of the force, N", 0.0, MOST_FORCE, 10.0, 0.0)
+        self.typed(size, _sized, lambda m: min(float(np.linalg.norm(m.state.force)), MOST_FORCE), keep=False)
+        around = gui.add_slider("Force around z, deg", -180.0, 180.0, 1.0, 0.0)
+        self.typed(around, _turned, _around, keep=False)
+        moments = gui.add_vector3("Moment, N·m", (0, 0, 0), step=1.0)
+        self.typed(moments, lambda m, v: m.put(moment=tuple(v)), lambda m: _round(m.state.moment))
+        gravity = gui.add_slider("Gravity downwards, m/s²", 0.0, MOST_GRAVITY, 0.01, 0.0)
+        self.typed(
+            gravity, lambda m, v: m.put(gravity=(0.0, 0.0, -float(v)), keep=False), _downwards, keep=False
+        )
         self._factor = gui.add_number(
             "Magnification", 1.0, min=0.0, hint="of the deflected machine; 0 hides it"
         )
         self.typed(self._factor, lambda m, v: m.put(magnification=float(v)))
-        self.pressed(gui.add_button("Round magnification"), lambda m: m.put(magnification=None))
+        gui.add_button("Round magnification").on_click(self.does(lambda m: m.put(magnification=None)))
         self._mode = gui.add_dropdown(
             "Assembly mode", (HOME,), hint="ways in which the machine takes this pose"
         )
-        self.typed(self._mode, lambda m, v: m.put(start=self._modes.get(v)))
+        self.typed(self._mode, lambda m, v: m.put(start=self._modes.get(v)), self._mode_of)
         gui.add_button("Search assembly modes").on_click(lambda _: self._search())
-        self.pressed(gui.add_button("Undo"), lambda m: m.undo())
-        self.pressed(gui.add_button("Reset"), lambda m: m.reset())
-        gui.add_command("Undo", hotkey="Z", modifier="cmd/ctrl").on_trigger(
-            lambda _: self.viewer.act(lambda m: m.undo())
-        )
-        gui.add_command("Reset the view").on_trigger(lambda _: self.viewer.act(lambda m: m.reset()))
+        undo, reset = self.does(lambda m: m.undo()), self.does(lambda m: m.reset())
+        gui.add_button("Undo").on_click(undo)
+        gui.add_button("Reset").on_click(reset)
+        gui.add_command("Undo", hotkey="Z", modifier="cmd/ctrl").on_trigger(undo)
+        gui.add_command("Reset the view").on_trigger(reset)
 
-    def _map(self, gui: Any, moment: Moment) -> None:
-        box = gui.add_checkbox("Map", True)
-        box.on_update(lambda e: self._set("map_on", e))
-        self._quantity = gui.add_dropdown(
-            "Colour", tuple(TITLES), initial_value=QUANTITIES["deflection"].title
+    def _map(self, gui: GuiApi, moment: Moment) -> None:
+        self.map_on = self._drawn(gui.add_checkbox("Map", True))
+        self.typed(
+            gui.add_dropdown("Colour", tuple(TITLES), initial_value=QUANTITIES["deflection"].title),
+            lambda m, v: m.put(quantity=TITLES[v]),
+            lambda m: QUANTITIES[m.state.quantity].title,
         )
-        self.typed(self._quantity, lambda m, v: m.put(quantity=TITLES[v]))
-        self._plane = gui.add_dropdown("Plane across", PLANES, initial_value=first_plane(moment.machine))
-        self.typed(self._plane, lambda m, v: m.put(plane=v))
-        self._normal = gui.add_vector3("Normal of a free plane", (0.0, 0.0, 1.0), step=0.05)
-        self.typed(self._normal, lambda m, v: m.put(normal=tuple(v), plane="free"))
-        self._tolerance = gui.add_number("Tolerance, µm", 250.0, min=0.001)
-        self.typed(self._tolerance, lambda m, v: m.put(tolerance=1e-6 * float(v)))
-        self._frequency = gui.add_number("Frequency, Hz", 0.0, min=0.0, hint="of the dynamic stiffness")
-        self.typed(self._frequency, lambda m, v: m.put(frequency=float(v)))
-        for label, name, on in (
-            ("Isolines", "isolines", True),
-            ("Hold the scale", "hold", False),
-            ("Whole box as points", "cloud", False),
-        ):
-            gui.add_checkbox(label, on).on_update(lambda e, name=name: self._set(name, e))
-        surface = gui.add_dropdown("At the tool", (NONE, "polar diagram", "ellipsoid"), initial_value=NONE)
-        surface.on_update(lambda e: self._set("surface", e))
+        plane = gui.add_dropdown("Plane across", PLANES, initial_value=first_plane(moment.machine))
+        self.typed(plane, lambda m, v: m.put(plane=v), lambda m: m.state.plane)
+        normal = gui.add_vector3("Normal of a free plane", (0.0, 0.0, 1.0), step=0.05)
+        self.typed(
+            normal, lambda m, v: m.put(normal=tuple(v), plane="free"), lambda m: _round(m.state.normal)
+        )
+        tolerance = gui.add_number("Tolerance, µm", 250.0, min=0.001)
+        self.typed(
+            tolerance,
+            lambda m, v: m.put(tolerance=1e-6 * float(v)),
+            lambda m: round(1e6 * m.state.tolerance, 6),
+        )
+        frequency = gui.add_number("Frequency, Hz", 0.0, min=0.0, hint="of the dynamic stiffness")
+        self.typed(frequency, lambda m, v: m.put(frequency=float(v)), lambda m: m.state.frequency)
+        self.isolines = self._drawn(gui.add_checkbox("Isolines", True))
+        self.hold = self._drawn(gui.add_checkbox("Hold the scale", False))
+        self.cloud = self._drawn(gui.add_checkbox("Whole box as points", False))
+        surfaces = (NONE, "polar diagram", "ellipsoid")
+        self.surface = self._drawn(gui.add_dropdown("At the tool", surfaces, initial_value=NONE))
         self._surface_text = gui.add_html("")
         fixed = [a for a, free in zip("xyz", moves(moment.machine), strict=True) if not free]
         if fixed:
@@ -126,28 +139,26 @@ class Controls:
                 "change along it</div>"
             )
 
-    def _why_tab(self, gui: Any) -> None:
-        self._light = gui.add_dropdown("Light an element", (NONE,))
-        self._light.on_update(lambda e: self._set("lit", e))
+    def _why_tab(self, gui: GuiApi) -> None:
+        self.light = self._drawn(gui.add_dropdown("Light an element", (NONE,)))
         self._why = gui.add_html("")
-        number = gui.add_slider("Mode", 1, 6, 1, 1)
-
-        def changed(event: Any) -> None:
-            self.viewer.swing.mode = int(event.target.value) - 1
-            self.viewer.worker.ask()
-
-        number.on_update(changed)
-
-        gui.add_checkbox("Mode moves", False).on_update(
-            lambda e: self.viewer.swing.play(bool(e.target.value))
-        )
+        self.mode = gui.add_slider("Mode", 1, 6, 1, 1)
+        self.mode.on_update(lambda _: self.viewer.worker.ask())
+        gui.add_checkbox("Mode moves", False).on_update(lambda e: self.viewer.swing.play(e.target.value))
 
     # -- plumbing -----------------------------------------------------------------------------------------------
 
-    def typed(self, handle: Any, deed: Callable[[Any, Any], object], keep: bool = True) -> None:
-        """A control whose value goes to the model; what the program itself writes into it does not."""
+    def typed(
+        self,
+        handle: GuiInputHandle[T],
+        deed: Callable[[ViewModel, T], object],
+        shown: Callable[[Moment], object] | None = None,
+        *,
+        keep: bool = True,
+    ) -> None:
+        """A control whose value goes to the model; what the program itself writes into it does not. `shown`: what it then says."""
 
-        def changed(event: Any) -> None:
+        def changed(event: GuiEvent[GuiInputHandle[T]]) -> None:
             if event.client_id is None:
                 return
             if not keep:
@@ -157,15 +168,21 @@ class Controls:
         if hasattr(handle, "precision"):  # else a field takes no more decimals than its step has
             handle.precision = DECIMALS
         handle.on_update(changed)
+        if shown is not None:
+            self._shown.append((handle, shown))
 
-    def pressed(self, handle: Any, deed: Callable[[Any], object]) -> None:
-        handle.on_click(lambda _: self.viewer.act(deed))
+    def does(self, deed: Callable[[ViewModel], object]) -> Callable[[object], None]:
+        """What a button or a command calls, to do this to the model."""
 
-    def _set(self, name: str, event: Any) -> None:
-        if event.client_id is not None:
-            value = event.target.value
-            setattr(self, name, "" if name == "lit" and value == NONE else value)
-            self.viewer.redraw()
+        def called(_: object) -> None:
+            self.viewer.act(deed)
+
+        return called
+
+    def _drawn(self, handle: H) -> H:
+        """A control whose value is what is drawn, and no part of the state."""
+        handle.on_update(lambda e: None if e.client_id is None else self.viewer.redraw())
+        return handle
 
     def _search(self) -> None:
         try:
@@ -180,14 +197,6 @@ class Controls:
 
     # -- what the model says ------------------------------------------------------------------------------------
 
-    def say(self, html: str) -> None:
-        """The line on top."""
-        write(self._status, "content", html)
-
-    def bar(self, html: str) -> None:
-        """The colour bar."""
-        write(self._bar, "content", html)
-
     def why(self, html: str, surface: str) -> None:
         """The panels, and what the size of the surface at the tool means."""
         write(self._why, "content", html)
@@ -196,53 +205,55 @@ class Controls:
     def elements(self, names: Sequence[str]) -> None:
         """What may be lit, by rank."""
         options = (NONE, *names)
-        if tuple(self._light.options) != options:
-            chosen = self._light.value
-            self._light.options = options
-            self._light.value = chosen if chosen in options else NONE
+        if tuple(self.light.options) != options:
+            chosen = self.light.value
+            self.light.options = options
+            write(self.light, "value", chosen if chosen in options else NONE)
 
     def show(self, moment: Moment) -> None:
         """The state's numbers in all controls."""
-        m, s = moment.machine, moment.state
-        turn = Rotation.from_matrix(rotation_of(m, s)).as_rotvec()
-        size = float(np.linalg.norm(s.force))
-        gravity = m.compiled.gravity(s.gravity)
-        write(self._position, "value", _round(1e3 * np.array(s.position)))
-        write(self._turn, "value", _round(np.rad2deg(turn)))
-        write(self._force, "value", _round(s.force))
-        write(self._moment, "value", _round(s.moment))
-        write(self._size, "value", min(size, MOST_FORCE))
-        write(self._around, "value", round(float(np.rad2deg(np.arctan2(s.force[1], s.force[0]))), 3))
-        write(self._gravity, "value", min(max(-float(gravity[2]), 0.0), MOST_GRAVITY))
+        for handle, shown in self._shown:
+            write(handle, "value", shown(moment))
         rest, solution = self.viewer.scene.rest, self.viewer._solution
         if solution is not None:
             factor = moment.magnification(rest, solution)
             write(self._factor, "value", factor)
             write(self._legend, "content", legend(moment, rest, factor) + hint(moment))
-        write(self._quantity, "value", QUANTITIES[s.quantity].title)
-        write(self._plane, "value", s.plane)
-        write(self._normal, "value", _round(s.normal))
-        write(self._tolerance, "value", round(1e6 * s.tolerance, 6))
-        write(self._frequency, "value", s.frequency)
-        chosen = next((n for n, x in self._modes.items() if x == s.start), HOME)
-        write(self._mode, "value", chosen)
-        self.numbers.show(s)
+        self.numbers.show(moment.state)
         self.outputs.show(moment)
 
+    def _mode_of(self, moment: Moment) -> str:
+        return next((n for n, x in self._modes.items() if x == moment.state.start), HOME)
 
-def _round(values: Any) -> tuple[float, float, float]:
-    x, y, z = (round(float(v), 6) + 0.0 for v in values)
+
+def _round(values: ArrayLike) -> tuple[float, float, float]:
+    x, y, z = (round(float(v), 6) + 0.0 for v in np.asarray(values))
     return x, y, z
 
 
-def _sized(model: Any, size: Any) -> object:
+def _rotation(moment: Moment) -> tuple[float, float, float]:
+    turn = Rotation.from_matrix(rotation_of(moment.machine, moment.state)).as_rotvec()
+    return _round(np.rad2deg(turn))
+
+
+def _around(moment: Moment) -> float:
+    x, y, _ = moment.state.force
+    return round(float(np.rad2deg(np.arctan2(y, x))), 3)
+
+
+def _downwards(moment: Moment) -> float:
+    gravity = moment.machine.compiled.gravity(moment.state.gravity)
+    return min(max(-float(gravity[2]), 0.0), MOST_GRAVITY)
+
+
+def _sized(model: ViewModel, size: float) -> object:
     f = np.array(model.state.force)
     length = float(np.linalg.norm(f))
     unit = f / length if length else np.array([0.0, 0.0, -1.0])
     return model.put(force=tuple(float(v) for v in float(size) * unit), keep=False)
 
 
-def _turned(model: Any, angle: Any) -> object:
+def _turned(model: ViewModel, angle: float) -> object:
     """The force turned about z; one along z lies down first."""
     x, y, z = model.state.force
     flat = float(np.hypot(x, y))

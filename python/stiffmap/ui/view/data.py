@@ -7,13 +7,14 @@ from dataclasses import dataclass
 from html import escape
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError
+from stiffmap.common.kept import Kept
 from stiffmap.experiment import Experiment
 from stiffmap.experiment.calls import residual
 from stiffmap.solve.machine import Machine, load_machine
@@ -24,6 +25,9 @@ from stiffmap.ui.view.colours import rgb
 from stiffmap.ui.view.moment import Moment
 from stiffmap.ui.view.place import solved
 from stiffmap.ui.view.scene import DIAGNOSED, Scene
+
+if TYPE_CHECKING:
+    from stiffmap.identification.diagnosis.report.result import Diagnosis
 
 DRAWN = 0.06
 """Of the machine's extent, the longest arrow and the widest ribbon."""
@@ -61,7 +65,7 @@ class ShownFindings:
     machine: Machine
 
 
-def findings(diagnosis: Any) -> ShownFindings:
+def findings(diagnosis: Diagnosis | str | PathLike[str]) -> ShownFindings:
     """Of a `Diagnosis`, or of the folder of one (or its ``diagnosis.json``); FileError where that cannot be read."""
     if isinstance(diagnosis, str | PathLike):
         return _from_folder(Path(diagnosis))
@@ -109,15 +113,14 @@ class Data:
         """opened: the machine whose residuals come before; None: the first that is drawn."""
         self.experiment, self.path = experiment, None if path is None else thinned(path)
         self.diagnosis, self.opened = diagnosis, opened
-        self._before: Arrows | None = None
-        self._named: Arrows | None = None
+        self._residuals: Kept[Machine, Arrows] = Kept(3)  # before, now, diagnosed
         self._drawn: tuple[Machine, Scene] | None = None
         self._said: dict[str, str] = {}
 
     def __call__(self, scene: Scene, moment: Moment) -> None:
         """Draw into a scene."""
         if self.experiment is not None:
-            self._rows(scene, moment)
+            self._rows(scene, moment, self.experiment)
         if self.diagnosis is not None:
             self._effects(scene, moment, self.diagnosis)
         if self.path is not None:
@@ -126,19 +129,19 @@ class Data:
     @property
     def html(self) -> str:
         """What the colours mean and how large they are drawn, for the panel."""
-        return "".join(f'<p style="margin:.4em 0"><b>{k}</b>: {v}</p>' for k, v in self._said.items())
+        said = self._said.copy()  # as a page may be made of it in another thread meanwhile
+        return "".join(f'<p style="margin:.4em 0"><b>{k}</b>: {v}</p>' for k, v in said.items())
 
-    def _rows(self, scene: Scene, moment: Moment) -> None:
+    def _rows(self, scene: Scene, moment: Moment, e: Experiment) -> None:
         if self._drawn == (moment.machine, scene):
             return
-        e = self.experiment
-        assert e is not None
-        now = residual_arrows(moment.machine, e)
-        if self._before is None:
-            self._before = now if self.opened is None else residual_arrows(self.opened, e)
-        before = self._before
-        if self.diagnosis is not None and self._named is None:
-            self._named = residual_arrows(self.diagnosis.machine, e)
+
+        def left(machine: Machine) -> Arrows:
+            return self._residuals.made(machine, lambda: residual_arrows(machine, e))
+
+        self.opened = self.opened or moment.machine
+        before, now = left(self.opened), left(moment.machine)
+        diagnosed = None if self.diagnosis is None else left(self.diagnosis.machine)
         self._drawn = (moment.machine, scene)
         places = before[0]
         if not len(places):
@@ -149,7 +152,7 @@ class Data:
         for name, colour, said, which, found in (
             ("before", BEFORE, "red", "as opened", before),
             ("now", NOW, "blue", "as changed here", None if np.array_equal(now, before) else now),
-            ("diagnosed", NAMED, "pink", "with the diagnosis", self._named),
+            ("diagnosed", NAMED, "pink", "with the diagnosis", diagnosed),
         ):
             at, arrows = found or (np.zeros((0, 3)),) * 2
             pieces = np.stack([at, at + factor * arrows], axis=1)

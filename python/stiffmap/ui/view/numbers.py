@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,13 +11,16 @@ from stiffmap.ui.view.model import addresses
 from stiffmap.ui.view.moment import Moment
 from stiffmap.ui.view.state import ViewState
 
+if TYPE_CHECKING:
+    from viser import GuiApi
+
 DECADE = 1.0
 
 
 class ChangedNumbers:
     """One number at a time, and a list of those that are changed."""
 
-    def __init__(self, controls: Any, gui: Any, moment: Moment) -> None:
+    def __init__(self, controls: Any, gui: GuiApi, moment: Moment) -> None:
         names = self._list(moment)
         self._find = gui.add_text("Find", "", hint="part of an address")
         self._address = gui.add_dropdown("Number", names, initial_value=names[0])
@@ -31,17 +34,17 @@ class ChangedNumbers:
             ),
             keep=False,
         )
-        controls.pressed(gui.add_button("As in the file"), lambda m: m.change(self._address.value, None))
-        controls.pressed(gui.add_button("All as in the file"), lambda m: m.put(changes=()))
+        gui.add_button("As in the file").on_click(
+            controls.does(lambda m: m.change(self._address.value, None))
+        )
+        gui.add_button("All as in the file").on_click(controls.does(lambda m: m.put(changes=())))
         self._changed = gui.add_text("Changed", "nothing", multiline=True, disabled=True)
 
-        def changed(event: Any) -> None:
-            if event.client_id is not None:
-                found = tuple(a for a in self.all if event.target.value.lower() in a.lower())
-                self._address.options = found or names
-
-        self._find.on_update(changed)
+        self._find.on_update(lambda e: None if e.client_id is None else self._search(e.target.value))
         self._address.on_update(lambda e: controls.viewer.worker.ask())
+
+    def _search(self, part: str) -> None:
+        self._address.options = tuple(a for a in self.all if part.lower() in a.lower()) or tuple(self.all)
 
     def show(self, state: ViewState) -> None:
         """The chosen number as it is now, and all that are changed."""
@@ -70,7 +73,7 @@ class ChangedNumbers:
         return tuple(self.all)
 
 
-def write(handle: Any, field: str, value: Any) -> None:
+def write(handle: object, field: str, value: object) -> None:
     """Only what differs is sent."""
     if getattr(handle, field) != value:
         setattr(handle, field, value)

@@ -8,7 +8,9 @@ import webbrowser
 from collections.abc import Callable
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import given_path, real_array
 from stiffmap.common.errors import StiffmapError
@@ -18,6 +20,11 @@ from stiffmap.ui.view.model import ViewModel
 from stiffmap.ui.view.serving import HERE, LOCAL, Guard, need_viser, silent, start_server
 from stiffmap.ui.view.state import ViewState, as_plain, from_permalink, from_plain, permalink
 from stiffmap.ui.view.viewer import Viewer
+
+if TYPE_CHECKING:
+    from stiffmap.experiment import Experiment
+    from stiffmap.identification.diagnosis.report.result import Diagnosis
+    from stiffmap.machining.toolpath import Toolpath
 
 POLL = 0.2
 """s between two looks whether the view is closed."""
@@ -122,9 +129,9 @@ def open_view(
     port: int | None = None,
     browser: bool = True,
     file: str | PathLike[str] | None = None,
-    experiment: object = None,
-    diagnosis: object = None,
-    path: object = None,
+    experiment: Experiment | str | PathLike[str] | None = None,
+    diagnosis: Diagnosis | str | PathLike[str] | None = None,
+    path: Toolpath | ArrayLike | PathLike[str] | None = None,
     meshes: str | PathLike[str] | None = None,
     **state: object,
 ) -> View:
@@ -136,7 +143,12 @@ def open_view(
     return view
 
 
-def data_of(machine: Machine, experiment: Any = None, diagnosis: Any = None, path: Any = None) -> Data | None:
+def data_of(
+    machine: Machine,
+    experiment: Experiment | str | PathLike[str] | None = None,
+    diagnosis: Diagnosis | str | PathLike[str] | None = None,
+    path: Toolpath | ArrayLike | PathLike[str] | None = None,
+) -> Data | None:
     """What is drawn with the machine; None where there is nothing. Raises FileError for files that cannot be read.
 
     experiment: an `Experiment` or its folder. diagnosis: a `Diagnosis` or the folder of one. path: positions (n, 3) m,

@@ -5,17 +5,20 @@ from __future__ import annotations
 
 import shlex
 import tempfile
+from collections.abc import Callable
 from html import escape
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
+from mpl_toolkits.mplot3d import Axes3D
 from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
+from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import length_text, place_text, vector_text
 from stiffmap.common.outputs import write_text
@@ -25,6 +28,7 @@ from stiffmap.ui.plot.scene import draw_box, draw_force, draw_skeleton, finish
 from stiffmap.ui.plot.style import COLOURS, MM, ORANGE, TOLERANCE, headline, leg_colours, paper
 from stiffmap.ui.view.colours import plane_image
 from stiffmap.ui.view.data import Data
+from stiffmap.ui.view.model import ViewModel
 from stiffmap.ui.view.moment import Moment
 from stiffmap.ui.view.numbers import write
 from stiffmap.ui.view.panels import (
@@ -42,6 +46,9 @@ from stiffmap.ui.view.scene import Scene, look_at_machine
 from stiffmap.ui.view.serving import HERE, need_viser, silent
 from stiffmap.ui.view.state import ViewState, as_plain, permalink
 
+if TYPE_CHECKING:
+    from viser import GuiApi, GuiButtonHandle, GuiEvent, ViserServer
+
 SHOWN = 51
 """Poses along each edge of the plane in a picture."""
 STYLE = """<style>
@@ -57,8 +64,8 @@ STYLE = """<style>
 class Outputs:
     """Buttons that hand files to the browser, and texts to copy."""
 
-    def __init__(self, viewer: Any, gui: Any) -> None:
-        self._viewer = viewer
+    def __init__(self, gui: GuiApi, model: ViewModel, data: Data | None, now: Callable[[], Moment]) -> None:
+        self._model, self._data, self._now = model, data, now
         gui.add_button("Picture (PNG)").on_click(lambda e: self._hand(e, "png"))
         gui.add_button("Picture (SVG)").on_click(lambda e: self._hand(e, "svg"))
         gui.add_button("Scene as one page (HTML)").on_click(lambda e: self._hand(e, "html"))
@@ -76,16 +83,13 @@ class Outputs:
     @property
     def source(self) -> str:
         """Shipped name, or the machine's file."""
-        file = self._viewer.model.file
-        return self._viewer.model.declared.name if file is None else str(file)
+        return self._model.declared.name if self._model.file is None else str(self._model.file)
 
-    def _hand(self, event: Any, kind: str) -> None:
+    def _hand(self, event: GuiEvent[GuiButtonHandle], kind: str) -> None:
         if event.client is None:
             return
-        moment = self._viewer.now()
-        content = (
-            page_of(moment, self._viewer.data_again()).encode() if kind == "html" else _picture(moment, kind)
-        )
+        moment = self._now()
+        content = page_of(moment, self._data).encode() if kind == "html" else _picture(moment, kind)
         event.client.send_file_download(f"{moment.machine.name}.{kind}", content, save_immediately=True)
 
 
@@ -156,7 +160,7 @@ def page_of(moment: Moment, data: Data | None = None) -> str:
     return f'{head}{STYLE}<div id="said">{said}</div></body>{tail}'
 
 
-def draw(server: Any, moment: Moment, data: Data | None = None) -> str:
+def draw(server: ViserServer, moment: Moment, data: Data | None = None) -> str:
     """The whole scene of a moment; its panels as HTML."""
     scene = Scene(server.scene, moment)
     scene.gizmo.visible = scene.force_handle.visible = False
@@ -187,7 +191,7 @@ def view_figure(moment: Moment) -> Figure:
     solution, rest, found = moment.solve(), moment.rest(), moment.plane(SHOWN)
     q, limits, s = QUANTITIES[moment.state.quantity], found.range, moment.state
     with paper(9.6, 5.2, most=0) as figure:
-        ax: Any = figure.add_subplot(1, 2, 1, projection="3d")
+        ax = figure.add_subplot(1, 2, 1, projection="3d")
         draw_box(ax, *box_of(moment.machine))
         _plane(ax, found, limits)
         _lines(ax, found.isolines(limits), "white", 0.5)
@@ -200,19 +204,24 @@ def view_figure(moment: Moment) -> Figure:
             unit, factor = q.shown(max(map(abs, limits)))
             bar = ScalarMappable(Normalize(factor * limits[0], factor * limits[1]), COLOURS)
             figure.colorbar(bar, ax=ax, label=f"{q.title}, {unit}", shrink=0.6, location="bottom", pad=0.08)
-        _shares(figure.add_subplot(1, 2, 2), moment)
+        right = figure.add_subplot(1, 2, 2)
+        try:
+            draw_budget(right, moment.shares())
+        except StiffmapError as problem:
+            right.text(0.5, 0.5, str(problem), ha="center", wrap=True)
+            right.axis("off")
         moved = length_text(float(np.linalg.norm(solution.displacement[:3])))
         headline(figure, f"{moment.machine.name} at {place_text(s.position, '.4g')} under {vector_text(s.force, 4)} N: the tool moves {moved} "
                          f"(orange: × {moment.magnification(rest, solution):g})")  # fmt: skip
     return figure
 
 
-def _lines(ax: Any, pieces: Any, colour: str, width: float) -> None:
+def _lines(ax: Axes3D, pieces: Floats, colour: str, width: float) -> None:
     if len(pieces):
         ax.add_collection3d(Line3DCollection(MM * pieces, colors=colour, linewidths=width))
 
 
-def _plane(ax: Any, found: PlaneMap, limits: tuple[float, float]) -> None:
+def _plane(ax: Axes3D, found: PlaneMap, limits: tuple[float, float]) -> None:
     p = MM * found.frame.poses(found.count)
     step = plane_image(found, limits)
     colours = step[:: len(step) // found.count, :: len(step) // found.count] / 255.0
@@ -220,11 +229,3 @@ def _plane(ax: Any, found: PlaneMap, limits: tuple[float, float]) -> None:
         p[..., 0], p[..., 1], p[..., 2], facecolors=colours, rcount=found.count, ccount=found.count, shade=False,
         antialiased=False, linewidth=0,
     )  # fmt: skip
-
-
-def _shares(ax: Any, moment: Moment) -> None:
-    try:
-        draw_budget(ax, moment.shares())
-    except StiffmapError as problem:
-        ax.text(0.5, 0.5, str(problem), ha="center", wrap=True)
-        ax.axis("off")

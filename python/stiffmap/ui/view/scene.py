@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.solve.solution import Solution
 from stiffmap.ui.plot.elements import thicknesses
 from stiffmap.ui.plot.scene import ARROW, FORCE, box_edges
-from stiffmap.ui.plot.skeleton import Skeleton
+from stiffmap.ui.plot.skeleton import COINCIDENT, Skeleton
 from stiffmap.ui.plot.style import BLACK, ORANGE, SKY, TOLERANCE, leg_colours
 from stiffmap.ui.view.colours import plane_image, rgb
 from stiffmap.ui.view.meshes import Meshes
@@ -21,13 +21,18 @@ from stiffmap.ui.view.moment import Moment
 from stiffmap.ui.view.place import box_of, moves, rotation_of, turns
 from stiffmap.ui.view.plane import NO_LINES, PlaneMap
 
+if TYPE_CHECKING:
+    from viser import ImageHandle, LineSegmentsHandle, MeshHandle, PointCloudHandle, SceneApi, ViserServer
+
+Shape = Literal["circle", "square"]
+Units = Literal["world", "screen"]
 SURFACE = 0.12
 """Of the extent, size of the surface at the tool."""
 GHOST, LIT, DIAGNOSED = ORANGE, "#FFD400", "#E8279B"
 GREY, DARK = "#BBBBBB", "#666666"
 
 
-def _seen(points: Floats) -> Any:
+def _seen(points: Floats) -> NDArray[np.float32]:
     """Points as they are sent; where there are none, one that is hidden, as no node is empty."""
     return np.asarray(points if len(points) else np.zeros((1, *np.shape(points)[1:])), np.float32)
 
@@ -41,14 +46,15 @@ def quaternion(rotation: Floats) -> tuple[float, float, float, float]:
 class Scene:
     """Draws moments; the nodes are made once and then only changed."""
 
-    def __init__(self, api: Any, moment: Moment) -> None:
+    def __init__(self, api: SceneApi, moment: Moment) -> None:
         self.api = api
         self.rest = rest = moment.rest()
         self.extent = rest.extent
         self.arrow_length = ARROW * self.extent
         """Of a force that is not being dragged, m."""
-        self._lines: dict[str, Any] = {}
-        self._image: Any = None
+        self._lines: dict[str, LineSegmentsHandle] = {}
+        self._surfaces: dict[str, MeshHandle] = {}
+        self._image: ImageHandle | None = None
         self._frame_size = (0.0, 0.0)
         self.lit: list[int] = []
         self.diagnosed: list[int] = []
@@ -65,8 +71,6 @@ class Scene:
             "/force", np.zeros((1, 2, 3), np.float32), rgb(FORCE), shaft_radius=0.005 * self.extent,
             head_radius=0.013 * self.extent, head_length=0.035 * self.extent, visible=False,
         )  # fmt: skip
-        self._plate: Any = None
-        self._surface: Any = None
         self.lines("/box", box_edges(*box_of(moment.machine)), GREY, 1.5, "screen")
         if len(rest.guides):
             self.lines("/travel", rest.guides, GREY, 0.006 * self.extent)
@@ -82,7 +86,7 @@ class Scene:
         self.probe = api.add_icosphere("/probe", 0.01 * self.extent, rgb(FORCE), visible=False)
         self._said = api.add_label("/probe/label", "", anchor="bottom-left")
 
-    def lines(self, name: str, points: Floats, colour: str, thick: float, units: str = "world") -> None:
+    def lines(self, name: str, points: Floats, colour: str, thick: float, units: Units = "world") -> None:
         """Pieces of lines (n, 2, 3); none hide the node."""
         there = self._lines.get(name)
         shown = len(points) > 0
@@ -96,20 +100,33 @@ class Scene:
         if there.visible != shown:
             there.visible = shown
 
-    def points(self, name: str, places: Floats, colours: Any, size: float, shape: str = "circle") -> Any:
+    def points(
+        self,
+        name: str,
+        places: Floats,
+        colours: NDArray[np.uint8] | tuple[int, int, int],
+        size: float,
+        shape: Shape = "circle",
+    ) -> PointCloudHandle:
         """Places (n, 3) as dots of a size (of the extent), in one colour or one for each; none hide them. Their handle."""
         return self.api.add_point_cloud(
             name, _seen(places), colours if len(places) else rgb(GREY), point_size=size * self.extent,
             point_shape=shape, precision="float32", visible=len(places) > 0,
         )  # fmt: skip
 
-    def mesh(self, name: str, vertices: Floats, faces: Any, colour: str, opacity: float = 0.4) -> Any:
-        """A surface seen from both sides; without triangles it is hidden. Its handle."""
-        shown = len(faces) > 0
-        return self.api.add_mesh_simple(
-            name, np.asarray(vertices, np.float32), faces if shown else np.zeros((1, 3), np.uint32),
-            color=rgb(colour), opacity=opacity, side="double", cast_shadow=False, visible=shown,
-        )  # fmt: skip
+    def mesh(
+        self, name: str, vertices: Floats, faces: NDArray[np.uint32], colour: str, opacity: float = 0.4
+    ) -> None:
+        """A surface seen from both sides; without triangles it is hidden."""
+        there, shown = self._surfaces.get(name), len(faces) > 0
+        v = np.asarray(vertices, np.float32)
+        if there is None or not np.array_equal(there.faces, faces):
+            self._surfaces[name] = self.api.add_mesh_simple(
+                name, v, faces if shown else np.zeros((1, 3), np.uint32), color=rgb(colour), opacity=opacity,
+                side="double", cast_shadow=False, visible=shown,
+            )  # fmt: skip
+            return
+        there.vertices, there.visible = v, True
 
     def machine(self, rest: Skeleton, ghost: Floats) -> None:
         """Links, joints, platform, and the links of the deflected ghost."""
@@ -123,9 +140,7 @@ class Scene:
             middle = np.concatenate([rest.plate, rest.plate.mean(axis=0)[None]])
             n = len(rest.plate)
             fan = np.array([[i, (i + 1) % n, n] for i in range(n)], np.uint32)
-            if self._plate is None:
-                self._plate = self.mesh("/platform", middle, fan, DARK)
-            self._plate.vertices = np.asarray(middle, np.float32)
+            self.mesh("/platform", middle, fan, DARK)
         self.lines("/ghost", ghost, GHOST, 0.004 * self.extent)
         self.lights()
 
@@ -183,16 +198,12 @@ class Scene:
         """The polar diagram or the ellipsoid at the tool; what its size means, in words."""
         c = solution.compliance[:3, :3]
         if kind == "none" or not np.isfinite(c).all():
-            if self._surface is not None:
-                self._surface.visible = False
+            if "/surface" in self._surfaces:
+                self._surfaces["/surface"].visible = False
             return ""
         make = ellipsoid if kind == "ellipsoid" else polar_surface
         around, most = make(c, SURFACE * self.extent)
-        points = around + np.array(moment.state.position)
-        if self._surface is None:
-            self._surface = self.mesh("/surface", points, sphere()[1], SKY, 0.45)
-        self._surface.vertices = np.asarray(points, np.float32)
-        self._surface.visible = True
+        self.mesh("/surface", around + np.array(moment.state.position), sphere()[1], SKY, 0.45)
         return f"longest radius: {1e6 * most:.4g} µm/N"
 
     def marker(self, point: Floats, text: str) -> None:
@@ -205,14 +216,13 @@ def _groups(moment: Moment, rest: Skeleton) -> list[tuple[str, str, float, list[
     thick = thicknesses(moment.machine, rest)
     colours = leg_colours(moment.machine.legs) | {"": DARK}
     sets: dict[tuple[str, float], list[int]] = {}
-    lengths = np.linalg.norm(rest.links[:, 1] - rest.links[:, 0], axis=1) if len(rest.links) else []
-    for i, leg in enumerate(rest.legs):
-        if lengths[i] > 1e-9:
+    for i, (leg, (start, end)) in enumerate(zip(rest.legs, rest.links, strict=True)):
+        if np.linalg.norm(end - start) > COINCIDENT:
             sets.setdefault((leg, round(float(thick[i]), 5)), []).append(i)
     return [(f"/links/{k}", colours[leg], t, found) for k, ((leg, t), found) in enumerate(sets.items())]
 
 
-def look_at_machine(server: Any, rest: Skeleton) -> None:
+def look_at_machine(server: ViserServer, rest: Skeleton) -> None:
     """The first look: from the front right, from above where all lies in a plane of constant height."""
     points = np.vstack(
         [rest.links.reshape(-1, 3), rest.tcp]

@@ -9,14 +9,22 @@ import io
 import logging
 import secrets
 import socket
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from functools import lru_cache
 from http import HTTPStatus
 from http.cookies import CookieError, SimpleCookie
-from typing import Any
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qs, urlsplit
 
 from stiffmap.common.errors import StiffmapError, needed
+
+if TYPE_CHECKING:
+    from viser import ViserServer
+    from websockets.asyncio.server import ServerConnection
+    from websockets.http11 import Request, Response
+
+    Answer = Callable[[ServerConnection, Request], Response | None]
 
 HERE = "127.0.0.1"
 LOCAL = (HERE, "localhost", "::1")
@@ -24,7 +32,7 @@ FIRST_PORT, TRIED_PORTS = 8080, 100
 COOKIE = "stiffmap_view"
 
 
-def need_viser() -> Any:
+def need_viser() -> ModuleType:
     """The library of the extra ``[view]``, imported only when something is to be looked at; MissingPartError that says how
     to install it."""
     with needed("a view", "view"):
@@ -40,7 +48,7 @@ class Guard:
         self.token = "" if host in LOCAL else secrets.token_urlsafe(24)
         self.on_link = on_link
 
-    def refusal(self, path: str, headers: Any) -> str:
+    def refusal(self, path: str, headers: Mapping[str, str]) -> str:
         """Why a request is refused; empty if it is not."""
         name = urlsplit(f"//{headers.get('Host', '')}").hostname or ""
         if self.host in LOCAL and name not in LOCAL:
@@ -60,12 +68,12 @@ class Guard:
         """The value of a query in a path; empty where there is none."""
         return parse_qs(urlsplit(path).query).get(name, [""])[0]
 
-    def wrapped(self, process: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
+    def wrapped(self, process: Answer) -> Answer:
         """The server's own answers behind the guard."""
         from websockets.datastructures import Headers
         from websockets.http11 import Response
 
-        def answer(connection: Any, request: Any) -> Any:
+        def answer(connection: ServerConnection, request: Request) -> Response | None:
             why = self.refusal(request.path, request.headers)
             if why:
                 body = f"403: {why}\n".encode()
@@ -77,7 +85,7 @@ class Guard:
                 self.on_link(link)
             out = process(connection, request)
             if out is not None and out.headers.get("Content-Type", "").startswith("text/html"):
-                out.body = named(out.body, out.headers.get("Content-Encoding") == "gzip")
+                out.body = named(bytes(out.body), out.headers.get("Content-Encoding") == "gzip")
                 del out.headers["Content-Length"]
                 out.headers["Content-Length"] = str(len(out.body))
             if out is not None and self.token:
@@ -87,12 +95,12 @@ class Guard:
         return answer
 
 
-def _is_page(headers: Any) -> bool:
+def _is_page(headers: Mapping[str, str]) -> bool:
     """Whether a browser asks for a page to show, not for a picture or a script; programs don't say."""
     return headers.get("Sec-Fetch-Dest", "document") in ("document", "iframe")
 
 
-def _cookie(headers: Any) -> str:
+def _cookie(headers: Mapping[str, str]) -> str:
     try:
         kept = SimpleCookie(headers.get("Cookie", ""))
     except CookieError:
@@ -100,12 +108,12 @@ def _cookie(headers: Any) -> str:
     return kept[COOKIE].value if COOKIE in kept else ""
 
 
-def start_server(host: str, port: int | None, guard: Guard, label: str) -> Any:
+def start_server(host: str, port: int | None, guard: Guard, label: str) -> ViserServer:
     """A viser server behind a guard; StiffmapError where the port or the address cannot be used."""
     viser = need_viser()
     chosen = free_port(host, port)
     with _guarded(guard), silent():
-        server = viser.ViserServer(host=host, port=chosen, label=label, verbose=False)
+        server: ViserServer = viser.ViserServer(host=host, port=chosen, label=label, verbose=False)
     logging.getLogger("websockets.server").setLevel(logging.CRITICAL)
     logging.getLogger("asyncio").addFilter(in_one_line)  # the same function is added once
     return server

@@ -66,7 +66,7 @@ class ViewState:
         return None if self.start is None else np.array(self.start)
 
 
-def as_plain(state: ViewState) -> dict[str, Any]:
+def as_plain(state: ViewState) -> dict[str, object]:
     """JSON data, without what is as by default."""
     default = ViewState(state.position)
     plain = asdict(state)

@@ -5,21 +5,24 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
+from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.solution import Solution
 from stiffmap.ui.plot.elements import element_links
 from stiffmap.ui.view.animation import Swing
 from stiffmap.ui.view.colours import colours_of
-from stiffmap.ui.view.controls import Controls
+from stiffmap.ui.view.controls import NONE, Controls
 from stiffmap.ui.view.data import Data
 from stiffmap.ui.view.hands import ProbePoint, listen, listen_to_nodes
 from stiffmap.ui.view.model import ViewModel
 from stiffmap.ui.view.moment import Moment
+from stiffmap.ui.view.numbers import write
 from stiffmap.ui.view.panels import (
     colour_bar,
     compliance_panel,
@@ -36,6 +39,9 @@ from stiffmap.ui.view.serving import silent
 from stiffmap.ui.view.state import ViewState
 from stiffmap.ui.view.worker import Worker
 
+if TYPE_CHECKING:
+    from viser import ViserServer
+
 BUDGET = 0.018
 """s, of the plane while something is dragged; fewer poses are solved where they would take longer."""
 COUNTS = (FINE, COARSE, 35, 25, 17, 11)
@@ -44,15 +50,14 @@ COUNTS = (FINE, COARSE, 35, 25, 17, 11)
 class Viewer:
     """Everything behind one address; all browsers that open it see the same."""
 
-    def __init__(self, model: ViewModel, server: Any, data: Data | None = None) -> None:
-        self.model, self.server, self._data = model, server, data
+    def __init__(self, model: ViewModel, server: ViserServer, data: Data | None = None) -> None:
+        self.model, self.server, self.data = model, server, data
         self.lock = threading.RLock()
         self.error = ""
         self._per_pose = 3e-6
         self._plane: PlaneMap | None = None
         self._plane_key: object = None
-        self._held: tuple[float, float] | None = None
-        self._held_quantity = ""
+        self._held: PlaneMap | None = None
         self._solution: Solution | None = None
         self._cloud_key: object = None
         self._renewed = False
@@ -84,14 +89,14 @@ class Viewer:
         self.worker.ask()
         return not self.error
 
-    def pull(self, tail: Any) -> None:
+    def pull(self, tail: ArrayLike) -> None:
         """The tail of the arrow was moved (m): the force points from there to the tool, as much larger as the arrow is longer."""
         with self.lock:
             size = self.pulling or max(float(np.linalg.norm(self.model.state.force)), 1.0)
             way = (np.array(self.model.state.position) - tail) / self.scene.arrow_length
             self.act(lambda m: m.put(force=tuple(float(v) for v in size * way), keep=False))
 
-    def drag(self, position: Any, wxyz: Any) -> None:
+    def drag(self, position: Floats, wxyz: ArrayLike) -> None:
         """The gizmo was moved (m, quaternion)."""
 
         def deed(model: ViewModel) -> None:
@@ -126,14 +131,14 @@ class Viewer:
                 self.scene.tool(moment)
             if found is not None:
                 self._show(found, moment.state)
-            self.controls.say(status_line(moment, s, self.model.message, self.error))
+            write(self.controls.status, "content", status_line(moment, s, self.model.message, self.error))
         self.server.flush()
 
     def fine(self) -> None:
         """The plane with all poses, and the panel's numbers as they are now."""
         moment = self.now()
         self.controls.show(moment)
-        if self.controls.map_on and (self._plane is None or self._plane.count < FINE):
+        if self.controls.map_on.value and (self._plane is None or self._plane.count < FINE):
             if QUANTITIES[moment.state.quantity].of is None and self._plane is not None:
                 return
             found = moment.plane(FINE)
@@ -152,7 +157,7 @@ class Viewer:
 
     def _map(self, moment: Moment, count: int) -> PlaneMap | None:
         """A new map of the plane; None where it would be the one that is shown."""
-        if not self.controls.map_on:
+        if not self.controls.map_on.value:
             self._plane_key = self._plane = None
             self.scene.no_plane()
             return None
@@ -165,10 +170,11 @@ class Viewer:
         return found
 
     def _show(self, found: PlaneMap, state: ViewState) -> None:
-        if not self.controls.hold or self._held is None or found.quantity != self._held_quantity:
-            self._held, self._held_quantity = found.range, found.quantity
-        self.scene.plane(found, self._held, state.tolerance, self.controls.isolines)
-        self.controls.bar(colour_bar(found, self._held, state.tolerance))
+        if not self.controls.hold.value or self._held is None or found.quantity != self._held.quantity:
+            self._held = found
+        limits = self._held.range
+        self.scene.plane(found, limits, state.tolerance, self.controls.isolines.value)
+        write(self.controls.bar, "content", colour_bar(found, limits, state.tolerance))
 
     def redraw(self) -> None:
         """The plane is to be drawn again though the machine is the same."""
@@ -180,7 +186,7 @@ class Viewer:
         moment, s = self.now(), self._solution
         assert s is not None
         parts = []
-        lit = self.controls.lit
+        lit = self.controls.light.value
         try:
             budget = moment.shares()
             self.controls.elements([n for n, _, _ in budget.ranked()])
@@ -190,29 +196,24 @@ class Viewer:
         parts += [compliance_panel(s), efforts_panel(moment, s)]
         w = self.swing.frequencies(moment)
         if w is not None:
-            parts.append(frequencies_panel(w.frequency.tolist(), self.swing.mode))
-        if self._data is not None:
-            self._data(self.scene, moment)
-            parts.insert(0, self._data.html)
-        self.scene.lit = element_links(moment.machine, lit) if lit else []
-        self.controls.why("".join(parts), self.scene.surface(moment, s, self.controls.surface))
+            parts.append(frequencies_panel(w.frequency.tolist(), self.controls.mode.value - 1))
+        if self.data is not None:
+            self.data(self.scene, moment)
+            parts.insert(0, self.data.html)
+        self.scene.lit = [] if lit == NONE else element_links(moment.machine, lit)
+        self.controls.why("".join(parts), self.scene.surface(moment, s, self.controls.surface.value))
         self.scene.lights()
 
     def cloud(self) -> None:
         """The quantity over the whole box."""
         moment = self.now()
-        key = (moment.map_key(anywhere=True), self.controls.cloud)
+        key = (moment.map_key(anywhere=True), self.controls.cloud.value)
         if key == self._cloud_key:
             return
         self._cloud_key = key
-        points, values = moment.cloud() if self.controls.cloud else (np.zeros((0, 3)), np.zeros(0))
-        limits = self._held or (0.0, 1.0)
+        points, values = moment.cloud() if key[1] else (np.zeros((0, 3)), np.zeros(0))
+        limits = (0.0, 1.0) if self._held is None else self._held.range
         self.scene.points("/cloud", points, colours_of(values, *limits), 0.012)
-
-    def data_again(self) -> Data | None:
-        """The same data for another scene, such as that of a page."""
-        d = self._data
-        return None if d is None else Data(d.experiment, d.path, d.diagnosis, d.opened)
 
     def _fail(self, problem: Exception) -> None:
         self.error = (
@@ -220,7 +221,7 @@ class Viewer:
         )
         s = self._solution
         if s is not None:
-            self.controls.say(status_line(self.now(), s, "", self.error))
+            write(self.controls.status, "content", status_line(self.now(), s, "", self.error))
 
     def renew(self) -> None:
         """The machine's file has changed: its own scene and addresses, made by the thread that draws."""

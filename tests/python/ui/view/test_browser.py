@@ -151,8 +151,8 @@ def test_every_field_of_a_number_has_decimals() -> None:
     pytest.importorskip("viser", reason="viser is not installed (pip install stiffmap[view])")
     with View(model_of(sm.load_machine("orthoglide-revised"))) as view:
         controls = view._viewer.controls
-        found = [*vars(controls).values(), *vars(controls.numbers).values()]
-        fields = [h for h in found if hasattr(h, "precision")]
+        found = [*vars(controls).values(), *vars(controls.numbers).values(), *(h for h, _ in controls._shown)]
+        fields = [h for h in found if hasattr(h, "precision") and h is not controls.mode]  # whole
         assert len(fields) >= 12
         assert {h.precision for h in fields} == {DECIMALS}
 
@@ -226,4 +226,4 @@ def test_controls_have_names_and_take_the_keyboard(browser: Any) -> None:
         isolines = page.get_by_role("checkbox", name="Isolines")
         isolines.focus()
         page.keyboard.press("Space")
-        assert until(lambda: not view._viewer.controls.isolines)
+        assert until(lambda: not view._viewer.controls.isolines.value)

@@ -127,6 +127,6 @@ def test_machine_view_takes_data(machine: sm.Machine) -> None:
     assert data is not None and data.experiment is e and found.effects == ()
     v = machine.view(browser=False, experiment=ROWS)
     try:
-        assert v._viewer._data.experiment.name == e.name
+        assert v._viewer.data.experiment.name == e.name
     finally:
         v.close()

@@ -104,12 +104,10 @@ def test_what_is_refused_is_shown_and_changes_nothing(view: View) -> None:
     assert not viewer.act(lambda m: m.put(position=(9.0, 0.0, 0.0)))
     assert viewer.worker.idle()
     assert view.state == before
-    assert (
-        'role="alert"' in viewer.controls._status.content and "cannot reach (9000, 0, 0) mm" in viewer.error
-    )
+    assert 'role="alert"' in viewer.controls.status.content and "cannot reach (9000, 0, 0) mm" in viewer.error
     assert viewer.act(lambda m: m.put(force=(1.0, 0.0, 0.0)))
     assert viewer.worker.idle()
-    assert "alert" not in viewer.controls._status.content
+    assert "alert" not in viewer.controls.status.content
 
 
 def test_a_fault_of_ours_is_shown_and_the_view_goes_on(view: View, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -158,13 +156,14 @@ def test_a_file_is_reloaded_or_its_error_shown(tmp_path: Path) -> None:
         assert until(lambda: "mine.yaml, line" in v._viewer.error)
         file.write_text(text.replace("name: five-bar", "name: seven-bar"), encoding="utf-8")
         assert until(lambda: v._viewer.model.machine.name == "seven-bar" and not v._viewer.error)
-        assert v._viewer.worker.idle() and "seven-bar" in v._viewer.controls._status.content
+        assert v._viewer.worker.idle() and "seven-bar" in v._viewer.controls.status.content
 
 
 @pytest.mark.parametrize("quantity", ["worst", "margin", "status", "frequency", "dynamic"])
 def test_every_quantity_is_drawn(view: View, quantity: str) -> None:
     viewer = view._viewer
-    viewer.controls.cloud, viewer.controls.surface, viewer.controls.lit = True, "ellipsoid", "x.foot"
+    controls = viewer.controls
+    controls.cloud.value, controls.surface.value, controls.light.value = True, "ellipsoid", "x.foot"
     view.set(quantity=quantity, plane="free", normal=(1.0, 0.2, 0.3))
     assert viewer.worker.idle(60) and not viewer.error
     assert viewer._plane is not None and viewer._plane.quantity == quantity
@@ -296,7 +295,7 @@ def test_meshes_of_a_urdf_stand_on_the_joints(arm: Path) -> None:
     turn = Rotation.from_matrix(at.rotation).as_rotvec()
     with View(model_of(machine, at.position, rotation=turn, meshes=arm)) as v:
         assert v._viewer.worker.idle(60) and not v._viewer.error and not v._viewer.model.message
-        assert "the machine is rigid" in v._viewer.controls._status.content
+        assert "the machine is rigid" in v._viewer.controls.status.content
         handles = {h.name: h for h in v._viewer.scene._meshes._shown._joint_frames}
         drawn = [
             trimesh.load_mesh(io.BytesIO(m.glb_data), file_type="glb")
@@ -348,4 +347,4 @@ def test_the_force_is_pulled_by_its_tail(view: View) -> None:
     assert viewer.worker.idle()
     np.testing.assert_allclose(viewer.scene.force_handle.position, tip - length * np.array([0.6, 0.0, 0.8]))
     d = 1e6 * np.linalg.norm(viewer.model.machine.solve(tip, view.state.wrench).displacement[:3])
-    assert f"{d:.1f} µm" in viewer.controls._status.content
+    assert f"{d:.1f} µm" in viewer.controls.status.content

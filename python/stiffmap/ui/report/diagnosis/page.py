@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from os import PathLike
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -125,7 +124,7 @@ def record(
     ]
 
 
-def _effect(e: Effect) -> dict[str, Any]:
+def _effect(e: Effect) -> dict[str, object]:
     legs = f", leg {', '.join(e.legs)}" if e.legs else ""
     return {
         "name": f"{registry.get(e.kind).title}: {in_shop_words(e.element)}{legs}",
@@ -137,7 +136,7 @@ def _effect(e: Effect) -> dict[str, Any]:
     }
 
 
-def _budget(d: Diagnosis) -> dict[str, Any] | None:
+def _budget(d: Diagnosis) -> dict[str, object] | None:
     """Shares of the corrected machine's deflection at the worst pose of the map in the pictures; None where it has play without load."""
     from stiffmap.ui.plot.loaded import budget_rows
     from stiffmap.ui.report.diagnosis.pictures import worst_pose

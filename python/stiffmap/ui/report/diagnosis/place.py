@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from matplotlib.figure import Figure
 
@@ -13,7 +11,7 @@ from stiffmap.identification.diagnosis.report.result import Diagnosis
 from stiffmap.solve.compiled import Role
 from stiffmap.solve.machine import Machine
 from stiffmap.ui.plot.elements import nodes_of
-from stiffmap.ui.plot.scene import draw_skeleton, finish, marks, on, scene_axes
+from stiffmap.ui.plot.scene import dots, draw_skeleton, finish, on, scene_axes
 from stiffmap.ui.plot.skeleton import COINCIDENT, owners, standing
 from stiffmap.ui.plot.style import new_figure
 
@@ -25,7 +23,7 @@ def place_figure(d: Diagnosis) -> Figure:
     machine = d.declared
     shape = standing(machine)
     figure = new_figure(4.6, 3.4)
-    ax: Any = scene_axes(figure, shape, None)
+    ax = scene_axes(figure, shape, None)
     legs = {leg for e in d.effects for leg in e.legs}
     dark = legs if len(legs) < len(machine.legs) else ()
     draw_skeleton(
@@ -35,7 +33,7 @@ def place_figure(d: Diagnosis) -> Figure:
         points, pieces = lit(machine, shape.coordinates, e)
         for ends in pieces:
             ax.plot(*on(ax, ends), color=LIT, lw=4)
-        ax.scatter(*on(ax, points if len(points) else shape.tcp[None]), s=90, color=LIT, **marks(ax))
+        dots(ax, points if len(points) else shape.tcp[None], 90, color=LIT)
     finish(ax)
     ax.set_axis_off()
     names = [
