@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from os import PathLike
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,7 +18,8 @@ from stiffmap.machining.milling.redundancy import Redundancy
 from stiffmap.machining.milling.redundancy import redundancy as best_turns
 from stiffmap.machining.milling.setting import Setting, setting
 from stiffmap.machining.milling.speed import other_side
-from stiffmap.machining.process import Process, load_process
+from stiffmap.machining.process.description import Process
+from stiffmap.machining.process.load import GivenProcess, as_process
 from stiffmap.machining.toolpath import Box, Placement, Toolpath, box, load_path, sampled
 from stiffmap.machining.toolpath.engagement import part_side
 from stiffmap.machining.toolpath.entry import entered_at, outline_of, turned_round
@@ -58,7 +59,7 @@ class Choices:
 def choices(
     machine: Machine,
     path: Toolpath | str | PathLike[str],
-    process: Process | str | PathLike[str] | Mapping[str, Any],
+    process: GivenProcess,
     *,
     at: ArrayLike | None = None,
     turn: float = 0.0,
@@ -78,7 +79,7 @@ def choices(
     threads: int | None,
 ) -> Choices:
     """In this order: the sense, the placement, the entry, the turns; arguments as of `mill`. Raises StiffmapError."""
-    cut = process if isinstance(process, Process) else load_process(process)
+    cut = as_process(process)
     if tolerance is not None:
         if not tolerance > 0:
             raise StiffmapError(f"tolerance: expected a length above zero (m), got {tolerance}")

@@ -236,7 +236,9 @@ def _mm(value: float) -> str:
 
 
 def identify_process(
-    table: str | PathLike[str] | Mapping[str, Any], process: Process | None = None, sheet: str | None = None
+    table: str | PathLike[str] | Mapping[str, object],
+    process: Process | None = None,
+    sheet: str | None = None,
 ) -> IdentifiedLaw:
     """Coefficients of the mechanistic law from a dynamometer's table: means per feed, or signals over time.
 
