@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, Unpack
+from typing import Unpack
 
 import numpy as np
 import xarray as xr
@@ -272,8 +272,8 @@ def polar(
     return xr.Dataset(data, coords, describe(loading, "polar diagram", call))
 
 
-def _extremes(force: TurningForce, plane: str, swept: DirectionSweep) -> dict[str, Any]:
-    out = {}
+def _extremes(force: TurningForce, plane: str, swept: DirectionSweep) -> dict[str, object]:
+    out: dict[str, object] = {}
     for suffix, _, worst, best in force.extremes(swept, plane):
         for word, size, e in (("worst", "largest", worst), ("best", "smallest", best)):
             what = f"{size} deflection over the force directions of the {plane} plane"

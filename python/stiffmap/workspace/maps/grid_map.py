@@ -34,7 +34,7 @@ def error_map(
     progress: bool | None = None,
     out: str | PathLike[str] | None = None,
     resume: bool = False,
-    scheduler: Any = None,
+    scheduler: object = None,
     **call: Any,
 ) -> xr.Dataset:
     """How far the machine is pushed off its commanded position, over a grid of positions.

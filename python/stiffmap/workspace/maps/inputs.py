@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -114,13 +113,15 @@ POINTS = 51
 """Along each edge of a plane."""
 
 
-def grid_of(machine: Machine, given: Mapping[str, ArrayLike | None], points: int = POINTS) -> dict[str, Any]:
+def grid_of(
+    machine: Machine, given: Mapping[str, ArrayLike | None], points: int = POINTS
+) -> dict[str, ArrayLike]:
     """Axes (m) x, y, z: those given, the others over the workspace.
 
     A coordinate that is not commanded has one value, its home; planes lie at three heights where none is named. StiffmapError where an
     axis is wanted of a machine without a workspace.
     """
-    out: dict[str, Any] = {a: v for a, v in given.items() if v is not None}
+    out: dict[str, ArrayLike] = {a: v for a, v in given.items() if v is not None}
     if len(out) == 3:
         return out
     low, high = machine.workspace

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.number_text import vector_text
@@ -75,7 +76,7 @@ def uncertain_readings(ds: xr.Dataset, plane: str) -> dict[str, dict[str, Any]]:
     return {name: how for name, how in readings(ds, plane).items() if name != "best"}
 
 
-def _deviations(size: Any, std: Any) -> dict[str, float]:
+def _deviations(size: Floats, std: Floats) -> dict[str, float]:
     good = np.isfinite(std) & (size > 0)
     sizes = std[good] if good.any() else np.array([np.nan])
     relative = std[good] / size[good] if good.any() else sizes
@@ -86,7 +87,7 @@ def _deviations(size: Any, std: Any) -> dict[str, float]:
     }
 
 
-def worst_pose(machine: Machine, ds: Any, gravity: Any) -> dict[str, Any] | None:
+def worst_pose(machine: Machine, ds: xr.Dataset, gravity: ArrayLike | None) -> dict[str, Any] | None:
     """The largest deflection of the map: load, position (m), deflection (m), shares of the elements and of their sources.
 
     The load is a case of the map, or the force that turned, in its worst direction there. None where no pose has an
@@ -109,9 +110,9 @@ def worst_pose(machine: Machine, ds: Any, gravity: Any) -> dict[str, Any] | None
     }
 
 
-def _worst(ds: Any) -> tuple[float, str, list[float], Any] | None:
+def _worst(ds: xr.Dataset) -> tuple[float, str, list[float], Floats] | None:
     """Deflection (m), load in words, position (m) and wrench (6,): of a case, or of the directions in which the force turned."""
-    sizes: list[tuple[Any, tuple[str, ...]]] = [(ds.deflection, ("z", "y", "x", "case"))]
+    sizes: list[tuple[xr.DataArray, tuple[str, ...]]] = [(ds.deflection, ("z", "y", "x", "case"))]
     sizes += [(ds.worst_deflection, ("z", "y", "x"))] if "worst_deflection" in ds else []
     largest = [v.isel(v.argmax(axes)) for v, axes in sizes if np.isfinite(v).any()]
     if not largest:

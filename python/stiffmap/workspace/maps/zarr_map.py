@@ -38,7 +38,7 @@ class ZarrMap:
         self.plan, self.folder, self.tiles = plan, folder, tiles
         self.done: NDArray[np.bool_] = np.zeros(tiles.count, dtype=bool)
 
-    def put(self, index: int, values: dict[str, Any]) -> None:
+    def put(self, index: int, values: dict[str, np.ndarray]) -> None:
         """Write a tile's chunks, then its line in the journal. FileError where the disk refuses."""
         plane, y = self.tiles.place(index)
         try:
@@ -98,7 +98,7 @@ class ZarrMap:
 
         StiffmapError where it belongs to another map, FileError for a chunk that is damaged.
         """
-        kept = kept_attributes(self.folder / "zarr.json", lambda whole: whole["attributes"])
+        kept = kept_attributes(self.folder / "zarr.json", "attributes")
         refuse_another_map(self.folder, kept, self.plan.attrs)
         self._mend_frame()
         for scrap in self.folder.rglob("*.partial"):  # chunks that zarr had not put in their place
