@@ -90,14 +90,14 @@ def _as_built(elements: list[Any]) -> None:
             e["actual"] = frame
 
 
-def _plain(data: Any) -> Any:
+def _plain(data: object) -> Any:
     """Numbers without their tolerances."""
     if isinstance(data, dict):
         return data["value"] if "value" in data else {k: _plain(v) for k, v in data.items()}
     return [_plain(v) for v in data] if isinstance(data, list) else data
 
 
-def _tolerances(data: Any, place: str) -> list[tuple[str, float, float]]:
+def _tolerances(data: object, place: str) -> list[tuple[str, float, float]]:
     """Place, value and tolerance of every number that has one, in the legs."""
     if isinstance(data, dict):
         if "value" in data and "u" in data:

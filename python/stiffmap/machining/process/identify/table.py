@@ -10,6 +10,7 @@ from os import PathLike
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from stiffmap.common.broadcasting import Floats, given_path, instance_of
 from stiffmap.common.errors import FileError
@@ -67,7 +68,7 @@ KNOWN = Known(
 
 
 def columns_of(
-    table: str | PathLike[str] | Mapping[str, Any], defaults: Mapping[str, Any], sheet: str | None
+    table: str | PathLike[str] | Mapping[str, object], defaults: Mapping[str, object], sheet: str | None
 ) -> ForceColumns:
     """The columns of a file or a mapping; `defaults`, SI, where it has none of that name. Raises FileError."""
     if isinstance(table, Mapping):
@@ -145,14 +146,16 @@ class ForceTable:
         """(n,) labels of the feeds per tooth that count as different."""
         return np.asarray(np.round(np.log(self.chip), SAME), dtype=float)
 
-    def rows(self, chosen: Any) -> ForceTable:
+    def rows(self, chosen: NDArray[np.bool_]) -> ForceTable:
         """Some of the cuts."""
         index = np.arange(len(self.cuts))[chosen]
         return replace(self, cuts=tuple(self.cuts[i] for i in index), force=self.force[index], signals=())
 
 
 def read_table(
-    table: str | PathLike[str] | Mapping[str, Any], process: Process | None = None, sheet: str | None = None
+    table: str | PathLike[str] | Mapping[str, object],
+    process: Process | None = None,
+    sheet: str | None = None,
 ) -> ForceTable:
     """A CSV file, a workbook, or a mapping (a data frame) of columns as `identify_process` takes them.
 
@@ -179,7 +182,7 @@ def read_table(
     return _slot_signs(ForceTable(tuple(cuts_of), np.array(means), tuple(signals), (), c.file, given))
 
 
-def _whole_turns(c: ForceColumns, here: Any, force: Floats) -> Signals:
+def _whole_turns(c: ForceColumns, here: NDArray[np.intp], force: Floats) -> Signals:
     time, turn = c.values["time"][here], 2 * pi / c.above_zero("spindle", int(here[0]))
     for i in np.flatnonzero(np.diff(time) <= 0)[:1]:
         what = f"expected rising times in a cut, found {time[i + 1]:g} s behind {time[i]:g} s"
@@ -213,7 +216,7 @@ def _slot_signs(table: ForceTable) -> ForceTable:
     )
 
 
-def _defaults(process: Process) -> dict[str, Any]:
+def _defaults(process: Process) -> dict[str, object]:
     instance_of(process, Process, "process", "a Process, as load_process gives it")
     c, t = process.cut, process.tool
     return {

@@ -70,7 +70,7 @@ def workspace_volume(
     cells: int | None = None,
     prove: int = 0,
     seed: int = 0,
-    scheduler: Any = None,
+    scheduler: object = None,
     **limits: Any,
 ) -> Workspace:
     """Volume of all positions that the machine comes to in one orientation, with its sampling error.
