@@ -20,7 +20,7 @@ from stiffmap.machining.milling.setting import Setting, setting
 from stiffmap.machining.milling.speed import other_side
 from stiffmap.machining.process.description import Process
 from stiffmap.machining.process.load import GivenProcess, as_process
-from stiffmap.machining.toolpath import Box, Placement, Toolpath, box, load_path, sampled
+from stiffmap.machining.toolpath import Placement, Toolpath, box, load_path, sampled
 from stiffmap.machining.toolpath.engagement import part_side
 from stiffmap.machining.toolpath.entry import entered_at, outline_of, turned_round
 from stiffmap.solve.machine import Machine
@@ -48,7 +48,8 @@ class Choices:
     path: Toolpath
     process: Process
     place: Placement
-    stock: Box | None
+    stock: Floats | None
+    """(2, 3) m."""
     angle: Floats | None
     """(points,) rad: turn of the tool; None: that of the path, else as at home."""
     placement: Placements | None = None
@@ -63,7 +64,7 @@ def choices(
     *,
     at: ArrayLike | None = None,
     turn: float = 0.0,
-    stock: Box | ArrayLike | None = None,
+    stock: ArrayLike | None = None,
     angle: Floats | None = None,
     size: tuple[float, ...] | None = None,
     offset: Mapping[str, ArrayLike] | None = None,
@@ -99,11 +100,10 @@ def choices(
         p = load_path(path, feed=cut.feed, spindle=cut.spindle, size=size, offsets=shifts, progress=progress)
     if reverse:
         p, cut = turned_round(p), other_side(cut)
-    if stock is not None and not isinstance(stock, Box):
-        corners = np.asarray(stock, dtype=float)
-        if corners.size != 6:
-            raise StiffmapError(f"stock: expected two corners (2, 3) in m, got {corners.shape}")
-        stock = box(corners.ravel()[:3], corners.ravel()[3:])
+    corners = None if stock is None else np.asarray(stock, dtype=float)
+    if corners is not None and corners.size != 6:
+        raise StiffmapError(f"stock: expected two corners (2, 3) in m, got {corners.shape}")
+    block = None if corners is None else box(*corners.reshape(2, 3))
     tried = None
     if place is not None:
         tried = placements(machine, p, cut, count=place, threads=threads, scheduler=scheduler)
@@ -112,7 +112,7 @@ def choices(
 
     def job(path: Toolpath, turns: Floats | None) -> Setting:
         return setting(
-            machine, path, cut, sampled(path, step), path.placed(origin, turn), stock=stock, angle=turns,
+            machine, path, cut, sampled(path, step), path.placed(origin, turn), stock=block, angle=turns,
             thickness=thickness,
         )  # fmt: skip
 
@@ -131,7 +131,7 @@ def choices(
         p = entered_at(p, here.way)
         turns = turned(p)
     return Choices(
-        p, cut, p.placed(origin, turn), stock, angle if turns is None else turns.angle, tried, here, turns
+        p, cut, p.placed(origin, turn), block, angle if turns is None else turns.angle, tried, here, turns
     )
 
 

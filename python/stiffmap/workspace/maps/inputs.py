@@ -16,18 +16,14 @@ PLANES = {"xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
 
 def axis(values: ArrayLike, name: str) -> Floats:
     """One axis of a grid (m): finite numbers, none twice, at least one."""
-    out = _numbers(values, name)
+    out = number_list(values, name)
     if len(np.unique(out)) != out.size:
         raise StiffmapError(f"{name}: expected different numbers, got one of them twice")
     return out
 
 
-def force_list(values: ArrayLike) -> Floats:
-    """Force magnitudes (N) of a sweep; a negative one acts against the direction."""
-    return _numbers(values, "forces")
-
-
-def _numbers(values: ArrayLike, name: str) -> Floats:
+def number_list(values: ArrayLike, name: str) -> Floats:
+    """(n,) finite numbers, at least one."""
     out = np.atleast_1d(real_array(values, name))
     if out.ndim != 1:
         raise StiffmapError(f"{name}: expected one axis of numbers, got shape {out.shape}")

@@ -19,7 +19,7 @@ from stiffmap.solve.machine import Machine, hint_metres, takes_machine
 from stiffmap.solve.options import LoadingKeywords, spelled_out
 from stiffmap.solve.status import Status
 from stiffmap.workspace.maps.fixed_order_sums import dot
-from stiffmap.workspace.maps.inputs import force_list, place, unit
+from stiffmap.workspace.maps.inputs import number_list, place, unit
 from stiffmap.workspace.maps.loading import Loading, at_place, describe, displaced, without_failed
 
 
@@ -69,7 +69,7 @@ def sweep(
         return load_path(loading, p, u, control, reach, steps, cross)
     if limit is not None or cross:
         raise StiffmapError(f"{'cross' if limit is None else 'limit'}: not together with forces")
-    f = force_list(forces)
+    f = number_list(forces, "forces")
     wrench = np.concatenate([f[:, None] * u, np.zeros((f.size, 3))], axis=1)
     s = loading.solve(p, wrench)
     d = without_failed(s.displacement, s.status, keep_unstable=True)

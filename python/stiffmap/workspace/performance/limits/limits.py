@@ -18,6 +18,7 @@ from stiffmap.solve.machine import Machine
 from stiffmap.solve.status import Status
 from stiffmap.workspace.maps.inputs import magnitude
 from stiffmap.workspace.performance.limits.bars import Bars
+from stiffmap.workspace.performance.limits.deflection import worst_deflection
 from stiffmap.workspace.performance.motion.closing import (
     DriveKinematics,
     characteristic_length,
@@ -206,8 +207,6 @@ class Bounds:
         return plain("clearance of bars", value, -self.clearance)
 
     def _deflection(self, position: Floats, closed: NDArray[np.bool_]) -> Limit:
-        from stiffmap.workspace.performance.limits.deflection import worst_deflection
-
         assert self.deflection is not None
         force, plane, most = self.deflection
         value = np.full(len(position), np.inf)
