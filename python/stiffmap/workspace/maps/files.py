@@ -94,7 +94,7 @@ def partial_folder(path: Path) -> Path:
 
 MICRON, MM = 1e6, 1e3
 LONGEST_CELL = 32767  # characters, of Excel
-LENGTHS = ("deflection", "worst_deflection", "best_deflection")
+LENGTHS = ("worst_deflection", "best_deflection")
 Cell = str | float | None
 ANGLES = ("worst_direction", "best_direction")
 
@@ -117,7 +117,7 @@ def map_table(ds: xr.Dataset) -> tuple[list[str], Iterator[list[Cell]]]:
             unit = "µm" if k < 3 else "µrad"
             columns[f"{component}{tail}, {unit}"] = MICRON * one.displacement.values[..., k]
         columns |= {f"{n}{tail}, µm": MICRON * v.values for n, v in _like(one, "deflection")}
-    for stem in LENGTHS[1:]:
+    for stem in LENGTHS:
         columns |= {f"{n}, µm": MICRON * v.values for n, v in _like(full, stem)}
     for stem in ANGLES:
         columns |= {f"{n}, deg": np.degrees(v.values) for n, v in _like(full, stem) if v.ndim == 3}

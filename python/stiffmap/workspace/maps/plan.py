@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Unpack
 
 import numpy as np
 import xarray as xr
@@ -234,7 +234,7 @@ def map_plan(
     tolerance: float = 0.25e-3,
     compliance: bool = False,
     uncertainty: bool = False,
-    **how: Any,
+    **how: Unpack[LoadingKeywords],
 ) -> MapPlan:
     """The plan of `stiffmap.error_map` with these arguments; `how`: the fields of `Loading`.
 
