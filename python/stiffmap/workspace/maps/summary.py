@@ -3,7 +3,7 @@ comes from."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -31,18 +31,23 @@ def summary(ds: xr.Dataset, plane: str, tolerance: float) -> list[dict[str, Any]
     ]
 
 
-def readings(ds: xr.Dataset, plane: str) -> dict[str, dict[str, Any]]:
-    """What a map is read for: the worst and the best direction, then its load cases; each with its variable and case."""
-    turned: dict[str, dict[str, Any]] = {
-        w: {"variable": f"{w}_deflection_{plane}"} for w in ("worst", "best")
-    }
-    return turned | {str(c): {"variable": name_of(ds, plane, c), "case": str(c)} for c in ds.case.values}
+class Reading(NamedTuple):
+    """A variable of a map, and the load case where it has one."""
+
+    variable: str
+    case: str | None = None
 
 
-def values_of(ds: xr.Dataset, reading: dict[str, str], suffix: str = "") -> xr.DataArray:
+def readings(ds: xr.Dataset, plane: str) -> dict[str, Reading]:
+    """What a map is read for: the worst and the best direction, then its load cases."""
+    turned = {w: Reading(f"{w}_deflection_{plane}") for w in ("worst", "best")}
+    return turned | {str(c): Reading(name_of(ds, plane, c), str(c)) for c in ds.case.values}
+
+
+def values_of(ds: xr.Dataset, reading: Reading, suffix: str = "") -> xr.DataArray:
     """The values of a reading, or of what is next to it, such as ``_std``."""
-    values = ds[reading["variable"] + suffix]
-    return values.sel(case=reading["case"]) if "case" in reading else values
+    values = ds[reading.variable + suffix]
+    return values if reading.case is None else values.sel(case=reading.case)
 
 
 def name_of(ds: xr.Dataset, plane: str, case: object) -> str:
@@ -71,7 +76,7 @@ def band(ds: xr.Dataset, plane: str) -> list[dict[str, Any]]:
     return rows
 
 
-def uncertain_readings(ds: xr.Dataset, plane: str) -> dict[str, dict[str, Any]]:
+def uncertain_readings(ds: xr.Dataset, plane: str) -> dict[str, Reading]:
     """Those of `readings` whose standard deviations are reported: all but the best direction."""
     return {name: how for name, how in readings(ds, plane).items() if name != "best"}
 

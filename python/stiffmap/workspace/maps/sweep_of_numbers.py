@@ -78,7 +78,6 @@ def design_sweep(
     for address in axes:
         known_values(machine.description.declared or machine.description, address)
     given = None if position is None else trailing(position, (3,), "position", "positions (m)")
-    options = {"rotation": rotation, "point": point, "gravity": gravity, "method": method, "threads": threads}
     cells: dict[tuple[int, ...], dict[str, np.ndarray]] = {}
     problems: dict[tuple[int, ...], str] = {}
     every = list(itertools.product(*(range(a.size) for a in axes.values())))
@@ -90,7 +89,9 @@ def design_sweep(
             problems[index] = str(problem)
             continue
         here = made.description.home.p if given is None else given
-        s = made.solve(here, wrench, **options)  # type: ignore[arg-type]
+        s = made.solve(
+            here, wrench, rotation=rotation, point=point, gravity=gravity, method=method, threads=threads
+        )
         cells[index] = {
             "displacement": s.displacement,
             "compliance": s.compliance,

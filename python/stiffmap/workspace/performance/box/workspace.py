@@ -141,9 +141,10 @@ def workspace_volume(
 
 
 def _begun(machine: Machine, region: ArrayLike | None, axes: list[int]) -> tuple[Floats, Floats]:
-    low, high = machine.workspace if region is None else read_region(region, axes)
     if region is not None:
+        low, high = read_region(region, axes)
         return low, high
+    low, high = machine.workspace
     centre, half = (low + high) / 2, (high - low) / 2
     moves = np.isin(np.arange(3), axes)
     half = np.where(half == 0, half.max(), half)

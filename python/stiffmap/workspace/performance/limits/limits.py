@@ -129,9 +129,11 @@ class Bounds:
         limits: list[Limit] = []
         if self.transmission is not None:
             limits.extend(self._factors(k, closed))
-        limits.extend(self.intervals(k.coordinates))
+        for index, name, sign, most in self.intervals_wanted:
+            limits.append(plain(name, sign * k.coordinates[:, index], most))
         if self.clearance is not None:
-            limits.append(self._clearance(k))
+            value = -self.bars.least_distance(k.coordinates)
+            limits.append(plain("clearance of bars", value, -self.clearance))
         if self.deflection is not None:
             limits.append(self._deflection(position, closed))
         return limits
@@ -196,15 +198,6 @@ class Bounds:
                 ends = ((1.0, high), (-1.0, -low))
                 out += [(i, name, sign, most) for sign, most in ends if abs(most) < UNLIMITED]
         return out
-
-    def intervals(self, x: Floats) -> list[Limit]:
-        """Ranges of drives and limits of joints at coordinates (n, coordinates)."""
-        return [plain(name, sign * x[:, index], most) for index, name, sign, most in self.intervals_wanted]
-
-    def _clearance(self, k: DriveKinematics) -> Limit:
-        assert self.clearance is not None
-        value = -self.bars.least_distance(k.coordinates)
-        return plain("clearance of bars", value, -self.clearance)
 
     def _deflection(self, position: Floats, closed: NDArray[np.bool_]) -> Limit:
         assert self.deflection is not None
