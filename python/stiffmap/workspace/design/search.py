@@ -9,7 +9,7 @@ from contextlib import nullcontext
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
@@ -24,6 +24,9 @@ from stiffmap.model.files.shipped import find
 from stiffmap.workspace.design.judging import IMPOSSIBLE, Judged, judge
 from stiffmap.workspace.design.problem import DesignProblem, load_design
 from stiffmap.workspace.performance.registry import get_measure
+
+if TYPE_CHECKING:
+    from pymoo.core.algorithm import Algorithm
 
 
 class Evaluations:
@@ -263,7 +266,7 @@ def _hypervolume(judged: list[Judged]) -> Callable[[Floats], float] | None:
     return lambda values: float(indicator((values - low) / span))
 
 
-def _algorithm(problem: DesignProblem, generations: int) -> Any:
+def _algorithm(problem: DesignProblem, generations: int) -> Algorithm:
     with needed("design", "design"):
         from pymoo.algorithms.moo.nsga2 import NSGA2
         from pymoo.algorithms.moo.nsga3 import NSGA3

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -148,30 +149,17 @@ class Tiles:
     """Rows of a plane."""
     height: int
 
-    @property
-    def per_plane(self) -> int:
-        """Tiles of one plane."""
-        return -(-self.rows // self.height)
-
-    @property
-    def count(self) -> int:
-        """Tiles of the map."""
-        return self.planes * self.per_plane
+    @cached_property
+    def parts(self) -> list[slice]:
+        """Rows of every tile, counted over the whole map."""
+        planes = [slice(z * self.rows, (z + 1) * self.rows) for z in range(self.planes)]
+        return [part for plane in planes for part in blocks_of(plane, 1, self.height)]
 
     def place(self, index: int) -> tuple[int, slice]:
         """Plane and rows of it (indices of z and y)."""
-        plane, part = divmod(index, self.per_plane)
-        return plane, slice(part * self.height, min((part + 1) * self.height, self.rows))
-
-    def rows_of(self, index: int) -> slice:
-        """Rows counted over the whole map."""
-        plane, y = self.place(index)
-        return slice(plane * self.rows + y.start, plane * self.rows + y.stop)
-
-    @property
-    def parts(self) -> list[slice]:
-        """Rows of every tile."""
-        return [self.rows_of(i) for i in range(self.count)]
+        part = self.parts[index]
+        plane, first = divmod(part.start, self.rows)
+        return plane, slice(first, first + part.stop - part.start)
 
 
 def tiles_of(plan: MapPlan) -> Tiles:

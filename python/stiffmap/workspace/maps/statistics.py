@@ -67,7 +67,7 @@ def map_statistics(
     tiles, work = tiles_of(plan), work_of(chunk, scheduler)
     found = {v.name: _Deflection(plan, tiles, v) for v in plan.variables if DEFLECTION.fullmatch(v.name)}
     counts = np.zeros((plan.z.size, len(plan.wrenches), len(Status)), dtype=np.int64)
-    for index, values in track(work.solved(plan, tiles.parts), tiles.count, "map", progress):
+    for index, values in track(work.solved(plan, tiles.parts), len(tiles.parts), "map", progress):
         for name, one in found.items():
             one.add(index, values[name])
         plane, _ = tiles.place(index)
