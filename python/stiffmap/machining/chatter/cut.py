@@ -6,26 +6,23 @@ Axes: feed, normal (left of the feed, seen against the tool), tool axis from hol
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from math import pi
-from os import PathLike
-from typing import Any
 
 import numpy as np
 
 from stiffmap.common.broadcasting import Floats, real_number, thread_count, whole_number
 from stiffmap.common.errors import StiffmapError
 from stiffmap.machining.chatter.modes import ToolModes, mode_rows
-from stiffmap.machining.process import EndMill, Process, load_process
+from stiffmap.machining.process.description import EndMill, Process
+from stiffmap.machining.process.load import GivenProcess, as_process
 from stiffmap.machining.process.mean import own_arc, with_coefficients
 from stiffmap.solve.compiled import multipliers
-
-GivenProcess = Process | str | PathLike[str] | Mapping[str, Any]
 
 
 def milling_process(process: GivenProcess) -> Process:
     """The process with a law of chips; StiffmapError where its tool has no teeth, since nothing then regenerates."""
-    p = with_coefficients(process if isinstance(process, Process) else load_process(process))
+    p = with_coefficients(as_process(process))
     if not p.tool.teeth or not isinstance(p.law, EndMill):
         raise StiffmapError(
             f"process {p.name}: a coated tool has no teeth whose passes a chip could remember; stability lobes "
@@ -96,7 +93,7 @@ INTERVALS = 80
 
 
 def floquet_multiplier(
-    modes: ToolModes | Iterable[Any],
+    modes: ToolModes | Iterable[object],
     process: GivenProcess,
     speed: float | str | None = None,
     depth: float | None = None,

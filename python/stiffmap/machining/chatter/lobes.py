@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from stiffmap.common.broadcasting import Floats, real_array, whole_number
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.tasks import workers
-from stiffmap.machining.chatter.cut import GivenProcess, cut_axes, milling_process, multiplier_map
+from stiffmap.machining.chatter.cut import cut_axes, milling_process, multiplier_map
 from stiffmap.machining.chatter.modes import ToolModes, mode_rows, modes_of_machine
 from stiffmap.machining.chatter.zero_order import (
     FEED,
@@ -25,7 +25,8 @@ from stiffmap.machining.chatter.zero_order import (
     least_depth,
     limits,
 )
-from stiffmap.machining.process import Process
+from stiffmap.machining.process.description import Process
+from stiffmap.machining.process.load import GivenProcess
 from stiffmap.solve.machine import Machine, as_machine
 from stiffmap.solve.options import keywords_of
 from stiffmap.workspace.vibration.modes import tip_modes
@@ -43,9 +44,12 @@ HIGHEST = 4.0
 """Top of a diagram, as a multiple of the least limit."""
 
 
+GivenModes = Machine | str | PathLike[str] | ToolModes | Iterable[object]
+
+
 @keywords_of(tip_modes)
 def stability_lobes(
-    machine: Machine | str | PathLike[str] | ToolModes | Iterable[Any],
+    machine: GivenModes,
     process: GivenProcess,
     position: ArrayLike | None = None,
     *,
@@ -54,11 +58,11 @@ def stability_lobes(
     diagram: tuple[int, int] = (SPEEDS, DEPTHS),
     feed: ArrayLike | None = None,
     tool: ArrayLike | None = None,
-    also: Iterable[Any] = (),
+    also: Iterable[object] = (),
     method: str = "semi-discretization",
     intervals: int | None = None,
     threads: int | None = None,
-    scheduler: Any = None,
+    scheduler: object = None,
     **pose: Any,
 ) -> xr.Dataset:
     """Stability of a cut over speeds of the spindle and depths.
@@ -186,7 +190,7 @@ def _limits_at(
 
 
 def _modes(
-    machine: Any, position: ArrayLike | None, axes: Floats, pose: dict[str, Any]
+    machine: GivenModes, position: ArrayLike | None, axes: Floats, pose: dict[str, Any]
 ) -> tuple[ToolModes, str]:
     if not isinstance(machine, Machine | str | PathLike):
         if pose or position is not None:

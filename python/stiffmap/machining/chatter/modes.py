@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -70,7 +69,7 @@ class ToolModes:
         )  # fmt: skip
 
 
-def mode_rows(modes: ToolModes | Iterable[Any]) -> ToolModes:
+def mode_rows(modes: ToolModes | Iterable[object]) -> ToolModes:
     """Rows (frequency Hz, damping ratio, mass kg, direction), the direction x, y, z or a vector; checked."""
     if isinstance(modes, ToolModes):
         return modes
@@ -81,14 +80,13 @@ def mode_rows(modes: ToolModes | Iterable[Any]) -> ToolModes:
     return ToolModes(f, ratio, mass, way, np.zeros((3, 3)))
 
 
-def _row(i: int, row: Any) -> tuple[float, float, float, Floats]:
+def _row(i: int, row: object) -> tuple[float, float, float, Floats]:
     name = f"modes, row {i + 1}"
-    try:
-        frequency, ratio, mass, *direction = row
-    except (TypeError, ValueError):
-        raise StiffmapError(f"{name}: expected {ROW}, got {row!r}") from None
-    way = direction[0] if len(direction) == 1 else direction
-    values = [real_number(v, name, "numbers") for v in (frequency, ratio, mass)]
+    given = list(row) if isinstance(row, Iterable) else []
+    if len(given) < 3:
+        raise StiffmapError(f"{name}: expected {ROW}, got {row!r}")
+    way = given[3] if len(given) == 4 else given[3:]
+    values = [real_number(v, name, "numbers") for v in given[:3]]
     for value, what in zip(values, ("a frequency (Hz)", "a damping ratio", "a mass (kg)"), strict=True):
         if not (np.isfinite(value) and value > 0):
             raise StiffmapError(f"{name}: expected {what} above zero, got {value:g}")
@@ -97,7 +95,7 @@ def _row(i: int, row: Any) -> tuple[float, float, float, Floats]:
     return values[0], values[1], values[2], _direction(name, way)
 
 
-def _direction(name: str, way: Any) -> Floats:
+def _direction(name: str, way: object) -> Floats:
     v = np.array(WAYS.get(way, ())) if isinstance(way, str) else real_array(way, name, "a direction")
     if v.shape == (2,):
         v = np.append(v, 0.0)

@@ -11,9 +11,10 @@ from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import Floats, real_array, trailing
 from stiffmap.common.tasks import workers
-from stiffmap.machining.chatter.cut import GivenProcess, cut_axes, milling_process
+from stiffmap.machining.chatter.cut import cut_axes, milling_process
 from stiffmap.machining.chatter.zero_order import FEED, TOOL, frequencies_of, least_depth
-from stiffmap.machining.process import Process
+from stiffmap.machining.process.description import Process
+from stiffmap.machining.process.load import GivenProcess
 from stiffmap.solve.labels import batch_dims
 from stiffmap.solve.machine import Machine, as_machine
 from stiffmap.solve.options import keywords_of
@@ -35,7 +36,7 @@ def vibration_map(
     feed: ArrayLike = FEED,
     tool: ArrayLike = TOOL,
     modes: int = 24,
-    scheduler: Any = None,
+    scheduler: object = None,
     **pose: Any,
 ) -> xr.Dataset:
     """How the machine vibrates over its workspace.

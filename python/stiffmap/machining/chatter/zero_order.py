@@ -6,7 +6,6 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Iterable
 from math import pi
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -14,9 +13,10 @@ from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import Floats, real_array
 from stiffmap.common.errors import StiffmapError, frames_of_this_package
-from stiffmap.machining.chatter.cut import GivenProcess, cut_axes, mean_chips, milling_process, spindle_speed
+from stiffmap.machining.chatter.cut import cut_axes, mean_chips, milling_process, spindle_speed
 from stiffmap.machining.chatter.modes import ToolModes, mode_rows
-from stiffmap.machining.process import Process
+from stiffmap.machining.process.description import Process
+from stiffmap.machining.process.load import GivenProcess
 
 Response = Callable[[Floats], np.ndarray]
 """Receptance (frequencies, 3, 3) m/N in the axes of the cut at (frequencies,) Hz."""
@@ -33,13 +33,13 @@ ZOOMS, AROUND = 4, 400
 
 
 def limiting_depth(
-    receptance: xr.DataArray | ToolModes | Iterable[Any],
+    receptance: xr.DataArray | ToolModes | Iterable[object],
     process: GivenProcess,
     *,
     speed: float | str | None = None,
     feed: ArrayLike = FEED,
     tool: ArrayLike = TOOL,
-) -> Any:
+) -> Floats | float:
     """Depth below which a cut is stable, m: at every speed of the spindle, or at one.
 
     Parameters
@@ -101,7 +101,7 @@ def frequencies_of(own: Floats) -> Floats:
     return np.unique(np.concatenate([close.ravel(), np.geomspace(low, high, 4 * AROUND)]))
 
 
-def least_depth(frequency: Floats, response: Response, process: GivenProcess) -> float:
+def least_depth(frequency: Floats, response: Response, process: Process) -> float:
     """m: least limit of a receptance over all frequencies, first of some (Hz), then ever closer to the least; infinite: none."""
     least = np.inf
     for _ in range(ZOOMS):
@@ -141,7 +141,7 @@ def _between(frequency: Floats, G: np.ndarray) -> tuple[Floats, Response]:
     return frequency, lambda x: G[np.abs(frequency - x[:, None]).argmin(axis=1)]
 
 
-def limits(G: np.ndarray, process: Any) -> tuple[Floats, Floats]:
+def limits(G: np.ndarray, process: Process) -> tuple[Floats, Floats]:
     """(..., frequencies, 2) depth m (infinite: none) and the angle of a wave over a tooth period, rad, of G (..., 3, 3)."""
     seen = G[..., :2, :] @ mean_chips(process)
     trace = seen[..., 0, 0] + seen[..., 1, 1]
@@ -177,7 +177,7 @@ def coupled_growth(m: ToolModes, p: Process, depth: float) -> float:
     return float(np.linalg.eigvals(first).real.max())
 
 
-def coupling_depth(modes: ToolModes | Iterable[Any], process: GivenProcess) -> float:
+def coupling_depth(modes: ToolModes | Iterable[object], process: GivenProcess) -> float:
     """m: least depth at which modes couple with damping, to 1e-6 of it; infinite where there is none up to 1 m."""
     m, p = mode_rows(modes), milling_process(process)
     depths = np.geomspace(1e-6, DEEPEST, 400)

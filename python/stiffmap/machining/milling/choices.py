@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from os import PathLike
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,8 +18,9 @@ from stiffmap.machining.milling.redundancy import Redundancy
 from stiffmap.machining.milling.redundancy import redundancy as best_turns
 from stiffmap.machining.milling.setting import Setting, setting
 from stiffmap.machining.milling.speed import other_side
-from stiffmap.machining.process import Process, load_process
-from stiffmap.machining.toolpath import Box, Placement, Toolpath, box, load_path, sampled
+from stiffmap.machining.process.description import Process
+from stiffmap.machining.process.load import GivenProcess, as_process
+from stiffmap.machining.toolpath import Placement, Toolpath, box, load_path, sampled
 from stiffmap.machining.toolpath.engagement import part_side
 from stiffmap.machining.toolpath.entry import entered_at, outline_of, turned_round
 from stiffmap.solve.machine import Machine
@@ -47,7 +48,8 @@ class Choices:
     path: Toolpath
     process: Process
     place: Placement
-    stock: Box | None
+    stock: Floats | None
+    """(2, 3) m."""
     angle: Floats | None
     """(points,) rad: turn of the tool; None: that of the path, else as at home."""
     placement: Placements | None = None
@@ -58,11 +60,11 @@ class Choices:
 def choices(
     machine: Machine,
     path: Toolpath | str | PathLike[str],
-    process: Process | str | PathLike[str] | Mapping[str, Any],
+    process: GivenProcess,
     *,
     at: ArrayLike | None = None,
     turn: float = 0.0,
-    stock: Box | ArrayLike | None = None,
+    stock: ArrayLike | None = None,
     angle: Floats | None = None,
     size: tuple[float, ...] | None = None,
     offset: Mapping[str, ArrayLike] | None = None,
@@ -78,7 +80,7 @@ def choices(
     threads: int | None,
 ) -> Choices:
     """In this order: the sense, the placement, the entry, the turns; arguments as of `mill`. Raises StiffmapError."""
-    cut = process if isinstance(process, Process) else load_process(process)
+    cut = as_process(process)
     if tolerance is not None:
         if not tolerance > 0:
             raise StiffmapError(f"tolerance: expected a length above zero (m), got {tolerance}")
@@ -98,11 +100,10 @@ def choices(
         p = load_path(path, feed=cut.feed, spindle=cut.spindle, size=size, offsets=shifts, progress=progress)
     if reverse:
         p, cut = turned_round(p), other_side(cut)
-    if stock is not None and not isinstance(stock, Box):
-        corners = np.asarray(stock, dtype=float)
-        if corners.size != 6:
-            raise StiffmapError(f"stock: expected two corners (2, 3) in m, got {corners.shape}")
-        stock = box(corners.ravel()[:3], corners.ravel()[3:])
+    corners = None if stock is None else np.asarray(stock, dtype=float)
+    if corners is not None and corners.size != 6:
+        raise StiffmapError(f"stock: expected two corners (2, 3) in m, got {corners.shape}")
+    block = None if corners is None else box(*corners.reshape(2, 3))
     tried = None
     if place is not None:
         tried = placements(machine, p, cut, count=place, threads=threads, scheduler=scheduler)
@@ -111,7 +112,7 @@ def choices(
 
     def job(path: Toolpath, turns: Floats | None) -> Setting:
         return setting(
-            machine, path, cut, sampled(path, step), path.placed(origin, turn), stock=stock, angle=turns,
+            machine, path, cut, sampled(path, step), path.placed(origin, turn), stock=block, angle=turns,
             thickness=thickness,
         )  # fmt: skip
 
@@ -130,7 +131,7 @@ def choices(
         p = entered_at(p, here.way)
         turns = turned(p)
     return Choices(
-        p, cut, p.placed(origin, turn), stock, angle if turns is None else turns.angle, tried, here, turns
+        p, cut, p.placed(origin, turn), block, angle if turns is None else turns.angle, tried, here, turns
     )
 
 

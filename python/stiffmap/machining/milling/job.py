@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from os import PathLike
 from typing import Any
@@ -21,7 +20,8 @@ from stiffmap.machining.milling.setting import Setting, setting
 from stiffmap.machining.milling.speed import Feeds, best_feeds
 from stiffmap.machining.milling.stability import PathStability, path_stability
 from stiffmap.machining.milling.verify import Run, run
-from stiffmap.machining.process import Process, cutting_force
+from stiffmap.machining.process.force import cutting_force
+from stiffmap.machining.process.load import GivenProcess
 from stiffmap.machining.toolpath import Toolpath, sampled
 from stiffmap.solve.machine import Machine, as_machine
 from stiffmap.solve.options import keywords_of
@@ -65,7 +65,7 @@ class Milled:
 def mill_job(
     machine: Machine,
     path: Toolpath | str | PathLike[str],
-    process: Process | str | PathLike[str] | Mapping[str, Any],
+    process: GivenProcess,
     *,
     true_machine: Machine | str | PathLike[str] | None = None,
     step: float = 2e-3,
@@ -136,7 +136,7 @@ def mill_job(
 def mill(
     machine: Machine | str | PathLike[str],
     path: Toolpath | str | PathLike[str],
-    process: Process | str | PathLike[str] | Mapping[str, Any],
+    process: GivenProcess,
     **options: Any,
 ) -> xr.Dataset:
     """The part as a machine will cut it, and compensated commands.

@@ -12,7 +12,7 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.machining.process.description import Process
 from stiffmap.machining.process.mean import mean_force, widened
-from stiffmap.machining.toolpath import Box, Placement, Points, Toolpath, engagement
+from stiffmap.machining.toolpath import Placement, Points, Toolpath, engagement
 from stiffmap.machining.toolpath.engagement import Engagement, part_side
 from stiffmap.solve.machine import Machine
 
@@ -107,7 +107,7 @@ def setting(
     points: Points,
     place: Placement,
     *,
-    stock: Box | None = None,
+    stock: Floats | None = None,
     thickness: float | None = None,
     angle: Floats | None = None,
     scale: float = 1.0,

@@ -3,19 +3,16 @@ its mean, peak, harmonics, what it needs of the spindle."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from math import pi, tan
-from os import PathLike
-from typing import Any
 
 import numpy as np
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.short import short_repr
 from stiffmap.machining.process.description import EndMill, Process
-from stiffmap.machining.process.load import load_process
+from stiffmap.machining.process.load import GivenProcess, as_process
 from stiffmap.machining.process.mean import mean_force, own_arc, slopes, tangential_force, with_coefficients
 
 STEPS = 720
@@ -156,14 +153,13 @@ class CuttingForce:
         return self.order * self.spindle_frequency
 
 
-def cutting_force(process: Process | str | PathLike[str] | Mapping[str, Any]) -> CuttingForce:
+def cutting_force(process: GivenProcess) -> CuttingForce:
     """Force of a process, or of the shipped one or file of that name.
 
     `mean` is the closed form where no tooth leaves the cut, a quadrature where run-out lifts one out of it.
     Raises FileError for a process file that cannot be used.
     """
-    given = process if isinstance(process, Process) else load_process(process)
-    p = with_coefficients(given)
+    p = with_coefficients(as_process(process))
     lifted = leaves_cut(p)
     mean = mean_with_runout(p) if lifted else mean_force(p, p.cut.radial, p.cut.axial)
     angle, force = revolution(p)

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
-from typing import Any
 
 from stiffmap.common.errors import FileError, StiffmapError, refuse_folder, suggestion
 from stiffmap.common.yaml_text import Document, read
 from stiffmap.machining.process.build import process_of
 from stiffmap.machining.process.description import Process
 
+GivenProcess = Process | str | PathLike[str] | Mapping[str, object]
 FOLDER = Path(__file__).with_name("library")
 
 
@@ -20,7 +20,12 @@ def process_names() -> list[str]:
     return sorted(p.stem for p in FOLDER.glob("*.yaml"))
 
 
-def load_process(source: str | PathLike[str] | Mapping[str, Any]) -> Process:
+def as_process(given: GivenProcess) -> Process:
+    """The process itself, or the one that `load_process` finds."""
+    return given if isinstance(given, Process) else load_process(given)
+
+
+def load_process(source: str | PathLike[str] | Mapping[str, object]) -> Process:
     """A process by its shipped name (``trimming``, ``slot``), from a file, or from a mapping with the file's keys.
 
     Numbers carry units there (docs/milling.md); the result is in SI. Raises FileError naming file, line, key,

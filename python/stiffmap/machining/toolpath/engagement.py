@@ -19,20 +19,12 @@ OUTMOST = np.radians(170.0)
 """Of an outside corner; a way back is none."""
 
 
-@dataclass(frozen=True, eq=False)
-class Box:
-    """Stock as a box: (3,) m lowest and highest corner, axes of the part."""
-
-    low: Floats
-    high: Floats
-
-
-def box(low: ArrayLike, high: ArrayLike) -> Box:
-    """Checked corners, m."""
+def box(low: ArrayLike, high: ArrayLike) -> Floats:
+    """(2, 3) m: stock by its lowest and its highest corner (3,), axes of the part; checked."""
     a, b = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
     if a.shape != (3,) or b.shape != (3,) or not (a < b).all():
         raise StiffmapError(f"stock: expected two corners (3,) in m, the lower first; got {low!r}, {high!r}")
-    return Box(a, b)
+    return np.stack([a, b])
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +49,11 @@ def part_side(process: Process) -> float:
 
 
 def engagement(
-    points: Points, path: Toolpath, process: Process, stock: Box | None = None, thickness: float | None = None
+    points: Points,
+    path: Toolpath,
+    process: Process,
+    stock: Floats | None = None,
+    thickness: float | None = None,
 ) -> Engagement:
     """Width and depth at each point: the process's own, or a `thickness` to trim (m), or what a box of stock holds."""
     m = len(points)
@@ -95,17 +91,17 @@ def _over_contact(points: Points, process: Process, curvature: Floats) -> Floats
     return np.where(length > 1e-7, np.clip(mean, curvature.min(), curvature.max()), curvature)
 
 
-def _in_box(points: Points, process: Process, stock: Box, side: float) -> tuple[Floats, Floats]:
+def _in_box(points: Points, process: Process, stock: Floats, side: float) -> tuple[Floats, Floats]:
     """From the wall of the part away from it until the stock ends; from the tip up to its top."""
-    out = -side * points.normal
+    out, (low, high) = -side * points.normal, stock
     wall = points.position - process.tool.diameter / 2 * out
     with np.errstate(divide="ignore", invalid="ignore"):
-        t = np.stack([(stock.low - wall) / out, (stock.high - wall) / out])
+        t = np.stack([(low - wall) / out, (high - wall) / out])
     far = np.where(np.abs(out) < 1e-12, np.inf, t.max(axis=0)).min(axis=1)
     near = np.where(np.abs(out) < 1e-12, -np.inf, t.min(axis=0)).max(axis=1)
-    inside = ((wall >= stock.low - 1e-9) & (wall <= stock.high + 1e-9)) | (np.abs(out) > 1e-12)
+    inside = ((wall >= low - 1e-9) & (wall <= high + 1e-9)) | (np.abs(out) > 1e-12)
     width = np.where(inside[:, :2].all(axis=1), far - np.maximum(near, 0.0), 0.0)
-    height = (stock.high[2] - points.position[:, 2]).clip(0.0, stock.high[2] - stock.low[2])
+    height = (high[2] - points.position[:, 2]).clip(0.0, high[2] - low[2])
     return width.clip(0.0), height.clip(0.0, process.cut.axial)
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,7 +45,7 @@ class Points:
     def __len__(self) -> int:
         return len(self.move)
 
-    def only(self, chosen: NDArray[Any]) -> Points:
+    def only(self, chosen: NDArray[np.bool_] | Integers) -> Points:
         """Some of the points, by a mask (m,) or by their numbers."""
         return Points(*(getattr(self, f.name)[chosen] for f in fields(self)))
 

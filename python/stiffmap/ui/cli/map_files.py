@@ -41,7 +41,9 @@ def map_figures(result: MapSummary, own_scales: bool) -> dict[str, Figure]:
     from stiffmap.ui.plot import map_figure
 
     return {
-        n: map_figure(result.ds, tolerance=result.tolerance, common_scale=not own_scales, **how)
+        n: map_figure(
+            result.ds, how.variable, case=how.case, tolerance=result.tolerance, common_scale=not own_scales
+        )
         for n, how in readings(result.ds, result.plane).items()
     }
 

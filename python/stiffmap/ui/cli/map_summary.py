@@ -141,8 +141,8 @@ def deviation_figures(ds: xr.Dataset, plane: str) -> Iterator[tuple[str, Any]]:
     from stiffmap.ui.plot import map_figure
 
     for name, how in uncertain_readings(ds, plane).items():
-        own = {**how, "variable": f"{how['variable']}_std"}
-        yield f"map-{name}-std.png", map_figure(ds, **own, tolerance=None)
+        figure = map_figure(ds, f"{how.variable}_std", case=how.case, tolerance=None)
+        yield f"map-{name}-std.png", figure
 
 
 def in_words(worst: dict[str, Any]) -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import yaml
@@ -37,9 +36,9 @@ class ChosenDesign:
     robust: Robustness | None
     table: MeasuresTable
 
-    def as_plain(self) -> dict[str, Any]:
+    def as_plain(self) -> dict[str, object]:
         """Data of JSON, SI."""
-        out: dict[str, Any] = {
+        out: dict[str, object] = {
             "found": self.found.values,
             "refined": self.judged.values,
             "x": self.x.tolist(),
@@ -63,7 +62,7 @@ class ComparedDesigns:
         """All of them by name."""
         return {**self.others, **{name: c.table for name, c in self.chosen.items()}}
 
-    def as_plain(self) -> dict[str, Any]:
+    def as_plain(self) -> dict[str, object]:
         """Data of JSON, SI."""
         return {
             "chosen": {name: t.as_plain() for name, t in self.tables.items()},

@@ -44,7 +44,7 @@ def steps(place: str) -> list[str | int | tuple[str, str]]:
     return out
 
 
-def edited(data: Any, values: dict[str, float]) -> Any:
+def edited(data: object, values: dict[str, float]) -> Any:
     """A machine file's data with these numbers (place: value); StiffmapError names the step that is not there."""
     data = unshared(data)
     for place, value in values.items():
@@ -52,16 +52,17 @@ def edited(data: Any, values: dict[str, float]) -> Any:
     return data
 
 
-def indices(data: Any, place: str) -> tuple[str | int, ...]:
+def indices(data: object, place: str) -> tuple[str | int, ...]:
     """The place as keys and numbers alone; StiffmapError names the step that is not there."""
-    at, out = data, list[str | int]()
+    at: Any = data
+    out: list[str | int] = []
     for step in steps(place):
         out.append(_key(at, step, place))
         at = at[out[-1]]
     return tuple(out)
 
 
-def _key(at: Any, step: str | int | tuple[str, str], place: str) -> Any:
+def _key(at: object, step: str | int | tuple[str, str], place: str) -> str | int:
     if isinstance(step, tuple):
         sort, name = step
         if isinstance(at, dict) and sort in at and isinstance(at[sort], dict | list):
@@ -87,14 +88,14 @@ def _key(at: Any, step: str | int | tuple[str, str], place: str) -> Any:
     return step
 
 
-def _elements(at: Any) -> list[str]:
+def _elements(at: object) -> list[str]:
     sorts = ("actuator", "joint", "spring", "body", "offset", "block", "point")
     if not isinstance(at, list):
         return []
     return [f"{s}[{e[s]}]" for e in at if isinstance(e, dict) for s in sorts if s in e]
 
 
-def unshared(data: Any) -> Any:
+def unshared(data: object) -> Any:
     """Anchors of YAML are one object in several places: each place gets its own."""
     if isinstance(data, dict):
         return {k: unshared(v) for k, v in data.items()}
@@ -107,7 +108,7 @@ Address = tuple[str | int, ...]
 _MODEL: TypeAdapter[Any] = TypeAdapter(ElementModel)
 
 
-def described(data: Any, document: Document, file: str) -> MachineDescription:
+def described(data: object, document: Document, file: str) -> MachineDescription:
     """The machine of a file's data, with the lines of its document."""
     return describe_document(Document(data, document.lines), file, Path(file).parent)
 
@@ -139,8 +140,8 @@ class Editor:
         self.context = Context(
             self.file, self.document, Path(self.file).parent, self.base.units, model.materials, Gathered()
         )
-        self.elements: dict[tuple[Address, Address], list[tuple[str, Any]]] = {}
-        self.space: list[tuple[str, Any]] = []
+        self.elements: dict[tuple[Address, Address], list[tuple[str, Address]]] = {}
+        self.space: list[tuple[str, Address]] = []
         for place in places:
             path = indices(data, place)
             if path[0] == "workspace" and len(path) == 3:
@@ -176,14 +177,14 @@ class Editor:
                 legs[name] = replace(legs[name], elements=elements or legs[name].elements)
         return replace(self.base, legs=tuple(legs.values()), workspace=self._workspace(values))
 
-    def _raw(self, at: Address, places: list[tuple[str, Any]], values: dict[str, float]) -> Any:
+    def _raw(self, at: Address, places: list[tuple[str, Address]], values: dict[str, float]) -> Any:
         """A part of the file's data with the numbers of some places, each with the way to it inside the part."""
         raw = unshared(reduce(getitem, at, self.document.data))
         for place, inner in places:
             _set(raw, inner, values[place])
         return raw
 
-    def _element(self, raw: Any, address: Address) -> Element:
+    def _element(self, raw: object, address: Address) -> Element:
         here = self.context.at(*address)
         try:
             return build_element(_MODEL.validate_python(raw), here)

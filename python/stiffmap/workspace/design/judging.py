@@ -12,7 +12,6 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.machine import Machine
 from stiffmap.workspace.design.problem import DesignProblem
-from stiffmap.workspace.maps.inputs import read_box
 from stiffmap.workspace.performance.registry import Case, Measure, get_measure
 from stiffmap.workspace.performance.requirements import Bound
 
@@ -50,7 +49,7 @@ def judge(design: DesignProblem, x: Floats) -> Judged:
 def values_of(design: DesignProblem, machine: Machine) -> dict[str, float]:
     """Worst values of all measures that the design asks for, on the search's nodes, SI."""
     task = design.requirements
-    low, high = read_box(machine, None)
+    low, high = machine.workspace
     if task.box is not None:
         middle, half = (low + high) / 2, np.array(task.box) / 2
         low, high = middle - half, middle + half

@@ -212,19 +212,14 @@ def load_design(path: str | PathLike[str]) -> DesignProblem:
         for name, bound in model.constraints.items()
     )
     design = DesignProblem(file, model, read(machine), str(machine), task, (*task.bounds, *own))
-    _try(design, fail)
-    return design
-
-
-def _try(design: DesignProblem, fail: Any) -> None:
-    """Every expression and place is tried once, in the middle of the bounds."""
     low, high = design.bounds
-    try:
+    try:  # every expression and place once, in the middle of the bounds
         names = design.names((low + high) / 2)
     except StiffmapError as error:
         raise fail(str(error), "derived") from None
-    for place, text in design.model.numbers.items():
+    for place, text in model.numbers.items():
         try:
             edited(design.document.data, {place: evaluate(text, names)})
         except StiffmapError as error:
             raise fail(str(error), "numbers", place) from None
+    return design

@@ -36,7 +36,7 @@ class Robustness:
     draws: int
 
 
-def robustness(design: DesignProblem, x: Floats, *, draws: int = DRAWS, seed: int = 0) -> Robustness | None:
+def robustness(design: DesignProblem, x: Floats, *, draws: int = DRAWS) -> Robustness | None:
     """Of a vector of variables; None where no number of the machine file has a tolerance.
 
     A tolerance is the standard deviation of a normal distribution. A number of a template is another one in every
@@ -57,7 +57,7 @@ def robustness(design: DesignProblem, x: Floats, *, draws: int = DRAWS, seed: in
 
     pairs = [(at(values + step), at(values - step)) for step in SHARE * np.diag(u)]
     slopes = {n: np.array([(up[n] - down[n]) / (2 * SHARE) for up, down in pairs]) for n in names}
-    rng = random_numbers(seed)
+    rng = random_numbers(0)
     drawn = [at(values + u * rng.standard_normal(len(u))) for _ in range(draws)]
     met = sum(all(violation(b, one[n]) <= 0 for n, b in design.constraints) for one in drawn)
     spread = np.std(np.array([[one[n] for n in names] for one in drawn]), axis=0, ddof=1)
@@ -90,14 +90,14 @@ def _as_built(elements: list[Any]) -> None:
             e["actual"] = frame
 
 
-def _plain(data: Any) -> Any:
+def _plain(data: object) -> Any:
     """Numbers without their tolerances."""
     if isinstance(data, dict):
         return data["value"] if "value" in data else {k: _plain(v) for k, v in data.items()}
     return [_plain(v) for v in data] if isinstance(data, list) else data
 
 
-def _tolerances(data: Any, place: str) -> list[tuple[str, float, float]]:
+def _tolerances(data: object, place: str) -> list[tuple[str, float, float]]:
     """Place, value and tolerance of every number that has one, in the legs."""
     if isinstance(data, dict):
         if "value" in data and "u" in data:

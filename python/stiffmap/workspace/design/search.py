@@ -9,7 +9,7 @@ from contextlib import nullcontext
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
@@ -24,6 +24,9 @@ from stiffmap.model.files.shipped import find
 from stiffmap.workspace.design.judging import IMPOSSIBLE, Judged, judge
 from stiffmap.workspace.design.problem import DesignProblem, load_design
 from stiffmap.workspace.performance.registry import get_measure
+
+if TYPE_CHECKING:
+    from pymoo.core.algorithm import Algorithm
 
 
 class Evaluations:
@@ -74,7 +77,7 @@ class Evaluations:
 
     def add(self, x: Floats, judged: list[Judged]) -> None:
         """Keep, and write at once."""
-        lines: list[dict[str, Any]] = []
+        lines: list[dict[str, object]] = []
         for row, one in zip(x, judged, strict=True):
             self.known[row.tobytes()] = one
             f, g = one.objectives.tolist(), one.violations.tolist()
@@ -192,7 +195,7 @@ def optimize(
         algorithm = _algorithm(problem, count)
         history: list[tuple[int, int, float]] = []
         seen: list[Floats] = []
-        measure: Any = None
+        measure: Callable[[Floats], float] | None = None
         with workers(judge, problem, scheduler=scheduler, processes=thread_count(processes)) as judges:
             while algorithm.has_next():
                 asked = algorithm.ask()
@@ -207,7 +210,7 @@ def optimize(
                 seen.extend(x)
                 measure = measure or _hypervolume([kept.get(r) for r in seen])
                 good = [kept.get(r) for r in seen if feasible(kept.get(r))]
-                volume = float(measure(np.array([j.objectives for j in good]))) if good and measure else 0.0
+                volume = measure(np.array([j.objectives for j in good])) if good and measure else 0.0
                 history.append((len(history) + 1, len(seen), volume))
                 if progress is not None:
                     progress(len(history), len(seen), volume, len(good))
@@ -250,7 +253,7 @@ def _shortfall(problem: DesignProblem, judged: list[Judged]) -> str:
     return f"{problem.file}: none of {len(judged)} designs meets all constraints; the nearest one misses: {'; '.join(parts)}"
 
 
-def _hypervolume(judged: list[Judged]) -> Any:
+def _hypervolume(judged: list[Judged]) -> Callable[[Floats], float] | None:
     """Measure with the first generation's feasible designs as scale, or None while there are none."""
     from pymoo.indicators.hv import HV
 
@@ -260,10 +263,10 @@ def _hypervolume(judged: list[Judged]) -> Any:
     low, high = f.min(axis=0), f.max(axis=0)
     span = np.where(high > low, high - low, 1.0)
     indicator = HV(ref_point=np.full(f.shape[1], 1.1))
-    return lambda values: indicator((values - low) / span)
+    return lambda values: float(indicator((values - low) / span))
 
 
-def _algorithm(problem: DesignProblem, generations: int) -> Any:
+def _algorithm(problem: DesignProblem, generations: int) -> Algorithm:
     with needed("design", "design"):
         from pymoo.algorithms.moo.nsga2 import NSGA2
         from pymoo.algorithms.moo.nsga3 import NSGA3

@@ -5,9 +5,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from stiffmap.common.broadcasting import Floats, whole_number
 from stiffmap.common.tasks import workers
@@ -21,7 +22,7 @@ from stiffmap.workspace.maps.plan import BEYOND, MapPlan
 from stiffmap.workspace.maps.uncertainty import Uncertain
 
 
-def solve_block(plan: MapPlan, rows: slice) -> dict[str, Any]:
+def solve_block(plan: MapPlan, rows: slice) -> dict[str, np.ndarray]:
     """Every variable of some rows, shaped (poses, ...)."""
     position = plan.positions(rows)
     out = _loads(plan, position)
@@ -53,9 +54,9 @@ def solve_block(plan: MapPlan, rows: slice) -> dict[str, Any]:
     return out
 
 
-def _loads(plan: MapPlan, position: Floats) -> dict[str, Any]:
+def _loads(plan: MapPlan, position: Floats) -> dict[str, np.ndarray]:
     s = plan.loading.solve(position[:, None], plan.wrenches, stiffness=plan.compliance)
-    out: dict[str, Any] = {
+    out: dict[str, np.ndarray] = {
         **deflections(without_failed(s.displacement, s.status), plan.shown_plane),
         "status": s.status,
         "flags": s.flags,
@@ -65,7 +66,7 @@ def _loads(plan: MapPlan, position: Floats) -> dict[str, Any]:
     return out
 
 
-def _beyond(plan: MapPlan, covered: Validity, position: Floats) -> Any:
+def _beyond(plan: MapPlan, covered: Validity, position: Floats) -> NDArray[np.uint8]:
     """(poses, cases)."""
     machine = plan.loading.machine
     r = plan.loading.options.rotation
@@ -75,7 +76,7 @@ def _beyond(plan: MapPlan, covered: Validity, position: Floats) -> Any:
     return np.stack(each, axis=-1).astype(np.uint8)
 
 
-def load_deviations(plan: MapPlan, uncertain: Uncertain, position: Floats) -> dict[str, Any]:
+def load_deviations(plan: MapPlan, uncertain: Uncertain, position: Floats) -> dict[str, np.ndarray]:
     """Standard deviations under the load cases, at positions (poses, 3)."""
     s, j = sensitivities(plan.loading, uncertain, position[:, None], plan.wrenches)
     d = without_failed(s.displacement, s.status)
@@ -92,8 +93,8 @@ def load_deviations(plan: MapPlan, uncertain: Uncertain, position: Floats) -> di
 
 
 def worst_deviations(
-    plan: MapPlan, uncertain: Uncertain, position: Floats, extremes: dict[str, Any]
-) -> dict[str, Any]:
+    plan: MapPlan, uncertain: Uncertain, position: Floats, extremes: dict[str, np.ndarray]
+) -> dict[str, np.ndarray]:
     """Standard deviation of the deflection in the worst direction.
 
     The direction itself moves with the numbers, but that adds nothing to first order: it is an extremum.
@@ -148,30 +149,17 @@ class Tiles:
     """Rows of a plane."""
     height: int
 
-    @property
-    def per_plane(self) -> int:
-        """Tiles of one plane."""
-        return -(-self.rows // self.height)
-
-    @property
-    def count(self) -> int:
-        """Tiles of the map."""
-        return self.planes * self.per_plane
+    @cached_property
+    def parts(self) -> list[slice]:
+        """Rows of every tile, counted over the whole map."""
+        planes = [slice(z * self.rows, (z + 1) * self.rows) for z in range(self.planes)]
+        return [part for plane in planes for part in blocks_of(plane, 1, self.height)]
 
     def place(self, index: int) -> tuple[int, slice]:
         """Plane and rows of it (indices of z and y)."""
-        plane, part = divmod(index, self.per_plane)
-        return plane, slice(part * self.height, min((part + 1) * self.height, self.rows))
-
-    def rows_of(self, index: int) -> slice:
-        """Rows counted over the whole map."""
-        plane, y = self.place(index)
-        return slice(plane * self.rows + y.start, plane * self.rows + y.stop)
-
-    @property
-    def parts(self) -> list[slice]:
-        """Rows of every tile."""
-        return [self.rows_of(i) for i in range(self.count)]
+        part = self.parts[index]
+        plane, first = divmod(part.start, self.rows)
+        return plane, slice(first, first + part.stop - part.start)
 
 
 def tiles_of(plan: MapPlan) -> Tiles:
@@ -186,7 +174,7 @@ def blocks_of(rows: slice, width: int, poses: int) -> list[slice]:
     return [slice(i, min(i + step, rows.stop)) for i in range(rows.start, rows.stop, step)]
 
 
-def solve_rows(plan: MapPlan, rows: slice, poses: int = POSES_AT_ONCE) -> dict[str, Any]:
+def solve_rows(plan: MapPlan, rows: slice, poses: int = POSES_AT_ONCE) -> dict[str, np.ndarray]:
     """Every variable (rows, x, ...) of some rows, solved block by block."""
     parts = [solve_block(plan, block) for block in blocks_of(rows, plan.x.size, poses)]
     shape = (rows.stop - rows.start, plan.x.size)
@@ -201,7 +189,7 @@ class Work:
     """Who solves a map: this process, about so many poses at once, or the workers of a cluster."""
 
     poses: int
-    scheduler: Any = None
+    scheduler: object = None
     """Address of a dask scheduler, or a `distributed.Client`."""
 
     def parts(self, plan: MapPlan) -> list[slice]:
@@ -210,7 +198,7 @@ class Work:
             return blocks_of(slice(0, plan.rows), plan.x.size, self.poses)
         return tiles_of(plan).parts
 
-    def solved(self, plan: MapPlan, parts: Sequence[slice]) -> Iterator[tuple[int, dict[str, Any]]]:
+    def solved(self, plan: MapPlan, parts: Sequence[slice]) -> Iterator[tuple[int, dict[str, np.ndarray]]]:
         """Number and values of each part: in order here, as they come from a cluster."""
         if self.scheduler is None:
             yield from ((i, solve_rows(plan, rows, self.poses)) for i, rows in enumerate(parts))
@@ -224,5 +212,5 @@ def work_of(chunk: int | None, scheduler: object) -> Work:
     return Work(POSES_AT_ONCE if chunk is None else whole_number(chunk, "chunk", 1), scheduler)
 
 
-def _solve(plan: MapPlan, rows: tuple[int, int]) -> dict[str, Any]:
+def _solve(plan: MapPlan, rows: tuple[int, int]) -> dict[str, np.ndarray]:
     return solve_rows(plan, slice(*rows))

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, Unpack
+from typing import Unpack
 
 import numpy as np
 import xarray as xr
@@ -44,6 +44,14 @@ class DirectionSweep:
     """(p, k, 3) m/N: change of the translation with the force's magnitude."""
     status: NDArray[np.uint8]
     """(p, k)."""
+
+    def sizes(self, parts: Parts) -> tuple[Floats, Floats]:
+        """(p, k) m and m/N: norm of these components of the translation, and its change with the force; where there is no
+        translation, the length of its change."""
+        d, growing = self.translation[..., parts], self.growing[..., parts]
+        size = norm(d)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return size, np.where(size > 0, dot(d, growing) / size, norm(growing))
 
     def join(self, other: DirectionSweep) -> DirectionSweep:
         """Directions of both."""
@@ -135,10 +143,8 @@ class TurningForce:
         value = norm(directions.translation[..., parts])
         best = directions.pick(np.argmax(np.where(np.isnan(value), -np.inf, sign * value), axis=1))
         failed = np.isnan(value).any(axis=1)
-        size = norm(best.translation[..., parts])[:, 0]
-        growth = value_growth(best.translation[..., parts], best.growing[..., parts])[:, 0]
-        angle = np.mod(best.angle[:, 0] + np.pi, 2 * np.pi) - np.pi
-        angle, size, growth = (np.where(failed, np.nan, a) for a in (angle, size, growth))
+        angle = np.mod(best.angle + np.pi, 2 * np.pi) - np.pi
+        angle, size, growth = (np.where(failed, np.nan, a[:, 0]) for a in (angle, *best.sizes(parts)))
         return Extreme(angle, size, growth, directions.status.max(axis=1))
 
     def extremes(
@@ -162,8 +168,7 @@ class TurningForce:
             if rows.size == 0:
                 return limit
             f = self.solve(worst.angle[rows, None], limit[rows], rows)
-            value = norm(f.translation[..., parts])[:, 0]
-            growth = value_growth(f.translation[..., parts], f.growing[..., parts])[:, 0]
+            value, growth = (a[:, 0] for a in f.sizes(parts))
             limit[rows] = newton_step(limit[rows], value, growth, tolerance)
             open_[rows] = np.abs(value - tolerance) > CLOSE * tolerance
         return np.where(open_ & (limit > 0), np.nan, limit)
@@ -174,13 +179,6 @@ def newton_step(force: Floats, value: Floats, growth: Floats, tolerance: float) 
     with np.errstate(invalid="ignore", divide="ignore"):
         step = np.where(growth > 0, (tolerance - value) / growth, np.nan)
     return np.asarray(np.maximum(force + step, 0.0))
-
-
-def value_growth(d: Floats, growing: Floats) -> Floats:
-    """Change of |d| with the force; at d = 0 the length of the change itself."""
-    size = norm(d)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return np.where(size > 0, dot(d, growing) / size, norm(growing))
 
 
 def peak_angle(value: Floats, slope: Floats) -> Floats:
@@ -272,8 +270,8 @@ def polar(
     return xr.Dataset(data, coords, describe(loading, "polar diagram", call))
 
 
-def _extremes(force: TurningForce, plane: str, swept: DirectionSweep) -> dict[str, Any]:
-    out = {}
+def _extremes(force: TurningForce, plane: str, swept: DirectionSweep) -> dict[str, object]:
+    out: dict[str, object] = {}
     for suffix, _, worst, best in force.extremes(swept, plane):
         for word, size, e in (("worst", "largest", worst), ("best", "smallest", best)):
             what = f"{size} deflection over the force directions of the {plane} plane"

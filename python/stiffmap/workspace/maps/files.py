@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable, Iterator
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from types import ModuleType
 
 import numpy as np
 import xarray as xr
@@ -66,14 +66,14 @@ def write_zarr(ds: xr.Dataset, folder: Path) -> None:
     named.to_zarr(folder, mode="w", zarr_format=3, consolidated=False)
 
 
-def zarr_package() -> Any:
+def zarr_package() -> ModuleType:
     """The package zarr; MissingPartError where it is absent."""
     with needed("writing Zarr", "zarr"):
         import zarr
     return zarr
 
 
-def _changed(ds: xr.Dataset, kind: str, change: Callable[[xr.Variable], Any]) -> xr.Dataset:
+def _changed(ds: xr.Dataset, kind: str, change: Callable[[xr.Variable], np.ndarray]) -> xr.Dataset:
     """The Dataset with the variables and coordinates of one kind of type changed."""
     new = {n: (v.dims, change(v), v.attrs) for n, v in ds.variables.items() if v.dtype.kind == kind}
     out = ds.assign_coords({n: v for n, v in new.items() if n in ds.coords})
@@ -94,15 +94,16 @@ def partial_folder(path: Path) -> Path:
 
 MICRON, MM = 1e6, 1e3
 LONGEST_CELL = 32767  # characters, of Excel
-LENGTHS = ("deflection", "worst_deflection", "best_deflection")
+LENGTHS = ("worst_deflection", "best_deflection")
+Cell = str | float | None
 ANGLES = ("worst_direction", "best_direction")
 
 
-def map_table(ds: xr.Dataset) -> tuple[list[str], Iterator[list[Any]]]:
+def map_table(ds: xr.Dataset) -> tuple[list[str], Iterator[list[Cell]]]:
     """Names of the columns with their units, and the rows: position in mm, status in words, each case's displacement (µm, µrad)
     and deflection, then what the map has of worst and best directions; a failed pose has empty cells."""
     full = ds.transpose("z", "y", "x", ...)
-    columns: dict[str, Any] = {}
+    columns: dict[str, np.ndarray] = {}
     z, y, x = (np.asarray(full[a].values, dtype=float) for a in "zyx")
     grid = np.meshgrid(z, y, x, indexing="ij")
     for name, values in zip("xyz", reversed(grid), strict=True):
@@ -116,7 +117,7 @@ def map_table(ds: xr.Dataset) -> tuple[list[str], Iterator[list[Any]]]:
             unit = "µm" if k < 3 else "µrad"
             columns[f"{component}{tail}, {unit}"] = MICRON * one.displacement.values[..., k]
         columns |= {f"{n}{tail}, µm": MICRON * v.values for n, v in _like(one, "deflection")}
-    for stem in LENGTHS[1:]:
+    for stem in LENGTHS:
         columns |= {f"{n}, µm": MICRON * v.values for n, v in _like(full, stem)}
     for stem in ANGLES:
         columns |= {f"{n}, deg": np.degrees(v.values) for n, v in _like(full, stem) if v.ndim == 3}
@@ -124,13 +125,13 @@ def map_table(ds: xr.Dataset) -> tuple[list[str], Iterator[list[Any]]]:
     return list(columns), map(list, zip(*(_cells(n, np.ravel(v)) for n, v in columns.items()), strict=True))
 
 
-def _like(ds: xr.Dataset, stem: str) -> list[tuple[str, Any]]:
+def _like(ds: xr.Dataset, stem: str) -> list[tuple[str, xr.DataArray]]:
     """Variables of one stem: whole, in the plane; not their deviations."""
     names = [str(n) for n in ds.data_vars if n == stem or str(n).startswith(f"{stem}_")]
     return [(n, ds[n]) for n in names if not n.endswith("_std")]
 
 
-def _cells(name: str, values: Any) -> Iterator[Any]:
+def _cells(name: str, values: np.ndarray) -> Iterator[Cell]:
     """Of one column (n,)."""
     if name.startswith("status"):
         return (Status(int(v)).name.lower() for v in values)
@@ -153,7 +154,7 @@ def write_map_table(ds: xr.Dataset, path: str | PathLike[str]) -> Path:
     raise StiffmapError(f"{target.name}: expected .csv or .xlsx")
 
 
-def _write_xlsx(ds: xr.Dataset, target: Path, names: list[str], rows: Iterator[list[Any]]) -> Path:
+def _write_xlsx(ds: xr.Dataset, target: Path, names: list[str], rows: Iterator[list[Cell]]) -> Path:
     with needed("writing Excel files", "excel"):
         from openpyxl import Workbook
         from openpyxl.cell import WriteOnlyCell

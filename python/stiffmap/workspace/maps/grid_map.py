@@ -34,7 +34,7 @@ def error_map(
     progress: bool | None = None,
     out: str | PathLike[str] | None = None,
     resume: bool = False,
-    scheduler: Any = None,
+    scheduler: object = None,
     **call: Any,
 ) -> xr.Dataset:
     """How far the machine is pushed off its commanded position, over a grid of positions.
@@ -142,7 +142,7 @@ def _to_netcdf(plan: MapPlan, out: Path, resume: bool, work: Work, progress: boo
 def _to_zarr(plan: MapPlan, out: Path, resume: bool, work: Work, progress: bool | None) -> None:
     store = open_zarr_map(plan, partial_folder(out), resume)
     missing = np.flatnonzero(~store.done).tolist()
-    parts = [store.tiles.rows_of(i) for i in missing]
+    parts = [store.tiles.parts[i] for i in missing]
     for number, values in track(work.solved(plan, parts), len(parts), "map", progress):
         store.put(missing[number], values)
     store.finish(out)

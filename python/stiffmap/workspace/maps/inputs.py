@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,18 +16,14 @@ PLANES = {"xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
 
 def axis(values: ArrayLike, name: str) -> Floats:
     """One axis of a grid (m): finite numbers, none twice, at least one."""
-    out = _numbers(values, name)
+    out = number_list(values, name)
     if len(np.unique(out)) != out.size:
         raise StiffmapError(f"{name}: expected different numbers, got one of them twice")
     return out
 
 
-def force_list(values: ArrayLike) -> Floats:
-    """Force magnitudes (N) of a sweep; a negative one acts against the direction."""
-    return _numbers(values, "forces")
-
-
-def _numbers(values: ArrayLike, name: str) -> Floats:
+def number_list(values: ArrayLike, name: str) -> Floats:
+    """(n,) finite numbers, at least one."""
     out = np.atleast_1d(real_array(values, name))
     if out.ndim != 1:
         raise StiffmapError(f"{name}: expected one axis of numbers, got shape {out.shape}")
@@ -114,13 +109,15 @@ POINTS = 51
 """Along each edge of a plane."""
 
 
-def grid_of(machine: Machine, given: Mapping[str, ArrayLike | None], points: int = POINTS) -> dict[str, Any]:
+def grid_of(
+    machine: Machine, given: Mapping[str, ArrayLike | None], points: int = POINTS
+) -> dict[str, ArrayLike]:
     """Axes (m) x, y, z: those given, the others over the workspace.
 
     A coordinate that is not commanded has one value, its home; planes lie at three heights where none is named. StiffmapError where an
     axis is wanted of a machine without a workspace.
     """
-    out: dict[str, Any] = {a: v for a, v in given.items() if v is not None}
+    out: dict[str, ArrayLike] = {a: v for a, v in given.items() if v is not None}
     if len(out) == 3:
         return out
     low, high = machine.workspace

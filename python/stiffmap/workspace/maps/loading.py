@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
-from typing import Any, Unpack
+from typing import Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,7 +65,7 @@ def deflections(d: Floats, plane: str) -> dict[str, Floats]:
     }
 
 
-def meanings(plane: str, of: str) -> dict[str, dict[str, Any]]:
+def meanings(plane: str, of: str) -> dict[str, dict[str, object]]:
     """Attributes of `deflections`, of the status of an equilibrium or pose (`of`) and of its flags."""
     return {
         "displacement": meaning(TWIST_UNITS, "displacement of the reference point"),
@@ -76,14 +76,16 @@ def meanings(plane: str, of: str) -> dict[str, dict[str, Any]]:
     }
 
 
-def displaced(dim: str, d: Floats, status: Any, flags: Any, plane: str) -> dict[str, Any]:
+def displaced(
+    dim: str, d: Floats, status: NDArray[np.uint8], flags: NDArray[np.uint32], plane: str
+) -> dict[str, object]:
     """Variables of equilibria along one dimension, displaced by d (n, 6)."""
-    values = deflections(d, plane) | {"status": status, "flags": flags}
+    values: dict[str, np.ndarray] = {**deflections(d, plane), "status": status, "flags": flags}
     attrs = meanings(plane, "the equilibrium")
     return {n: ((dim, "component") if v.ndim == 2 else dim, v, attrs[n]) for n, v in values.items()}
 
 
-def at_place(position: Floats) -> dict[str, Any]:
+def at_place(position: Floats) -> dict[str, object]:
     """Coordinates of a Dataset of equilibria at one commanded position (3,) m."""
     return {
         "component": ("component", np.array(COMPONENTS)),
@@ -92,7 +94,7 @@ def at_place(position: Floats) -> dict[str, Any]:
     }
 
 
-def describe(loading: Loading, title: str, call: dict[str, Any]) -> dict[str, Any]:
+def describe(loading: Loading, title: str, call: dict[str, object]) -> dict[str, object]:
     """Attributes of a Dataset: conventions, machine, version and the call that made it.
 
     The call leaves out what cannot change the numbers: threads, chunks, output path, time of day.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Unpack
 
 import numpy as np
 import xarray as xr
@@ -44,7 +44,7 @@ class Variable:
 
     name: str
     dims: tuple[str, ...]
-    attrs: dict[str, Any]
+    attrs: dict[str, object]
     dtype: str = "f8"
 
 
@@ -139,6 +139,11 @@ class MapPlan:
         grid = np.broadcast_arrays(self.x, self.y[iy, None], self.z[iz, None])
         return np.stack(grid, axis=-1).reshape(-1, 3)
 
+    @property
+    def case(self) -> tuple[str, ...]:
+        """The dimension of the load cases, where there is one."""
+        return () if self.cases is None else ("case",)
+
     @cached_property
     def validity(self) -> Validity | None:
         """What the readings covered that the machine was calibrated by."""
@@ -147,7 +152,7 @@ class MapPlan:
     @cached_property
     def variables(self) -> list[Variable]:
         """The variables that the map will hold."""
-        case = () if self.cases is None else ("case",)
+        case = self.case
         out = load_variables(case, self.shown_plane, self.compliance)
         if self.validity is not None:
             text = "1: joints or load are beyond the readings that the machine was calibrated by"
@@ -158,28 +163,29 @@ class MapPlan:
         return out + (extreme_variables(self.shown_plane, self.tolerance) if self.turning else [])
 
     @cached_property
-    def coords(self) -> dict[str, Any]:
+    def coords(self) -> dict[str, xr.Variable]:
         """Coordinates of the Dataset."""
-        out: dict[str, Any] = {
-            n: (n, getattr(self, n), meaning("m", f"commanded tcp, base {n} axis")) for n in ("z", "y", "x")
-        }
-        out["component"] = ("component", np.array(COMPONENTS))
-        out["wrench_component"] = ("wrench_component", np.array(WRENCH))
+        names: dict[str, Sequence[str]] = {"component": COMPONENTS, "wrench_component": WRENCH}
         if self.uncertain is not None:
-            out["parameter"] = ("parameter", np.array(self.uncertain.names))
-        dims: tuple[str, ...] = ("wrench_component",)
+            names["parameter"] = self.uncertain.names
         if self.cases is not None:
-            out["case"], dims = ("case", np.array(self.cases)), ("case", *dims)
-        w = self.wrenches.reshape([out[d][1].size for d in dims])
-        out["wrench"] = (dims, w, meaning("N (fx, fy, fz), N m (mx, my, mz)", "external wrench"))
-        return out
+            names["case"] = self.cases
+        out = {
+            n: xr.Variable(n, getattr(self, n), meaning("m", f"commanded tcp, base {n} axis")) for n in "zyx"
+        } | {n: xr.Variable(n, np.array(values)) for n, values in names.items()}
+        dims = (*self.case, "wrench_component")
+        w = self.wrenches.reshape([out[d].size for d in dims])
+        meant = meaning("N (fx, fy, fz), N m (mx, my, mz)", "external wrench")
+        return out | {"wrench": xr.Variable(dims, w, meant)}
 
     @cached_property
-    def attrs(self) -> dict[str, Any]:
+    def attrs(self) -> dict[str, object]:
         """Attributes of the Dataset."""
-        call = {n: getattr(self, n) for n in ("x", "y", "z", "compliance")}
-        call |= {"function": "error_map", "wrench": self.wrenches, "cases": self.cases}
-        call |= {"plane": self.shown_plane if self.turning else None, "tolerance": self.tolerance}
+        call: dict[str, object] = {
+            "x": self.x, "y": self.y, "z": self.z, "compliance": self.compliance, "function": "error_map",
+            "wrench": self.wrenches, "cases": self.cases, "plane": self.shown_plane if self.turning else None,
+            "tolerance": self.tolerance,
+        }  # fmt: skip
         call |= {"uncertainty": True} if self.uncertain is not None else {}
         call |= {"force": self.force, "directions": self.directions} if self.turning else {}
         out = describe(self.loading, "error map", call)
@@ -201,9 +207,9 @@ class MapPlan:
 
     def tail(self, v: Variable) -> tuple[int, ...]:
         """Lengths of a variable's own dimensions."""
-        return tuple(self.coords[d][1].size for d in v.dims)
+        return tuple(self.coords[d].size for d in v.dims)
 
-    def dataset(self, arrays: dict[str, Any]) -> xr.Dataset:
+    def dataset(self, arrays: dict[str, np.ndarray]) -> xr.Dataset:
         """Label arrays of shape (rows, x, ...)."""
         data = {
             v.name: (self.dims(v), arrays[v.name].reshape(self.shape + self.tail(v)), v.attrs)
@@ -228,7 +234,7 @@ def map_plan(
     tolerance: float = 0.25e-3,
     compliance: bool = False,
     uncertainty: bool = False,
-    **how: Any,
+    **how: Unpack[LoadingKeywords],
 ) -> MapPlan:
     """The plan of `stiffmap.error_map` with these arguments; `how`: the fields of `Loading`.
 

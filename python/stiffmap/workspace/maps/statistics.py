@@ -33,7 +33,7 @@ def map_statistics(
     percentiles: Sequence[float] = (50, 95, 99),
     chunk: int | None = None,
     progress: bool | None = None,
-    scheduler: Any = None,
+    scheduler: object = None,
     **call: Any,
 ) -> xr.Dataset:
     """Worst values, percentiles and shares within the tolerance of a map, without storing the map.
@@ -67,24 +67,25 @@ def map_statistics(
     tiles, work = tiles_of(plan), work_of(chunk, scheduler)
     found = {v.name: _Deflection(plan, tiles, v) for v in plan.variables if DEFLECTION.fullmatch(v.name)}
     counts = np.zeros((plan.z.size, len(plan.wrenches), len(Status)), dtype=np.int64)
-    for index, values in track(work.solved(plan, tiles.parts), tiles.count, "map", progress):
+    for index, values in track(work.solved(plan, tiles.parts), len(tiles.parts), "map", progress):
         for name, one in found.items():
             one.add(index, values[name])
         plane, _ = tiles.place(index)
         status = values["status"].reshape(-1, len(plan.wrenches))
         counts[plane] += np.stack([(status == s).sum(0) for s in Status], axis=-1)
-    out: dict[str, Any] = {}
+    out: dict[str, object] = {}
     for name, one in found.items():
         out |= one.variables(name, wanted)
-    case = () if plan.cases is None else ("case",)
     out["status_count"] = (
-        ("z", *case, "status"),
-        counts if case else counts[:, 0],
+        ("z", *plan.case, "status"),
+        counts if plan.case else counts[:, 0],
         meaning("1", "poses of each status"),
     )
     coords = {k: v for k, v in plan.coords.items() if k not in ("component", "parameter")}
-    coords |= {"node": ("node", np.array(NODE)), "percentile": ("percentile", wanted)}
-    coords["status"] = ("status", np.array([int(s) for s in Status], dtype=np.uint8), status_attrs("poses"))
+    coords |= {"node": xr.Variable("node", np.array(NODE)), "percentile": xr.Variable("percentile", wanted)}
+    coords["status"] = xr.Variable(
+        "status", np.array([int(s) for s in Status], dtype=np.uint8), status_attrs("poses")
+    )
     bound = f"at most {100 * RELATIVE_WIDTH:.2g} % above the exact value, never below it"
     return xr.Dataset(out, coords, plan.attrs | {"tolerance_m": plan.tolerance, "percentile_bound": bound})
 
@@ -120,7 +121,7 @@ class _Deflection:
             if first or not self.most[plane, c] >= value:
                 self.most[plane, c], self.place[plane, c] = value, place
 
-    def variables(self, name: str, percentiles: Floats) -> dict[str, Any]:
+    def variables(self, name: str, percentiles: Floats) -> dict[str, object]:
         """Variables of the Dataset."""
         p = self.plan
         iy, ix = np.divmod(self.place, p.x.size)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from functools import partial
+from functools import partial, reduce
+from operator import getitem
 from pathlib import Path
 from tokenize import TokenError
-from typing import Any
 
 import numpy as np
 from numpy.lib.format import open_memmap
@@ -33,10 +33,10 @@ LEFT_OUT = (
 LONG = 60
 
 
-def kept_attributes(path: Path, attributes: Callable[[Any], Any] = lambda whole: whole) -> dict[str, Any]:
-    """Attributes of an unfinished map in a JSON file, where `attributes` finds them; FileError where it is damaged."""
+def kept_attributes(path: Path, *keys: str) -> dict[str, object]:
+    """Attributes of an unfinished map in a JSON file, under these keys; FileError where it is damaged."""
     try:
-        kept = attributes(parse_json(path.read_bytes()))
+        kept = reduce(getitem, keys, parse_json(path.read_bytes()))
         if not isinstance(kept, dict) or not isinstance(parse_json(kept["call"]), dict):
             raise TypeError
     except (OSError, ValueError, LookupError, TypeError) as error:
@@ -48,7 +48,7 @@ def kept_attributes(path: Path, attributes: Callable[[Any], Any] = lambda whole:
     return kept
 
 
-def refuse_another_map(folder: Path, kept: Mapping[str, Any], wanted: Mapping[str, Any]) -> None:
+def refuse_another_map(folder: Path, kept: Mapping[str, object], wanted: Mapping[str, object]) -> None:
     """StiffmapError, by what differs, where an unfinished map in `folder` is not the one wanted."""
     found = difference(kept, wanted)
     if found:
@@ -57,14 +57,14 @@ def refuse_another_map(folder: Path, kept: Mapping[str, Any], wanted: Mapping[st
         )
 
 
-def difference(kept: Mapping[str, Any], wanted: Mapping[str, Any]) -> str:
+def difference(kept: Mapping[str, object], wanted: Mapping[str, object]) -> str:
     """What differs between the attributes of two maps, in words; empty: nothing."""
     old, new = _flat(kept), _flat(wanted)
     names = [n for n in {**old, **new} if old.get(n) != new.get(n)]
     return "; ".join(f"{WORDS.get(n, n)} {_both(old.get(n), new.get(n))}" for n in names)
 
 
-def _flat(attrs: Mapping[str, Any]) -> dict[str, Any]:
+def _flat(attrs: Mapping[str, object]) -> dict[str, object]:
     plain = json.loads(json.dumps(dict(attrs), default=lambda v: v.tolist()))
     call = json.loads(plain.pop("call", "{}"))
     return {k: v for k, v in {**plain, **call}.items() if k not in LEFT_OUT}
@@ -86,11 +86,11 @@ UNREADABLE = (OSError, ValueError, TypeError, SyntaxError, TokenError)
 class Store:
     """Arrays (rows, x, ...) of all variables, and which rows are done."""
 
-    def __init__(self, arrays: dict[str, Any], done: NDArray[np.bool_]) -> None:
+    def __init__(self, arrays: dict[str, np.ndarray], done: NDArray[np.bool_]) -> None:
         self.arrays, self.done = arrays, done
         self._waiting: list[slice] = []
 
-    def put(self, rows: slice, block: dict[str, Any]) -> None:
+    def put(self, rows: slice, block: dict[str, np.ndarray]) -> None:
         """Keep a block."""
         for name, values in block.items():
             target = self.arrays[name][rows]
@@ -128,14 +128,14 @@ def folder_store(plan: MapPlan, folder: Path, resume: bool) -> Store:
     return store
 
 
-def _store(plan: MapPlan, array: Callable[[str, str, tuple[int, ...]], Any]) -> Store:
+def _store(plan: MapPlan, array: Callable[[str, str, tuple[int, ...]], np.ndarray]) -> Store:
     """Arrays are made, or found, by name, type and shape."""
     shape = (plan.rows, plan.x.size)
     arrays = {v.name: array(v.name, v.dtype, (*shape, *plan.tail(v))) for v in plan.variables}
     return Store(arrays, array("done", "?", shape[:1]))
 
 
-def _kept(folder: Path, name: str, dtype: str, shape: tuple[int, ...]) -> Any:
+def _kept(folder: Path, name: str, dtype: str, shape: tuple[int, ...]) -> np.ndarray:
     """The array that an earlier run left; FileError where it is none of this map."""
     path, found = folder / f"{name}.npy", "none"
     with suppress(*UNREADABLE):

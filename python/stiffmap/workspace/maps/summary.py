@@ -3,10 +3,11 @@ comes from."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
+from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.number_text import vector_text
@@ -30,18 +31,23 @@ def summary(ds: xr.Dataset, plane: str, tolerance: float) -> list[dict[str, Any]
     ]
 
 
-def readings(ds: xr.Dataset, plane: str) -> dict[str, dict[str, Any]]:
-    """What a map is read for: the worst and the best direction, then its load cases; each with its variable and case."""
-    turned: dict[str, dict[str, Any]] = {
-        w: {"variable": f"{w}_deflection_{plane}"} for w in ("worst", "best")
-    }
-    return turned | {str(c): {"variable": name_of(ds, plane, c), "case": str(c)} for c in ds.case.values}
+class Reading(NamedTuple):
+    """A variable of a map, and the load case where it has one."""
+
+    variable: str
+    case: str | None = None
 
 
-def values_of(ds: xr.Dataset, reading: dict[str, str], suffix: str = "") -> xr.DataArray:
+def readings(ds: xr.Dataset, plane: str) -> dict[str, Reading]:
+    """What a map is read for: the worst and the best direction, then its load cases."""
+    turned = {w: Reading(f"{w}_deflection_{plane}") for w in ("worst", "best")}
+    return turned | {str(c): Reading(name_of(ds, plane, c), str(c)) for c in ds.case.values}
+
+
+def values_of(ds: xr.Dataset, reading: Reading, suffix: str = "") -> xr.DataArray:
     """The values of a reading, or of what is next to it, such as ``_std``."""
-    values = ds[reading["variable"] + suffix]
-    return values.sel(case=reading["case"]) if "case" in reading else values
+    values = ds[reading.variable + suffix]
+    return values if reading.case is None else values.sel(case=reading.case)
 
 
 def name_of(ds: xr.Dataset, plane: str, case: object) -> str:
@@ -70,12 +76,12 @@ def band(ds: xr.Dataset, plane: str) -> list[dict[str, Any]]:
     return rows
 
 
-def uncertain_readings(ds: xr.Dataset, plane: str) -> dict[str, dict[str, Any]]:
+def uncertain_readings(ds: xr.Dataset, plane: str) -> dict[str, Reading]:
     """Those of `readings` whose standard deviations are reported: all but the best direction."""
     return {name: how for name, how in readings(ds, plane).items() if name != "best"}
 
 
-def _deviations(size: Any, std: Any) -> dict[str, float]:
+def _deviations(size: Floats, std: Floats) -> dict[str, float]:
     good = np.isfinite(std) & (size > 0)
     sizes = std[good] if good.any() else np.array([np.nan])
     relative = std[good] / size[good] if good.any() else sizes
@@ -86,7 +92,7 @@ def _deviations(size: Any, std: Any) -> dict[str, float]:
     }
 
 
-def worst_pose(machine: Machine, ds: Any, gravity: Any) -> dict[str, Any] | None:
+def worst_pose(machine: Machine, ds: xr.Dataset, gravity: ArrayLike | None) -> dict[str, Any] | None:
     """The largest deflection of the map: load, position (m), deflection (m), shares of the elements and of their sources.
 
     The load is a case of the map, or the force that turned, in its worst direction there. None where no pose has an
@@ -109,9 +115,9 @@ def worst_pose(machine: Machine, ds: Any, gravity: Any) -> dict[str, Any] | None
     }
 
 
-def _worst(ds: Any) -> tuple[float, str, list[float], Any] | None:
+def _worst(ds: xr.Dataset) -> tuple[float, str, list[float], Floats] | None:
     """Deflection (m), load in words, position (m) and wrench (6,): of a case, or of the directions in which the force turned."""
-    sizes: list[tuple[Any, tuple[str, ...]]] = [(ds.deflection, ("z", "y", "x", "case"))]
+    sizes: list[tuple[xr.DataArray, tuple[str, ...]]] = [(ds.deflection, ("z", "y", "x", "case"))]
     sizes += [(ds.worst_deflection, ("z", "y", "x"))] if "worst_deflection" in ds else []
     largest = [v.isel(v.argmax(axes)) for v, axes in sizes if np.isfinite(v).any()]
     if not largest:

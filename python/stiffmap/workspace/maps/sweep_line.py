@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from typing import Any, Unpack
+from typing import Unpack
 
 import numpy as np
 import xarray as xr
@@ -19,7 +19,7 @@ from stiffmap.solve.machine import Machine, hint_metres, takes_machine
 from stiffmap.solve.options import LoadingKeywords, spelled_out
 from stiffmap.solve.status import Status
 from stiffmap.workspace.maps.fixed_order_sums import dot
-from stiffmap.workspace.maps.inputs import force_list, place, unit
+from stiffmap.workspace.maps.inputs import number_list, place, unit
 from stiffmap.workspace.maps.loading import Loading, at_place, describe, displaced, without_failed
 
 
@@ -69,7 +69,7 @@ def sweep(
         return load_path(loading, p, u, control, reach, steps, cross)
     if limit is not None or cross:
         raise StiffmapError(f"{'cross' if limit is None else 'limit'}: not together with forces")
-    f = force_list(forces)
+    f = number_list(forces, "forces")
     wrench = np.concatenate([f[:, None] * u, np.zeros((f.size, 3))], axis=1)
     s = loading.solve(p, wrench)
     d = without_failed(s.displacement, s.status, keep_unstable=True)
@@ -81,9 +81,11 @@ def sweep(
         "unstable_modes": np.full(f.size, np.nan),
         "branch": np.zeros(f.size, dtype=np.intp),
     }
-    return _dataset(loading, "force sweep", {"position": p, "direction": u, "forces": f}, f, variables, own)
+    return _dataset(loading, "force sweep", p, u, {"forces": f}, f, variables, own)
 
 
+Critical = dict[str, float | Floats]
+"""A critical point of a path: its numbers, its mode and its coordinates, by name."""
 UNITS = {"force": "N", "displacement": "m", "arc": "m"}
 ENDS = (
     "the limit was reached",
@@ -123,8 +125,7 @@ def load_path(
         raise StiffmapError(
             f"cross: the path has {forks} bifurcations, got {cross} (end of the path: {ENDS[end]})"
         )
-    call = {"position": position, "direction": direction, "control": control,
-            "limit": limit, "steps": steps, "cross": cross}  # fmt: skip
+    how: dict[str, object] = {"control": control, "limit": limit, "steps": steps, "cross": cross}
     both = points + crossing
     d = np.array([p["displacement"] for p in both], dtype=float).reshape(-1, 6)
     unstable = np.array([p["unstable"] for p in both], dtype=float)
@@ -139,16 +140,17 @@ def load_path(
     }
     force = np.array([p["load"] for p in both], dtype=float)
     ends = ENDS[end], _crossing_end(cross, critical, crossing, ENDS[crossing_end])
-    title = f"load path by {control}"
-    return _dataset(loading, title, call, force, variables, own, ends, (critical, crossing_critical))
+    title, points_of = f"load path by {control}", (critical, crossing_critical)
+    return _dataset(loading, title, position, direction, how, force, variables, own, ends, points_of)
 
 
-def _crossing_end(cross: int, critical: list[dict[str, Any]], points: list[Any], end: str) -> str:
+def _crossing_end(cross: int, critical: list[Critical], points: Sequence[object], end: str) -> str:
     """Why it ended; at its first point, where several modes leave no single branch to follow."""
     if cross and len(points) == 1:
         fork = [c for c in critical if not c["limit"]][abs(cross) - 1]
-        if abs(fork["after"] - fork["before"]) > 1:
-            return f"not followed: {abs(fork['after'] - fork['before'])} modes at once, no single branch"
+        at_once = int(np.abs(np.subtract(fork["after"], fork["before"])))
+        if at_once > 1:
+            return f"not followed: {at_once} modes at once, no single branch"
     return end
 
 
@@ -180,39 +182,39 @@ MEANINGS = {
 
 
 def _dataset(
-    loading: Loading, title: str, call: dict[str, Any], force: Floats, variables: dict[str, Any], own: dict[str, Any],
-    ends: tuple[str, str] = ("", ""), critical: tuple[Sequence[Any], Sequence[Any]] = ((), ()),
+    loading: Loading, title: str, position: Floats, direction: Floats, how: dict[str, object], force: Floats,
+    variables: dict[str, object], own: dict[str, np.ndarray], ends: tuple[str, str] = ("", ""),
+    critical: tuple[Sequence[Critical], Sequence[Critical]] = ((), ()),
 ) -> xr.Dataset:  # fmt: skip
-    """What `sweep` describes, `own` the variables that only sweeps have; `call` holds position and direction. A path and the
-    branch that crosses it have ends and critical points."""
+    """What `sweep` describes, `own` the variables that only sweeps have. A path and the branch that crosses it have ends and
+    critical points."""
     modes, coordinate = critical_variables(loading.machine, [*critical[0], *critical[1]])
     modes["critical_branch"] = ("critical", np.repeat([0, 1], [len(c) for c in critical]), BRANCH)
-    coords = (
-        coordinate
-        | at_place(call["position"])
-        | {
-            "force": ("step", force, meaning("N", "force along the direction")),
-            "direction": ("axis", call["direction"], meaning("1", "direction of the force, base axes")),
-        }
-    )
-    attrs = describe(loading, title, {"function": "sweep", **call}) | {
+    coords = {
+        **coordinate,
+        **at_place(position),
+        "force": ("step", force, meaning("N", "force along the direction")),
+        "direction": ("axis", direction, meaning("1", "direction of the force, base axes")),
+    }
+    call = {"function": "sweep", "position": position, "direction": direction, **how}
+    points = [{"kind": _kind(c), "force": c["load"], "deflection_along": c["along"]} for c in critical[0]]
+    attrs = describe(loading, title, call) | {
         "failed_poses": "NaN, with their status; unstable ones kept",
         "end": ends[0],
         "crossing_end": ends[1],
-        "critical_points": json.dumps([_summary(c) for c in critical[0]]),
+        "critical_points": json.dumps(points),
     }
     variables |= {name: ("step", values, MEANINGS[name]) for name, values in own.items()}
     return xr.Dataset(variables | modes, coords, attrs)
 
 
-def _summary(c: dict[str, Any]) -> dict[str, Any]:
-    kind = "limit" if c["limit"] else "bifurcation"
-    return {"kind": kind, "force": c["load"], "deflection_along": c["along"]}
+def _kind(c: Critical) -> str:
+    return "limit" if c["limit"] else "bifurcation"
 
 
 def critical_variables(
-    machine: Machine, critical: list[dict[str, Any]]
-) -> tuple[dict[str, Any], dict[str, Any]]:
+    machine: Machine, critical: list[Critical]
+) -> tuple[dict[str, object], dict[str, object]]:
     """Variables and coordinates over the dimensions ``critical`` and ``coordinate``."""
     known = machine.compiled.names
     names = list(known.coordinates)
@@ -224,17 +226,16 @@ def critical_variables(
     sizes = np.abs(modes) * np.where(known.prismatic, 1.0, machine.compiled.length)
     moving = [_joint(names, np.array(known.roles), s) for s in sizes]
     legs = [joint.split(".")[0] for joint in moving]
-    kinds = ["limit" if c["limit"] else "bifurcation" for c in critical]
     what = "limit: the force has an extremum; bifurcation: branches cross"
     wide = ("critical", "coordinate")
-    over = {
+    over: dict[str, object] = {
         "critical_force": ("critical", column("load"), meaning("N", "force at the critical point")),
         "critical_deflection": (
             "critical",
             column("along"),
             meaning("m", "translation along the force there"),
         ),
-        "critical_kind": ("critical", np.array(kinds).astype(str), meaning("", what)),
+        "critical_kind": ("critical", np.array([_kind(c) for c in critical]).astype(str), meaning("", what)),
         "unstable_before": ("critical", column("before").astype(int)),
         "unstable_after": ("critical", column("after").astype(int)),
         "mode_leg": ("critical", np.array([leg if leg in machine.legs else "" for leg in legs]).astype(str)),

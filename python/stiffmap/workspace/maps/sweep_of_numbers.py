@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from stiffmap.common.broadcasting import trailing
+from stiffmap.common.broadcasting import Floats, trailing
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.addresses import known_values
 from stiffmap.solve.compiled import Status
@@ -78,10 +77,8 @@ def design_sweep(
     axes = {address: axis(values, address) for address, values in numbers.items()}
     for address in axes:
         known_values(machine.description.declared or machine.description, address)
-    dims = {address: address.replace("/", ".") for address in axes}
     given = None if position is None else trailing(position, (3,), "position", "positions (m)")
-    options = {"rotation": rotation, "point": point, "gravity": gravity, "method": method, "threads": threads}
-    cells: dict[tuple[int, ...], dict[str, Any]] = {}
+    cells: dict[tuple[int, ...], dict[str, np.ndarray]] = {}
     problems: dict[tuple[int, ...], str] = {}
     every = list(itertools.product(*(range(a.size) for a in axes.values())))
     for index in track(every, len(every), "designs", progress):
@@ -92,7 +89,9 @@ def design_sweep(
             problems[index] = str(problem)
             continue
         here = made.description.home.p if given is None else given
-        s = made.solve(here, wrench, **options)  # type: ignore[arg-type]
+        s = made.solve(
+            here, wrench, rotation=rotation, point=point, gravity=gravity, method=method, threads=threads
+        )
         cells[index] = {
             "displacement": s.displacement,
             "compliance": s.compliance,
@@ -104,10 +103,10 @@ def design_sweep(
         raise StiffmapError(
             f"numbers: no machine can be made of them; the first: {next(iter(problems.values()))}"
         )
-    return _dataset(machine, axes, dims, cells, problems)
+    return _dataset(machine, axes, cells, problems)
 
 
-def _evaluated(evaluate: Evaluate | None, machine: Machine) -> dict[str, Any]:
+def _evaluated(evaluate: Evaluate | None, machine: Machine) -> dict[str, np.ndarray]:
     if evaluate is None:
         return {}
     if not callable(evaluate):
@@ -121,12 +120,12 @@ def _evaluated(evaluate: Evaluate | None, machine: Machine) -> dict[str, Any]:
 
 def _dataset(
     machine: Machine,
-    axes: Mapping[str, Any],
-    dims: Mapping[str, str],
-    cells: Mapping[tuple[int, ...], dict[str, Any]],
+    axes: Mapping[str, Floats],
+    cells: Mapping[tuple[int, ...], dict[str, np.ndarray]],
     problems: Mapping[tuple[int, ...], str],
 ) -> xr.Dataset:
     shape = tuple(a.size for a in axes.values())
+    dims = {address: address.replace("/", ".") for address in axes}
     outer = tuple(dims.values())
     first = next(iter(cells.values()))
     poses = batch_dims(first["status"].ndim)
@@ -137,7 +136,7 @@ def _dataset(
         "status": poses,
     }
     units = {"displacement": TWIST_UNITS, "deflection": "m", "compliance": COMPLIANCE_UNITS}
-    data: dict[str, Any] = {}
+    data: dict[str, object] = {}
     for name, sample in first.items():
         fill = int(Status.UNREACHABLE) if name == "status" else np.nan
         values = np.full(shape + sample.shape, fill, dtype=sample.dtype)

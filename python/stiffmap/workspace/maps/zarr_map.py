@@ -36,9 +36,9 @@ class ZarrMap:
 
     def __init__(self, plan: MapPlan, folder: Path, tiles: Tiles) -> None:
         self.plan, self.folder, self.tiles = plan, folder, tiles
-        self.done: NDArray[np.bool_] = np.zeros(tiles.count, dtype=bool)
+        self.done: NDArray[np.bool_] = np.zeros(len(tiles.parts), dtype=bool)
 
-    def put(self, index: int, values: dict[str, Any]) -> None:
+    def put(self, index: int, values: dict[str, np.ndarray]) -> None:
         """Write a tile's chunks, then its line in the journal. FileError where the disk refuses."""
         plane, y = self.tiles.place(index)
         try:
@@ -48,7 +48,7 @@ class ZarrMap:
             add_lines(self.folder / JOURNAL, [line], flushed=False)
         except OSError as error:
             raise FileError(
-                f"cannot be written: {error.strerror or error}; {int(self.done.sum())} of {self.tiles.count} "
+                f"cannot be written: {error.strerror or error}; {int(self.done.sum())} of {len(self.done)} "
                 "tiles are kept, resume=True (--resume) goes on with them",
                 file=str(self.folder),
             ) from error
@@ -98,7 +98,7 @@ class ZarrMap:
 
         StiffmapError where it belongs to another map, FileError for a chunk that is damaged.
         """
-        kept = kept_attributes(self.folder / "zarr.json", lambda whole: whole["attributes"])
+        kept = kept_attributes(self.folder / "zarr.json", "attributes")
         refuse_another_map(self.folder, kept, self.plan.attrs)
         self._mend_frame()
         for scrap in self.folder.rglob("*.partial"):  # chunks that zarr had not put in their place
@@ -131,7 +131,7 @@ class ZarrMap:
         try:
             entry = parse_json(line)
             index, checks = entry["tile"], entry["crc"]
-            known = type(index) is int and 0 <= index < self.tiles.count and isinstance(checks, dict)
+            known = type(index) is int and 0 <= index < len(self.done) and isinstance(checks, dict)
             if not known or set(checks) != {v.name for v in self.plan.variables}:
                 raise ValueError
         except (KeyError, TypeError, ValueError) as error:

@@ -54,7 +54,7 @@ class Case:
     """m, least distance between members of different legs in the workspace; None: not asked for."""
     deflection: float | None = None
     """m, largest deflection under `force` in `plane` in the workspace; None: not asked for."""
-    scheduler: Any = None
+    scheduler: object = None
     """`distributed.Client` whose workers close `positions` and prove the largest box; None: here."""
 
     @property

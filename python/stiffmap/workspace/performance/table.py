@@ -7,7 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
 from dataclasses import dataclass
 from os import PathLike
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -75,7 +75,7 @@ class MeasuresTable:
         """Whether every requirement holds."""
         return all(row.verdict in ("", "pass") for row in self.rows)
 
-    def as_plain(self) -> dict[str, Any]:
+    def as_plain(self) -> dict[str, object]:
         """The table as plain data, SI; numbers that are not finite stay so."""
         return {
             "machine": self.machine.name,

@@ -6,7 +6,6 @@ import re
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -94,6 +93,8 @@ def _receptance(frequency: Floats, values: Complex, derivatives: int) -> Complex
         return np.asarray(np.where(w == 0, np.nan, values / w**derivatives))
 
 
+DataSet = dict[str, int | float | str | np.ndarray]
+"""A data set of a universal file, as pyuff names its fields."""
 MOTIONS = {8: 0, 11: 1, 12: 2}
 """Of universal files: displacement, velocity, acceleration."""
 WAYS = {0: "", 1: "+x", -1: "-x", 2: "+y", -2: "-y", 3: "+z", -3: "-z", 4: "+rx", 5: "+ry", 6: "+rz", -4: "-rx", -5: "-ry", -6: "-rz"}  # fmt: skip
@@ -120,7 +121,7 @@ def _universal(path: Path) -> list[MeasuredResponse]:
             raise ValueError(f"found {len(marks)} marks -1 for {file.get_n_sets()}: it is cut off")
     except Exception as problem:  # the reader raises whatever its parsing meets
         raise StiffmapError(f"expected a universal file with data sets 58; {problem}") from None
-    base: dict[str, Any] = {}
+    base: DataSet = {}
     functions = []
     for s in sets if isinstance(sets, list) else [sets]:
         if s.get("type") == UNITS:  # those of all that follows
@@ -153,7 +154,7 @@ def _universal(path: Path) -> list[MeasuredResponse]:
     return out
 
 
-def _coherence(ends: list[tuple[str, str]], given: list[dict[str, Any]]) -> list[dict[str, Any] | None]:
+def _coherence(ends: list[tuple[str, str]], given: list[DataSet]) -> list[DataSet | None]:
     """The coherence of each response, by its ends: of several there one after the other, or one for all."""
     of = {e: [c for c in given if _ends(c) == e] for e in ends}
     for e, found in of.items():
@@ -164,7 +165,7 @@ def _coherence(ends: list[tuple[str, str]], given: list[dict[str, Any]]) -> list
     return [of[e][ends[:k].count(e) % len(of[e])] if of[e] else None for k, e in enumerate(ends)]
 
 
-def _hertz(s: dict[str, Any]) -> float:
+def _hertz(s: DataSet) -> float:
     """Hz of one unit of the abscissa."""
     kind, label = int(s.get("abscissa_spec_data_type") or 0), _label(s, "abscissa")
     if kind not in (*UNKNOWN, FREQUENCY):
@@ -174,7 +175,7 @@ def _hertz(s: dict[str, Any]) -> float:
     return FREQUENCIES[label.lower()] if label else 1.0
 
 
-def _in_si(s: dict[str, Any], base: dict[str, Any]) -> tuple[float, int]:
+def _in_si(s: DataSet, base: DataSet) -> tuple[float, int]:
     """What the ordinate is multiplied by to be in SI, and 0, 1, 2 for displacement, velocity, acceleration.
 
     Units that stand at the axes count before those of the file (data set 164), as the format says.
@@ -210,7 +211,7 @@ def _in_si(s: dict[str, Any], base: dict[str, Any]) -> tuple[float, int]:
     return whole.size, found
 
 
-def _unit_of(s: dict[str, Any], axis: str) -> ResponseUnit | None:
+def _unit_of(s: DataSet, axis: str) -> ResponseUnit | None:
     """The unit at an axis; None where there is none."""
     label = _label(s, axis)
     unit = response_unit(label) if label else None
@@ -219,7 +220,7 @@ def _unit_of(s: dict[str, Any], axis: str) -> ResponseUnit | None:
     return unit
 
 
-def _label(s: dict[str, Any], axis: str) -> str:
+def _label(s: DataSet, axis: str) -> str:
     """The unit as it is written at an axis: in its own field, or in brackets after the axis's name."""
     own, name = (str(s.get(f"{axis}_{field}") or "").strip() for field in ("axis_units_lab", "axis_lab"))
     if own.upper() not in ("", "NONE"):
@@ -228,7 +229,7 @@ def _label(s: dict[str, Any], axis: str) -> str:
     return inside[1].strip() if inside else ""
 
 
-def _written(s: dict[str, Any]) -> str:
+def _written(s: DataSet) -> str:
     return " by ".join(repr(label) for axis in ("ordinate", "orddenom") if (label := _label(s, axis)))
 
 
@@ -236,7 +237,7 @@ def _quantity(kind: int) -> str:
     return f"{QUANTITIES.get(kind, 'another quantity')} (type {kind})"
 
 
-def _base(base: dict[str, Any], what: str) -> float:
+def _base(base: DataSet, what: str) -> float:
     """SI size of the file's own unit of length or force: data set 164 has how many of them make one of SI."""
     factor = float(base.get(what, 1.0))
     if not 0 < factor < np.inf:
@@ -248,7 +249,7 @@ def _base(base: dict[str, Any], what: str) -> float:
     return 1 / factor
 
 
-def _check_whole(s: dict[str, Any]) -> None:
+def _check_whole(s: DataSet) -> None:
     """What a data set 58 promises in its head against what is in it; StiffmapError."""
     name = f"data set 58 {s.get('id1', '')}".strip()
     whole = {k: s.get(k) for k in ("func_type", "num_pts", "rsp_node", "rsp_dir", "ref_node", "ref_dir")}
@@ -266,15 +267,16 @@ def _check_whole(s: dict[str, Any]) -> None:
         raise StiffmapError(f"{name}: expected finite numbers; point {k + 1} has {data[k]}")
 
 
-def _without_padding(s: dict[str, Any], values: Any) -> Any:
+def _without_padding(s: DataSet, values: np.ndarray) -> np.ndarray:
     """The values less the zeros that fill the last line."""
     line = 6 if s.get("ord_data_type") in (2, 5) else 4
-    surplus = values[s["num_pts"] :]
-    padded = len(surplus) * (1 + np.iscomplexobj(s["data"])) < line and not np.any(s["data"][s["num_pts"] :])
-    return values[: s["num_pts"]] if padded else values
+    count, data = int(s["num_pts"]), np.atleast_1d(s["data"])
+    surplus = values[count:]
+    padded = len(surplus) * (1 + np.iscomplexobj(data)) < line and not np.any(data[count:])
+    return values[:count] if padded else values
 
 
-def _ends(s: dict[str, Any]) -> tuple[str, str]:
+def _ends(s: DataSet) -> tuple[str, str]:
     def end(prefix: str) -> str:
         return f"{s.get(prefix + '_node', 0)} {WAYS.get(int(s.get(prefix + '_dir', 0)), '')}".strip()
 

@@ -4,7 +4,6 @@ damping, declared or assumed (V2)."""
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -218,7 +217,7 @@ def _count(machine: Machine, damping: Damping, modes: int | None) -> int:
     return max(1, min(size, 6 * len(machine.compiled.bodies) + damped))
 
 
-def _statically(out: dict[str, Any], compliance: Floats) -> None:
+def _statically(out: dict[str, Floats], compliance: Floats) -> None:
     """What is not in the modes is the loaded compliance without theirs: the same number at 0 Hz as in statics."""
     b = np.nan_to_num(out["tip"])
     rest = compliance - b @ b.transpose(0, 2, 1)

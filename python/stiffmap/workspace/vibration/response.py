@@ -39,37 +39,36 @@ def receptance(modes: TipModes, frequency: Floats, threads: int | None = None) -
         ok = np.isfinite(modes.rest[rows, 0, 0])
         out[rows[~ok]] = np.nan
         if ok.any():
-            arrays = ("square", "tip", "viscous", "loss", "rest")
-            out[rows[ok]] = solve({n: getattr(modes, n)[rows[ok]] for n in arrays}, s)
+            out[rows[ok]] = solve(modes.only(rows[ok]), s)
 
     with ThreadPoolExecutor(thread_count(threads)) as pool:
         list(pool.map(block, range(0, n, BLOCK)))
     return out
 
 
-def _real_modes(m: dict[str, Floats], s: Complex) -> Complex:
-    square, tip = m["square"], m["tip"]
+def _real_modes(m: TipModes, s: Complex) -> Complex:
+    square, tip = m.square, m.tip
     n, k = square.shape
     each = np.einsum("nik,njk->nkij", tip, tip).reshape(n, k, 36)
-    c = np.einsum("nkk->nk", m["viscous"])
+    c = np.einsum("nkk->nk", m.viscous)
     w = s.imag
     real, imag = 1 - square[:, None, :] * w[:, None] ** 2, c[:, None, :] * w[:, None]
     size = real**2 + imag**2
     out = np.empty((n, len(s), 36), complex)
-    out.real = (real / size) @ each + m["rest"].reshape(n, 1, 36)
+    out.real = (real / size) @ each + m.rest.reshape(n, 1, 36)
     out.imag = -(imag / size) @ each
     return out.reshape(n, len(s), 6, 6)
 
 
-def _poles(m: dict[str, Floats], s: Complex) -> Complex:
-    square, tip = m["square"], m["tip"]
+def _poles(m: TipModes, s: Complex) -> Complex:
+    square, tip = m.square, m.tip
     n, k = square.shape
     eye = np.broadcast_to(np.eye(k), (n, k, k))
-    inverse = np.linalg.inv(eye + 1j * m["loss"])
+    inverse = np.linalg.inv(eye + 1j * m.loss)
     companion = np.zeros((n, 2 * k, 2 * k), complex)
     companion[:, :k, k:] = eye
     companion[:, k:, :k] = -inverse * square[:, None, :]
-    companion[:, k:, k:] = -inverse @ m["viscous"]
+    companion[:, k:, k:] = -inverse @ m.viscous
     nu, X = np.linalg.eig(companion)
     good = np.linalg.cond(X) < WORST_BASIS
     out = np.empty((n, len(s), 6, 6), complex)
@@ -81,26 +80,26 @@ def _poles(m: dict[str, Floats], s: Complex) -> Complex:
         right = right @ b.transpose(0, 2, 1)
         residue = np.einsum("nij,njl->njil", left, right).reshape(len(b), 2 * k, 36)
         weight = s[:, None] * nu_[:, None, :] ** 2 / (1 - s[:, None] * nu_[:, None, :])
-        still = b @ inverse[good] @ b.transpose(0, 2, 1) + m["rest"][good]
+        still = b @ inverse[good] @ b.transpose(0, 2, 1) + m.rest[good]
         out[good] = (weight @ residue).reshape(len(b), len(s), 6, 6) + still[:, None]
     for i in np.flatnonzero(~good):
-        out[i] = direct({name: a[i] for name, a in m.items()}, s)
+        out[i] = direct(m, int(i), s)
     zero = s == 0
     if zero.any():
-        out[:, zero] = (tip @ tip.transpose(0, 2, 1) + m["rest"])[:, None]
+        out[:, zero] = (tip @ tip.transpose(0, 2, 1) + m.rest)[:, None]
     return out
 
 
-def direct(m: dict[str, Floats], s: Complex) -> Complex:
-    """(frequencies, 6, 6) of one pose, by one linear system for each frequency."""
-    k = len(m["square"])
+def direct(m: TipModes, i: int, s: Complex) -> Complex:
+    """(frequencies, 6, 6) of the pose i, by one linear system for each frequency."""
+    k = m.square.shape[1]
     sign = np.sign(s.imag)[:, None, None]
     dynamic = (
-        np.eye(k) + s[:, None, None] * m["viscous"] + s[:, None, None] ** 2 * np.diag(m["square"])
-        + 1j * sign * m["loss"]
+        np.eye(k) + s[:, None, None] * m.viscous[i] + s[:, None, None] ** 2 * np.diag(m.square[i])
+        + 1j * sign * m.loss[i]
     )  # fmt: skip
-    tip = m["tip"].astype(complex)
-    return np.asarray(tip @ np.linalg.solve(dynamic, np.broadcast_to(tip.T, (len(s), k, 6))) + m["rest"])
+    tip = m.tip[i].astype(complex)
+    return np.asarray(tip @ np.linalg.solve(dynamic, np.broadcast_to(tip.T, (len(s), k, 6))) + m.rest[i])
 
 
 KINDS = {"receptance": 0, "mobility": 1, "accelerance": 2}

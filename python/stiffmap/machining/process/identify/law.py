@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from math import pi
 from os import PathLike
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from scipy.stats import chi2, wilcoxon
@@ -176,7 +175,7 @@ class IdentifiedLaw:
             )
         return out
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, object]:
         """Data of the answer, SI; a number is its value, standard uncertainty and both ends of its 95 % interval."""
         laws = [
             {
@@ -203,7 +202,7 @@ def listed(error: Floats) -> str:
     return ", ".join(f"{v:.1f}" for v in rms(error))
 
 
-def _keys(p: Process, numbers: Mapping[str, Number]) -> dict[str, Any]:
+def _keys(p: Process, numbers: Mapping[str, Number]) -> dict[str, object]:
     """The keys of a process file with a law of chips and edges, whose `numbers` are SI, by name."""
     t, c, law = p.tool, p.cut, {}
     assert isinstance(p.law, EndMill)
@@ -214,7 +213,7 @@ def _keys(p: Process, numbers: Mapping[str, Number]) -> dict[str, Any]:
             note = f"95 % interval {low / size:.4g} to {high / size:.4g} {unit}"
             law[n] |= {"u": f"{u / size:.3g} {unit}", "note": note}
     helix = f"{t.helix * 180 / pi:.10g} deg"
-    tool: dict[str, Any] = {"diameter": _mm(t.diameter), "teeth": t.teeth, "helix": helix}
+    tool: dict[str, object] = {"diameter": _mm(t.diameter), "teeth": t.teeth, "helix": helix}
     if t.runout:
         angle = f"{t.runout_angle * 180 / pi:.10g} deg"
         tool["runout"] = {"offset": f"{1e6 * t.runout:.4g} um", "angle": angle}
@@ -236,7 +235,9 @@ def _mm(value: float) -> str:
 
 
 def identify_process(
-    table: str | PathLike[str] | Mapping[str, Any], process: Process | None = None, sheet: str | None = None
+    table: str | PathLike[str] | Mapping[str, object],
+    process: Process | None = None,
+    sheet: str | None = None,
 ) -> IdentifiedLaw:
     """Coefficients of the mechanistic law from a dynamometer's table: means per feed, or signals over time.
 

@@ -10,6 +10,7 @@ from os import PathLike
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from stiffmap.common.broadcasting import Floats, given_path, instance_of
 from stiffmap.common.errors import FileError
@@ -34,15 +35,12 @@ PER_TOOTH = re.compile(r"(/|_per_|_)tooth$")
 PER_EDGE = ("feed_per_tooth", "c", "chip")
 
 
-class ForceColumns(NamedTable):
-    """Numbers by the names of `COLUMNS`, SI."""
-
-    def above_zero(self, name: str, row: int, default: float = 0.0) -> float:
-        """A number that must be above zero."""
-        value = float(self.values[name][row]) if name in self.values else default
-        if not value > 0:
-            self.fail(f"expected a number above zero, found {value / self.size.get(name, 1.0):g}", name, row)
-        return value
+def above_zero(c: NamedTable, name: str, row: int, default: float = 0.0) -> float:
+    """A number that must be above zero."""
+    value = float(c.values[name][row]) if name in c.values else default
+    if not value > 0:
+        c.fail(f"expected a number above zero, found {value / c.size.get(name, 1.0):g}", name, row)
+    return value
 
 
 def _renamed(name: str, unit: str) -> tuple[str, str]:
@@ -67,14 +65,13 @@ KNOWN = Known(
 
 
 def columns_of(
-    table: str | PathLike[str] | Mapping[str, Any], defaults: Mapping[str, Any], sheet: str | None
-) -> ForceColumns:
-    """The columns of a file or a mapping; `defaults`, SI, where it has none of that name. Raises FileError."""
+    table: str | PathLike[str] | Mapping[str, object], defaults: Mapping[str, object], sheet: str | None
+) -> NamedTable:
+    """Numbers by the names of `COLUMNS`, SI, of a file or a mapping; `defaults`, SI, where it has none of that name. Raises FileError."""
     if isinstance(table, Mapping):
-        found = named(_of_mapping(table), KNOWN)
+        out = named(_of_mapping(table), KNOWN)
     else:
-        found = read_named(given_path(table, "table", "a file or a mapping of columns"), KNOWN, sheet)
-    out = ForceColumns(**vars(found))
+        out = read_named(given_path(table, "table", "a file or a mapping of columns"), KNOWN, sheet)
     if "side" in out.values:
         out.values["side"] = np.array(out.values["side"])
     if {"feed", "feed_per_tooth"} <= set(out.values):
@@ -85,7 +82,7 @@ def columns_of(
     if missing := [COLUMNS[n][0] for n in needed if n not in out.values]:
         out.fail(f"missing column '{missing[0]}'; needed: {', '.join(COLUMNS[n][0] for n in needed)}")
     if "feed" in out.values:
-        each = [[out.above_zero(n, i) for n in ("feed", "spindle", "teeth")] for i in range(len(out.lines))]
+        each = [[above_zero(out, n, i) for n in ("feed", "spindle", "teeth")] for i in range(len(out.lines))]
         feed, spindle, teeth = np.array(each).T
         del out.values["feed"]
         out.values["feed_per_tooth"] = feed * 2 * pi / spindle / teeth
@@ -145,14 +142,16 @@ class ForceTable:
         """(n,) labels of the feeds per tooth that count as different."""
         return np.asarray(np.round(np.log(self.chip), SAME), dtype=float)
 
-    def rows(self, chosen: Any) -> ForceTable:
+    def rows(self, chosen: NDArray[np.bool_]) -> ForceTable:
         """Some of the cuts."""
         index = np.arange(len(self.cuts))[chosen]
         return replace(self, cuts=tuple(self.cuts[i] for i in index), force=self.force[index], signals=())
 
 
 def read_table(
-    table: str | PathLike[str] | Mapping[str, Any], process: Process | None = None, sheet: str | None = None
+    table: str | PathLike[str] | Mapping[str, object],
+    process: Process | None = None,
+    sheet: str | None = None,
 ) -> ForceTable:
     """A CSV file, a workbook, or a mapping (a data frame) of columns as `identify_process` takes them.
 
@@ -179,8 +178,8 @@ def read_table(
     return _slot_signs(ForceTable(tuple(cuts_of), np.array(means), tuple(signals), (), c.file, given))
 
 
-def _whole_turns(c: ForceColumns, here: Any, force: Floats) -> Signals:
-    time, turn = c.values["time"][here], 2 * pi / c.above_zero("spindle", int(here[0]))
+def _whole_turns(c: NamedTable, here: NDArray[np.intp], force: Floats) -> Signals:
+    time, turn = c.values["time"][here], 2 * pi / above_zero(c, "spindle", int(here[0]))
     for i in np.flatnonzero(np.diff(time) <= 0)[:1]:
         what = f"expected rising times in a cut, found {time[i + 1]:g} s behind {time[i]:g} s"
         c.fail(what, "time", here[i + 1])
@@ -213,7 +212,7 @@ def _slot_signs(table: ForceTable) -> ForceTable:
     )
 
 
-def _defaults(process: Process) -> dict[str, Any]:
+def _defaults(process: Process) -> dict[str, object]:
     instance_of(process, Process, "process", "a Process, as load_process gives it")
     c, t = process.cut, process.tool
     return {
@@ -222,16 +221,16 @@ def _defaults(process: Process) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _cut(c: ForceColumns, i: int) -> Process:
+def _cut(c: NamedTable, i: int) -> Process:
     """One row's tool and engagement; its law is to be found."""
     way = str(c.values["side"][i]) if "side" in c.values else "slot"
     if way not in SIDES:
         c.fail(f"expected one of {', '.join(SIDES)}, found '{way}'", "side", i)
     if way != "slot" and not {"diameter", "radial"} <= set(c.values):
         c.fail("a cut that is no slot needs the columns diameter_mm and radial_mm")
-    chip, axial, teeth = (c.above_zero(n, i) for n in ("feed_per_tooth", "axial", "teeth"))
-    diameter, spindle = c.above_zero("diameter", i, 0.01), c.above_zero("spindle", i, 200 * pi)
-    radial = diameter if way == "slot" else c.above_zero("radial", i)
+    chip, axial, teeth = (above_zero(c, n, i) for n in ("feed_per_tooth", "axial", "teeth"))
+    diameter, spindle = above_zero(c, "diameter", i, 0.01), above_zero(c, "spindle", i, 200 * pi)
+    radial = diameter if way == "slot" else above_zero(c, "radial", i)
     if teeth != int(teeth) or teeth > 1000:
         c.fail(f"expected a whole number from 1 to 1000, found {teeth:g}", "teeth", i)
     if radial > diameter * (1 + 1e-12):

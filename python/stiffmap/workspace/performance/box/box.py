@@ -82,7 +82,7 @@ def largest_box(
     region: ArrayLike | None = None,
     tolerance: float = 1e-4,
     max_evaluations: int = WORK,
-    scheduler: Any = None,
+    scheduler: object = None,
     **limits: Any,
 ) -> LargestBox:
     """Largest box of given proportions, anywhere in the workspace, all of it within the limits.

@@ -10,6 +10,7 @@ from scipy.optimize import linprog
 from scipy.spatial import cKDTree
 
 from stiffmap.common.broadcasting import Floats
+from stiffmap.workspace.maps.inputs import box_nodes
 from stiffmap.workspace.performance.box.cells import shrink
 from stiffmap.workspace.performance.box.inside import REACH
 from stiffmap.workspace.performance.box.proof import BOX, Judge, judge_cells
@@ -90,9 +91,9 @@ class BoxSearch:
 
     def starts(self, count: int) -> list[tuple[Floats, float]]:
         """The roomiest nodes of a grid, and the cubes about them that hold no node that breaks a limit."""
-        axes = [np.linspace(a, b, SAMPLES) for a, b in zip(self.low, self.high, strict=True)]
-        grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-        good: NDArray[np.bool_] = self._inside(grid.reshape(-1, 3)).reshape(grid.shape[:3])
+        nodes = box_nodes(self.low, self.high, SAMPLES)
+        grid = nodes.reshape(SAMPLES, SAMPLES, SAMPLES, 3)
+        good: NDArray[np.bool_] = self._inside(nodes).reshape(grid.shape[:3])
         pairs = []
         for axis in range(3):
             a, b = np.moveaxis(grid, axis, 0), np.moveaxis(good, axis, 0)

@@ -51,11 +51,6 @@ class JudgedPoses:
         """These of the rows break a limit, or its other end."""
         self.broken.setdefault(name, np.zeros(len(self.position), dtype=bool))[rows] |= bad
 
-    def forget(self, rows: NDArray[np.int64]) -> None:
-        """What an earlier attempt said of these."""
-        for table in self.broken.values():
-            table[rows] = False
-
     def causes(self) -> dict[str, NDArray[np.bool_]]:
         """(n,) by limit, reach among them, for poses that are not inside."""
         known = np.zeros(len(self.position), dtype=bool)
@@ -164,7 +159,8 @@ class Inside:
         if sound is not None:
             closed &= sound
         inside = closed.copy()
-        out.forget(rows)
+        for table in out.broken.values():  # what an earlier attempt said
+            table[rows] = False
         if self.singularity is not None:
             beyond, near = self._singular(k)
             out.mark(SINGULAR, rows, closed & (beyond | near))

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
 from stiffmap.common.broadcasting import Floats, random_numbers, real_array, real_number, whole_number
@@ -70,7 +70,7 @@ def workspace_volume(
     cells: int | None = None,
     prove: int = 0,
     seed: int = 0,
-    scheduler: Any = None,
+    scheduler: object = None,
     **limits: Any,
 ) -> Workspace:
     """Volume of all positions that the machine comes to in one orientation, with its sampling error.
@@ -119,11 +119,11 @@ def workspace_volume(
     low, high = _begun(machine, region, axes)
     more = 0
     if region is None:
-        drawn, _, low, high, more = _grown(ask, low, high, axes, FIRST[len(axes)], rng, GROWN, 1 / 2)
+        drawn, _, low, high, more = _drawn(ask, low, high, axes, FIRST[len(axes)], rng, GROWN, 1 / 2)
         if drawn.inside.any():
             kept, step = drawn.position[drawn.inside], (high - low) / FIRST[len(axes)]
             low, high = np.maximum(kept.min(axis=0) - step, low), np.minimum(kept.max(axis=0) + step, high)
-    drawn, touched, low, high, _ = _grown(ask, low, high, axes, cells, rng, more, 1 / 4)
+    drawn, touched, low, high, _ = _drawn(ask, low, high, axes, cells, rng, more, 1 / 4)
     cell = float(np.prod((high - low)[axes] / cells))
     pairs = drawn.inside.reshape(-1, 2)
     kept = drawn.position[drawn.inside]
@@ -135,50 +135,40 @@ def workspace_volume(
         volume=cell * float(pairs.mean(axis=1).sum()),
         error=cell * float(np.sqrt((pairs[:, 0] != pairs[:, 1]).sum() / 4)),
         dimension=len(axes), proven=proven, box=box,
-        region=np.stack([low, high]), cut=bool(touched.any()), limited_by=_limiting(drawn),
+        region=np.stack([low, high]), cut=touched, limited_by=_limiting(drawn),
         drawn=drawn, ask=ask,
     )  # fmt: skip
 
 
 def _begun(machine: Machine, region: ArrayLike | None, axes: list[int]) -> tuple[Floats, Floats]:
-    low, high = machine.workspace if region is None else read_region(region, axes)
     if region is not None:
+        low, high = read_region(region, axes)
         return low, high
+    low, high = machine.workspace
     centre, half = (low + high) / 2, (high - low) / 2
     moves = np.isin(np.arange(3), axes)
     half = np.where(half == 0, half.max(), half)
     return centre - 3 * half * moves, centre + 3 * half * moves
 
 
-def _grown(
+def _drawn(
     ask: Inside, low: Floats, high: Floats, axes: list[int], cells: int, rng: np.random.Generator, more: int, by: float
-) -> tuple[JudgedPoses, NDArray[np.bool_], Floats, Floats, int]:  # fmt: skip
-    """Poses as of `_draw`, where the region's border is reached in one larger by this share, and so on `more` times; the
+) -> tuple[JudgedPoses, bool, Floats, Floats, int]:  # fmt: skip
+    """Two random poses in each of cells^axes cells of a region, neighbours in memory. Where a cell of the border holds a pose
+    inside, in a region that is larger there by this share, and so on `more` times; whether the last border holds one, the
     region, and how many times are left."""
-    while True:
-        drawn, touched = _draw(ask, low, high, axes, cells, rng)
-        if not touched.any() or more == 0:
-            return drawn, touched, low, high, more
-        more, step = more - 1, by * (high - low)
-        low, high = low - step * touched[0], high + step * touched[1]
-
-
-def _draw(
-    ask: Inside, low: Floats, high: Floats, axes: list[int], cells: int, rng: np.random.Generator
-) -> tuple[JudgedPoses, NDArray[np.bool_]]:
-    """Two random poses in each of cells^axes cells, neighbours in memory; (2, 3) at which end of each axis a cell of
-    the region's border holds a pose inside."""
     grid = np.stack(np.meshgrid(*[np.arange(cells)] * len(axes), indexing="ij"), axis=-1)
     corner = np.repeat(grid.reshape(-1, len(axes)), 2, axis=0)
-    p = np.tile((low + high) / 2, (len(corner), 1))
-    p[:, axes] = low[axes] + (corner + rng.random(corner.shape)) * ((high - low)[axes] / cells)
-    judged = ask(p)
-    inside = judged.inside
-    touched = np.zeros((2, 3), dtype=bool)
-    for i, axis in enumerate(axes):
-        touched[0, axis] = inside[corner[:, i] == 0].any()
-        touched[1, axis] = inside[corner[:, i] == cells - 1].any()
-    return judged, touched
+    while True:
+        p = np.tile((low + high) / 2, (len(corner), 1))
+        p[:, axes] = low[axes] + (corner + rng.random(corner.shape)) * ((high - low)[axes] / cells)
+        judged = ask(p)
+        touched = np.zeros((2, 3))
+        touched[:, axes] = [(judged.inside[:, None] & (corner == end)).any(axis=0) for end in (0, cells - 1)]
+        if not touched.any() or more == 0:
+            return judged, bool(touched.any()), low, high, more
+        more, step = more - 1, by * (high - low)
+        low, high = low - step * touched[0], high + step * touched[1]
 
 
 def _limiting(drawn: JudgedPoses) -> tuple[tuple[str, float], ...]:

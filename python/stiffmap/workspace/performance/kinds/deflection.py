@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from stiffmap.common.broadcasting import Floats
@@ -35,7 +37,7 @@ def compute(case: Case) -> Found:
         )
         note += f"; {in_shares({n: s for n, _, s in budget.ranked()})}" if budget is not None else ""
     found = over_poses(d.positions, d.values, "low", note, direction=d.direction)
-    return Found(**{**found.__dict__, "worst": d.value, "worst_at": d.position})
+    return replace(found, worst=d.value, worst_at=d.position)
 
 
 def quick(case: Case) -> Found:

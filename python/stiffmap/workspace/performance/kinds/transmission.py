@@ -3,6 +3,7 @@ near the box comes to a singularity, and of which type."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -36,7 +37,7 @@ def singularity(case: Case) -> Found:
     if not np.isfinite(found.worst):
         return found
     which = TYPES[int(np.argmin(table[:, int(np.argmin(nearest))]))]
-    return Found(**{**found.__dict__, "note": f"nearest is {which}"})
+    return replace(found, note=f"nearest is {which}")
 
 
 MEASURES = (

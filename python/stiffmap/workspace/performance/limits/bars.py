@@ -55,9 +55,6 @@ class Bars:
         """(n,) m between the axes of members of different legs at (n, coordinates); NaN stays NaN."""
         out = np.full(len(coordinates), np.nan)
         ok = np.isfinite(coordinates).all(axis=1)
-        if not len(self.pairs):
-            out[ok] = np.inf
-            return out
         points = [self._compiled.frames(x)[0][list(self.nodes)] for x in coordinates[ok]]
         if points:
             out[ok] = self.over(np.array(points), np.zeros((len(points), len(self.nodes))))[0]

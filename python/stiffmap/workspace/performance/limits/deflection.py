@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -192,4 +192,4 @@ def _refined(ask: _Ask, out: WorstDeflection, low: Floats, high: Floats, nodes: 
         i = int(np.argmax(value))
         if value[i] > best:
             best, at, unit = float(value[i]), p[i], way[i]
-    return WorstDeflection(**{**out.__dict__, "value": best, "position": at, "direction": unit})
+    return replace(out, value=best, position=at, direction=unit)

@@ -18,6 +18,7 @@ from stiffmap.solve.machine import Machine
 from stiffmap.solve.status import Status
 from stiffmap.workspace.maps.inputs import magnitude
 from stiffmap.workspace.performance.limits.bars import Bars
+from stiffmap.workspace.performance.limits.deflection import worst_deflection
 from stiffmap.workspace.performance.motion.closing import (
     DriveKinematics,
     characteristic_length,
@@ -128,9 +129,11 @@ class Bounds:
         limits: list[Limit] = []
         if self.transmission is not None:
             limits.extend(self._factors(k, closed))
-        limits.extend(self.intervals(k.coordinates))
+        for index, name, sign, most in self.intervals_wanted:
+            limits.append(plain(name, sign * k.coordinates[:, index], most))
         if self.clearance is not None:
-            limits.append(self._clearance(k))
+            value = -self.bars.least_distance(k.coordinates)
+            limits.append(plain("clearance of bars", value, -self.clearance))
         if self.deflection is not None:
             limits.append(self._deflection(position, closed))
         return limits
@@ -196,18 +199,7 @@ class Bounds:
                 out += [(i, name, sign, most) for sign, most in ends if abs(most) < UNLIMITED]
         return out
 
-    def intervals(self, x: Floats) -> list[Limit]:
-        """Ranges of drives and limits of joints at coordinates (n, coordinates)."""
-        return [plain(name, sign * x[:, index], most) for index, name, sign, most in self.intervals_wanted]
-
-    def _clearance(self, k: DriveKinematics) -> Limit:
-        assert self.clearance is not None
-        value = -self.bars.least_distance(k.coordinates)
-        return plain("clearance of bars", value, -self.clearance)
-
     def _deflection(self, position: Floats, closed: NDArray[np.bool_]) -> Limit:
-        from stiffmap.workspace.performance.limits.deflection import worst_deflection
-
         assert self.deflection is not None
         force, plane, most = self.deflection
         value = np.full(len(position), np.inf)

@@ -3,7 +3,7 @@ hold at the tool (docs/measures.md)."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -80,10 +80,7 @@ def accuracy_transmission(
     """
     k = drive_kinematics(machine, position, rotation, sharing=sharing, threads=threads)
     out = accuracy_of(machine, k, errors=errors, plane=plane)
-    if not nonlinear:
-        return out
-    moved = _by_closing(machine, k, out.errors, threads)
-    return AccuracyTransmission(**{**out.__dict__, "nonlinear": moved})
+    return replace(out, nonlinear=_by_closing(machine, k, out.errors, threads)) if nonlinear else out
 
 
 def accuracy_of(

@@ -17,6 +17,7 @@ from stiffmap.common.broadcasting import Floats, real_array
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import place_text
 from stiffmap.solve.machine import Machine
+from stiffmap.workspace.maps.inputs import plane_axes
 from stiffmap.workspace.performance.motion.closing import drive_kinematics, drive_values, refuse_failed
 from stiffmap.workspace.performance.motion.inertia import friction_efforts, need_masses, rigid_dynamics
 from stiffmap.workspace.performance.motion.tensions import PUSHES, held, in_cables, inertia_columns
@@ -79,8 +80,6 @@ def line(start: ArrayLike, end: ArrayLike, points: int = 201) -> Path:
 
 def circle(centre: ArrayLike, radius: float, plane: str = "xy", points: int = 401) -> Path:
     """One turn about `centre` (3,) m in a plane of the base axes."""
-    from stiffmap.workspace.maps.inputs import plane_axes
-
     c = real_array(centre, "centre")
     if c.shape != (3,) or not radius > 0:
         raise StiffmapError(f"circle: expected a centre (3,) and a radius in m, got {centre!r}, {radius!r}")
@@ -109,10 +108,9 @@ def through(points: ArrayLike, samples: int = 401) -> Path:
         raise StiffmapError(
             f"path: points {int(np.argmin(steps)) + 1} and {int(np.argmin(steps)) + 2} coincide"
         )
-    at = np.concatenate([[0.0], np.cumsum(steps)]) / steps.sum()
     if len(p) == 2:
         return line(p[0], p[1], samples)
-    spline = CubicSpline(at, p)
+    spline = CubicSpline(way_along(p) / steps.sum(), p)
     s = np.linspace(0, 1, samples)
     return Path(s, spline(s), spline(s, 1), spline(s, 2))
 
