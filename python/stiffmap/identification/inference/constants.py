@@ -6,9 +6,6 @@ import numpy as np
 
 ODDS = 20.0
 """The one threshold of decisions: a name, an equivalent, a world, the largest of many."""
-LIKELIER = 2.0
-"""Times that a name must be as likely as declared numbers within tolerance in its stead. Of 70 right names in `bench/twins.py` one is
-less likely (1.6), and of 90 machines without a fault one has such a name (1.1)."""
 RARE = 1e-3
 """The one threshold of tests: the same everywhere, something unexplained."""
 DEGREES = 4.0

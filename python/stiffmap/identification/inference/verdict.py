@@ -12,7 +12,7 @@ from stiffmap.experiment.experiment import Experiment, Floats, Integers
 from stiffmap.identification.inference.amplitudes import OFF, Fit, noise_prior
 from stiffmap.identification.inference.chosen import Chosen
 from stiffmap.identification.inference.columns import Columns
-from stiffmap.identification.inference.constants import ALIKE, EQUAL_SHARE, LIKELIER, ODDS, RARE, TOLERANCES
+from stiffmap.identification.inference.constants import ALIKE, EQUAL_SHARE, ODDS, RARE, TOLERANCES
 from stiffmap.identification.inference.names import EXACT, Model, Search
 from stiffmap.identification.inference.parts import GAPS, Part
 from stiffmap.identification.inference.places import Place
@@ -97,7 +97,7 @@ def judged(columns: Columns, search: Search) -> Verdict:
             numbers = tuple(b for b in _out_of_tolerance(columns, instead) if b.unknown.name not in known)
             if any((e := effect_of(columns, b, ())) and e.place is c.place for b in numbers):
                 numbers, against = (), np.inf  # the effect by another name
-            why = why if numbers or against > np.log(LIKELIER) else TOLERABLE
+            why = why if numbers or against > 0.0 else TOLERABLE
         if why:
             refused.append((c, why))
         else:

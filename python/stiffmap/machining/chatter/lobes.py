@@ -49,7 +49,7 @@ GivenModes = Machine | str | PathLike[str] | ToolModes | Iterable[object]
 
 @keywords_of(tip_modes)
 def stability_lobes(
-    machine: GivenModes,
+    machine: Machine | str | PathLike[str] | ToolModes | Iterable[object],
     process: GivenProcess,
     position: ArrayLike | None = None,
     *,

@@ -16,7 +16,7 @@ from stiffmap.experiment import load_experiment, random_plan, simulate
 from stiffmap.identification.candidates.candidates import Candidate
 from stiffmap.identification.inference.amplitudes import fitted
 from stiffmap.identification.inference.chosen import Chosen
-from stiffmap.identification.inference.constants import LIKELIER, ODDS
+from stiffmap.identification.inference.constants import ODDS
 from stiffmap.identification.inference.inference import inferred, terms
 from stiffmap.identification.inference.names import Model, _World, searched
 from stiffmap.identification.inference.parts import Parts
@@ -179,7 +179,7 @@ def test_a_name_needs_odds_against_the_best_model_of_another_world_without_it():
     c = setting(1, (0.0, 30.0, 0.0))
     c = replace(c, experiment=one_place(len(c.rows)))
     s = searched(c)
-    for odds, word in ((2.0 * ODDS, "effects"), (1.1 * LIKELIER, "effects"), (0.9 * LIKELIER, "none")):
+    for odds, word in ((2.0 * ODDS, "effects"), (1.1, "effects"), (0.9, "none")):
         v = judged(c, replace(s, instead=((s.null, float(np.log(odds))),)))
         assert v.word == word and len(v.named) == (word != "none")
         assert [n.against_numbers for n in v.named] == [np.log(odds)] * len(v.named)
@@ -193,10 +193,7 @@ def test_what_numbers_within_tolerances_show_is_not_unexplained_whatever_else_re
     monkeypatch.setattr(
         "stiffmap.identification.inference.verdict.refusal", lambda *_: (0.0, "another reason")
     )
-    for odds, why, word in (
-        (0.9 * LIKELIER, TOLERABLE, "none"),
-        (1.1 * LIKELIER, "another reason", "unattributed"),
-    ):
+    for odds, why, word in ((0.9, TOLERABLE, "none"), (1.1, "another reason", "unattributed")):
         v = judged(c, replace(s, instead=((s.null, float(np.log(odds))),)))
         assert [w for _, w in v.refused] == [why] and v.word == word
 
