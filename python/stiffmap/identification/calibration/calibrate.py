@@ -117,11 +117,12 @@ def _answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, star
     held = made.held_out
     unseen = (held.before, held.after) if held else (before, after)
     beyond_noise = [s.ratio**2 - best.fit.noise**2 for s in unseen]
-    word = tolerance_word(", ".join(r.name for r in beyond), wide)
-    if not beyond and (verdict.rest or verdict.time) and beyond_noise[1] > 0.5 * beyond_noise[0]:
-        word = "unattributed"  # more is left than taken away
-    elif not beyond and exact:
-        word = "as declared"
+    # more is left than taken away
+    unattributed = (verdict.rest or verdict.time) and beyond_noise[1] > 0.5 * beyond_noise[0]
+    if beyond or not (unattributed or exact):
+        word = tolerance_word(", ".join(r.name for r in beyond), wide)
+    else:
+        word = "unattributed" if unattributed else "as declared"
     return Calibration(
         verdict=word,
         rows=rows,

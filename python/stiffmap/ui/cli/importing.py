@@ -62,8 +62,8 @@ def command(
     machine.save(file)
     data = {"file": file, "name": machine.name, "legs": machine.legs, "actuators": machine.actuators, "tip": read.tip,
             "left_out": read.left_out, "rigid": read.rigid}  # fmt: skip
-    told = [f"wrote {file}: legs {', '.join(machine.legs)}; {len(machine.actuators)} actuators"]
-    show(as_json, data, [*told, *_remarks(read)])
+    lines = [f"wrote {file}: legs {', '.join(machine.legs)}; {len(machine.actuators)} actuators"]
+    show(as_json, data, [*lines, *_remarks(read)])
 
 
 def _remarks(found: Imported) -> Iterator[Text]:

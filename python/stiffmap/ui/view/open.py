@@ -8,12 +8,13 @@ import webbrowser
 from collections.abc import Callable
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import given_path, real_array
 from stiffmap.common.errors import StiffmapError
+from stiffmap.common.from_above import OpenView
 from stiffmap.solve.machine import Machine
 from stiffmap.ui.view.data import Data, findings
 from stiffmap.ui.view.model import ViewModel
@@ -30,7 +31,7 @@ POLL = 0.2
 """s between two looks whether the view is closed."""
 
 
-class View:
+class View(OpenView):
     """A view that is open; `close` ends it, as the end of a ``with`` block and of the program do."""
 
     def __init__(
@@ -106,7 +107,7 @@ class View:
             self._viewer.close()
             self._viewer = None  # type: ignore[assignment]
 
-    def __enter__(self) -> View:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:

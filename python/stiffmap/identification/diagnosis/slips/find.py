@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -39,6 +40,16 @@ KEPT = 2.0
 """Rms of a check, over the noise, up to which it holds."""
 ROWS = 400
 """Rows that are judged at most."""
+
+
+class JudgedSlip(NamedTuple):
+    """A mistake, and shares of the misfit beyond noise."""
+
+    hypothesis: Hypothesis
+    left: float
+    """What stays with it."""
+    with_part: float
+    """What stays with it and the best single part of the machine."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,32 +126,32 @@ def find_slip(predictor: Predictor, plan: CandidatePlan) -> tuple[Slip, Experime
     of = float(misfit @ misfit)
     if len(problem) < FEWEST or of < MISFIT * problem.freedom:
         return None
-    judged = [j for j in _judged(s, problem) if j[2] < LEFT]
+    judged = [j for j in _judged(s, problem) if j.with_part < LEFT]
     if not judged:
         return None
-    best = min(beside for *_, beside in judged)
+    best = min(j.with_part for j in judged)
     slack = max(SAME * best, 3.0 * (2.0 * problem.freedom) ** 0.5 / of)
-    alike = (j for j in judged if j[2] <= best + slack)
-    (h, left, beside), *others = sorted(alike, key=lambda j: (j[0].changes, j[1]))
+    alike = (j for j in judged if j.with_part <= best + slack)
+    first, *others = sorted(alike, key=lambda j: (j.hypothesis.changes, j.left))
+    h = first.hypothesis
     # shifted rows look like noise where they are repeats: of that the noise of the readings holds too much
     noise = float(np.nanmedian((sigma / s.sigma) ** 2))
     possible = h.physical or h.kind != "factor"
-    if possible and beside > BETTER * best_part(s, noise * problem.freedom) - slack:
+    if possible and first.with_part > BETTER * best_part(s, noise * problem.freedom) - slack:
         return None
-    also = (o.check for o, *_ in others if o.changes <= h.changes)
+    also = (j.hypothesis.check for j in others if j.hypothesis.changes <= h.changes)
     same = tuple(dict.fromkeys(check for check in also if check != h.check))[:3]
     after = h.undo(whole) if h.undo else whole
     undone, evidence = h.undo is not None, _evidence(whole, after)
-    return Slip(h.kind, h.seen, h.check, same, left, undone, evidence, h.factor), after
+    return Slip(h.kind, h.seen, h.check, same, first.left, undone, evidence, h.factor), after
 
 
-def _judged(s: SlipReadings, problem: LinearProblem) -> Iterator[tuple[Hypothesis, float, float]]:
-    """Mistakes that take away enough to be one, and the shares of the misfit beyond noise that stay with each and with it and the best
-    single part of the machine."""
+def _judged(s: SlipReadings, problem: LinearProblem) -> Iterator[JudgedSlip]:
+    """Mistakes that take away enough to be one, jointly with a fault that the machine may have as well."""
     for h in _hypotheses(s, problem):
         left = _left(h, problem)
         if left < MOST:
-            yield h, left, min(left, _beside(s, h))
+            yield JudgedSlip(h, left, min(left, _beside(s, h)))
 
 
 def _beside(s: SlipReadings, h: Hypothesis) -> float:
