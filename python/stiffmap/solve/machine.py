@@ -13,9 +13,10 @@ from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError, frames_of_this_package
-from stiffmap.common.from_above import OpenView, from_above
+from stiffmap.common.from_above import from_above
 from stiffmap.common.html import machine_html
 from stiffmap.common.kept import Kept
+from stiffmap.common.open_view import OpenView
 from stiffmap.model.addresses import Listed, listed
 from stiffmap.model.description import MachineDescription
 from stiffmap.model.effects import add_effect

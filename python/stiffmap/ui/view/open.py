@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import given_path, real_array
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.from_above import OpenView
+from stiffmap.common.open_view import OpenView
 from stiffmap.solve.machine import Machine
 from stiffmap.ui.view.data import Data, findings
 from stiffmap.ui.view.model import ViewModel

@@ -19,6 +19,7 @@ from stiffmap.identification.calibration.calibrate import independent
 from stiffmap.identification.inference.corrected import corrected
 from stiffmap.identification.inference.covariance import Covariance
 from stiffmap.identification.inference.readings import Readings
+from stiffmap.identification.inference.shares import WideGroup, tolerance_word
 from stiffmap.identification.numbers import Tolerances, Unknown, unknowns
 from stiffmap.identification.numbers.sensitivity import bends, predicted, sensitivity, sensitivity_at
 from stiffmap.model.with_errors import edited
@@ -265,6 +266,13 @@ def test_a_group_that_is_off_as_a_whole_is_said() -> None:
     assert any("--tolerance" in x for x in c.lines())
     wide = calibrate(machine, data, tolerances=Tolerances().scaled(4.0))
     assert not wide.wide and wide.verdict == "adjusted within tolerance"
+
+
+def test_a_single_number_beyond_tolerance_is_said_before_its_group() -> None:
+    wide = (WideGroup("zeros", 3.0),)
+    assert tolerance_word("", ()) == "adjusted within tolerance"
+    assert tolerance_word("", wide) == "adjusted beyond tolerance"
+    assert tolerance_word("zero of x", wide) == "beyond tolerance: zero of x"
 
 
 def test_a_minimal_set_spans_what_the_readings_determine() -> None:
