@@ -58,20 +58,20 @@ def residual(
     out of reach, and an unknown noise.
     """
     m = as_machine(machine)
-    predictor = Predictor(m, as_experiment(experiment), threads=threads)
-    e, base = predictor.experiment, predictor(effects_of(m, effects))
+    e, base = _predicted(m, as_experiment(experiment), effects, threads)
     refuse_unreachable(e, base)
-    raw = e.reading - base
     noise, out = without_suspects(e, base)
     problem = LinearProblem.of(e, noise.sigma, base, ~out)
-    part = nuisance_part(problem, raw)
-    kept = np.where(out[:, None], np.nan, raw - part)
+    values = e.reading - base
+    part = nuisance_part(problem, values)
+    values -= part
+    kept = np.where(out[:, None], np.nan, values)
     white = problem.residual(base)
     late = over_time(problem, white)
     return Residual(
         e,
         base + part,
-        raw - part,
+        values,
         noise,
         out,
         summary(kept, noise.sigma, e.channels),
@@ -81,6 +81,14 @@ def residual(
         checks(e, e.reading, noise.sigma, ~out),
         [*limitations(e, noise, m), *([] if late is None else [str(late)])],
     )
+
+
+def _predicted(
+    machine: Machine, experiment: Experiment, effects: Effects, threads: int | None
+) -> tuple[Experiment, Floats]:
+    """Rows in reach, and what they should read; nothing else stays in memory."""
+    predictor = Predictor(machine, experiment, threads=threads)
+    return predictor.experiment, predictor(effects_of(machine, effects))
 
 
 def _groups_off(problem: LinearProblem, white: Floats) -> int:

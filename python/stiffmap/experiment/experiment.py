@@ -203,9 +203,8 @@ class Experiment:
     @cached_property
     def distinct(self) -> tuple[Experiment, Integers]:
         """The rows of each different (pose, wrench) once, and (n,) which of them stands for each row."""
-        key = np.hstack([self.groups[:, None], self.wrench])
-        _, first, back = np.unique(key, axis=0, return_index=True, return_inverse=True)
-        return self.rows(first.astype(np.intp)), back.reshape(-1)
+        back = numbered([self.groups, self.wrench])
+        return self.rows(np.unique(back, return_index=True)[1].astype(np.intp)), back
 
     @cached_property
     def each_pose(self) -> Experiment:
@@ -215,7 +214,7 @@ class Experiment:
     @cached_property
     def without_load(self) -> Experiment:
         """The same rows without their wrenches."""
-        return replace(self, wrench=np.zeros_like(self.wrench)) if self.wrench.any() else self
+        return replace(self, wrench=np.zeros(self.wrench.shape)) if self.wrench.any() else self
 
     @cached_property
     def conditions(self) -> Integers:
@@ -258,10 +257,14 @@ def numbered(parts: Sequence[Any]) -> Integers:
     """(n,) number of each different row of the parts, numbers (n, ...) or words (n,); None and no words are left out."""
     given = [p for p in parts if p is not None and len(p)]
     columns = [np.unique(p, return_inverse=True)[1] if isinstance(p, tuple) else p for p in given]
-    arrays = [np.asarray(c, dtype=float).reshape(len(c), -1) for c in columns]
-    key = np.nan_to_num(np.round(np.hstack(arrays), 9), nan=np.inf) + 0.0
-    order = np.lexsort(key.T[::-1])  # as np.unique along an axis, in half its time
-    new = np.any(key[order[1:]] != key[order[:-1]], axis=1)
-    number = np.zeros(len(key), dtype=np.intp)
+    key = np.concatenate([np.asarray(c, dtype=float).reshape(len(c), -1).T for c in columns])
+    np.nan_to_num(np.round(key, 9, out=key), copy=False, nan=np.inf)
+    key += 0.0  # no -0
+    order = np.lexsort(key[::-1])  # as np.unique along an axis, in half its time
+    new = np.zeros(max(len(order) - 1, 0), dtype=bool)
+    for row in key:
+        in_order = row[order]
+        new |= in_order[1:] != in_order[:-1]
+    number = np.zeros(len(order), dtype=np.intp)
     number[order[1:]] = np.cumsum(new)
     return number

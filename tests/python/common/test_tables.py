@@ -152,3 +152,42 @@ def test_words_behind_a_row_are_said(text: str, tmp_path: Path) -> None:
     sheet = read_sheet(tmp_path / "t.txt")
     assert sheet.numbers(2).tolist() == [40.0, 80.0]
     assert sheet.aside == ("row 3, '# bumped' behind the last column",)
+
+
+def test_what_is_no_reading_is_found_anywhere_in_a_long_table(tmp_path: Path) -> None:
+    """Rows that are plain are taken some hundreds at a time."""
+    rows = [f"P{i},{i}.5,{i % 7},0,{0.001 * i:.3f}" for i in range(2000)]
+    odd = {
+        3: "Mean,1,2,3,4",
+        777: ",12,5,0,9",
+        1203: "# a remark, 5",
+        1499: "P1499,1,2,0,4,seen twice",
+        1600: "",
+    }
+    odd |= {1777: "P1777,1,2", 1998: ",,,,", 1999: "checked by hand,,,,"}
+    for i, text in odd.items():
+        rows[i] = text
+    file = tmp_path / "long.csv"
+    file.write_text("id,x [mm],y [mm],z [mm],dz [mm]\n" + "\n".join(rows) + "\n")
+    table = read_sheet(file)
+    left_out = {3, 1203, 1600, 1998, 1999}
+    assert list(table.lines) == [i + 2 for i in range(2000) if i not in left_out]
+    assert table.aside == (
+        "row 5, 'Mean', is no reading",
+        "row 2001 is a remark: checked by hand",
+        "row 1501, 'seen twice' behind the last column",
+    )
+    dz = table.numbers(4)
+    assert np.isnan(dz[list(table.lines).index(1779)])
+    np.testing.assert_allclose(dz[:3], [0.0, 0.001, 0.002], atol=0)
+    assert next(iter(table.columns[0])) == "P0"
+    assert list(table.columns[0])[775:778] == ["P776", "", "P778"]
+
+
+@pytest.mark.parametrize("text", ["0.123", "-0.041", "0.000"])
+def test_a_decimal_fraction_below_one_is_never_thousands(text: str, tmp_path: Path) -> None:
+    file = tmp_path / "t.csv"
+    file.write_text(f"x [mm];y [mm];z [mm]\n1;2;{text}\n3;4;10.250\n")
+    assert not read_sheet(file).decimal_comma
+    file.write_text(f'x [mm],y [mm],z [mm]\n"1,500",2,{text}\n"3,25",4,5\n')
+    assert not read_sheet(file).decimal_comma

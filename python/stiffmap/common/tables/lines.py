@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from stiffmap.common.errors import FileError
 from stiffmap.common.number_text import number_in
-from stiffmap.common.tables.cells import BETWEEN, BLOCK, Cells, filled
+from stiffmap.common.tables.cells import BETWEEN, Cells, blocks, filled
 from stiffmap.common.tables.workbook import WORKBOOKS, workbook_lines
 from stiffmap.common.texts import text_of
 from stiffmap.common.units import unit_of
@@ -27,11 +27,12 @@ BLANKS = re.compile(r"[ \t]+(?![\[(])")
 """Between cells, but not before a unit in brackets."""
 MARKED = re.compile(r"^(#|%|//)\s+")
 """The mark of a comment, which is no cell."""
-THOUSANDS = re.compile(r"[+-]?\d{1,3}(\.\d{3})+")
+THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(\.\d{3})+")
 """``1.000`` is a thousand in a table with decimal commas."""
 COMMA = re.compile(r"^[ \t]*[+-]?[\d.]*,\d+[ \t]*$", re.M)
 QUOTED = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
-POINT = re.compile(r"^[ \t]*[+-]?[\d,]*\.\d+[ \t]*$", re.M)
+POINT = re.compile(r"^[ \t]*(?![+-]?[1-9]\d{0,2}(?:\.\d{3})+[ \t]*$)[+-]?[\d,]*\.\d+[ \t]*$", re.M)
+"""A number with a decimal point, which no `THOUSANDS` are."""
 ODD_SIGNS = str.maketrans("−", "-", "\u00a0\u2007\u2009\u202f")
 """Blanks within a number go, and a minus is that of a keyboard."""
 SAMPLE = 2_000
@@ -75,7 +76,12 @@ def lines_of(path: Path, sheet: str | None = None) -> tuple[str, Lines, str]:
 
 def kept(lines: Iterable[tuple[int, list[str]]]) -> Iterator[tuple[int, list[str]]]:
     """Lines with something in them that are no comments."""
-    return ((n, c) for n, c in lines if filled(c) and not c[0].strip().startswith(COMMENTS))
+    for block in blocks(lines):
+        begins = {c[0].lstrip()[:1] if c else "" for _, c in block}
+        if begins.isdisjoint(("", *(mark[0] for mark in COMMENTS))):
+            yield from block
+        else:
+            yield from ((n, c) for n, c in block if filled(c) and not c[0].strip().startswith(COMMENTS))
 
 
 def even(
@@ -89,21 +95,31 @@ def even(
 
     With `aside` a row may be short, unless blanks leave open which cell it lacks, and words behind the last column are said there.
     """
-    left: list[str] = []
-    for n, cells in rows:
-        if (found := len(cells)) != width:
-            behind = [c.strip() for c in cells[width:] if c.strip()]
-            if found > width:
-                found = max(i for i, c in enumerate(cells, 1) if i == width or c.strip())
-            unclear = NUMBER.fullmatch(behind[0]) if behind else separator == " "
-            if separator and found != width and (aside is None or unclear):
-                raise FileError(f"expected {width} values, found {found}", file=file, line=n)
-            if behind:
-                left.append(f"row {n}, '{' '.join(behind)[:40]}' behind the last column")
-            cells = [*cells, *[""] * width][:width]
-        yield n, cells
-    if left and aside is not None:
-        aside.append(left[0] + (f", and {len(left) - 1} rows like it" if len(left) > 1 else ""))
+    behind: list[str] = []
+    for block in blocks(rows):
+        if {len(cells) for _, cells in block} == {width}:
+            yield from block
+        else:
+            yield from ((n, _even(n, c, width, file, separator, aside is not None, behind)) for n, c in block)
+    if behind and aside is not None:
+        aside.append(behind[0] + (f", and {len(behind) - 1} rows like it" if len(behind) > 1 else ""))
+
+
+def _even(
+    n: int, cells: list[str], width: int, file: str, separator: str, short: bool, behind: list[str]
+) -> list[str]:
+    """One row of `even`; it may be `short`, and what stands `behind` its last column is said there."""
+    if (found := len(cells)) == width:
+        return cells
+    more = [c.strip() for c in cells[width:] if c.strip()]
+    if found > width:
+        found = max(i for i, c in enumerate(cells, 1) if i == width or c.strip())
+    unclear = NUMBER.fullmatch(more[0]) if more else separator == " "
+    if separator and found != width and (unclear or not short):
+        raise FileError(f"expected {width} values, found {found}", file=file, line=n)
+    if more:
+        behind.append(f"row {n}, '{' '.join(more)[:40]}' behind the last column")
+    return [*cells, *[""] * width][:width]
 
 
 def finite_number(cell: str, blank: Sequence[str] = ()) -> float:
@@ -140,8 +156,8 @@ def with_points(cells: Cells) -> Cells:
 
 def decimal_comma(rows: Iterable[list[str]], separator: str) -> bool:
     """Whether numbers have commas and none has a point; where cells stand between commas, ``"1,500"`` does not tell."""
-    commas = points = False
-    while block := list(islice(rows, BLOCK)):
+    commas = False
+    for block in blocks(rows):
         text = "\n".join(chain.from_iterable(block))
         if text.count("\n") != sum(map(len, block)) - 1:
             text = "\n".join(c.replace("\n", " ") for row in block for c in row)
@@ -150,10 +166,7 @@ def decimal_comma(rows: Iterable[list[str]], separator: str) -> bool:
             "," in text
             and any(separator != "," or not QUOTED.fullmatch(m[0].strip()) for m in COMMA.finditer(text))
         )
-        points = points or (
-            "." in text and any(not THOUSANDS.fullmatch(m[0].strip()) for m in POINT.finditer(text))
-        )
-        if points:
+        if POINT.search(text):
             return False
     return commas
 

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 
 from stiffmap.common.errors import FileError
-from stiffmap.common.tables.cells import Cells, filled, packed
+from stiffmap.common.number_text import LARGEST
+from stiffmap.common.tables.cells import Cells, blocks, filled, packed
 from stiffmap.common.tables.header import (
     Line,
     fits,
@@ -106,8 +108,11 @@ def read_sheet(path: Path, sheet: str | None = None, layout: Layout = PLAIN) -> 
     width = len(names)
     said = [*header, *(c.strip() for _, cells in above for c in cells)]
     aside = list[str]()
-    data = _data(chain([first], kept(rows)), header, said, spelling, aside, layout, str(path))
-    data = even(data, width, str(path), separator, None if layout.strict else aside)
+    clear = (
+        b if _all_readings(b) else _data(b, header, said, spelling, aside, layout, str(path))
+        for b in blocks(chain([first], kept(rows)))
+    )
+    data = even(chain.from_iterable(clear), width, str(path), separator, None if layout.strict else aside)
     cells_of, lines_ = packed(data, width)
     columns = list(cells_of)
     file = f"{path}, sheet '{page}'" if page else str(path)
@@ -210,6 +215,26 @@ def _above(rows: Iterator[Line], spelling: Spelling, above: list[Line]) -> Itera
         elif not data:
             above.append((n, cells))
             del above[:-8]
+
+
+def _all_readings(rows: Sequence[Line]) -> bool:
+    """Whether rows have as many cells each, a column of plain numbers, and a first one that never says mean or sum."""
+    width = len(rows[0][1])
+    begins = (cells[0].strip() for _, cells in rows)
+    return (
+        {len(cells) for _, cells in rows} == {width}
+        and not any(not word or STATISTICS.fullmatch(word) for word in begins)
+        and any(_plain_numbers([cells[i] for _, cells in rows]) for i in reversed(range(width)))
+    )
+
+
+def _plain_numbers(cells: Sequence[str]) -> bool:
+    text = "".join(cells)
+    if "_" in text or not text.isascii():
+        return False
+    with suppress(ValueError):
+        return all(abs(float(c)) <= LARGEST for c in cells)
+    return False
 
 
 def _data(

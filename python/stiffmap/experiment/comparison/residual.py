@@ -90,7 +90,8 @@ class Residual:
 
     def worst(self, number: int = 10) -> list[tuple[str, str, float]]:
         """Rows by their worst reading, most noise floors first: id, channel, residual (m or rad)."""
-        z = np.nan_to_num(np.abs(self.values / self.noise.sigma))
+        z = self.values / self.noise.sigma
+        np.nan_to_num(np.abs(z, out=z), copy=False)
         at = [(int(i), int(np.argmax(z[i]))) for i in np.argsort(-z.max(axis=1), kind="stable")[:number]]
         e = self.experiment
         return [(e.ids[i], e.channels[a].name, float(self.values[i, a])) for i, a in at if z[i, a] > 0]

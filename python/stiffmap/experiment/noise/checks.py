@@ -48,9 +48,9 @@ class Conditions:
     def of(e: Experiment, values: Floats, sigma: Floats, keep: Mask) -> Conditions:
         """Weighted means of the kept rows of each condition."""
         good = np.isfinite(values) & np.isfinite(sigma) & keep[:, None]
-        weight = np.where(good, 1.0 / np.where(good, sigma, 1.0) ** 2, 0.0)
+        weight = np.divide(1.0, sigma**2, out=np.zeros(sigma.shape), where=good)
         total = sums(weight, e.conditions)
-        mean = sums(np.where(good, values, 0.0) * weight, e.conditions)
+        mean = sums(np.multiply(values, weight, out=weight, where=good), e.conditions)
         first = np.unique(e.conditions, return_index=True)[1]
         branch = np.array(e.branch or ("",) * len(e))[first]
         safe = np.where(total > 0, total, 1.0)

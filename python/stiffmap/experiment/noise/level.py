@@ -62,22 +62,25 @@ def noise_of(experiment: Experiment, keep: Mask | None = None) -> Noise:
         repeats = np.sqrt(squares / freedom)
         lower = chi2.cdf(squares / declared**2, np.maximum(freedom, 1))
     p = np.where((freedom > 0) & (declared > 0), 2 * np.minimum(lower, 1 - lower), np.nan)
-    if lost := unknown(experiment, keep):
+    if lost := _unknown(experiment, squares, freedom, declared):
         raise StiffmapError(
             f"{experiment.name}: the noise of {', '.join(lost)} is zero or unknown; declare it (noise: in "
             f"experiment.yaml) or repeat readings at {ENOUGH} or more conditions"
         )
     floor = np.fmax(declared, np.where(freedom >= ENOUGH, repeats, np.nan))
     factor = np.where(declared > 0, floor / np.where(declared > 0, declared, 1.0), np.nan)
-    sigma = np.where(experiment.sigma > 0, experiment.sigma * factor, floor)
-    return Noise(
-        experiment.channels, declared, repeats, freedom, p, floor, np.where(experiment.read, sigma, np.nan)
-    )
+    sigma = experiment.sigma * factor
+    np.copyto(sigma, floor, where=~(experiment.sigma > 0))
+    sigma[~experiment.read] = np.nan
+    return Noise(experiment.channels, declared, repeats, freedom, p, floor, sigma)
 
 
 def unknown(experiment: Experiment, rows: Mask | None = None) -> list[str]:
     """Channels of which neither a declaration nor repeats, among rows (n,), say how sure they are: `noise_of` refuses them."""
-    squares, freedom, declared = _within(experiment, rows)
+    return _unknown(experiment, *_within(experiment, rows))
+
+
+def _unknown(experiment: Experiment, squares: Floats, freedom: Integers, declared: Floats) -> list[str]:
     known = (declared > 0) | ((freedom >= ENOUGH) & (squares > 0))
     return [
         c.name for c, lost in zip(experiment.channels, experiment.axis_read & ~known, strict=True) if lost
@@ -161,7 +164,12 @@ def _within(
     values = np.where(read, experiment.reading, 0.0)
     count = sums(read, condition)
     mean = sums(values, condition) / np.maximum(count, 1)
-    squares = np.where(read, (values - mean[condition]) ** 2, 0.0).sum(axis=0)
-    stated = np.isfinite(experiment.sigma).sum(axis=0)
-    declared = np.sqrt(np.nansum(experiment.sigma**2, axis=0) / np.where(stated > 0, stated, np.nan))
+    away = mean[condition]
+    np.subtract(values, away, out=away, where=read)  # in place: rows may be millions
+    away *= away
+    squares = away.sum(axis=0, where=read)
+    given = np.isfinite(experiment.sigma)
+    stated = given.sum(axis=0)
+    np.multiply(experiment.sigma, experiment.sigma, out=away)
+    declared = np.sqrt(away.sum(axis=0, where=given) / np.where(stated > 0, stated, np.nan))
     return squares, np.maximum(count - 1, 0).sum(axis=0).astype(np.intp), declared

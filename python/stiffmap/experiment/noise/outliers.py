@@ -125,11 +125,13 @@ def whole_stays(experiment: Experiment, found: Mask) -> Mask:
 def without_suspects(experiment: Experiment, base: Floats) -> tuple[Noise, Mask]:
     """The noise floor of readings that do not stand alone before any effect is known, and (n,) those that do; `base` (n, c) is the
     declared prediction. One that is far off hides another one, so they are looked for until there is none."""
-    out, raw = np.zeros(len(experiment), bool), experiment.reading - base
+    out = np.zeros(len(experiment), bool)
     while True:
         noise = noise_of(experiment, ~out)
         problem = LinearProblem.of(experiment, noise.sigma, base, ~out)
-        bare = np.where(out[:, None], np.nan, raw - nuisance_part(problem, raw, robust=True))
+        bare = experiment.reading - base
+        bare -= nuisance_part(problem, bare, robust=True)
+        bare[out] = np.nan
         more = whole_stays(experiment, out | suspects(experiment, bare, noise.sigma))
         if not (more & ~out).any():
             return noise, out

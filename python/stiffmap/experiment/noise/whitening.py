@@ -112,7 +112,7 @@ def best_fit(problem: LinearProblem, columns: Floats, values: Floats, *, robust:
     """(n, c) what columns (n, c, q) of best fit to the kept readings say of `values` (n, c), nothing else fitted; `robust`:
     readings that are far off do not count."""
     if not columns.shape[-1]:
-        return np.zeros_like(values)
+        return np.zeros(values.shape)  # no memory until it is written to
     bare = replace(problem, nuisance=np.zeros((len(problem), 0)))
     rounds = ROUNDS if robust else 1
     return np.asarray(columns @ fitted(bare.white(columns), bare.white(np.nan_to_num(values)), rounds)[0])

@@ -5,12 +5,13 @@ from __future__ import annotations
 from array import array
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import repeat
+from itertools import chain, repeat
 from pathlib import Path
 from typing import Any
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs import make_folder, only_job, write_rows, write_text
+from stiffmap.common.tables.cells import BLOCK
 from stiffmap.common.tables.table import Table
 from stiffmap.common.yaml_text import text_of
 from stiffmap.experiment.channels import AXES
@@ -165,7 +166,8 @@ class Rows:
             return self._same("" if wanted is None else wanted)
         if wanted not in self._numbers:
             return self._sheet.columns[wanted]
-        return ("" if v != v else v for v in map(float, self._numbers[wanted]))
+        blocks = (self._numbers[wanted][i : i + BLOCK].tolist() for i in range(0, len(self._sheet), BLOCK))
+        return ("" if v != v else v for v in chain.from_iterable(blocks))
 
     def _same(self, cell: object) -> Iterable[object]:
         return repeat(cell, len(self._sheet.lines))

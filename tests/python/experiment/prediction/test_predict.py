@@ -9,6 +9,7 @@ import pytest
 
 import stiffmap as sm
 from stiffmap.experiment import Predictor, predict, random_plan, simulate
+from stiffmap.experiment.experiment import numbered
 from stiffmap.experiment.noise.checks import checks
 from stiffmap.experiment.noise.level import noise_of
 from stiffmap.experiment.noise.outliers import suspects, without_suspects
@@ -113,3 +114,15 @@ def test_rows_that_are_left_out_say_whether_it_is_the_load() -> None:
         Predictor(machine, replace(plan, wrench=plan.wrench * 300))
     with pytest.raises(sm.StiffmapError, match=r"at 36 rows .*: out of reach, or units are wrong"):
         Predictor(machine, replace(plan, position=plan.position + np.array([1.0, 0, 0])))
+
+
+def test_numbers_of_rows_are_those_of_sorted_different_rows() -> None:
+    """Against `np.unique` along an axis, which shares no code with it; unread cells are alike."""
+    rng = np.random.default_rng(4)
+    key = rng.integers(-2, 3, (400, 3)) / 7.0
+    key[rng.random(400) < 0.1, 2] = np.nan
+    words = tuple(rng.choice(["up", "down"], 400))
+    number = numbered([key[:, 0], None, key[:, 1:], words, ()])
+    plain = np.hstack([np.round(np.nan_to_num(key, nan=9.0), 9) + 0.0, (np.array(words) == "up")[:, None]])
+    np.testing.assert_array_equal(number, np.unique(plain, axis=0, return_inverse=True)[1].reshape(-1))
+    assert numbered([np.array([-0.0, 0.0, 1e-12])]).tolist() == [0, 0, 0]
