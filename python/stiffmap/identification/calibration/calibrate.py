@@ -101,24 +101,19 @@ def _answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, star
     fit = best.fit if best.world == EXACT else found.search.calibrated or best.fit
     clock.say("calibrated machine")
     given = readings(predictor, found.uncertain, columns, fit, sigma, found.suspects)
-    models: dict[str, Corrected] = {}
-    if given.drives or (len(given.spread) and not exact):
-        models[CALIBRATED] = corrected(given, ())
+    at = corrected(given, ()) if given.drives or (len(given.spread) and not exact) else None
+    models = {CALIBRATED: at} if at else {}
     listed = stands_out(columns, best.fit, found.suspects, models.values())
     clock.say("readings that no fit saw")
     made = written(models, base, given, listed, seed, lambda: clock.over)
-    at = models.get(CALIBRATED)
-    before, after = made.sizes
-    pairs = swapped(e, made.left[1], sigma, listed)
     rows, rank = table_of(columns, found.search.calibrated or fit, at)
     verdict, wide = judged(columns, found.search), too_wide(fit)
     at_name = {r.name: r for r in rows}
     beyond = tuple(at_name[b.unknown.name] for b in verdict.beyond)
-    held = made.held_out
-    unseen = (held.before, held.after) if held else (before, after)
-    beyond_noise = [s.ratio**2 - best.fit.noise**2 for s in unseen]
-    # more is left than taken away
-    unattributed = (verdict.rest or verdict.time) and beyond_noise[1] > 0.5 * beyond_noise[0]
+    held, rest = made.held_out, verdict.rest or verdict.time
+    unseen = (held.before, held.after) if held else made.sizes
+    first, last = (s.ratio**2 - best.fit.noise**2 for s in unseen)
+    unattributed = rest and last > 0.5 * first  # more is left than taken away
     if beyond or not (unattributed or exact):
         word = tolerance_word(", ".join(r.name for r in beyond), wide)
     else:
@@ -130,17 +125,17 @@ def _answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, star
         beyond=beyond,
         wide=wide,
         which=made.which,
-        before=before,
-        after=after,
+        before=made.sizes[0],
+        after=made.sizes[1],
         held_out=held,
         promise=made.promise,
         noise=found.noise.rms,
         scale=best.fit.noise,
         shares=shares(columns, best.fit),
-        rest=verdict.rest or verdict.time,
+        rest=rest,
         profiles=at.profiles if at and made.which == CALIBRATED else (),
         outliers=tuple(e.ids[i] for i in np.flatnonzero(listed)),
-        swapped=tuple((e.ids[i], e.ids[j]) for i, j in pairs),
+        swapped=tuple((e.ids[i], e.ids[j]) for i, j in swapped(e, made.left[1], sigma, listed)),
         failed=given.sensitivity.failed,
         stopped=clock.stopped,
         machine=vouched(predictor, made, f"Numbers calibrated by experiment {e.name}.", columns),

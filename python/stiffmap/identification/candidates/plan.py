@@ -11,7 +11,7 @@ from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.prediction.fingerprint import fingerprint
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.identification.candidates.candidates import Candidate, candidates
-from stiffmap.identification.candidates.sensitivity import Slopes, Variant, variants
+from stiffmap.identification.candidates.sensitivity import Variant, slopes_of, variants
 from stiffmap.identification.clock import Clock
 from stiffmap.model.effects import get, kinds
 
@@ -44,7 +44,7 @@ def plan_of(predictor: Predictor, clock: Clock | None = None) -> CandidatePlan:
     failed: list[tuple[Candidate, str]] = []
     kind, whole = "", True
     tried = candidates(predictor.machine.description, predictor.experiment)
-    slopes = Slopes(predictor, tried)
+    slopes = slopes_of(predictor, tried)
     for candidate in tried:
         if clock.over:
             where = "some places" if candidate.kind == kind else "any place"

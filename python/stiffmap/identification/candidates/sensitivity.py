@@ -80,10 +80,10 @@ class Variant:
 
 
 def variants(
-    candidate: Candidate, predictor: Predictor, base: Floats, slopes: Slopes | None = None
+    candidate: Candidate, predictor: Predictor, base: Floats, slopes: Ahead[Key] | None = None
 ) -> Iterator[Variant | None]:
     """One linear model per signature of a candidate; None where the machine fails with it. `slopes`: computed ahead."""
-    slopes = slopes or Slopes(predictor, [candidate])
+    slopes = slopes or slopes_of(predictor, [candidate])
     tried = Tried(candidate.element, candidate.legs, candidate.parameters)
     linear = candidate.linear
     index = readings_of(predictor.experiment, base)
@@ -102,7 +102,7 @@ def variants(
             single = [
                 difference(candidate, p, shape, predictor, base) if told is None else told
                 for p in linear
-                for told in [slopes.of(candidate, p)]
+                for told in [slopes.of((candidate, p))]
             ]
             columns = lines_of(np.stack(single, axis=-1), base, index)
             sign = np.array([side(p) for p in linear])
@@ -176,26 +176,19 @@ class PlanProbe:
         return np.stack(out, axis=-1)
 
 
-class Slopes:
-    """Slopes per scale at the null, computed ahead in the order in which they will be asked for."""
+def slopes_of(predictor: Predictor, candidates: Iterable[Candidate]) -> Ahead[Key]:
+    """Changes (n, c) of the readings per scale of each parameter at its null."""
 
-    def __init__(self, predictor: Predictor, candidates: Iterable[Candidate]) -> None:
-        self._predictor = predictor
-        wanted = [(c, p) for c in candidates if _is_smooth(c) for p in c.linear if side(p) == 0]
-        self._ahead = Ahead(wanted, AT_ONCE, self._tell)
-
-    def of(self, candidate: Candidate, p: Parameter) -> Floats | None:
-        """(n, c) change of the readings per scale of a parameter; None where a whole prediction must tell."""
-        return self._ahead.of((candidate, p))
-
-    def _tell(self, some: Sequence[Key]) -> list[Floats | None]:
+    def tell(some: Sequence[Key]) -> list[Floats | None]:
         moved = [(c.term_of({p.name: float(p.null or 0.0) + step_of(p)}),) for c, p in some]
-        unmoved = [(c.term_of({}),) for c, _ in some]
-        changes = self._predictor.changes(moved, unmoved=unmoved)
+        changes = predictor.changes(moved, unmoved=[(c.term_of({}),) for c, _ in some])
         return [
             None if change is None else change / (step_of(p) / p.scale)
             for (_, p), change in zip(some, changes, strict=True)
         ]
+
+    wanted = [(c, p) for c in candidates if _is_smooth(c) for p in c.linear if side(p) == 0]
+    return Ahead(wanted, AT_ONCE, tell)
 
 
 def _is_smooth(candidate: Candidate) -> bool:

@@ -64,8 +64,8 @@ def answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, cross
     held, late = made.held_out, made.over_time
     best = models.get(CORRECTED)
     each, gap = shares(columns, fit), gap_of(columns, fit)
-    effects = _effects(predictor, v, best, each, fit)
-    others = list(_alternatives(predictor, found, v, best, clock)) if best and effects else []
+    effects = _effects(v, best, each, fit)
+    others = list(_alternatives(found, v, best, clock)) if best and effects else []
     noise = _noise(found, made, best)
     rest = _rest(columns, fit, v, each, gap)
     return Diagnosis(
@@ -101,7 +101,7 @@ def answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, cross
         residual_after=made.left[1],
         set_aside=listed,
         gap=gap,
-        calibration=_numbers(found, v, best, given),
+        calibration=_numbers(found, v, best),
         refused=[f"{c.place.candidate}: {why}" for c, why in v.refused],
         which=made.which,
         stopped=clock.stopped or bool(clock.left_out),
@@ -149,9 +149,7 @@ def _models(
     return out, v, []
 
 
-def _effects(
-    predictor: Predictor, v: Verdict, best: Corrected | None, each: dict[str, float], fit: Fit
-) -> list[Effect]:
+def _effects(v: Verdict, best: Corrected | None, each: dict[str, float], fit: Fit) -> list[Effect]:
     if best is None or not v.named:
         return []
     total = float(np.sum(fit.columns.residual**2))
@@ -163,16 +161,11 @@ def _effects(
         }
         for n in v.named
     ]
-    places = [n.chosen.place for n in v.named]
-    return effects_of(predictor.machine.description, best, places, evidence)
+    return effects_of(best, [n.chosen.place for n in v.named], evidence)
 
 
 def _alternatives(
-    predictor: Predictor,
-    found: Inferred,
-    v: Verdict,
-    best: Corrected,
-    clock: Clock,
+    found: Inferred, v: Verdict, best: Corrected, clock: Clock
 ) -> Iterator[tuple[list[Effect], Corrected]]:
     """Each other place of each effect, all else refitted; those that are likeliest first, at most `RIVALS` of an effect."""
     named = [n.chosen.place for n in v.named]
@@ -188,7 +181,7 @@ def _alternatives(
             except StiffmapError:
                 continue
             places = [*named[:k], place, *named[k + 1 :]]
-            yield effects_of(predictor.machine.description, fitted, places, [{} for _ in places]), fitted
+            yield effects_of(fitted, places, [{} for _ in places]), fitted
 
 
 def _word(v: Verdict, effects: Sequence[Effect], rest: Sequence[Rest], cut_short: bool) -> str:
@@ -262,11 +255,11 @@ def _or_numbers(n: Named) -> str:
     )
 
 
-def _numbers(found: Inferred, v: Verdict, best: Corrected | None, given: Readings) -> FoundNumbers | None:
+def _numbers(found: Inferred, v: Verdict, best: Corrected | None) -> FoundNumbers | None:
     if best is None or not len(best.numbers):
         return None
     said = zip(found.columns.unknowns, of_numbers(found.columns, found.search.best.fit), strict=True)
-    at = dict(zip((u.name for u in given.sensitivity.unknowns), best.numbers.tolist(), strict=True))
+    at = dict(zip((u.name for u in best.given.sensitivity.unknowns), best.numbers.tolist(), strict=True))
     table = [
         FoundNumber(u.name, u.group, u.leg, u.unit, at[u.name] * u.u, u.u, sd * u.u, share)
         for u, (_, sd, share) in said

@@ -56,8 +56,10 @@ def moves_of(pairs: Iterable[tuple[Unknown, float]]) -> dict[tuple[str, str], fl
     return moves
 
 
-def with_numbers(predictor: Predictor, moves: Moves) -> Predictor:
-    """What predicts the machine with its own numbers off; the instrument's are left out."""
+def with_numbers(predictor: Predictor, moves: Moves, here: Mask | None = None) -> Predictor:
+    """What predicts the machine with its own numbers off, in the rows `here` (n,), None: all; the instrument's are left out."""
+    if here is not None and not here.all():
+        predictor = predictor.beside(rows=here)
     machine = predictor.machine
     moved = with_moves(machine.description, moves)
     if moved is machine.description:
@@ -121,14 +123,10 @@ def predicted(
         scale = moves.pop((INSTRUMENT, SCALE), 0.0)
         moved = tuple((at, by) for at, by in moves.items() if at[0] != INSTRUMENT)
         key = (name, here.tobytes(), moved)
-        mine = predictor.kept(key, partial(_beside, predictor, here, dict(moved)))
+        mine = predictor.kept(key, partial(with_numbers, predictor, dict(moved), here))
         of_instrument = [scaled(predictor.machine.description, scale)] if scale else []
         out[here] = mine([*terms, *of_instrument])
     return np.asarray(out + _frame_part(predictor, pairs))
-
-
-def _beside(predictor: Predictor, here: Mask, moves: Moves) -> Predictor:
-    return with_numbers(predictor if here.all() else predictor.beside(rows=here), moves)
 
 
 def _frame_part(predictor: Predictor, pairs: Sequence[tuple[Unknown, float]]) -> Floats | float:

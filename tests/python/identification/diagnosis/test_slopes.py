@@ -14,7 +14,7 @@ from stiffmap.experiment.channels import Channel
 from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.prediction.nearby import Near, Nearby
 from stiffmap.identification.candidates.candidates import Candidate, candidates
-from stiffmap.identification.candidates.sensitivity import Slopes, step_of
+from stiffmap.identification.candidates.sensitivity import slopes_of, step_of
 from stiffmap.model.description import Block, Branch, Point, Spring
 from stiffmap.model.effects import Parameter
 
@@ -32,8 +32,8 @@ def plan_for(machine: sm.Machine, quantity: str, gravity: tuple[float, float, fl
 def told(predictor: Predictor, every: int = 1) -> Iterator[tuple[Candidate, Parameter, Floats]]:
     """Candidates and parameters whose slopes are told without whole predictions."""
     tried = candidates(predictor.machine.description, predictor.experiment)
-    slopes = Slopes(predictor, tried)
-    columns = [(c, p, slopes.of(c, p)) for c in tried for p in c.linear]
+    slopes = slopes_of(predictor, tried)
+    columns = [(c, p, slopes.of((c, p))) for c in tried for p in c.linear]
     found = [(c, p, s) for c, p, s in columns if s is not None]
     assert found
     yield from found[::every]
@@ -96,9 +96,9 @@ def test_weights_that_may_turn_spins_leave_no_slopes(name: str) -> None:
     machine = sm.load_machine(name)
     predictor = Predictor(machine, plan_for(machine, "deflection", DOWN))
     tried = candidates(machine.description, predictor.experiment)
-    slopes = Slopes(predictor, tried)
+    slopes = slopes_of(predictor, tried)
     assert all(
-        slopes.of(c, p) is None for c in tried for p in c.linear if p.name == "error" or c.kind == "length"
+        slopes.of((c, p)) is None for c in tried for p in c.linear if p.name == "error" or c.kind == "length"
     )
 
 
@@ -154,8 +154,8 @@ def test_another_point_of_the_platform(name: str) -> None:
 def kinds_told(predictor: Predictor, kinds: Sequence[str], machine: sm.Machine) -> set[str]:
     tried = [c for c in candidates(machine.description, predictor.experiment) if c.kind in kinds]
     assert {c.kind for c in tried} == set(kinds)
-    slopes = Slopes(predictor, tried)
-    return {c.kind for c in tried for p in c.linear if slopes.of(c, p) is not None}
+    slopes = slopes_of(predictor, tried)
+    return {c.kind for c in tried for p in c.linear if slopes.of((c, p)) is not None}
 
 
 def test_what_needs_whole_predictions() -> None:

@@ -23,12 +23,10 @@ POWER = 0.95
 
 
 def effects_of(
-    description: MachineDescription,
-    found: Corrected,
-    places: Sequence[Place],
-    evidence: Sequence[dict[str, float]],
+    found: Corrected, places: Sequence[Place], evidence: Sequence[dict[str, float]]
 ) -> list[Effect]:
     """The effects of an optimum with their 95 % intervals, SI, at their places; `evidence` per effect."""
+    description = found.given.predictor.machine.description
     sd = np.sqrt(np.maximum(np.diag(found.covariance), 0.0))
     ends = np.cumsum([0, *(len(t.values) for t in found.terms)])
     return [
