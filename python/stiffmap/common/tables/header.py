@@ -27,11 +27,11 @@ BEHIND = [
 
 
 def header_of(
-    above: Sequence[Line], first: Sequence[str], known: Callable[[str], bool]
+    above: Sequence[Line], first: Sequence[str], known: Callable[[str], bool], repeated: bool = False
 ) -> tuple[int, list[str]] | None:
     """Line number and names of the columns, from the lines above the first row of data; None where none is a header.
 
-    `known`: whether a name without its unit has a meaning of its own, without the group that stands over it.
+    `known`: whether a name without its unit and the group over it has a meaning of its own; `repeated`: whether names may come again.
     """
     width = sum(bool(c.strip()) for c in first)
     lines = [(n, [_plain(c) for c in cells]) for n, cells in above]
@@ -52,7 +52,10 @@ def header_of(
     if len(lines) > 1 and _needs_group(names, lines[-2][1], first):
         names = _grouped(lines[-2][1], names, known)
     elif len(lines) > 1:  # Position [mm] over x y z
-        names = [_with_own_unit(n, split_unit(g)[1]) if n else n for n, g in _under(lines[-2][1], names)]
+        names = [_with_own_unit(n, _of_group(g)[1]) if n else n for n, g in _under(lines[-2][1], names)]
+    for _, group in reversed([] if repeated else lines[:-2]):
+        if len({*names}) < len(names) and _needs_group(names, group, first):
+            names = _grouped(group, names, known)
     if units:
         names = [_with_own_unit(n, units[i] if i < len(units) else "") for i, n in enumerate(names)]
     return number, _of_metres(names)
@@ -64,11 +67,11 @@ def _of_metres(names: Sequence[str]) -> list[str]:
     return [re.sub(r"^(.+)_m$", r"\1 [m]", n) if said else n for n in names]
 
 
-def refuse_twice(names: Sequence[str], file: str, line: int) -> None:
-    """FileError where two columns have one name."""
+def refuse_twice(names: Sequence[str], file: str, line: int, way: str = "") -> None:
+    """FileError where two columns have one name; `way`: what to do then."""
     twice = sorted(name for name, times in Counter(names).items() if times > 1)
     if twice:
-        raise FileError(f"column '{twice[0]}' occurs twice", file=file, line=line)
+        raise FileError(f"column '{twice[0]}' occurs twice{way}", file=file, line=line)
 
 
 RECORD = {
@@ -146,13 +149,20 @@ def _grouped(group: Sequence[str], names: Sequence[str], known: Callable[[str], 
     out = []
     once = Counter(split_unit(n)[0].lower() for n in names)
     for name, over in _under(group, names):
-        title, unit = split_unit(over)
+        title, unit = _of_group(over)
         plain, own = split_unit(name)
         text = " ".join(p for p in (title, plain) if p)
         if once[plain.lower()] == 1 and known(plain) and not known(text):
             text = plain  # Force over Fx
         out.append(with_unit(text, own or unit))
     return out
+
+
+def _of_group(over: str) -> tuple[str, str]:
+    """Name and unit of what stands over columns; a size, ``Tool length: 120 mm``, and ``mm, N`` are no unit of all of them."""
+    title, unit = split_unit(over)
+    size = unit and re.search(rf"\d\s*{re.escape(unit)}\s*$", over)
+    return (over, "") if size or split_unit(title)[1] else (title, unit)
 
 
 def _under(group: Sequence[str], names: Sequence[str]) -> Iterator[tuple[str, str]]:

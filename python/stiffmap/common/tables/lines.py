@@ -28,12 +28,12 @@ BLANKS = re.compile(r"[ \t]+(?![\[(])")
 MARKED = re.compile(r"^(#|%|//)\s+")
 """The mark of a comment, which is no cell."""
 THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(\.\d{3})+")
-"""``1.000`` is a thousand in a table with decimal commas."""
+"""``1.000`` is a thousand in a table with decimal commas; ``0.041`` is not."""
 COMMA = re.compile(r"^[ \t]*[+-]?[\d.]*,\d+[ \t]*$", re.M)
 QUOTED = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
 POINT = re.compile(r"^[ \t]*(?![+-]?[1-9]\d{0,2}(?:\.\d{3})+[ \t]*$)[+-]?[\d,]*\.\d+[ \t]*$", re.M)
 """A number with a decimal point, which no `THOUSANDS` are."""
-ODD_SIGNS = str.maketrans("−", "-", "\u00a0\u2007\u2009\u202f")
+ODD_SIGNS = str.maketrans("−–", "--", "\u00a0\u2007\u2009\u202f")
 """Blanks within a number go, and a minus is that of a keyboard."""
 SAMPLE = 2_000
 """Lines by which the separator is found."""
@@ -42,7 +42,7 @@ GROUPED = re.compile(r"[+-]?\d{1,3}(?:(['’ ])\d{3}(?:\1\d{3})*(?:\.\d+)?|(?:,\
 """``1'000``, ``1 000.5``, ``1,000.5``."""
 FORTRAN = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)[dD][+-]?\d+")
 WITH_UNIT = re.compile(
-    r"([+\-−]?\d(?:[\d.,]|['’ ](?=\d))*(?:[eE][+-]?\d+)?)\s*((?:[^\W\d_]|[°\"']).{0,19})", re.DOTALL
+    r"([+\-−–]?\d(?:[\d.,]|['’ ](?=\d))*(?:[eE][+-]?\d+)?)\s*((?:[^\W\d_]|[°\"']).{0,19})", re.DOTALL
 )
 """``12.5 µm``; what a wrong separator leaves together has no letter behind its first number, or is longer than any unit."""
 
@@ -235,12 +235,13 @@ def _text(path: Path) -> tuple[str, Lines, str]:
 
 
 def _numbers_between(separator: str, lines: Sequence[str]) -> tuple[int, int]:
-    """How well it parts the cells: quotations that it breaks, negative, and cells that are numbers then."""
+    """How well it parts the cells: quotations and brackets that it breaks, negative, and cells that are numbers then."""
     with suppress(csv.Error):  # the reader of the whole says where
         rows = map(_cut, lines) if separator == " " else csv.reader(lines, delimiter=separator)
         cells = list(chain.from_iterable(rows))
         numbers = sum(NUMBER.fullmatch(c) is not None or parted(c)[1] != "" for c in cells)
-        return -sum('"' in c for c in cells), numbers
+        broken = sum('"' in c or any(c.count(a) != c.count(b) for a, b in ("[]", "{}")) for c in cells)
+        return -broken, numbers
     return -len(lines), 0
 
 

@@ -6,13 +6,14 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from itertools import chain
+from itertools import chain, islice
 from pathlib import Path
 
 from stiffmap.common.errors import FileError
 from stiffmap.common.number_text import LARGEST
 from stiffmap.common.tables.cells import Cells, blocks, filled, packed
 from stiffmap.common.tables.header import (
+    MOST_LINES,
     Line,
     fits,
     header_of,
@@ -23,6 +24,7 @@ from stiffmap.common.tables.header import (
 )
 from stiffmap.common.tables.lines import (
     COMMENTS,
+    Lines,
     Spelling,
     decimal_comma,
     even,
@@ -38,13 +40,14 @@ from stiffmap.common.tables.table import Table
 from stiffmap.common.units import unit_of
 
 STATISTICS = re.compile(
-    r"(mean|average|avg|mittel(wert)?e?|mw|ø|sum|summe|total|gesamt|std\.?( ?dev\.?)?|stdev|stabw|s|sigma|σ|m[ií]n(imum|imo|i)?|"
+    r"(((gesamt|grand|overall)[ -]?)?(mean|average|avg|mittel(wert)?e?|total)|mw|ø|x̄|x̅|m[aá]x\.? ?[-–] ?min|sum|summe|gesamt|std\.?( ?dev\.?)?|stdev|stabw|s|sigma|σ|m[ií]n(imum|imo|i)?|"
     r"m[aá]x(imum|imo|i)?|median|range|spannweite|rms|durchschnitt|standardabweichung|streuung|[1-6] ?(sigma|σ|s)|count|anzahl|n|uncertainty|unsicherheit|toleran(ce|z)|"
     r"varian(ce|z|za)|deviation|moyenne|somme|m[ée]diane|[ée]cart([ -]?type)?|[ée]tendue|promedio|media|mediana|suma|desviación|"
     r"desv(est)?|rango|somma|totale|deviazione|scarto|massimo|minimo)\.?:?( .*)?",
     re.IGNORECASE,
 )
 """First cell of a row that is no reading but what a spreadsheet computed of them."""
+WAY = "--header id,x,y,z,dx,dy,dz (nothing between two commas for a column that is not used)"
 LONGEST_HEADER, MOST_COLUMNS = 300, 1000
 
 
@@ -82,32 +85,29 @@ def read_sheet(path: Path, sheet: str | None = None, layout: Layout = PLAIN) -> 
         comma = decimal_comma(
             ([parted(c)[0] for c in row] if units else row for row in cells_only), separator
         )
-        spelling, above = Spelling(comma, units), list[Line]()
-        rows = iter(lines() if layout.table is None else _one_table(lines(), spelling, layout, str(path)))
-        first = next(_above(rows, spelling, above), None)
-        if first is not None:
+        spelling = Spelling(comma, units)
+        rows, above, begun, found = _begun(lines, spelling, layout, str(path))
+        if begun:
             break
+    first = begun[-1] if begun else None
     if first is None and not above:
         raise FileError(f"the {'sheet' if page else 'file'} is empty", file=str(path))
-    found = None if first is None else header_of(above, first[1], layout.known)
     if first is not None and (layout.header or (found is None and layout.numbered)):
         found = first[0], _names(first[1], layout.header, str(path), first[0])
     if first is None or found is None:
-        way = (
-            "; if the table has none, name its columns: --header id,x,y,z,dx,dy,dz (nothing between two commas for a column "
-            "that is not used), or by their numbers, as in --map x=2"
-        )
+        way = f"; if the table has none, name its columns: {WAY}, or by their numbers, as in --map x=2"
+        rule = "; a row of numbers has two or more, each alone in its cell, in half of its cells or more"
         raise FileError(
-            f"no header line with rows of numbers below it was found{way if first and not layout.strict else ''}",
+            f"no header line with rows of numbers below it was found{'' if layout.strict else way if first else rule}",
             file=str(path),
         )
     number_, header = found
     names = _checked(header, str(path), number_)
     if not layout.repeated:
-        refuse_twice(names, str(path), number_)
+        refuse_twice(names, str(path), number_, "" if layout.strict else f"; name the columns: {WAY}")
     width = len(names)
     said = [*header, *(c.strip() for _, cells in above for c in cells)]
-    aside = list[str]()
+    aside = [f"row {n}, of numbers above the header" for n, _ in begun[:-1]]
     clear = (
         b if _all_readings(b) else _data(b, header, said, spelling, aside, layout, str(path))
         for b in blocks(chain([first], kept(rows)))
@@ -215,6 +215,26 @@ def _above(rows: Iterator[Line], spelling: Spelling, above: list[Line]) -> Itera
         elif not data:
             above.append((n, cells))
             del above[:-8]
+
+
+def _begun(
+    lines: Lines, spelling: Spelling, layout: Layout, file: str
+) -> tuple[Iterator[Line], list[Line], list[Line], tuple[int, list[str]] | None]:
+    """Lines from the second row of data on, those above the first, the first row behind rows of numbers above the header, such as
+    numbers of channels, and the header. The very first row counts unless another line names the columns better."""
+    for skip in (*range(1 if layout.strict or layout.header else MOST_LINES), 0):
+        above = list[Line]()
+        rows = iter(lines() if layout.table is None else _one_table(lines(), spelling, layout, file))
+        data = list(islice(_above(rows, spelling, above), skip + 1))
+        found = header_of(above, data[-1][1], layout.known, layout.repeated) if data else None
+        if found and len(data) > skip and (not skip or found[0] > data[-2][0]):
+            names = _checked(found[1], file, found[0])
+            behind = any(is_finite(c, spelling) for c in data[-1][1][len(names) :])
+            if not behind and (layout.repeated or len({*names}) == len(names)):
+                break
+        if not skip and (found is None or any(layout.known(split_unit(n)[0]) for n in found[1])):
+            break
+    return rows, above, data, found
 
 
 def _all_readings(rows: Sequence[Line]) -> bool:

@@ -187,7 +187,7 @@ def _certificate(model: ExperimentFile, units: Units, file: Path) -> tuple[tuple
 def _fits(quantity: str, table: Table) -> None:
     """FileError for a column that an experiment of this quantity cannot have."""
     of_position = (*SEEN, *SEEN_TURNED, *SEEN_QUATERNION)
-    wrong = [] if quantity == "position" else [(c, "it") for c in of_position]
+    wrong = [] if quantity == "position" else [(c, "a place (quantity: position)") for c in of_position]
     wrong += [(c, k.title) for k in kinds() if quantity not in k.quantities for c in (k.name, k.absolute)]
     for column, title in wrong:
         if column in table:

@@ -139,7 +139,7 @@ class Meant(Answers):
         if not following or following[0].meaning != "note":
             return ""
         cells = self.sheet.columns[column + 1]
-        if any(cell and unit_of(cell) is None for cell in cells):
+        if self.sheet.is_numeric(column + 1) or any(cell and unit_of(cell) is None for cell in cells):
             return ""
         units = set(cells) - {""}
         if len(units) > 1:

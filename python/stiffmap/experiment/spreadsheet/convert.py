@@ -13,6 +13,7 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs import make_folder, only_job, write_rows, write_text
 from stiffmap.common.tables.cells import BLOCK
 from stiffmap.common.tables.table import Table
+from stiffmap.common.units import unit_of
 from stiffmap.common.yaml_text import text_of
 from stiffmap.experiment.channels import AXES
 from stiffmap.experiment.experiment import WRENCH
@@ -58,6 +59,8 @@ def understand(m: Meant, loaded: bool = False) -> ImportedSheet:
         used = [c for c in columns if c.meaning != "note"]
         known |= set(POSE)
     _ask(m, known, bool(drives))
+    for meaning in dict.fromkeys(c.meaning for c in used if c.repeat):
+        _refuse_loads(m, [c for c in used if c.meaning == meaning])
     units = dict.fromkeys((c.meaning, m.unit(c.index, c.meaning)) for c in used if quantity_of(c.meaning))
     found = dict(list(units))
     for meaning in (name for name, unit in units if unit != found[name]):
@@ -82,12 +85,23 @@ def understand(m: Meant, loaded: bool = False) -> ImportedSheet:
     )
 
 
+def _refuse_loads(m: Meant, repeats: Sequence[Column]) -> None:
+    """StiffmapError where columns side by side are not numbered from 1, or have units of something else: each has a load of its own."""
+    ordered = sorted(c.repeat for c in repeats) == [*range(1, len(repeats) + 1)]
+    if not ordered or any(unit_of(c.unit) and not unit_of(c.unit, quantity_of(c.meaning)) for c in repeats):
+        headers = ", ".join(f"'{m.sheet.header[c.index]}'" for c in repeats)
+        raise StiffmapError(
+            f"{m.sheet.file}: {headers} are no repeats, numbered from 1 in units of {repeats[0].meaning}: of several loads, write a "
+            f"row for each one with the load in a column; of one, say --map {repeats[0].meaning}='HEADER|HEADER'"
+        )
+
+
 def _ask(m: Meant, known_: set[str], joints: bool) -> None:
     lost = [a for a in POSE if a not in known_]
     if lost:
         m.ask_column(
             f"which column is the position {lost[0]}? Say --map {lost[0]}='HEADER', or "
-            f"--set {lost[0]}=NUMBER (mm) where it is the same in every row",
+            f"--set {lost[0]}=NUMBER (mm) where it is the same in every row; of commanded joints, --map JOINT='HEADER'",
             lost[0],
         )
     if not known_ & set(READINGS):

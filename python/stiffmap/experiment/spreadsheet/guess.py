@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.tables.header import split_unit
 from stiffmap.common.tables.meaning import meaning_of
+from stiffmap.common.units import TIMES
 from stiffmap.experiment.channels import AXES
 from stiffmap.experiment.files.fields import SEEN
 
@@ -49,7 +50,7 @@ def guess(headers: Sequence[str], chosen: Mapping[str, Sequence[str]]) -> list[C
             meaning, repeat = given[index]
             out.append(Column(index, name, unit, meaning, repeat if len(chosen[meaning]) > 1 else 0))
         else:
-            meaning, repeat = _meaning(name)
+            meaning, repeat = ("note", 0) if unit in (*TIMES, "ms", "h") else _meaning(name)
             out.append(Column(index, name, unit, "note" if meaning in chosen else meaning, repeat))
     if "ll" not in chosen and any(c.meaning in READINGS and c.meaning != "ll" for c in out):
         # a length of something else

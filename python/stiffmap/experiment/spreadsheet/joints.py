@@ -18,7 +18,7 @@ from stiffmap.experiment.spreadsheet.guess import READINGS, Column
 from stiffmap.experiment.spreadsheet.together import quaternion
 from stiffmap.solve.machine import Machine
 
-NUMBERED = r"(joint|axis|achse|gelenk|theta|q|j|a)[ _.-]?{}"
+NUMBERED = r"{}(joint|axis|achse|gelenk|theta|q|j|a)[ _.-]?{}"
 MEASURED = r"([xyz])[ _.-]?meas(?:ured|\.)?"
 """A header of a measured position, next to joints."""
 MOST_TURNS = 4.0 * math.pi
@@ -41,7 +41,8 @@ def commanded(m: Meant, drives: Mapping[str, bool]) -> None:
     """
     short = {n.split(".")[-1] for n in drives}
     given = _given(m.chosen, drives, short)
-    at = {name: _find(m, name, k, given.get(name)) for k, name in enumerate(drives, 1)}
+    numbers = zip(drives, _numbered(m, len(drives)), strict=True)
+    at = {name: _find(m, name, number, given.get(name)) for name, number in numbers}
     lost = [n for n, i in at.items() if i is None]
     if len(lost) == len(at):
         return
@@ -67,12 +68,23 @@ def _given(chosen: Mapping[str, list[str]], drives: Mapping[str, bool], short: s
     return {name: chosen[key][0] for name, key in keys if key in chosen}
 
 
-def _find(m: Meant, name: str, number: int, header: str | None) -> int | None:
+def _numbered(m: Meant, count: int) -> list[str]:
+    """Headers of joints by their numbers: from 1, or from 0 where those are as many as the joints."""
+    turns = quaternion(m.sheet)
+    for whose in ("", "target[ _.-]?", "actual[ _.-]?"):
+        names = [NUMBERED.format(whose, k) for k in range(count + 1)]
+        there = [m.sheet.find(n, turns) is not None for n in names]
+        if any(there):
+            return names[:-1] if there[0] and not there[-1] else names[1:]
+    return names[1:]
+
+
+def _find(m: Meant, name: str, number: str, header: str | None) -> int | None:
     if header is not None:
         return m.index(header)
     own = [re.escape(n) for n in (name, name.split(".")[-1]) if n.lower() not in ("x", "y", "z")]
     turns = quaternion(m.sheet)
-    found = (m.sheet.find(pattern, turns) for pattern in (*own, NUMBERED.format(number)))
+    found = (m.sheet.find(pattern, turns) for pattern in (*own, number))
     return next((i for i in found if i is not None), None)
 
 

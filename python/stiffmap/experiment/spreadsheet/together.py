@@ -54,6 +54,7 @@ TURNS = (
     ("rx ry rz", "rotvec", "a rotation vector (UR's RX, RY, RZ)"),
 )
 """Names of three angles, how they turn, and that in words."""
+WXYZ = tuple(rf"(.*\.)?(q|quat(ernion)?|rot(ation)?|orientation)[ _.]?{a}" for a in "wxyz")
 ROUNDED = 0.01
 """By how much digits of a table may change the length of a quaternion."""
 
@@ -206,8 +207,8 @@ def _hung(m: Meant) -> None:
 
 
 def quaternion(sheet: Table) -> list[int]:
-    """Columns w x y z of quaternions, by their names and their length of one; empty where there are none."""
-    for names in (QUATERNION, ("q1", "q2", "q3", "q4"), ("q0", "q1", "q2", "q3")):
+    """Columns w x y z of quaternions, by their names (Motive: Rotation W, ROS: pose.orientation.w) and length of one, or none."""
+    for names in (WXYZ, ("q1", "q2", "q3", "q4"), ("q0", "q1", "q2", "q3"), ("q0", *WXYZ[1:])):
         at = [i for i in map(sheet.find, names) if i is not None and sheet.is_numeric(i)]
         if len(at) == 4:
             size = np.linalg.norm([sheet.numbers(i) for i in at], axis=0)
@@ -224,7 +225,7 @@ def _turns(m: Meant, taken: set[int]) -> None:
     forms = [(quaternion(m.sheet), "", "quaternions, w first")]
     forms += [(_angles(m.sheet, names), turns, words) for names, turns, words in TURNS]
     columns, turns, words = next((f for f in forms if f[0] and not taken & {*f[0]}), ([], "", ""))
-    if not columns or not set(position) <= set(meanings):
+    if not columns or not set(position) <= {*meanings, *([] if turns else m.constants)}:
         return
     of_pose = {"": QUATERNION, "rotvec": VECTOR}.get(turns, EULER)
     of_seen = SEEN_TURNED if turns else [f"p{c}" for c in QUATERNION]

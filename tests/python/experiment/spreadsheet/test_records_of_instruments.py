@@ -1,0 +1,177 @@
+"""Tables as tracking systems, controllers and measuring programs write them: what would be a wrong number is read or refused."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import stiffmap as sm
+from stiffmap.common.errors import StiffmapError
+
+HEAD = "x [mm];y [mm];z [mm];fz [N];dz [µm]\n"
+ROWS = "0;0;0;-100;-41\n50;0;0;-200;-83\n"
+COMMANDS = ("0.016", "-0.416", "1.072", "-1.466", "-1.834", "-0.107")
+LOAD = {"fz": -100.0}
+
+
+@pytest.fixture(autouse=True)
+def own_profiles(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
+
+
+def made(
+    folder: Path, text: str, machine: str = "orthoglide-revised", **more: Mapping[str, Any]
+) -> sm.FromTable:
+    file = folder / "record.csv"
+    file.write_text(text, encoding="utf-8")
+    return sm.experiment_from_table(machine, file, folder / "e", **more)  # type: ignore[arg-type]
+
+
+def truth(e: sm.Experiment) -> None:
+    np.testing.assert_allclose(e.position, [[0, 0, 0], [0.05, 0, 0]])
+    np.testing.assert_allclose(e.wrench[:, 2], [-100, -200])
+    np.testing.assert_allclose(e.reading[:, 2], [-41e-6, -83e-6])
+
+
+@pytest.mark.parametrize(
+    "remark", ["Tool length: 120 mm", "# Facet size: 19 mm", "Payload, 5 kg", "Units: mm, N"]
+)
+def test_a_size_above_the_table_is_no_unit_of_its_columns(remark: str, tmp_path: Path) -> None:
+    text = f"{remark}\nx;y;z;dz;fz [N]\n1;2;3;0.101;-250\n1.1;2;3;0.102;-250\n"
+    e = made(tmp_path, text, units={"length": "in"}).experiment
+    np.testing.assert_allclose(e.position[0], np.array([1, 2, 3]) * 0.0254)
+
+
+@pytest.mark.parametrize("title", ["Test in mm", "Units: mm", "All lengths [mm]"])
+def test_a_unit_above_the_table_still_is(title: str, tmp_path: Path) -> None:
+    e = made(tmp_path, f"{title}\nx;y;z;dz;fz [N]\n1;2;3;0.101;-250\n1.1;2;3;0.102;-250\n").experiment
+    np.testing.assert_allclose(e.position[0], [1e-3, 2e-3, 3e-3])
+
+
+@pytest.mark.parametrize("fixed", [False, True])
+@pytest.mark.parametrize(
+    "names", ["Rotation {}", "field.pose.orientation.{}", ".pose.orientation.{}", "quat_{}", "Q{}"]
+)
+def test_quaternions_are_no_rotations(names: str, fixed: bool, tmp_path: Path) -> None:
+    """Motive, ROS, Polaris: their x, y, z are half angles, which degrees would make wrong in silence."""
+    turns = ";".join("Q0" if names == "Q{}" and a == "W" else names.format(a) for a in "XYZW")
+    places, cells = ("", "") if fixed else ("x [mm];y [mm];z [mm];", "1;2;3;")
+    at = {"x": 1.0, "y": 2.0, "z": 3.0} if fixed else {}
+    text = f"{places}{turns};dx [mm]\n{cells}0;0;0.1;0.994987;0.1\n{cells}0;0;0.1;0.994987;0.1\n"
+    e = made(tmp_path, text, constants={**LOAD, **at}).experiment
+    assert np.isnan(e.reading[:, 3:]).all()
+    head = (tmp_path / "e" / "data.csv").read_text().splitlines()[0].split(",")
+    assert {"qw", "qx", "qy", "qz"} <= {*head}
+
+
+@pytest.mark.parametrize("names", ["q_{}", "joint{}", "target_q_{}", "actual_q_{}"])
+@pytest.mark.parametrize("first", [0, 1])
+def test_joints_are_counted_from_where_they_begin(names: str, first: int, tmp_path: Path) -> None:
+    header = " ".join(names.format(k + first) for k in range(6))
+    row = " ".join(COMMANDS)
+    text = f"clock {header} px py pz\n1 {row} 1400.1 200.2 300.3\n2 {row} 1400.1 200.2 300.3\n"
+    made(tmp_path, text, machine="ur10", units={"joints": "rad", "length": "mm"})
+    data = (tmp_path / "e" / "data.csv").read_text().splitlines()
+    assert data[0].startswith("q1,q2,q3,q4,q5,q6,px")
+    assert data[1].split(",")[:6] == list(COMMANDS)
+
+
+@pytest.mark.parametrize(
+    "loads", ["dz 50 [µm];dz 100 [µm]", "dz 0 [µm];dz 50 [µm]", "dz 2;dz 5", "50 N;100 N"]
+)
+def test_columns_of_several_loads_are_no_repeats(loads: str, tmp_path: Path) -> None:
+    chosen = {"dz": loads.replace(";", "|")} if loads[0] != "d" else {}
+    with pytest.raises(StiffmapError, match=r"no repeats.*a row for each one with the load in a column"):
+        made(tmp_path, f"x [mm];y [mm];z [mm];{loads}\n0;0;0;-41;-83\n50;0;0;-45;-90\n", constants=LOAD,
+             columns=chosen, units={"dz": "um"})  # fmt: skip
+
+
+@pytest.mark.parametrize("cell", ["-0.041", "0.125", "00.500"])
+def test_a_number_that_begins_with_zero_is_no_thousand(cell: str, tmp_path: Path) -> None:
+    """Next to a decimal comma it was taken as -41, 125, 500."""
+    with pytest.raises(StiffmapError, match=r"line 3: column 'x \[mm\]': expected a number; found '50,0'"):
+        made(tmp_path, f"{HEAD}0;0;0;-100;{cell}\n50,0;0;0;-200;-83\n")
+
+
+@pytest.mark.parametrize(
+    "word", ["Gesamtmittel", "Overall mean", "Grand total", "x̄", "Max-Min", "Max. – Min."]
+)
+def test_what_programs_compute_below_is_no_reading(word: str, tmp_path: Path) -> None:
+    found = made(
+        tmp_path, f"Nr;{HEAD}A;{ROWS.splitlines()[0]}\nB;{ROWS.splitlines()[1]}\n{word};0;0;0;-150;-62\n"
+    )
+    truth(found.experiment)
+    assert found.remarks == (f"left out: row 4, '{word}', is no reading",)
+
+
+@pytest.mark.parametrize(
+    ("above", "lines"),
+    [
+        ("Channels;3;;;\nSamples;2;2;2;\nX_Dimension;Time;Time;Time;\nX0;0.0;0.0;0.0;\nDelta_X;0.1;0.1;0.1;\n", (2, 4, 5)),
+        ("Base;Base;Base;Load;Tool\n1;1;1;2;3\n", (2,)),
+        ("Serial;Serial;Serial;Serial;Serial\n4711;4712;4713;4714;4715\n;;;;\n", (2,)),
+    ],
+)  # fmt: skip
+def test_numbers_above_the_header_are_no_readings(above: str, lines: tuple[int, ...], tmp_path: Path) -> None:
+    found = made(tmp_path, above + HEAD + ROWS)
+    truth(found.experiment)
+    assert found.remarks == tuple(f"left out: row {n}, of numbers above the header" for n in lines)
+
+
+def test_a_first_table_is_not_passed_over(tmp_path: Path) -> None:
+    with pytest.raises(
+        StiffmapError, match=r"line 1: column 'x \[mm\]' occurs twice; name the columns: --header"
+    ):
+        made(tmp_path, f"x [mm];x [mm];dz\n1;2;3\n{HEAD}{ROWS}")
+
+
+def test_bodies_stand_over_groups_of_their_columns(tmp_path: Path) -> None:
+    text = (
+        ";Type;Body;Body;Body;Body;Body;Body\n;Name;Base;Base;Base;Tool;Tool;Tool\n;ID;1;1;1;2;2;2\n"
+        ";;Position;Position;Position;Position;Position;Position\nFrame;Time;X;Y;Z;X;Y;Z\n1;0,1;0;0;0;1,5;2;3\n2;0,2;0;0;0;1,5;2;3\n"
+    )
+    chosen = {a: f"Tool Position {a.upper()}" for a in "xyz"}
+    e = made(
+        tmp_path, text, columns={**chosen, "dz": "Base Position Z"}, constants=LOAD, units={"length": "mm"}
+    )
+    np.testing.assert_allclose(e.experiment.position, [[1.5e-3, 2e-3, 3e-3]] * 2)
+
+
+@pytest.mark.parametrize(
+    "cell", ["[[1,0],[1,0,0,0],[0,0],[9E9,9E9,9E9]]", "{X 1.5,Y 2.5,Z 3.5,A 0,B 0,C 0}", "[1,2,3,4,5,6,7,8]"]
+)
+def test_a_position_in_one_cell_is_not_taken_apart(cell: str, tmp_path: Path) -> None:
+    rows = "".join(f"{cell};{row}\n" for row in ROWS.splitlines())
+    truth(made(tmp_path, f"target;{HEAD}{rows}").experiment)
+
+
+@pytest.mark.parametrize("cell", ["0.01", "0.1", "0.001"])
+def test_numbers_in_the_next_column_are_no_unit(cell: str, tmp_path: Path) -> None:
+    """`0.01`, in a header hundredths of a millimetre, was the unit of the column before."""
+    text = f"x [mm];y [mm];z [mm];fz [N];dz;sigma\n0;0;0;-100;-41;{cell}\n50;0;0;-200;-83;{cell}\n"
+    truth(made(tmp_path, text, units={"length": "um"}).experiment)
+
+
+@pytest.mark.parametrize("time", ["t [s]", "T (ms)", "t in min", "t [h]"])
+def test_a_time_is_no_temperature(time: str, tmp_path: Path) -> None:
+    rows = "".join(f"{k};{row}\n" for k, row in enumerate(ROWS.splitlines()))
+    found = made(tmp_path, f"{time};{HEAD}{rows}").experiment
+    truth(found)
+    assert found.temperature is None
+
+
+@pytest.mark.parametrize("sign", ["-", "\u2212", "\u2013"])
+def test_any_sign_of_a_minus(sign: str, tmp_path: Path) -> None:
+    truth(made(tmp_path, HEAD + ROWS.replace("-", sign)).experiment)
+
+
+@pytest.mark.parametrize(
+    "text", ["P1={X 1.5,Y 2.5,Z 3.5}\nP2={X 2.5,Y 2.5,Z 3.5}\n", "P[1]{\n X = 1.0 mm, Y = 2.0 mm,\n};\n", "Name;Ax;Dev;Test\nA;X;0.1;Pass\nA;Y;0.2;Pass\n"]
+)  # fmt: skip
+def test_what_a_row_of_numbers_is_stands_in_the_error(text: str, tmp_path: Path) -> None:
+    with pytest.raises(StiffmapError, match="a row of numbers has two or more, each alone in its cell"):
+        made(tmp_path, text)
