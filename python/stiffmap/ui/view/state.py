@@ -12,6 +12,7 @@ from dataclasses import asdict, dataclass, fields, replace
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
@@ -59,6 +60,11 @@ class ViewState:
     def wrench(self) -> tuple[float, ...]:
         """(6,) N, N·m on the tool."""
         return (*self.force, *self.moment)
+
+    @property
+    def turned(self) -> Floats | None:
+        """(3, 3) commanded orientation; None: as at home."""
+        return None if self.rotation is None else np.asarray(Rotation.from_rotvec(self.rotation).as_matrix())
 
     @property
     def start_array(self) -> Floats | None:

@@ -21,7 +21,7 @@ from stiffmap.ui.view.controls import NONE, Controls
 from stiffmap.ui.view.data import Data
 from stiffmap.ui.view.hands import ProbePoint, listen, listen_to_nodes
 from stiffmap.ui.view.model import ViewModel
-from stiffmap.ui.view.moment import Moment
+from stiffmap.ui.view.moment import COARSE, FINE, Moment
 from stiffmap.ui.view.numbers import write
 from stiffmap.ui.view.panels import (
     colour_bar,
@@ -31,8 +31,7 @@ from stiffmap.ui.view.panels import (
     shares_panel,
     status_line,
 )
-from stiffmap.ui.view.place import rotation_of
-from stiffmap.ui.view.plane import COARSE, FINE, PlaneMap
+from stiffmap.ui.view.plane import PlaneMap
 from stiffmap.ui.view.quantities import QUANTITIES
 from stiffmap.ui.view.scene import Scene, look_at_machine
 from stiffmap.ui.view.serving import silent
@@ -101,7 +100,7 @@ class Viewer:
 
         def deed(model: ViewModel) -> None:
             turned = Rotation.from_quat(np.roll(wxyz, -1)).as_matrix()
-            same = np.abs(turned - rotation_of(model.machine, model.state)).max() < 1e-9
+            same = np.abs(turned - model.moment.rotation).max() < 1e-9
             model.drag(position, None if same else turned)
 
         self.act(deed)
