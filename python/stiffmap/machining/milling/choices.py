@@ -113,13 +113,13 @@ def choices(
     def job(path: Toolpath, turns: Floats | None) -> Setting:
         return setting(
             machine, path, cut, sampled(path, step), path.placed(origin, turn), stock=block, angle=turns,
-            thickness=thickness,
+            thickness=thickness, threads=threads,
         )  # fmt: skip
 
     def turned(path: Toolpath) -> Redundancy | None:
         if redundancy is None:
             return None
-        return best_turns(job(path, None), redundancy, threads=threads, scheduler=scheduler)
+        return best_turns(job(path, None), redundancy, scheduler=scheduler)
 
     if isinstance(entry, str) and entry != "best":
         raise StiffmapError(f"entry: expected a length (m) or 'best', got {entry!r}")
@@ -127,7 +127,7 @@ def choices(
     here = None
     if entry is not None:
         now = angle if turns is None else turns.angle
-        here = best_entry(job(p, now), threads) if isinstance(entry, str) else Entry(entry)
+        here = best_entry(job(p, now)) if isinstance(entry, str) else Entry(entry)
         p = entered_at(p, here.way)
         turns = turned(p)
     return Choices(
@@ -135,10 +135,10 @@ def choices(
     )
 
 
-def best_entry(job: Setting, threads: int | None = None) -> Entry:
+def best_entry(job: Setting) -> Entry:
     """The point of a closed outline with the least error across the wall; inside corners are none. Raises StiffmapError for other paths."""
     outline_of(job.path)
-    e = equilibrium(Plant(job, threads=threads), job.position)
+    e = equilibrium(Plant(job), job.position)
     size = np.abs(np.where(np.isfinite(e.error), e.error, np.inf) * job.off).sum(axis=1)
     normal = np.abs((np.nan_to_num(e.error) * job.off).sum(axis=1))
     normal = np.where(np.isfinite(size) & (job.engaged.corner == 0) & job.engaged.wall, normal, np.inf)
