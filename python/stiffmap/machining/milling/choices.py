@@ -100,10 +100,7 @@ def choices(
         p = load_path(path, feed=cut.feed, spindle=cut.spindle, size=size, offsets=shifts, progress=progress)
     if reverse:
         p, cut = turned_round(p), other_side(cut)
-    corners = None if stock is None else np.asarray(stock, dtype=float)
-    if corners is not None and corners.size != 6:
-        raise StiffmapError(f"stock: expected two corners (2, 3) in m, got {corners.shape}")
-    block = None if corners is None else box(*corners.reshape(2, 3))
+    block = None if stock is None else box(stock)
     tried = None
     if place is not None:
         tried = placements(machine, p, cut, count=place, threads=threads, scheduler=scheduler)

@@ -66,7 +66,7 @@ def progress_figure(found: ParetoSet) -> Figure:
     return figure
 
 
-def beside_figure(tables: Mapping[str, MeasuresTable]) -> Figure:
+def comparison_figure(tables: Mapping[str, MeasuresTable]) -> Figure:
     """Maps on the middle plane of the box, a row per measure and a column per machine; one scale per row."""
     rows = [n for n in MAPPED if all(_map(t, n) is not None for t in tables.values())]
     if not rows:
