@@ -24,7 +24,7 @@ from stiffmap.solve.machine import Machine, load_machine
 from stiffmap.solve.reach import follow
 from stiffmap.ui.view.moment import Moment
 from stiffmap.ui.view.place import moves
-from stiffmap.ui.view.state import History, ViewState, checked, with_change
+from stiffmap.ui.view.state import History, ViewState, checked
 
 KEPT_MACHINES = 16
 
@@ -91,7 +91,7 @@ class ViewModel:
         """A number of the machine (SI) by its address; None: as in the file."""
         if value is not None and not np.isfinite(value):
             raise StiffmapError(f"{address}: expected a finite number, got {value}")
-        return self.put(changes=with_change(self.state, address, value).changes, keep=keep)
+        return self.put(changes=self.state.changed(address, value).changes, keep=keep)
 
     def drag(self, position: Floats, rotation: Floats | None = None) -> ViewState:
         """The tool follows a hand (m; (3, 3), None: as it is) as far as the machine goes; `message` says what stops it.

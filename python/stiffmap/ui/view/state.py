@@ -66,6 +66,11 @@ class ViewState:
         """(3, 3) commanded orientation; None: as at home."""
         return None if self.rotation is None else np.asarray(Rotation.from_rotvec(self.rotation).as_matrix())
 
+    def changed(self, address: str, value: float | None) -> ViewState:
+        """With a number of the machine changed; None: as in the file."""
+        others = {a: v for a, v in self.changes if a != address}
+        return replace(self, changes=tuple((others | ({} if value is None else {address: value})).items()))
+
     @property
     def start_array(self) -> Floats | None:
         """(coordinates,) of the assembly mode; None: home's."""
@@ -197,11 +202,3 @@ class History:
         """As at the start; an undo leads back."""
         self.put(self.first)
         return self.now
-
-
-def with_change(state: ViewState, address: str, value: float | None) -> ViewState:
-    """A number of the machine changed; None: as in the file."""
-    others = {a: v for a, v in state.changes if a != address}
-    if value is not None:
-        others[address] = value
-    return replace(state, changes=tuple(others.items()))

@@ -122,7 +122,7 @@ class Viewer:
         rest = moment.rest()
         ghost = moment.ghost(rest, s)
         self._solution = s
-        found = self._map(moment, self._count())
+        found = self._map(moment)
         with self.server.atomic():
             self.scene.machine(rest, ghost)
             self.scene.force(moment, self.pulling)
@@ -147,14 +147,11 @@ class Viewer:
                 self._show(found, moment.state)
         self.probe.again()
 
-    def _count(self) -> int:
-        return next((n for n in COUNTS if n * n * self._per_pose <= BUDGET), COUNTS[-1])
-
     def _learn(self, found: PlaneMap) -> None:
         if QUANTITIES[found.quantity].of is not None:
             self._per_pose = 0.5 * self._per_pose + 0.5 * found.seconds / found.count**2
 
-    def _map(self, moment: Moment, count: int) -> PlaneMap | None:
+    def _map(self, moment: Moment) -> PlaneMap | None:
         """A new map of the plane; None where it would be the one that is shown."""
         if not self.controls.map_on.value:
             self._plane_key = self._plane = None
@@ -163,6 +160,7 @@ class Viewer:
         key = moment.map_key()
         if key == self._plane_key:
             return None
+        count = next((n for n in COUNTS if n * n * self._per_pose <= BUDGET), COUNTS[-1])
         found = moment.plane(count)
         self._learn(found)
         self._plane, self._plane_key = found, key
