@@ -51,8 +51,8 @@ def points(machine: sm.Machine, count: int, threads: int) -> None:
     middle = machine.workspace.mean(axis=0)
     Plant(setting(machine, path, process, sampled(path), path.placed(middle)))  # the machine is ready
     start, cpu = time.perf_counter(), time.process_time()
-    job = setting(machine, path, process, here, path.placed(middle))
-    plant = Plant(job, threads=threads)
+    job = setting(machine, path, process, here, path.placed(middle), threads=threads)
+    plant = Plant(job)
     e = equilibrium(plant, job.position)
     half, busy = time.perf_counter(), time.process_time() - cpu
     command, _, _ = commanded(plant, e)

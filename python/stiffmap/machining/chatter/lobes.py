@@ -44,9 +44,6 @@ HIGHEST = 4.0
 """Top of a diagram, as a multiple of the least limit."""
 
 
-GivenModes = Machine | str | PathLike[str] | ToolModes | Iterable[object]
-
-
 @keywords_of(tip_modes)
 def stability_lobes(
     machine: Machine | str | PathLike[str] | ToolModes | Iterable[object],
@@ -117,8 +114,7 @@ def stability_lobes(
     along = flange(machine, pose.get("rotation")) if tool is None else real_array(tool, "tool")
     ahead = _across(along) if feed is None else real_array(feed, "feed")
     modes, said = _modes(machine, position, cut_axes(ahead, along), pose)
-    extra = list(also)
-    if extra:
+    if extra := list(also):
         modes = modes.and_also(mode_rows(extra))
     modes = modes.below(np.inf)
     frequency = frequencies_of(modes.frequency)
@@ -190,17 +186,18 @@ def _limits_at(
 
 
 def _modes(
-    machine: GivenModes, position: ArrayLike | None, axes: Floats, pose: dict[str, Any]
+    machine: Machine | ToolModes | Iterable[object],
+    position: ArrayLike | None,
+    axes: Floats,
+    pose: dict[str, Any],
 ) -> tuple[ToolModes, str]:
-    if not isinstance(machine, Machine | str | PathLike):
+    if not isinstance(machine, Machine):
         if pose or position is not None:
             raise StiffmapError(
                 "modes: a list of modes has no pose; position and its options are for a machine"
             )
         return mode_rows(machine), "of the modes as given"
-    m = as_machine(machine)
-    at = m.description.home.p if position is None else position
-    found = tip_modes(m, at, **pose)
+    found = tip_modes(machine, machine.description.home.p if position is None else position, **pose)
     return modes_of_machine(found).turned(axes), found.damping.said
 
 

@@ -100,10 +100,7 @@ def choices(
         p = load_path(path, feed=cut.feed, spindle=cut.spindle, size=size, offsets=shifts, progress=progress)
     if reverse:
         p, cut = turned_round(p), other_side(cut)
-    corners = None if stock is None else np.asarray(stock, dtype=float)
-    if corners is not None and corners.size != 6:
-        raise StiffmapError(f"stock: expected two corners (2, 3) in m, got {corners.shape}")
-    block = None if corners is None else box(*corners.reshape(2, 3))
+    block = None if stock is None else box(stock)
     tried = None
     if place is not None:
         tried = placements(machine, p, cut, count=place, threads=threads, scheduler=scheduler)
@@ -113,13 +110,13 @@ def choices(
     def job(path: Toolpath, turns: Floats | None) -> Setting:
         return setting(
             machine, path, cut, sampled(path, step), path.placed(origin, turn), stock=block, angle=turns,
-            thickness=thickness,
+            thickness=thickness, threads=threads,
         )  # fmt: skip
 
     def turned(path: Toolpath) -> Redundancy | None:
         if redundancy is None:
             return None
-        return best_turns(job(path, None), redundancy, threads=threads, scheduler=scheduler)
+        return best_turns(job(path, None), redundancy, scheduler=scheduler)
 
     if isinstance(entry, str) and entry != "best":
         raise StiffmapError(f"entry: expected a length (m) or 'best', got {entry!r}")
@@ -127,7 +124,7 @@ def choices(
     here = None
     if entry is not None:
         now = angle if turns is None else turns.angle
-        here = best_entry(job(p, now), threads) if isinstance(entry, str) else Entry(entry)
+        here = best_entry(job(p, now)) if isinstance(entry, str) else Entry(entry)
         p = entered_at(p, here.way)
         turns = turned(p)
     return Choices(
@@ -135,10 +132,10 @@ def choices(
     )
 
 
-def best_entry(job: Setting, threads: int | None = None) -> Entry:
+def best_entry(job: Setting) -> Entry:
     """The point of a closed outline with the least error across the wall; inside corners are none. Raises StiffmapError for other paths."""
     outline_of(job.path)
-    e = equilibrium(Plant(job, threads=threads), job.position)
+    e = equilibrium(Plant(job), job.position)
     size = np.abs(np.where(np.isfinite(e.error), e.error, np.inf) * job.off).sum(axis=1)
     normal = np.abs((np.nan_to_num(e.error) * job.off).sum(axis=1))
     normal = np.where(np.isfinite(size) & (job.engaged.corner == 0) & job.engaged.wall, normal, np.inf)

@@ -36,9 +36,9 @@ class Stand:
 class Plant:
     """A machine that runs along the points of a job, its own rigidity aside what the tool bends by."""
 
-    def __init__(self, job: Setting, machine: Machine | None = None, threads: int | None = None) -> None:
+    def __init__(self, job: Setting, machine: Machine | None = None) -> None:
         """`machine`: None, or another than the job's, that follows its commands."""
-        self.job, self.machine, self.threads = job, machine or job.machine, threads
+        self.job, self.machine = job, machine or job.machine
         self.heavy = bool(np.any(self.machine.compiled.gravity(None)))
 
     @cached_property
@@ -81,7 +81,7 @@ class Plant:
                 np.nan_to_num(wrench[here]),
                 rotation=self._turns(mine[here]),
                 stiffness=full,
-                threads=self.threads,
+                threads=self.job.threads,
             )
             ok = s.ok & np.isfinite(command[here]).all(axis=1)
             # along what the machine does not command the tool stays where it was
@@ -193,9 +193,9 @@ def commanded(plant: Plant, before: Equilibrium) -> tuple[Floats, Floats, Floats
     return u, np.linalg.norm(rest, axis=1), job.position - steered * before.error
 
 
-def wall_errors(job: Setting, threads: int | None = None) -> Floats:
+def wall_errors(job: Setting) -> Floats:
     """(m,) m across the wall as the cut is, before compensation; infinite where a point has no answer or leaves a range of the drives."""
-    e = equilibrium(Plant(job, threads=threads), job.position)
+    e = equilibrium(Plant(job), job.position)
     good = np.isfinite(e.error).all(axis=1) & (e.flags & RANGES == 0)
     return np.where(good, np.nan_to_num(job.across(e.error)), np.inf)
 

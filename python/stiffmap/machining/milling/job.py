@@ -84,13 +84,19 @@ def mill_job(
     p, cut, where, box, angle = made_of.path, made_of.process, made_of.place, made_of.stock, made_of.angle
     if angle is not None:
         p = replace(p, turn=None)
-    job = setting(machine, p, cut, sampled(p, step), where, stock=box, thickness=thickness, angle=angle)
-    must_reach(job, threads)
-    best = best_feeds(job, threads=threads) if feeds else None
+
+    def job_of(path: Toolpath) -> Setting:
+        return setting(
+            machine, path, cut, sampled(path, step), where, stock=box, thickness=thickness, angle=angle,
+            threads=threads,
+        )  # fmt: skip
+
+    job = job_of(p)
+    must_reach(job)
+    best = best_feeds(job) if feeds else None
     if best is not None:
-        p = replace(p, feed=best.feed)
-        job = setting(machine, p, cut, sampled(p, step), where, stock=box, thickness=thickness, angle=angle)
-    plant = Plant(job, threads=threads)
+        job = job_of(replace(p, feed=best.feed))
+    plant = Plant(job)
     before = equilibrium(plant, job.position)
     command, left, mirror = commanded(plant, before)
     made = program(
@@ -99,17 +105,17 @@ def mill_job(
         within,
         None if best is None else best.feed,
     )
-    after = run(job, made, step=step, threads=threads)
+    after = run(job, made, step=step)
     mirrored = equilibrium(plant, np.where(np.isfinite(mirror), mirror, job.position))
     ds = dataset_of(job, before, command, left, after, mirrored)
     ds["ripple"] = ("point", ripple(job, before))
     if passes > 1:
-        ds["error_normal_passes"] = (("passes", "point"), after_passes(job, before, passes, threads))
+        ds["error_normal_passes"] = (("passes", "point"), after_passes(job, before, passes))
     if band:
         for name, share in (("low", 1 - BAND), ("high", 1 + BAND)):
-            again = run(replace(job, scale=share * job.scale), made, step=step, threads=threads)
+            again = run(replace(job, scale=share * job.scale), made, step=step)
             ds[f"error_normal_after_{name}"] = along(job, again)
-    stability = path_stability(job, threads)
+    stability = path_stability(job)
     if isinstance(stability, PathStability):
         ds["multiplier"] = ("point", np.interp(job.points.way, stability.way, stability.multiplier))
         ds["multiplier"].attrs["said"] = stability.sentence(job.process.spindle)
@@ -126,9 +132,9 @@ def mill_job(
                 f"true_machine: expected the actuators {', '.join(machine.actuators)}, "
                 f"got {', '.join(true_machine.actuators)}"
             )
-        real = equilibrium(Plant(job, true_machine, threads), job.position)
+        real = equilibrium(Plant(job, true_machine), job.position)
         ds["true_error_normal"] = ("point", job.across(real.error))
-        ds["true_error_normal_after"] = along(job, run(job, made, true_machine, step=step, threads=threads))
+        ds["true_error_normal_after"] = along(job, run(job, made, true_machine, step=step))
     return Milled(job, before, command, made, after, ds, stability, best, warnings, made_of)
 
 
@@ -203,14 +209,14 @@ def mill(
     return mill_job(as_machine(machine), path, process, **options).dataset
 
 
-def after_passes(job: Setting, first: Equilibrium, passes: int, threads: int | None = None) -> Floats:
+def after_passes(job: Setting, first: Equilibrium, passes: int) -> Floats:
     """(passes, m) m: height of the wall over the wanted one after each pass; never below what a pass before it took."""
     wall = job.across(first.error)
     out = [wall]
     for _ in range(passes - 1):
         radial = np.maximum(np.nan_to_num(wall), 0.0)
         rest = replace(job, engaged=replace(job.engaged, radial=radial, corner=0 * job.engaged.corner))
-        wall = np.minimum(wall, job.across(equilibrium(Plant(rest, threads=threads), job.position).error))
+        wall = np.minimum(wall, job.across(equilibrium(Plant(rest), job.position).error))
         out.append(wall)
     return np.array(out)
 

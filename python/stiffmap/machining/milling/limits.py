@@ -14,12 +14,15 @@ from numpy.typing import NDArray
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
+from stiffmap.common.number_text import place_text
 from stiffmap.machining.milling.setting import Setting
 from stiffmap.solve.kinematics import SAME, inverse_kinematics, missed, missed_words
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.status import Flag, Status
-from stiffmap.workspace.performance.motion.closing import drive_table
+from stiffmap.workspace.performance.motion.closing import declared
 
+STILL = 1e-12
+"""m/s, rad/s: what a drive that stands still is seen to move by round-off."""
 BROKEN = {"joint range": Flag.JOINT_LIMIT, "drive range": Flag.DRIVE_RANGE, "drive effort": Flag.DRIVE_FORCE}
 
 
@@ -33,8 +36,8 @@ def drive_speeds(job: Setting) -> Floats:
 
 
 def fastest(machine: Machine) -> Floats:
-    """(actuators,) m/s, rad/s; infinite where none is declared."""
-    return np.array([d.speed if d.speed else np.inf for d in drive_table(machine)])
+    """(actuators,) m/s, rad/s; infinite where none is declared, of a drive that is declared to stand still only round-off."""
+    return np.maximum(declared(machine, "speed", np.inf), STILL)
 
 
 def outside(ds: xr.Dataset, machine: Machine) -> dict[str, np.ndarray]:
@@ -83,9 +86,9 @@ def chatter(job: Setting, ds: xr.Dataset) -> list[Warned]:
 def corners(job: Setting, ds: xr.Dataset) -> list[Warned]:
     """What happens to sharp outside corners: the two walls that meet in each."""
     none = ~job.engaged.wall
-    last = np.flatnonzero(none != np.r_[none[1:], none[-1:]])  # beside it, on the one or the other side
-    beside = np.unique(np.where(none[last], np.minimum(last + 1, len(none) - 1), last))
-    most = [1e3 * np.nanmax(np.abs(ds[n].values[beside]), initial=0.0) for n in AT_CORNERS]
+    last = np.flatnonzero(none != np.r_[none[1:], none[-1:]])  # next to it, on the one or the other side
+    near = np.unique(np.where(none[last], np.minimum(last + 1, len(none) - 1), last))
+    most = [1e3 * np.nanmax(np.abs(ds[n].values[near]), initial=0.0) for n in AT_CORNERS]
     text = (
         f"Sharp outside corners have no wall within a tool radius, so that {int(none.sum())} points next to them do not count; the "
         f"walls that meet there are off by up to {most[0]:.4f} mm, compensated {most[1]:.4f} mm."
@@ -108,30 +111,30 @@ def warned(job: Setting, ds: xr.Dataset) -> tuple[Warned, ...]:
     return found
 
 
-def reached(job: Setting, position: Floats, threads: int | None = None) -> NDArray[np.bool_]:
+def reached(job: Setting, position: Floats) -> NDArray[np.bool_]:
     """(...,) bool: poses (..., m, 3) that the machine takes without load."""
-    s = job.machine.solve(position, rotation=job.rotation, stiffness=False, threads=threads)
-    return np.asarray((s.status != Status.UNREACHABLE) & followed(job, position, threads))
+    s = job.machine.solve(position, rotation=job.rotation, stiffness=False, threads=job.threads)
+    return np.asarray((s.status != Status.UNREACHABLE) & followed(job, position))
 
 
-def astray(job: Setting, position: Floats, threads: int | None = None) -> Floats:
+def astray(job: Setting, position: Floats) -> Floats:
     """(..., m, 6) m, rad by which the machine misses what the path asks for at positions (..., m, 3): of the three coordinates, the
     tool's axis, and the turn about it where the path sets one."""
-    gap = missed(job.machine, position, job.rotation, threads)
+    gap = missed(job.machine, position, job.rotation, job.threads)
     if job.angle is None:
         axis = np.einsum("mji,mj->mi", job.rotation, job.tool)
         gap[..., 3:] -= (gap[..., 3:] * axis).sum(axis=-1, keepdims=True) * axis
     return gap
 
 
-def followed(job: Setting, position: Floats, threads: int | None = None) -> NDArray[np.bool_]:
+def followed(job: Setting, position: Floats) -> NDArray[np.bool_]:
     """(..., m) bool: positions (..., m, 3) m at which the machine does what the path asks for."""
-    return np.asarray((np.abs(astray(job, position, threads)) <= SAME).all(axis=-1))
+    return np.asarray((np.abs(astray(job, position)) <= SAME).all(axis=-1))
 
 
-def must_follow(job: Setting, threads: int | None = None) -> None:
+def must_follow(job: Setting) -> None:
     """Raise StiffmapError with the directions in which the machine does not follow the path."""
-    gap = astray(job, job.position, threads)
+    gap = astray(job, job.position)
     words = missed_words(job.machine, gap)
     if words:
         i = int(np.argmax((np.abs(gap) > SAME).any(axis=-1)))
@@ -140,17 +143,16 @@ def must_follow(job: Setting, threads: int | None = None) -> None:
         )
 
 
-def must_reach(job: Setting, threads: int | None = None) -> None:
+def must_reach(job: Setting) -> None:
     """Raise StiffmapError naming the points out of reach, how far the part sticks out, and a place that holds it."""
-    must_follow(job, threads)
-    ok = reached(job, job.position, threads)
+    must_follow(job)
+    ok = reached(job, job.position)
     if ok.all():
         return
     lost = np.flatnonzero(~ok)
     lines = job.path.line[job.points.move[lost]]
-    where = ", ".join(f"{v:.1f}" for v in 1e3 * job.position[lost[0]])
     text = (
-        f"the path leaves the workspace of {job.machine.name}: {lost.size} of {len(job)} points, the first at ({where}) mm, "
+        f"the path leaves the workspace of {job.machine.name}: {lost.size} of {len(job)} points, the first at {place_text(job.position[lost[0]], '.1f')}, "
         f"line {lines[0]} of the path"
     )
     box = job.machine.description.workspace
@@ -158,12 +160,11 @@ def must_reach(job: Setting, threads: int | None = None) -> None:
         raise StiffmapError(text)
     low, high = np.array(box)
     out = np.maximum(np.maximum(low - job.position, job.position - high), 0.0).max(axis=0)
-    text += f"; beyond the declared box by up to ({', '.join(f'{1e3 * v:.1f}' for v in out)}) mm"
+    text += f"; beyond the declared box by up to {place_text(out, '.1f')}"
     if (np.ptp(job.position, axis=0) > high - low).any():
         raise StiffmapError(f"{text}; the part is larger than that box")
     middle = (job.position.max(axis=0) + job.position.min(axis=0)) / 2
     shift = (low + high) / 2 - middle
-    fits = reached(job, job.position + shift, threads).all()
-    at = 1e3 * (job.place.at + shift)
-    hint = f"; it fits with the part's origin at ({', '.join(f'{v:.1f}' for v in at)}) mm" if fits else ""
-    raise StiffmapError(text + hint)
+    fits = reached(job, job.position + shift).all()
+    at = place_text(job.place.at + shift, ".1f")
+    raise StiffmapError(f"{text}; it fits with the part's origin at {at}" if fits else text)

@@ -10,6 +10,7 @@ from scipy.stats import qmc
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
+from stiffmap.common.number_text import place_text
 from stiffmap.common.tasks import workers
 from stiffmap.machining.milling.equilibrium import RANGES, wall_errors
 from stiffmap.machining.milling.limits import followed, must_follow
@@ -57,8 +58,8 @@ class Placements:
 
     def words(self, tolerance: float | None = None) -> str:
         """One sentence; `tolerance` m: also whether a placement reaches it before compensation."""
-        at = ", ".join(f"{1e3 * v:.1f}" for v in self.best.at)
-        best = f"{1e3 * self.best_error:.3f} mm at ({at}) mm, turned by {np.degrees(self.best.turn):.1f} deg"
+        at = place_text(self.best.at, ".1f")
+        best = f"{1e3 * self.best_error:.3f} mm at {at}, turned by {np.degrees(self.best.turn):.1f} deg"
         if tolerance is None or self.best_error <= tolerance:
             return f"Of {len(self.at)} placements the best leaves {best}; the middle of the workspace {1e3 * self.naive_error:.3f} mm."
         return (
@@ -102,7 +103,7 @@ def placements(
     with workers(PlacementSearch.largest, search, scheduler=scheduler) as hands:
         largest = np.concatenate(hands.in_order((at[r], turn[r]) for r in rows))
     if not np.isfinite(largest).any():
-        must_follow(search.at_place(naive), threads)
+        must_follow(search.at_place(naive))
         raise StiffmapError(
             f"no placement of {count} holds the path on {machine.name}: it measures "
             f"{', '.join(f'{v:.0f}' for v in 1e3 * search.size)} mm, the box {', '.join(f'{v:.0f}' for v in 1e3 * (search.high - search.low))} mm"
@@ -149,7 +150,7 @@ class PlacementSearch:
         self.size = np.ptp(p, axis=0)
 
     def at_place(self, place: Placement) -> Setting:
-        return setting(self.machine, self.path, self.process, self.points, place)
+        return setting(self.machine, self.path, self.process, self.points, place, threads=self.threads)
 
     def _extent(self, turn: Floats) -> tuple[Floats, Floats]:
         """(n, 3) lowest and highest corner of the path turned (n,) rad about its origin."""
@@ -185,7 +186,7 @@ class PlacementSearch:
         slope = np.einsum("nij,mj->nmi", r, self.slope)
         bent = np.matmul(s.compliance[..., :3, :3], slope[..., None])[..., 0]
         loop = 1 - np.einsum("nmi,nmi->nm", off, bent)  # 1 + kp/k
-        good = s.ok & (s.flags & RANGES == 0) & (loop > 0) & followed(self.job, position, self.threads)
+        good = s.ok & (s.flags & RANGES == 0) & (loop > 0) & followed(self.job, position)
         error = np.einsum("nmi,nmi->nm", s.displacement[..., :3], off)
         with np.errstate(divide="ignore", invalid="ignore"):
             error = np.abs(error / loop).max(axis=1)
@@ -198,7 +199,7 @@ class PlacementSearch:
     def errors(self, place: Placement) -> Floats:
         """(k,) m across the wall at the points of the search; infinite where one fails."""
         job = self.at_place(place)
-        return np.where(followed(job, job.position, self.threads), wall_errors(job, self.threads), np.inf)
+        return np.where(followed(job, job.position), wall_errors(job), np.inf)
 
     def refined(self, begin: tuple[Floats, float]) -> tuple[float, Placement]:
         """Error and placement after a descent from a place and a turn along the gradient of a high mean of the errors, within the workspace."""

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
+from stiffmap.common.number_text import place_text
 from stiffmap.common.tasks import workers
 from stiffmap.machining.milling.equilibrium import wall_errors
 from stiffmap.machining.milling.limits import fastest as fastest_drives
@@ -50,7 +51,6 @@ def redundancy(
     turns: int = 72,
     *,
     fastest: float | None = FASTEST,
-    threads: int | None = None,
     scheduler: object = None,
 ) -> Redundancy:
     """Turns (m,) rad that make the largest error smallest, and of these the smallest sum of squares.
@@ -66,7 +66,7 @@ def redundancy(
     if turns < 2:
         raise StiffmapError(f"turns: expected 2 or more, got {turns}")
     grid = -np.pi + 2 * np.pi * np.arange(turns) / turns
-    with workers(_turned, (job, threads), scheduler=scheduler) as hands:
+    with workers(_turned, job, scheduler=scheduler) as hands:
         errors, drives = zip(*hands.in_order(float(angle) for angle in grid), strict=True)
     error, joints = np.stack(errors, axis=1), np.stack(drives, axis=1)
     time = np.linalg.norm(np.diff(job.position, axis=0), axis=1) / job.feed[1:]
@@ -76,9 +76,9 @@ def redundancy(
     top = best_sequence(stage, free, largest=True)
     if top is None:
         lost = int(np.argmax(~np.isfinite(stage).any(axis=1)))
-        where = ", ".join(f"{1e3 * v:.1f}" for v in job.position[lost])
+        where = place_text(job.position[lost], ".1f")
         raise StiffmapError(
-            f"redundancy: no turn of the tool holds the path on {job.machine.name}, as at ({where}) mm"
+            f"redundancy: no turn of the tool holds the path on {job.machine.name}, as at {where}"
         )
     bound = max(stage[k, a] for k, a in enumerate(top))
     cost = stage**2 * (1 + SAME * np.abs(grid))
@@ -88,12 +88,11 @@ def redundancy(
     return Redundancy(grid[chosen], error[rows, chosen], stage.max(axis=0), grid, joints[rows, chosen])
 
 
-def _turned(shared: tuple[Setting, int | None], angle: float) -> tuple[Floats, Floats]:
+def _turned(job: Setting, angle: float) -> tuple[Floats, Floats]:
     """(m,) m and (m, actuators) of one turn all along, as a task."""
-    job, threads = shared
     turned = replace(job, rotation=orientations(job.machine, job.tool, np.full(len(job), angle)))
-    drives = inverse_kinematics(job.machine, job.position, turned.rotation, threads=threads).actuators
-    return wall_errors(turned, threads), drives
+    drives = inverse_kinematics(job.machine, job.position, turned.rotation, threads=job.threads).actuators
+    return wall_errors(turned), drives
 
 
 @dataclass(frozen=True, eq=False)

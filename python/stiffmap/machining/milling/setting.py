@@ -47,6 +47,8 @@ class Setting:
     """(m,) rad, turn of an arm's tool about its axis; None: as at home."""
     scale: float = 1.0
     """Of the force: 0.8 to 1.2 for a band of 20 %."""
+    threads: int | None = None
+    """That solve its points; None: all cores."""
 
     def __len__(self) -> int:
         return len(self.position)
@@ -110,7 +112,7 @@ def setting(
     stock: Floats | None = None,
     thickness: float | None = None,
     angle: Floats | None = None,
-    scale: float = 1.0,
+    threads: int | None = None,
 ) -> Setting:
     """A job; `angle` (m,) rad turns the tool of an arm about its axis. Raises StiffmapError for what does not go together."""
     if angle is not None and np.shape(angle) != (len(points),):
@@ -139,7 +141,7 @@ def setting(
         np.where(np.isfinite(points.feed), points.feed, process.feed),
         faster,
         angle,
-        scale,
+        threads=threads,
     )
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.machining.milling.equilibrium import Plant, equilibrium
-from stiffmap.machining.milling.limits import drive_speeds, fastest
+from stiffmap.machining.milling.limits import STILL, drive_speeds, fastest
 from stiffmap.machining.milling.setting import Setting
 from stiffmap.machining.process.description import Process
 from stiffmap.solve.status import Flag
@@ -39,7 +39,7 @@ class Feeds:
     """(moves,) tolerance, drive effort, drive speed, or fastest feed asked for."""
 
 
-def best_feeds(job: Setting, tolerance: float | None = None, threads: int | None = None) -> Feeds:
+def best_feeds(job: Setting, tolerance: float | None = None) -> Feeds:
     """Largest feed of each move at which no point of it is off by more than the tolerance (m), before compensation.
 
     Within the drives' speeds and efforts (of the cut as it is and of the wanted one), and FASTEST times the feed as it is; by bisection at all
@@ -48,21 +48,22 @@ def best_feeds(job: Setting, tolerance: float | None = None, threads: int | None
     t = job.process.tolerance if tolerance is None else tolerance
     if t is None or not t > 0:
         raise StiffmapError("tolerance: expected a length above zero (m), from the process or given")
-    most = fastest(job.machine)
-    with np.errstate(divide="ignore"):
-        room = (most / np.maximum(np.abs(drive_speeds(job)), 1e-12)).min(axis=1)
-    top = np.minimum(room, FASTEST)
+    rates, most = np.abs(drive_speeds(job)), fastest(job.machine)
+    if (moved := (most <= STILL) & (rates > STILL).any(axis=0)).any():
+        name = job.machine.actuators[int(np.argmax(moved))]
+        raise StiffmapError(f"feeds: the path moves {name}, which is declared to stand still (speed 0)")
+    top = np.minimum((most / np.maximum(rates, STILL)).min(axis=1), FASTEST)
 
     def strong(share: Floats) -> NDArray[np.bool_]:
         faster = replace(job, feed=job.feed * share, faster=job.faster * share, scale=job.scale * EFFORT_ROOM)
-        plant = Plant(faster, threads=threads)
+        plant = Plant(faster)
         wanted = plant.stand(job.position, faster.force(np.zeros((len(job), 2))), full=True)
         flags = wanted.flags | equilibrium(plant, job.position).flags
         return np.asarray(flags & Flag.DRIVE_FORCE == 0)
 
     def exact(share: Floats) -> NDArray[np.bool_]:
         faster = replace(job, feed=job.feed * share, faster=job.faster * share)
-        e = equilibrium(Plant(faster, threads=threads), job.position)
+        e = equilibrium(Plant(faster), job.position)
         return np.asarray(np.abs(np.nan_to_num(job.across(e.error), nan=np.inf)) <= t)
 
     borne = _largest(strong, np.full(len(job), SLOWEST), top)

@@ -67,7 +67,7 @@ class PathStability:
         return f"{text} Stable everywhere: {', '.join(f'{s * rpm:.0f}' for s in self.offered)} rpm."
 
 
-def path_stability(job: Setting, threads: int | None = None) -> PathStability | str:
+def path_stability(job: Setting) -> PathStability | str:
     """Stability along a job's path; a sentence where it cannot be judged (no teeth, no masses)."""
     p = job.process
     if not isinstance(p.law, EndMill | Kienzle) or not p.tool.teeth:
@@ -75,7 +75,8 @@ def path_stability(job: Setting, threads: int | None = None) -> PathStability | 
     p = milling_process(p)
     places = np.unique(np.linspace(0, len(job) - 1, PLACES).round().astype(int))
     try:
-        modes = tip_modes(job.machine, job.position[places], rotation=job.rotation[places], threads=threads)
+        turned = job.rotation[places]
+        modes = tip_modes(job.machine, job.position[places], rotation=turned, threads=job.threads)
     except StiffmapError as problem:
         return f"Stability is not judged: {problem}"
     speed = p.spindle * np.linspace(*SPAN, SPEEDS)
@@ -86,7 +87,7 @@ def path_stability(job: Setting, threads: int | None = None) -> PathStability | 
             continue
         own = modes_of_machine(modes, k).turned(job.axes[i]).below(np.inf)
         kept.append(i)
-        table.append(multipliers_at(own, p, speed, depth, None, threads)[:, 0])
+        table.append(multipliers_at(own, p, speed, depth, None, job.threads)[:, 0])
     if not table:
         return "Stability is not judged: no place along the path has an equilibrium."
     mu_all = np.array(table)

@@ -41,7 +41,6 @@ def run(
     machine: Machine | None = None,
     *,
     step: float = 2e-3,
-    threads: int | None = None,
 ) -> Run:
     """Simulate a program on the job's machine or on another one, the force re-evaluated at the true distance from the wall."""
     must_cut_whole(job, made)
@@ -59,8 +58,7 @@ def run(
             wanted, share, position, tangent, job.path.tool[wanted], bend, way, own.feed, own.spindle
         )
         here = _job(job, points, p.turn_at(own.move, own.share))
-        plant = Plant(here, machine, threads)
-        state = equilibrium(plant, u)
+        state = equilibrium(Plant(here, machine), u)
         at = job.place.back(here.position + np.nan_to_num(state.error))
     return Run(here, state, here.across(state.error))
 
@@ -141,7 +139,7 @@ def _job(job: Setting, points: Points, angle: Floats | None) -> Setting:
     """The job at other points, the tool turned by `angle`; width and depth as at the nearest of its own."""
     order = np.argsort(job.points.way, kind="stable")
     way = job.points.way[order]
-    made = setting(job.machine, job.path, job.process, points, job.place, scale=job.scale, angle=angle)
+    made = setting(job.machine, job.path, job.process, points, job.place, angle=angle, threads=job.threads)
     k = np.clip(np.searchsorted(way, points.way), 1, len(way) - 1)
     k -= np.abs(points.way - way[k - 1]) < np.abs(points.way - way[k])
     old = order[k]
@@ -150,7 +148,8 @@ def _job(job: Setting, points: Points, angle: Floats | None) -> Setting:
     old = np.where(same, old, np.where(job.points.move[order[other]] == points.move, order[other], old))
     e = job.engaged
     bent = np.interp(points.way, way, e.curvature[order])
-    return replace(made, engaged=Engagement(e.radial[old], bent, e.corner[old], e.axial[old], e.wall[old]))
+    engaged = Engagement(e.radial[old], bent, e.corner[old], e.axial[old], e.wall[old])
+    return replace(made, engaged=engaged, scale=job.scale)
 
 
 def nearest(path: Toolpath, move: NDArray[np.int64], p: Floats) -> Floats:

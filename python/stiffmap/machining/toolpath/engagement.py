@@ -19,12 +19,12 @@ OUTMOST = np.radians(170.0)
 """Of an outside corner; a way back is none."""
 
 
-def box(low: ArrayLike, high: ArrayLike) -> Floats:
-    """(2, 3) m: stock by its lowest and its highest corner (3,), axes of the part; checked."""
-    a, b = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
-    if a.shape != (3,) or b.shape != (3,) or not (a < b).all():
-        raise StiffmapError(f"stock: expected two corners (3,) in m, the lower first; got {low!r}, {high!r}")
-    return np.stack([a, b])
+def box(corners: ArrayLike) -> Floats:
+    """(2, 3) m: stock by its lowest and its highest corner, axes of the part; checked."""
+    out = np.asarray(corners, dtype=float)
+    if out.size != 6 or not (np.diff(out.reshape(2, 3), axis=0) > 0).all():
+        raise StiffmapError(f"stock: expected two corners (2, 3) in m, the lower first; got {corners!r}")
+    return out.reshape(2, 3)
 
 
 @dataclass(frozen=True, eq=False)

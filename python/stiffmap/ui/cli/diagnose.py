@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 import typer
@@ -57,17 +58,13 @@ def command(
         exclude=exclude or (),
         time_limit=budget,
         tolerances=Tolerances().scaled(tolerance),
-        progress=None if silent else _say,
+        progress=None if silent else partial(print, "trying:", file=sys.stderr),
     )
     if output is not None:
         write(result, output, date, [p for p in (Path(machine), Path(data)) if p.exists()])
     wrote = None if output is None else f"wrote {output}: start with report.html"
     show(as_json, result.as_plain(), [str(result), f"next: {next_step(result)}", wrote])
     finish(result.verdict != "none")
-
-
-def _say(what: str) -> None:
-    print(f"trying: {what}", file=sys.stderr)
 
 
 def write(result: Diagnosis, folder: Path, date: str | None = None, inputs: Sequence[Path] = ()) -> None:

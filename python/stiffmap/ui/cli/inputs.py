@@ -10,7 +10,7 @@ import typer
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.number_text import number_in
+from stiffmap.common.number_text import number_in, place_text
 from stiffmap.model.effects import apply_records, parse_effect
 from stiffmap.solve.machine import Machine, load_machine
 
@@ -81,7 +81,7 @@ def position(text: str | None, machine: Machine) -> Floats:
 def position_words(at: Floats, machine: Machine) -> str:
     """``at (0, 400, 0) mm; not commanded: z``."""
     others = [axis for axis in "xyz" if axis not in machine.description.task]
-    words = f"at ({', '.join(f'{v / MM:g}' for v in at)}) mm"
+    words = f"at {place_text(at)}"
     return f"{words}; not commanded: {', '.join(others)}" if others else words
 
 

@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 
 from stiffmap.common.errors import StiffmapError
+from stiffmap.common.number_text import place_text
 from stiffmap.machining.chatter import stability_lobes
 from stiffmap.machining.process import Process, load_process
 from stiffmap.ui.cli import options
@@ -130,9 +131,8 @@ def _modes(given: list[str] | None) -> list[tuple[float, float, float, str]]:
 def _files(ds: xr.Dataset, p: Process, name: str, place: Any, i: int) -> Iterator[tuple[str, Any]]:
     from stiffmap.ui.plot.vibration import lobes_figure
 
-    where = ", ".join(f"{v / MM:g}" for v in place)
     stem = "lobes" if i == 0 else f"lobes_{i + 1}"
-    yield f"{stem}.png", lobes_figure(ds, f"{name} at ({where}) mm: {p.name}", p.spindle, p.cut.axial)
+    yield f"{stem}.png", lobes_figure(ds, f"{name} at {place_text(place)}: {p.name}", p.spindle, p.cut.axial)
     yield f"{stem}.nc", ds.assign_attrs(stable_speeds=np.ravel(ds.attrs["stable_speeds"]))
 
 

@@ -14,11 +14,10 @@ import xarray as xr
 from rich.table import Table
 from rich.text import Text
 
-from stiffmap.common.number_text import length_text
+from stiffmap.common.number_text import length_text, place_text
 from stiffmap.model.description.sources import in_words as source_words
 from stiffmap.solve.budget import in_shares
 from stiffmap.solve.machine import Machine
-from stiffmap.ui.cli.inputs import MM
 from stiffmap.ui.cli.output import failed, failed_in_words, table
 from stiffmap.workspace.maps.plan import BEYOND
 from stiffmap.workspace.maps.summary import across, band, name_of, summary, uncertain_readings, worst_pose
@@ -147,9 +146,9 @@ def deviation_figures(ds: xr.Dataset, plane: str) -> Iterator[tuple[str, Any]]:
 
 def in_words(worst: dict[str, Any]) -> str:
     """``worst pose of the map: (300, 300, -200) mm, 932.5 µm in space under …, 57 % from z.foot …; 83 % of it …``."""
-    at = ", ".join(f"{v / MM:.4g}" for v in worst["position"])
+    at = place_text(worst["position"], ".4g")
     rests = source_words(worst["sources"])
     return (
-        f"worst pose of the map: ({at}) mm, {length_text(worst['deflection'])} in space under {worst['case']}; "
+        f"worst pose of the map: {at}, {length_text(worst['deflection'])} in space under {worst['case']}; "
         f"{in_shares(worst['shares'])}{'; ' + rests if rests else ''}"
     )

@@ -10,7 +10,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from stiffmap.common.broadcasting import Floats
-from stiffmap.common.number_text import length_text
+from stiffmap.common.number_text import length_text, place_text
 from stiffmap.common.outputs import write_rows
 from stiffmap.solve.kinematics import must_take
 from stiffmap.solve.machine import Machine
@@ -49,9 +49,8 @@ def map_toolpath(
     if np.isfinite(sizes).any():
         i = int(np.nanargmax(sizes))
         worst = {"way": way[i], "position": position[i], "deflection": sizes[i]}
-        place = ", ".join(f"{v / MM:.4g}" for v in position[i])
         told = (
-            f"{m.name}: largest deflection along the path {length_text(sizes[i])} at ({place}) mm, "
+            f"{m.name}: largest deflection along the path {length_text(sizes[i])} at {place_text(position[i], '.4g')}, "
             f"{way[i] / MM:.4g} mm from its start"
         )
     lost = f"{failed} of {len(way)} poses failed: {s.count()}" if failed else None

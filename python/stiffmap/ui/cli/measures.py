@@ -123,15 +123,10 @@ def cells(r: MeasureRow) -> tuple[str, ...]:
         unit,
         "" if r.found.worst_at is None else " ".join(f"{1e3 * v:.0f}" for v in r.found.worst_at),
         "" if np.isnan(r.found.best) else f"{f * r.found.best:.4g}",
-        required(r),
+        "" if r.bound is None else r.bound.text(f),
         "" if np.isnan(r.margin) else f"{f * r.margin:+.4g}",
         verdict,
     )
-
-
-def required(r: MeasureRow) -> str:
-    """``≥ 500`` and the like."""
-    return "" if r.bound is None else r.bound.text(r.measure.factor)
 
 
 def write(table: MeasuresTable, output: Path) -> list[Path]:

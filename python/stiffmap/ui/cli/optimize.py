@@ -85,14 +85,14 @@ def command(
 
 def _files(found: ParetoSet, report: ComparedDesigns) -> Iterator[tuple[str, Any]]:
     """The set and its pictures."""
-    from stiffmap.ui.plot.design import beside_figure, front_figure, parallel_figure, progress_figure
+    from stiffmap.ui.plot.design import comparison_figure, front_figure, parallel_figure, progress_figure
     from stiffmap.ui.plot.measures import path_measures_figure
 
     yield "pareto.nc", found.dataset
     figures = {"fronts": front_figure, "parallel": parallel_figure, "progress": progress_figure}
     yield from ((f"{name}.png", make(found)) for name, make in figures.items())
     with suppress(StiffmapError):  # no measure with a map is asked for
-        yield "beside.png", beside_figure(report.tables)
+        yield "beside.png", comparison_figure(report.tables)
     with suppress(StiffmapError):  # no toolpath
         yield "toolpath.png", path_measures_figure(report.tables)
 

@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 from rich.table import Table
 
+from stiffmap.common.number_text import place_text
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import MM, finish, force_given, gravity, machine_with, position
 from stiffmap.ui.cli.options import option
@@ -66,9 +67,9 @@ def command(
 
 def _under(place: Any, vector: Any, displacement: Any) -> str:
     """The deflection under the force that was given as a vector, in words."""
-    d = 1e3 * displacement[:3]
-    words = [", ".join(f"{v:.4g}" for v in values) for values in (1e3 * place, vector, d)]
-    return f"at ({words[0]}) mm, force ({words[1]}) N: ({words[2]}) mm, norm {np.linalg.norm(d):.4f} mm"
+    force = ", ".join(f"{v:.4g}" for v in vector)
+    at, moved = (place_text(v, ".4g") for v in (place, displacement[:3]))
+    return f"at {at}, force ({force}) N: {moved}, norm {np.linalg.norm(1e3 * displacement[:3]):.4f} mm"
 
 
 def _files(many: list[xr.Dataset], plane: str, tolerance: float) -> Iterator[tuple[str, Any]]:

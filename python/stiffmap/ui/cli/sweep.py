@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 from rich.table import Table
 
+from stiffmap.common.number_text import place_text
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.status import Status
 from stiffmap.ui.cli import options
@@ -93,7 +94,7 @@ def as_table(ds: xr.Dataset) -> Table:
 
 
 def _place(ds: xr.Dataset) -> str:
-    return f"{ds.attrs['machine']} at ({', '.join(f'{1e3 * v:g}' for v in ds.position.values)}) mm"
+    return f"{ds.attrs['machine']} at {place_text(ds.position.values)}"
 
 
 OF_FORCES = ("position", "direction", "force", "deflection", "deflection_along", "displacement", "status")

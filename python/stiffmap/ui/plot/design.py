@@ -66,15 +66,15 @@ def progress_figure(found: ParetoSet) -> Figure:
     return figure
 
 
-def beside_figure(tables: Mapping[str, MeasuresTable]) -> Figure:
+def comparison_figure(tables: Mapping[str, MeasuresTable]) -> Figure:
     """Maps on the middle plane of the box, a row per measure and a column per machine; one scale per row."""
-    rows = [n for n in MAPPED if all(_map(t, n) is not None for t in tables.values())]
+    found = {n: {k: m for k, t in tables.items() if (m := _map(t, n)) is not None} for n in MAPPED}
+    rows = {name: maps for name, maps in found.items() if len(maps) == len(tables)}
     if not rows:
         raise StiffmapError(f"no maps to set side by side; asked for {', '.join(MAPPED)}")
     with paper(2.2 * len(tables) + 0.8, 2.3 * len(rows) + 0.4, most=0) as figure:
         grid = figure.subplots(len(rows), len(tables), squeeze=False)
-        for line, name in zip(grid, rows, strict=True):
-            maps = {k: m for k, t in tables.items() if (m := _map(t, name)) is not None}
+        for line, (name, maps) in zip(grid, rows.items(), strict=True):
             steps = levels(*map(_middle, maps.values()))
             for axes, (machine, m) in zip(line, maps.items(), strict=True):
                 drawn = axes.contourf(MM * m.x, MM * m.y, _middle(m).T, levels=steps, cmap=COLOURS)

@@ -12,7 +12,6 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.ui.plot.modes import swung
 from stiffmap.ui.plot.skeleton import skeleton
 from stiffmap.ui.view.moment import Moment
-from stiffmap.ui.view.plane import modes_at
 from stiffmap.ui.view.scene import GHOST
 from stiffmap.workspace.performance.motion.inertia import NaturalFrequencies
 
@@ -42,7 +41,7 @@ class Swing:
     def frequencies(self, moment: Moment) -> NaturalFrequencies | None:
         """The lowest modes; None where bodies lack masses or the pose has none."""
         try:
-            w = modes_at(moment.machine, moment.state, np.array(moment.state.position), MODES, 1)
+            w = moment.modes(moment.state.position, MODES)
         except StiffmapError:
             w = None
         if w is not None and not np.isfinite(w.frequency).any():

@@ -15,7 +15,7 @@ from stiffmap.ui.view.moment import Moment
 from stiffmap.ui.view.numbers import ChangedNumbers, write
 from stiffmap.ui.view.outputs import Outputs
 from stiffmap.ui.view.panels import hint, legend
-from stiffmap.ui.view.place import first_plane, moves, orientation, rotation_of, turns
+from stiffmap.ui.view.place import moves, turns
 from stiffmap.ui.view.quantities import QUANTITIES
 from stiffmap.ui.view.state import PLANES
 
@@ -112,7 +112,7 @@ class Controls:
             lambda m, v: m.put(quantity=TITLES[v]),
             lambda m: QUANTITIES[m.state.quantity].title,
         )
-        plane = gui.add_dropdown("Plane across", PLANES, initial_value=first_plane(moment.machine))
+        plane = gui.add_dropdown("Plane across", PLANES, initial_value=moment.state.plane)
         self.typed(plane, lambda m, v: m.put(plane=v), lambda m: m.state.plane)
         normal = gui.add_vector3("Normal of a free plane", (0.0, 0.0, 1.0), step=0.05)
         self.typed(
@@ -187,7 +187,7 @@ class Controls:
     def _search(self) -> None:
         try:
             moment = self.viewer.now()
-            found = assembly_modes(moment.machine, moment.state.position, orientation(moment.state))
+            found = assembly_modes(moment.machine, moment.state.position, moment.state.turned)
         except StiffmapError as problem:
             self.viewer.error = str(problem)
             return
@@ -232,8 +232,7 @@ def _round(values: ArrayLike) -> tuple[float, float, float]:
 
 
 def _rotation(moment: Moment) -> tuple[float, float, float]:
-    turn = Rotation.from_matrix(rotation_of(moment.machine, moment.state)).as_rotvec()
-    return _round(np.rad2deg(turn))
+    return _round(np.rad2deg(Rotation.from_matrix(moment.rotation).as_rotvec()))
 
 
 def _around(moment: Moment) -> float:

@@ -23,7 +23,6 @@ from stiffmap.ui.plot.loaded import round_factor
 from stiffmap.ui.plot.style import BLUE, GREEN, VERMILLION
 from stiffmap.ui.view.colours import rgb
 from stiffmap.ui.view.moment import Moment
-from stiffmap.ui.view.place import solved
 from stiffmap.ui.view.scene import DIAGNOSED, Scene
 
 if TYPE_CHECKING:
@@ -236,7 +235,7 @@ def path_errors(moment: Moment, path: Floats, size: float) -> tuple[Floats, Floa
     """
 
     def off(at: Floats) -> Floats:
-        return np.asarray(solved(moment.machine, moment.state, at, stiffness=False).displacement[:, :3])
+        return np.asarray(moment.solve(at, stiffness=False).displacement[:, :3])
 
     cut = off(path)
     command = path - cut

@@ -23,8 +23,8 @@ from stiffmap.solve.kinematics import inverse_kinematics
 from stiffmap.solve.machine import Machine, load_machine
 from stiffmap.solve.reach import follow
 from stiffmap.ui.view.moment import Moment
-from stiffmap.ui.view.place import first_plane, orientation, rotation_of
-from stiffmap.ui.view.state import History, ViewState, checked, with_change
+from stiffmap.ui.view.place import moves
+from stiffmap.ui.view.state import History, ViewState, checked
 
 KEPT_MACHINES = 16
 
@@ -46,9 +46,7 @@ class ViewModel:
         self.meshes = meshes
         self.declared = machine
         self._machines: Kept[Hashable, Machine] = Kept(KEPT_MACHINES)
-        home = machine.description.home.p
-        first = ViewState((float(home[0]), float(home[1]), float(home[2])), plane=first_plane(machine))
-        self.history = History(checked(state) if state else first)
+        self.history = History(checked(state) if state else first_state(machine))
         self.message = ""
         self._check(self.state)
 
@@ -74,7 +72,7 @@ class ViewModel:
 
     def _check(self, state: ViewState) -> None:
         k = inverse_kinematics(
-            self._with(state.changes), state.position, orientation(state), start=state.start_array, threads=1
+            self._with(state.changes), state.position, state.turned, start=state.start_array, threads=1
         )
         if int(k.status) != Status.CONVERGED:
             where = place_text(state.position)
@@ -93,7 +91,7 @@ class ViewModel:
         """A number of the machine (SI) by its address; None: as in the file."""
         if value is not None and not np.isfinite(value):
             raise StiffmapError(f"{address}: expected a finite number, got {value}")
-        return self.put(changes=with_change(self.state, address, value).changes, keep=keep)
+        return self.put(changes=self.state.changed(address, value).changes, keep=keep)
 
     def drag(self, position: Floats, rotation: Floats | None = None) -> ViewState:
         """The tool follows a hand (m; (3, 3), None: as it is) as far as the machine goes; `message` says what stops it.
@@ -101,7 +99,7 @@ class ViewModel:
         Not kept for undo: call `history.mark` when a drag begins.
         """
         m, s = self.machine, self.state
-        now = rotation_of(m, s)
+        now = self.moment.rotation
         wanted = np.array(position, dtype=float)
         if not np.isfinite(wanted).all():
             raise StiffmapError(f"position: expected 3 finite numbers, got {wanted.tolist()}")
@@ -139,6 +137,14 @@ class ViewModel:
         except StiffmapError:
             self.declared = before
             raise
+
+
+def first_state(machine: Machine) -> ViewState:
+    """At home, on the plane with the most commanded axes: z before y before x."""
+    x, y, z = map(float, machine.description.home.p)
+    free = moves(machine)
+    plane = max("zyx", key=lambda a: sum(free[i] for i in range(3) if "xyz"[i] != a))
+    return ViewState((x, y, z), plane=plane)
 
 
 EFFECTS = "effects"

@@ -2,26 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import time
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.budget import DeflectionBudget, deflection_budget
-from stiffmap.solve.compiled import Status
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.solution import Solution
 from stiffmap.ui.plot.loaded import SHOWN, round_factor
+from stiffmap.ui.plot.scene import box_corners
 from stiffmap.ui.plot.skeleton import Skeleton, skeleton, standing
-from stiffmap.ui.view.place import box_of, moves, orientation, solved
-from stiffmap.ui.view.plane import FINE, NO_LINES, PlaneMap, plane_map, values_at
+from stiffmap.ui.view.place import box_of, drawn_box, moves
+from stiffmap.ui.view.plane import NO_LINES, Frame, PlaneMap
 from stiffmap.ui.view.quantities import QUANTITIES
 from stiffmap.ui.view.state import ViewState
 from stiffmap.workspace.maps.inputs import box_nodes
+from stiffmap.workspace.performance.motion.inertia import NaturalFrequencies, natural_frequencies
+from stiffmap.workspace.vibration import frequency_response
 
+FINE, COARSE, DEAR = 101, 51, 15
+"""Poses along each edge: at rest, while something is dragged, and of quantities that need modes."""
+MODES = 40
+"""As parallel machines have dozens of modes of their bars below those that move the tool."""
+DAMPING = 0.02
+"""Modal damping ratio of every mode."""
+INSIDE = 1e-9
+"""Of the box, how far outside it a pose may lie by round-off."""
 CLOUD = 15
 """Poses of the cloud along each commanded axis."""
 
@@ -35,18 +47,88 @@ class Moment:
     meshes: Path | None = None
     """The URDF whose meshes are drawn."""
 
-    def solve(self) -> Solution:
-        """The tool's pose under the load."""
-        return solved(self.machine, self.state, threads=1)
+    @property
+    def rotation(self) -> Floats:
+        """(3, 3) commanded orientation."""
+        turned = self.state.turned
+        return np.asarray(self.machine.compiled.home_rotation if turned is None else turned)
+
+    @property
+    def _how(self) -> dict[str, Any]:
+        return {"rotation": self.state.turned, "gravity": self.state.gravity}
+
+    def solve(self, position: Floats | None = None, *, stiffness: bool = True) -> Solution:
+        """Under the load, at the tool's pose or at positions (..., 3) m with its orientation."""
+        s = self.state
+        at, threads = (s.position, 1) if position is None else (position, None)
+        return self.machine.solve(
+            at, s.wrench, **self._how, start=s.start_array, stiffness=stiffness, threads=threads
+        )
+
+    def frame(self) -> Frame:
+        """The rectangle across the workspace box that holds the tool."""
+        low, high = drawn_box(self.machine)
+        s, p = self.state, np.array(self.state.position)
+        if s.plane == "free":
+            n = np.array(s.normal) / np.linalg.norm(s.normal)
+            other = np.eye(3)[int(np.argmin(np.abs(n)))]
+            u = np.cross(other, n)
+            u /= np.linalg.norm(u)
+            v = np.cross(n, u)
+            corners = box_corners(low, high) - p
+            along = np.stack([corners @ u, corners @ v])
+            lowest, highest = along.min(axis=1), along.max(axis=1)
+            middle = (lowest + highest) / 2
+            width, height = highest - lowest
+            return Frame(p + middle[0] * u + middle[1] * v, u, v, float(width), float(height))
+        axis = "xyz".index(s.plane)
+        right, up = (i for i in range(3) if i != axis)
+        centre = (low + high) / 2
+        centre[axis] = p[axis]
+        e = np.eye(3)
+        return Frame(centre, e[right], e[up], float(high[right] - low[right]), float(high[up] - low[up]))
 
     def plane(self, count: int = FINE) -> PlaneMap:
-        """The plane through the tool."""
-        return plane_map(self.machine, self.state, count)
+        """The plane through the tool; outside the box its poses are solved as well and hidden."""
+        begun = time.perf_counter()
+        frame = self.frame()
+        if QUANTITIES[self.state.quantity].of is None:
+            count = min(count, DEAR)
+        p = frame.poses(count)
+        low, high = drawn_box(self.machine)
+        slack = INSIDE * (high - low)
+        outside = np.asarray(((p < low - slack) | (p > high + slack)).any(axis=-1))
+        values, status = self.at(p)
+        values = np.where(outside, np.nan, values)
+        return PlaneMap(frame, self.state.quantity, values, status, outside, time.perf_counter() - begun)
 
-    def at(self, point: Sequence[float]) -> tuple[float, Status]:
-        """Value (SI) of the quantity with the tool at a point (3,) m, solved there, and the status."""
-        value, status = values_at(self.machine, self.state, np.array(point, dtype=float))
-        return float(value), Status(int(status))
+    def at(self, position: Floats) -> tuple[Floats, Floats]:
+        """(...) of the quantity with the tool at (..., 3) m, SI, solved there, and statuses."""
+        quantity = QUANTITIES[self.state.quantity]
+        if self.state.quantity == "frequency":
+            w = self.modes(position, 1)
+            return np.asarray(w.frequency[..., 0]), np.asarray(w.status, dtype=float)
+        if quantity.of is None:
+            return self.dynamic_stiffness(position)
+        s = self.solve(position, stiffness=quantity.stiffness)
+        size = float(np.linalg.norm(self.state.force))
+        return quantity.of(s, size, self.state.tolerance), np.asarray(s.status, dtype=float)
+
+    def modes(self, position: ArrayLike, count: int) -> NaturalFrequencies:
+        """The lowest modes at (..., 3) m under the load; StiffmapError where bodies lack masses."""
+        return natural_frequencies(self.machine, position, self.state.wrench, **self._how, modes=count)
+
+    def dynamic_stiffness(self, position: Floats) -> tuple[Floats, Floats]:
+        """(...) N/m of the softest direction at the state's frequency, and statuses; modes beyond the lowest count as statics."""
+        s = self.state
+        found = frequency_response(
+            self.machine, position, [s.frequency], s.wrench, **self._how, damping=DAMPING, modes=MODES,
+            symmetrise=True,
+        )  # fmt: skip
+        c = found.values[..., 0, :3, :3]
+        good = np.isfinite(c).all(axis=(-2, -1))
+        softest = np.linalg.norm(np.where(good[..., None, None], c, np.eye(3)), 2, axis=(-2, -1))
+        return np.where(good, 1.0 / softest, np.nan), np.asarray(found.status, dtype=float)
 
     def cloud(self) -> tuple[Floats, Floats]:
         """The quantity over the whole box: points (n, 3) m, values (n,) in the unit of the screen; none where it needs modes."""
@@ -55,12 +137,12 @@ class Moment:
             return np.zeros((0, 3)), np.zeros(0)
         low, high = (np.where(moves(self.machine), end, at) for end in box_of(self.machine))
         points = box_nodes(low, high, CLOUD)
-        return points, values_at(self.machine, self.state, points)[0] * quantity.factor
+        return points, self.at(points)[0] * quantity.factor
 
     def rest(self) -> Skeleton:
         """The machine at its pose, springs at rest."""
         s = self.state
-        return standing(self.machine, s.position, orientation(s), start=s.start_array)
+        return standing(self.machine, s.position, s.turned, start=s.start_array)
 
     def ghost(self, rest: Skeleton, solution: Solution) -> Floats:
         """(n, 2, 3) m, links of the machine under the load, its deflection magnified; none without an equilibrium."""
@@ -81,9 +163,7 @@ class Moment:
         s = self.state
         if s.start is not None:
             raise StiffmapError("shares of the deflection are known in the assembly mode of home only")
-        return deflection_budget(
-            self.machine, s.position, s.wrench, rotation=orientation(s), gravity=s.gravity
-        )
+        return deflection_budget(self.machine, s.position, s.wrench, **self._how)
 
     def map_key(self, *, anywhere: bool = False) -> object:
         """What the colours of a plane (or, `anywhere`, of the box) depend on."""

@@ -17,7 +17,7 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.common.open_view import OpenView
 from stiffmap.solve.machine import Machine
 from stiffmap.ui.view.data import Data, findings
-from stiffmap.ui.view.model import ViewModel
+from stiffmap.ui.view.model import ViewModel, first_state
 from stiffmap.ui.view.serving import HERE, LOCAL, Guard, need_viser, silent, start_server
 from stiffmap.ui.view.state import ViewState, as_plain, from_permalink, from_plain, permalink
 from stiffmap.ui.view.viewer import Viewer
@@ -185,15 +185,11 @@ def model_of(
     **state: object,
 ) -> ViewModel:
     """A model in a state given by keywords; StiffmapError for bad ones."""
-    model = ViewModel(
-        machine, file=file, meshes=None if meshes is None else given_path(meshes, "meshes", "a URDF file")
-    )
-    given = {k: _listed(v) for k, v in state.items() if v is not None}
-    if position is not None:
-        given["position"] = _listed(position)
-    if not given:
-        return model
-    return ViewModel(machine, from_plain(as_plain(model.state) | given), file=model.file, meshes=model.meshes)
+    given = {k: _listed(v) for k, v in (state | {"position": position}).items() if v is not None}
+    return ViewModel(
+        machine, from_plain(as_plain(first_state(machine)) | given), file=file,
+        meshes=None if meshes is None else given_path(meshes, "meshes", "a URDF file"),
+    )  # fmt: skip
 
 
 def _listed(value: object) -> Any:

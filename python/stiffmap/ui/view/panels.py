@@ -172,10 +172,14 @@ def frequencies_panel(frequency: Sequence[float], shown: int) -> str:
 
 def probe_text(moment: Moment, point: Sequence[float]) -> str:
     """What the chosen quantity is at a point of the plane, solved there."""
-    value, status = moment.at(point)
+    value, status = map(float, moment.at(np.array(point, dtype=float)))
     q = QUANTITIES[moment.state.quantity]
     unit, factor = q.shown(value * q.factor)
-    said = f"{value * q.factor * factor:.5g} {unit}".strip() if np.isfinite(value) else status.name.lower()
+    said = (
+        f"{value * q.factor * factor:.5g} {unit}".strip()
+        if np.isfinite(value)
+        else Status(int(status)).name.lower()
+    )
     return f"probe at {place_text(point, '.1f')}: {said}"
 
 

@@ -18,7 +18,7 @@ from stiffmap.ui.plot.style import BLACK, ORANGE, SKY, TOLERANCE, leg_colours
 from stiffmap.ui.view.colours import plane_image, rgb
 from stiffmap.ui.view.meshes import Meshes
 from stiffmap.ui.view.moment import Moment
-from stiffmap.ui.view.place import box_of, moves, rotation_of, turns
+from stiffmap.ui.view.place import box_of, moves, turns
 from stiffmap.ui.view.plane import NO_LINES, PlaneMap
 
 if TYPE_CHECKING:
@@ -154,7 +154,7 @@ class Scene:
     def tool(self, moment: Moment) -> None:
         """The gizmo at the tool of the state."""
         self.gizmo.position = moment.state.position
-        self.gizmo.wxyz = quaternion(rotation_of(moment.machine, moment.state))
+        self.gizmo.wxyz = quaternion(moment.rotation)
 
     def force(self, moment: Moment, pulled: float = 0.0) -> None:
         """The arrow that ends at the tool; one that is dragged from a size `pulled` (N) is as long as it is pulled."""

@@ -12,6 +12,7 @@ from dataclasses import asdict, dataclass, fields, replace
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
@@ -59,6 +60,16 @@ class ViewState:
     def wrench(self) -> tuple[float, ...]:
         """(6,) N, N·m on the tool."""
         return (*self.force, *self.moment)
+
+    @property
+    def turned(self) -> Floats | None:
+        """(3, 3) commanded orientation; None: as at home."""
+        return None if self.rotation is None else np.asarray(Rotation.from_rotvec(self.rotation).as_matrix())
+
+    def changed(self, address: str, value: float | None) -> ViewState:
+        """With a number of the machine changed; None: as in the file."""
+        others = {a: v for a, v in self.changes if a != address}
+        return replace(self, changes=tuple((others | ({} if value is None else {address: value})).items()))
 
     @property
     def start_array(self) -> Floats | None:
@@ -191,11 +202,3 @@ class History:
         """As at the start; an undo leads back."""
         self.put(self.first)
         return self.now
-
-
-def with_change(state: ViewState, address: str, value: float | None) -> ViewState:
-    """A number of the machine changed; None: as in the file."""
-    others = {a: v for a, v in state.changes if a != address}
-    if value is not None:
-        others[address] = value
-    return replace(state, changes=tuple(others.items()))

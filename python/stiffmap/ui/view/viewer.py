@@ -21,7 +21,7 @@ from stiffmap.ui.view.controls import NONE, Controls
 from stiffmap.ui.view.data import Data
 from stiffmap.ui.view.hands import ProbePoint, listen, listen_to_nodes
 from stiffmap.ui.view.model import ViewModel
-from stiffmap.ui.view.moment import Moment
+from stiffmap.ui.view.moment import COARSE, FINE, Moment
 from stiffmap.ui.view.numbers import write
 from stiffmap.ui.view.panels import (
     colour_bar,
@@ -31,8 +31,7 @@ from stiffmap.ui.view.panels import (
     shares_panel,
     status_line,
 )
-from stiffmap.ui.view.place import rotation_of
-from stiffmap.ui.view.plane import COARSE, FINE, PlaneMap
+from stiffmap.ui.view.plane import PlaneMap
 from stiffmap.ui.view.quantities import QUANTITIES
 from stiffmap.ui.view.scene import Scene, look_at_machine
 from stiffmap.ui.view.serving import silent
@@ -101,7 +100,7 @@ class Viewer:
 
         def deed(model: ViewModel) -> None:
             turned = Rotation.from_quat(np.roll(wxyz, -1)).as_matrix()
-            same = np.abs(turned - rotation_of(model.machine, model.state)).max() < 1e-9
+            same = np.abs(turned - model.moment.rotation).max() < 1e-9
             model.drag(position, None if same else turned)
 
         self.act(deed)
@@ -123,7 +122,7 @@ class Viewer:
         rest = moment.rest()
         ghost = moment.ghost(rest, s)
         self._solution = s
-        found = self._map(moment, self._count())
+        found = self._map(moment)
         with self.server.atomic():
             self.scene.machine(rest, ghost)
             self.scene.force(moment, self.pulling)
@@ -148,14 +147,11 @@ class Viewer:
                 self._show(found, moment.state)
         self.probe.again()
 
-    def _count(self) -> int:
-        return next((n for n in COUNTS if n * n * self._per_pose <= BUDGET), COUNTS[-1])
-
     def _learn(self, found: PlaneMap) -> None:
         if QUANTITIES[found.quantity].of is not None:
             self._per_pose = 0.5 * self._per_pose + 0.5 * found.seconds / found.count**2
 
-    def _map(self, moment: Moment, count: int) -> PlaneMap | None:
+    def _map(self, moment: Moment) -> PlaneMap | None:
         """A new map of the plane; None where it would be the one that is shown."""
         if not self.controls.map_on.value:
             self._plane_key = self._plane = None
@@ -164,6 +160,7 @@ class Viewer:
         key = moment.map_key()
         if key == self._plane_key:
             return None
+        count = next((n for n in COUNTS if n * n * self._per_pose <= BUDGET), COUNTS[-1])
         found = moment.plane(count)
         self._learn(found)
         self._plane, self._plane_key = found, key

@@ -12,7 +12,7 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.common.outputs import write_text
 from stiffmap.solve.machine import load_machine
 from stiffmap.workspace.design.judging import Judged, refine
-from stiffmap.workspace.design.problem import DesignProblem
+from stiffmap.workspace.design.problem import DesignProblem, near
 from stiffmap.workspace.design.robustness import DRAWS, Robustness, robustness
 from stiffmap.workspace.design.search import ParetoSet
 from stiffmap.workspace.performance.registry import get_measure
@@ -109,8 +109,7 @@ def measured(found: ParetoSet, place: Path, nodes: int = 21, draws: int = DRAWS)
 
     others = {"start": full(design.machine_file)}
     for other in design.model.beside:
-        near = Path(design.file).parent / other
-        others[Path(other).stem] = full(near if near.is_file() else other)
+        others[Path(other).stem] = full(near(other, design.file))
     chosen: dict[str, ChosenDesign] = {}
     for name, i in found.chosen().items():
         x, judged = refine(design, found.x[i], _weights(design, name), keep=name == "compromise")

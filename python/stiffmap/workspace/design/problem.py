@@ -161,6 +161,12 @@ class DesignProblem:
         return settled(base.declared or base)
 
 
+def near(name: str, file: str) -> str | Path:
+    """What a file calls by a name: the file next to it, where there is one."""
+    here = Path(file).parent / name
+    return here if here.is_file() else name
+
+
 def load_design(path: str | PathLike[str]) -> DesignProblem:
     """A design problem from a file, or a shipped one by name (``redesign``).
 
@@ -194,15 +200,12 @@ def load_design(path: str | PathLike[str]) -> DesignProblem:
                 f"unknown objective '{name}' (number {i + 1}); known: {', '.join(sorted(known))}",
                 "objectives",
             )
-    beside = given.parent / model.machine
-    machine = beside if beside.is_file() else find(model.machine)
+    machine = find(near(model.machine, file))
     task = Requirements()
     if model.requirements is not None:
-        near = given.parent / model.requirements
-        task = load_requirements(near if near.is_file() else model.requirements)
+        task = load_requirements(near(model.requirements, file))
     for name in model.beside:
-        if not (given.parent / name).is_file():
-            find(name)
+        find(near(name, file))
     if model.toolpath is not None:
         task = replace(task, toolpath=near_or_shipped(model.toolpath, given.parent))
     if task.toolpath is not None:

@@ -22,7 +22,7 @@ from stiffmap.common.outputs import add_lines, make_folder, only_job
 from stiffmap.common.tasks import workers
 from stiffmap.model.files.shipped import find
 from stiffmap.workspace.design.judging import IMPOSSIBLE, Judged, judge
-from stiffmap.workspace.design.problem import DesignProblem, load_design
+from stiffmap.workspace.design.problem import DesignProblem, load_design, near
 from stiffmap.workspace.performance.registry import get_measure
 
 if TYPE_CHECKING:
@@ -95,15 +95,14 @@ class Evaluations:
 
 def fingerprint(design: DesignProblem) -> str:
     """Of everything that the answers depend on: the files as read, those that they name, code."""
-    near, beside = Path(design.file).parent, Path(design.machine_file).parent
     return digest(
         design.model.model_dump(),
         design.document.data,
         design.requirements,
         design.constraints,
-        named_files(design.model.model_dump(), near),
-        named_files(design.document.data, beside),
-        [file_digest(find(name)) for name in design.model.beside if not (near / name).is_file()],
+        named_files(design.model.model_dump(), Path(design.file).parent),
+        named_files(design.document.data, Path(design.machine_file).parent),
+        [file_digest(find(name)) for name in design.model.beside if near(name, design.file) == name],
         design.toolpath,
         code(),
     )[:16]

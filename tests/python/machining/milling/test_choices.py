@@ -15,7 +15,7 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.machining.milling import mill, mill_job
 from stiffmap.machining.milling.choices import choices, part_lies
 from stiffmap.machining.milling.equilibrium import Plant, equilibrium
-from stiffmap.machining.milling.limits import drive_speeds
+from stiffmap.machining.milling.limits import drive_speeds, fastest
 from stiffmap.machining.milling.placement import PlacementSearch, placements
 from stiffmap.machining.milling.redundancy import Steps, best_sequence, redundancy
 from stiffmap.machining.milling.setting import Setting, setting
@@ -189,6 +189,15 @@ def test_feed_up_to_the_drives_efforts() -> None:
         force = faster.force(np.zeros((len(job), 2)))
         effort = Plant(faster).stand(job.position, force, full=True).effort
         assert (np.abs(effort).max() > 150.0) is np.bool_(broken)  # N, from the machine's file
+
+
+def test_a_drive_declared_to_stand_still_has_no_feed() -> None:
+    machine, path = sm.load_machine("orthoglide-revised"), outline("circle", (0.06,))
+    still = machine.with_numbers({"x.actuator/speed": 0.0})
+    job = setting(still, path, PROCESS, sampled(path, 4e-3), path.placed((0.0, 0.0, 0.0)))
+    assert fastest(still)[0] < 1e-9
+    with pytest.raises(StiffmapError, match="declared to stand still"):
+        best_feeds(job, 1e-3)
 
 
 def test_the_other_way_round() -> None:

@@ -132,7 +132,7 @@ def test_the_best_entry_leaves_the_least_step() -> None:
 
 def test_stock_wider_than_the_tool_is_a_full_cut_whatever_the_deflection() -> None:
     """The force does not follow the wall there: the gain is nought and every point has an answer."""
-    stock = box((-0.2, -0.2, -0.005), (0.2, 0.2, 0.02))
+    stock = box([(-0.2, -0.2, -0.005), (0.2, 0.2, 0.02)])
     found = mill_job(
         sm.load_machine("linear-delta"),
         outline("rectangle", (0.12, 0.08, 0.015)),

@@ -109,12 +109,12 @@ def test_stock_says_width_and_depth() -> None:
     process = sm.load_process("trimming")
     p = path_of([[-0.2, 0, 0], [0.2, 0, 0]])  # part right of it, stock to the left
     q = sampled(p, 0.01)
-    e = engagement(q, p, process, box([-0.1, -1, -0.1], [0.1, -3e-3, 5e-3]))
+    e = engagement(q, p, process, box([[-0.1, -1, -0.1], [0.1, -3e-3, 5e-3]]))
     inside = np.abs(q.position[:, 0]) < 0.0999
     assert e.radial[inside] == pytest.approx(np.full(inside.sum(), 3e-3))
     assert e.axial[inside] == pytest.approx(np.full(inside.sum(), 5e-3))
     assert e.radial[np.abs(q.position[:, 0]) > 0.1001].max() == 0.0
-    e = engagement(q, p, process, box([-1e3, -1e3, 0.0], [1e3, 1e3, 3e-3]))
+    e = engagement(q, p, process, box([[-1e3, -1e3, 0.0], [1e3, 1e3, 3e-3]]))
     assert e.axial == pytest.approx(np.full(len(q), 3e-3))
     assert (e.radial > process.tool.diameter).all()  # the tool cuts its diameter of it
     assert engagement(q, p, process, thickness=2e-3).radial[0] == 2e-3
@@ -157,7 +157,7 @@ def test_refused_without_a_file() -> None:
     with pytest.raises(StiffmapError, match="tool's diameter"):
         engagement(sampled(p), p, sm.load_process("trimming"), thickness=1.0)
     with pytest.raises(StiffmapError, match="lower first"):
-        box([0, 0, 0], [1, 1, -1])
+        box([[0, 0, 0], [1, 1, -1]])
 
 
 @pytest.mark.parametrize("downwards", [True, False])

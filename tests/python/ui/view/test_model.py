@@ -16,7 +16,7 @@ from stiffmap.ui.plot.elements import THICK, THIN, element_links, thicknesses
 from stiffmap.ui.plot.skeleton import skeleton
 from stiffmap.ui.view.model import ViewModel, addresses, changed
 from stiffmap.ui.view.panels import principal
-from stiffmap.ui.view.place import first_plane, moves, turns
+from stiffmap.ui.view.place import moves, turns
 from stiffmap.ui.view.scene import ellipsoid, polar_surface, sphere
 
 
@@ -76,7 +76,7 @@ def test_a_turn_of_the_gizmo_turns_the_tool() -> None:
                                                      ("3-rps", "y", (0, 0, 1))])  # fmt: skip
 def test_first_plane_shows_what_is_commanded(name: str, plane: str, free: tuple[int, ...]) -> None:
     machine = sm.load_machine(name)
-    assert first_plane(machine) == plane and moves(machine) == free
+    assert ViewModel(machine).state.plane == plane and moves(machine) == free
     assert turns(sm.load_machine("linear-delta")) == (False, False, False)
 
 

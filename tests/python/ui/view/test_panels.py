@@ -28,7 +28,6 @@ from stiffmap.ui.view.panels import (
     shares_panel,
     status_line,
 )
-from stiffmap.ui.view.plane import plane_map
 from stiffmap.ui.view.state import ViewState
 
 EVIL = '<img src=x onerror="alert(1)">&'
@@ -75,7 +74,7 @@ def test_panels_hold_the_numbers(model: ViewModel) -> None:
 
 
 def test_the_colour_bar_shows_scale_and_tolerance(model: ViewModel) -> None:
-    found = plane_map(model.machine, model.state, 9)
+    found = model.moment.plane(9)
     html = colour_bar(found, found.range, 1e-6 * float(np.mean(found.range)))
     svg = well_formed(html)[0]
     assert svg.attrib["role"] == "img" and "deflection under this load" in svg.attrib["aria-label"]
@@ -178,7 +177,7 @@ def test_lengths_from_a_millimetre_on_are_in_millimetres(model: ViewModel) -> No
 
 
 def test_the_colour_bar_says_how_many_poses_are_hatched(model: ViewModel) -> None:
-    found = plane_map(model.machine, model.state, 5)
+    found = model.moment.plane(5)
     assert "hatched" not in colour_bar(found, found.range, 1.0)
     status = found.status.copy()
     for row, words in ((1, "hatched: 1 pose without"), (2, "hatched: 2 poses without")):

@@ -12,8 +12,7 @@ from stiffmap.solve.status import Status
 from stiffmap.solve.worst_force import greatest
 from stiffmap.ui.plot.planes import levels
 from stiffmap.ui.view.colours import DARK, GREY, colours_of, plane_image, table
-from stiffmap.ui.view.model import ViewModel
-from stiffmap.ui.view.plane import dynamic_stiffness, plane_frame, plane_map
+from stiffmap.ui.view.moment import Moment
 from stiffmap.ui.view.quantities import QUANTITIES
 from stiffmap.ui.view.state import ViewState
 
@@ -29,7 +28,7 @@ def machine() -> sm.Machine:
 @pytest.mark.parametrize("quantity", OF_SOLUTION)
 def test_values_are_those_of_solve(machine: sm.Machine, quantity: str) -> None:
     s = ViewState((0.05, 0.0, 0.1), force=FORCE, quantity=quantity, gravity=(0.0, 0.0, -9.81), tolerance=2e-4)
-    found = plane_map(machine, s, 7)
+    found = Moment(machine, s).plane(7)
     p = found.frame.poses(7)
     for i, j in ((0, 0), (3, 5), (6, 2)):
         one = machine.solve(p[i, j], s.wrench, gravity=s.gravity)
@@ -43,17 +42,13 @@ def test_values_are_those_of_solve(machine: sm.Machine, quantity: str) -> None:
             "status": 0.0,
         }[quantity]
         assert found.values[i, j] == pytest.approx(want, rel=1e-9)
-        assert replace_moment(machine, s).at(p[i, j])[0] == pytest.approx(want, rel=1e-9)
-
-
-def replace_moment(machine: sm.Machine, s: ViewState) -> object:
-    return ViewModel(machine, s).moment
+        assert Moment(machine, s).at(p[i, j])[0] == pytest.approx(want, rel=1e-9)
 
 
 def test_plane_lies_through_the_tool_and_across_the_box(machine: sm.Machine) -> None:
     low, high = machine.workspace
     for axis in "xyz":
-        f = plane_frame(machine, ViewState((0.05, -0.1, 0.2), plane=axis))
+        f = Moment(machine, ViewState((0.05, -0.1, 0.2), plane=axis)).frame()
         i = "xyz".index(axis)
         p = f.poses(3)
         assert np.ptp(p[..., i]) == 0 and p[0, 0, i] == (0.05, -0.1, 0.2)[i]
@@ -64,7 +59,7 @@ def test_plane_lies_through_the_tool_and_across_the_box(machine: sm.Machine) -> 
 
 def test_free_plane_holds_the_tool_and_hides_what_is_outside(machine: sm.Machine) -> None:
     s = ViewState((0.05, -0.1, 0.2), plane="free", normal=(1.0, 1.0, 1.0))
-    found = plane_map(machine, s, 21)
+    found = Moment(machine, s).plane(21)
     f = found.frame
     assert abs((f.centre - np.array(s.position)) @ f.normal) < 1e-12
     low, high = machine.workspace
@@ -77,7 +72,7 @@ def test_free_plane_holds_the_tool_and_hides_what_is_outside(machine: sm.Machine
 
 
 def test_colours_are_those_of_the_values(machine: sm.Machine) -> None:
-    found = plane_map(machine, ViewState((0.0, 0.0, 0.1), force=FORCE), 9)
+    found = Moment(machine, ViewState((0.0, 0.0, 0.1), force=FORCE)).plane(9)
     low, high = found.range
     image = plane_image(found, (low, high))
     assert image.shape == (9, 9, 4)
@@ -94,7 +89,7 @@ def test_not_a_number_is_grey_and_beyond_the_scale_is_its_end() -> None:
 def test_failed_poses_are_hatched() -> None:
     machine = sm.load_machine("tripteron")
     s = ViewState(tuple(machine.description.home.p))  # type: ignore[arg-type]
-    found = plane_map(machine, s, 21)
+    found = Moment(machine, s).plane(21)
     assert found.failed.any() and not found.failed.all()
     image = plane_image(found, found.range)
     hatched = (image[..., :3] == DARK).all(-1)
@@ -105,7 +100,7 @@ def test_failed_poses_are_hatched() -> None:
 
 
 def test_isolines_lie_at_their_values(machine: sm.Machine) -> None:
-    found = plane_map(machine, ViewState((0.0, 0.0, 0.1), force=FORCE), 41)
+    found = Moment(machine, ViewState((0.0, 0.0, 0.1), force=FORCE)).plane(41)
     for level in levels(*found.range)[:3]:
         for a, _ in found.lines_at(level)[::40]:
             s = machine.solve(a, (*FORCE, 0, 0, 0))
@@ -129,15 +124,15 @@ def test_dynamic_stiffness_begins_at_the_static_one(machine: sm.Machine) -> None
     p = np.array([0.1, 0.0, 0.05])
     s = ViewState(tuple(p), force=(0.0, 0.0, -1.0))  # type: ignore[arg-type]
     static = 1 / np.linalg.svd(machine.solve(p, s.wrench).compliance[:3, :3], compute_uv=False)[0]
-    assert float(dynamic_stiffness(machine, s, p)[0]) == pytest.approx(static, rel=1e-9)
+    assert float(Moment(machine, s).dynamic_stiffness(p)[0]) == pytest.approx(static, rel=1e-9)
     turned = replace(s, moment=(3.0, -2.0, 1.0))  # under a moment the compliance is no longer symmetric
     k = machine.solve(p, turned.wrench).stiffness
     c = np.linalg.inv((k + k.T) / 2)[:3, :3]
-    assert float(dynamic_stiffness(machine, turned, p)[0]) == pytest.approx(
+    assert float(Moment(machine, turned).dynamic_stiffness(p)[0]) == pytest.approx(
         1 / np.linalg.norm(c, 2), rel=1e-6
     )
     first = float(sm.natural_frequencies(machine, p, s.wrench).frequency[0])
-    value, status = ViewModel(machine, replace(s, quantity="frequency")).moment.at(p)
+    value, status = Moment(machine, replace(s, quantity="frequency")).at(p)
     assert value == pytest.approx(first) and status == Status.CONVERGED
 
 
@@ -158,18 +153,18 @@ def test_dynamic_stiffness_is_the_sum_over_all_modes(machine: sm.Machine) -> Non
         at = 2 * np.pi * f
         c = np.einsum("mi,mj,m->ij", motion, motion, 1 / (k**2 - at**2 + 2j * 0.02 * k * at))
         want = 1 / np.linalg.svd(c, compute_uv=False)[0]
-        assert float(dynamic_stiffness(machine, replace(s, frequency=f), p)[0]) == pytest.approx(
+        assert float(Moment(machine, replace(s, frequency=f)).dynamic_stiffness(p)[0]) == pytest.approx(
             want, rel=1e-4
         )
 
 
 def test_quantities_of_modes_are_mapped_coarsely(machine: sm.Machine) -> None:
-    found = plane_map(machine, ViewState((0.0, 0.0, 0.0), quantity="frequency"), 3)
+    found = Moment(machine, ViewState((0.0, 0.0, 0.0), quantity="frequency")).plane(3)
     assert found.count == 3 and (found.values > 1).all()
 
 
 def test_a_ray_meets_the_plane(machine: sm.Machine) -> None:
-    f = plane_frame(machine, ViewState((0.0, 0.0, 0.1)))
+    f = Moment(machine, ViewState((0.0, 0.0, 0.1))).frame()
     hit = f.under_ray(np.array([0.1, 0.2, 5.0]), np.array([0.0, 0.0, -1.0]))
     assert hit is not None
     np.testing.assert_allclose(hit, [0.1, 0.2, 0.1], atol=1e-12)

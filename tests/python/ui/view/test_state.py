@@ -16,7 +16,6 @@ from stiffmap.ui.view.state import (
     from_permalink,
     from_plain,
     permalink,
-    with_change,
 )
 
 FULL = ViewState(
@@ -94,5 +93,5 @@ def test_reset_can_be_undone() -> None:
 
 
 def test_a_change_is_put_and_taken_back() -> None:
-    s = with_change(with_change(FULL, "a/b", 1.0), "x.foot/beam.EIx", None)
+    s = FULL.changed("a/b", 1.0).changed("x.foot/beam.EIx", None)
     assert dict(s.changes) == {"a/b": 1.0}

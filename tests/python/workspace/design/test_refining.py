@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import stiffmap as sm
-from stiffmap.ui.plot.design import beside_figure
+from stiffmap.ui.plot.design import comparison_figure
 from stiffmap.workspace.design import load_design
 from stiffmap.workspace.design.judging import judge, refine
 from stiffmap.workspace.design.robustness import robustness
@@ -113,11 +113,11 @@ def test_a_design_at_its_bound_holds_for_every_second_machine(tmp_path):
 def test_maps_side_by_side():
     machine = sm.load_machine("orthoglide-revised")
     table = sm.measures(machine, only=["deflection", "mass", "transmission_max"], nodes=3, coarse=3)
-    figure = beside_figure({"one": table, "other": table})
+    figure = comparison_figure({"one": table, "other": table})
     titles = [a.get_title() for a in figure.axes if a.get_title()]
     assert titles == ["one", "other"] * 2
     with pytest.raises(sm.StiffmapError, match="no maps"):
-        beside_figure({"one": sm.measures(machine, only=["mass"], nodes=3)})
+        comparison_figure({"one": sm.measures(machine, only=["mass"], nodes=3)})
 
 
 def test_without_tolerances_there_is_nothing_to_say(tmp_path):

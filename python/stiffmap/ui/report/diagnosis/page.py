@@ -170,14 +170,8 @@ def _folds(d: Diagnosis) -> str:
 
 def _noise(d: Diagnosis) -> list[tuple[str, ...]]:
     n = d.noise
-    return [
-        (a, *(in_axis_units(a, v[a]) for v in (n.floor, n.repeats, n.declared)), _or_none(n.consistency[a]))
-        for a in n.floor
-    ]
-
-
-def _or_none(value: float) -> str:
-    return f"{value:.2g}" if np.isfinite(value) else "–"
+    sizes = {a: [in_axis_units(a, v[a]) for v in (n.floor, n.repeats, n.declared)] for a in n.floor}
+    return [(a, *v, f"{c:.2g}" if np.isfinite(c := n.consistency[a]) else "–") for a, v in sizes.items()]
 
 
 def _checks(before: Sequence[Check], after: Sequence[Check]) -> list[tuple[object, ...]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -248,6 +249,7 @@ def worst_pose(d: Diagnosis) -> tuple[Floats, Floats] | None:
     return position[np.unravel_index(int(np.nanargmax(size)), size.shape)], force
 
 
+@lru_cache(maxsize=1)  # several pictures of one report, and its words, ask for them
 def plane_errors(d: Diagnosis) -> tuple[Floats, Floats, Floats, Floats]:
     """Positions (25, 25, 3) m in the middle plane of the workspace, the wrench (6,) N, N·m, and errors (25, 25, 3) m before and after.
 
