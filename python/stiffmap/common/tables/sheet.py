@@ -120,7 +120,10 @@ def read_sheet(path: Path, sheet: str | None = None, layout: Layout = PLAIN) -> 
         raise FileError(f"expected rows of numbers alone below the header; {aside[0]}", file=file)
     for i in range(width):
         names[i], columns[i] = _united(names[i], columns[i], file, lines_)
-    return Table(file, tuple(names), tuple(columns), lines_, number_, comma, record_of(above), tuple(aside))
+    top = tuple(said[len(header) :])
+    return Table(
+        file, tuple(names), tuple(columns), lines_, number_, comma, record_of(above), top, tuple(aside)
+    )
 
 
 def _united(name: str, cells: Cells, file: str, lines: Sequence[int]) -> tuple[str, Cells]:
