@@ -49,7 +49,7 @@ def header_of(
         return None
     number, names = lines[-1]
     names = [*names, *[""] * (len(units) - len(names))]
-    if len(lines) > 1 and _needs_group(names, lines[-2][1], first):
+    if len(lines) > 1 and not repeated and _needs_group(names, lines[-2][1], first):
         names = _grouped(lines[-2][1], names, known)
     elif len(lines) > 1:  # Position [mm] over x y z
         names = [_with_own_unit(n, _of_group(g)[1]) if n else n for n, g in _under(lines[-2][1], names)]
