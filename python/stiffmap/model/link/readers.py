@@ -20,6 +20,7 @@ from stiffmap.model.link.gmshmesh import UNITS
 from stiffmap.model.link.optional import need
 
 Rows = tuple[Ints, Floats]
+FIELDS = (".csv", ".dat", ".frd", ".lis", ".txt", ".vtk", ".vtu")
 OTHER = re.compile(r"normal|force|rotat|veloc|accel|stress", re.IGNORECASE)
 """Names of vectors at nodes that are no displacements."""
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[EeDd][-+]?\d+)?"
@@ -167,9 +168,8 @@ def read_field(
     suffix = Path(path).suffix.lower()
     if suffix == ".csv":
         return read_csv_field(path)
-    known = {".dat", ".frd", ".vtk", ".vtu", ".lis", ".txt"}
-    if suffix not in known:
-        raise StiffmapError(f"{path}: expected .csv, {', '.join(sorted(known))}, got {suffix!r}")
+    if suffix not in FIELDS:
+        raise StiffmapError(f"{path}: expected {', '.join(FIELDS)}, got {suffix!r}")
     if unit not in UNITS:
         raise StiffmapError(f"{path}: this format has no units; give --unit, one of {', '.join(UNITS)}")
     if suffix in {".frd", ".vtk", ".vtu"}:
