@@ -84,10 +84,10 @@ def read_dh(given: Table, units: Mapping[str, str], convention: str) -> list[DHR
     before = [i for i, h in enumerate(header) if h[0] in "aAαΑ" and (found := INDEX.match(h)) and found[2]]
     if "a" not in at and (r := sheet.find("r")) is not None and len({*NUMBERS} & {*at}) == 3:
         before += _with_r(at, r, sheet)
-    words = [given.header[i] for i in before] or [w for w in given.above if MODIFIED.search(w)]
-    if words and convention != "modified":
+    marks = [given.header[i] for i in before] or [w for w in given.above if MODIFIED.search(w)]
+    if marks and convention != "modified":
         raise StiffmapError(
-            f"{sheet.file}: {', '.join(map(repr, words))}: of the link before its joint, which is the "
+            f"{sheet.file}: {', '.join(map(repr, marks))}: of the link before its joint, which is the "
             "modified convention; say --dh-convention modified"
         )
     lost = [n for n in NUMBERS if n not in at]

@@ -21,8 +21,6 @@ from stiffmap.model.link.optional import need
 
 Rows = tuple[Ints, Floats]
 FIELDS = (".csv", ".dat", ".frd", ".lis", ".txt", ".vtk", ".vtu")
-OTHER = re.compile(r"normal|force|rotat|veloc|accel|stress", re.IGNORECASE)
-"""Names of vectors at nodes that are no displacements."""
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[EeDd][-+]?\d+)?"
 
 
@@ -137,18 +135,16 @@ def read_vtk(path: str | Path) -> tuple[Floats, Floats]:
         mesh = meshio.read(path)
     except (Exception, SystemExit) as error:
         raise StiffmapError(f"{path}: meshio cannot read it ({' '.join(str(error).split())[:80]})") from None
-    arrays = sorted(mesh.point_data, key=lambda name: [part.zfill(12) for part in re.split(r"(\d+)", name)])
-    arrays = [name for name in arrays if np.shape(mesh.point_data[name])[1:] == (3,)]
-    if not arrays:
+    in_order = sorted(mesh.point_data, key=lambda n: [part.zfill(12) for part in re.split(r"(\d+)", n)])
+    fields = [
+        np.asarray(mesh.point_data[n], dtype=float)
+        for n in in_order
+        if np.shape(mesh.point_data[n])[1:] == (3,)
+    ]
+    if not fields:
         raise StiffmapError(
             f"{path}: expected point arrays with three components, got {sorted(mesh.point_data)}"
         )
-    other = [name for name in arrays if OTHER.search(name)]
-    if 0 < len(other) < len(arrays):  # cases may be named after their loads
-        raise StiffmapError(
-            f"{path}: every point array of three numbers is a load case; take out '{other[0]}'"
-        )
-    fields = [np.asarray(mesh.point_data[name], dtype=float) for name in arrays]
     return np.asarray(mesh.points, dtype=float), np.array(fields)
 
 
