@@ -252,7 +252,7 @@ def _all_readings(rows: Sequence[Line]) -> bool:
     return (
         {len(cells) for _, cells in rows} == {width}
         and not any(not word or STATISTICS.fullmatch(word) for word in begins)
-        and (_plain_numbers(ends) or not any(map(MEAN.fullmatch, ends)))
+        and (_plain_numbers(ends) or not any(map(MEAN.fullmatch, {*ends})))
         and any(_plain_numbers([cells[i] for _, cells in rows]) for i in reversed(range(width)))
     )
 
