@@ -9,7 +9,7 @@ from itertools import pairwise, zip_longest
 
 from stiffmap.common.errors import FileError
 from stiffmap.common.tables.lines import COMMENTS
-from stiffmap.common.units import name_and_unit, unit_of
+from stiffmap.common.units import TIMES, name_and_unit, unit_of
 
 Line = tuple[int, list[str]]
 MOST_LINES = 4
@@ -49,7 +49,7 @@ def header_of(
         return None
     number, names = lines[-1]
     names = [*names, *[""] * (len(units) - len(names))]
-    if len(lines) > 1 and _needs_group(names, lines[-2][1], first):
+    if len(lines) > 1 and not repeated and _needs_group(names, lines[-2][1], first):
         names = _grouped(lines[-2][1], names, known)
     elif len(lines) > 1:  # Position [mm] over x y z
         names = [_with_own_unit(n, _of_group(g)[1]) if n else n for n, g in _under(lines[-2][1], names)]
@@ -131,7 +131,8 @@ def with_unit(name: str, unit: str) -> str:
 
 def _with_own_unit(name: str, unit: str) -> str:
     bare = _bare(unit)
-    return name if unit_of(bare) is None or split_unit(name)[1] else with_unit(name, bare)
+    no_unit = unit_of(bare) is None and bare not in TIMES
+    return name if no_unit or split_unit(name)[1] else with_unit(name, bare)
 
 
 def _needs_group(names: Sequence[str], group: Sequence[str], first: Sequence[str]) -> bool:

@@ -47,6 +47,10 @@ STATISTICS = re.compile(
     re.IGNORECASE,
 )
 """First cell of a row that is no reading but what a spreadsheet computed of them."""
+MEAN = re.compile(
+    r"(?i)(mean|average|avg|median|mittel(wert)?|mw|ø|x̄|x̅|durchschnitt|moyenne|promedio|std( ?dev)?|stdev|stabw|standardabweichung)\.?:?"
+)
+"""All of the last cell of such a row, where the first row is a reading."""
 WAY = "--header id,x,y,z,dx,dy,dz (nothing between two commas for a column that is not used)"
 LONGEST_HEADER, MOST_COLUMNS = 300, 1000
 
@@ -109,7 +113,7 @@ def read_sheet(path: Path, sheet: str | None = None, layout: Layout = PLAIN) -> 
     said = [*header, *(c.strip() for _, cells in above for c in cells)]
     aside = [f"row {n}, of numbers above the header" for n, _ in begun[:-1]]
     clear = (
-        b if _all_readings(b) else _data(b, header, said, spelling, aside, layout, str(path))
+        b if _all_readings(b) else _data(b, first, header, said, spelling, aside, layout, str(path))
         for b in blocks(chain([first], kept(rows)))
     )
     data = even(chain.from_iterable(clear), width, str(path), separator, None if layout.strict else aside)
@@ -120,7 +124,10 @@ def read_sheet(path: Path, sheet: str | None = None, layout: Layout = PLAIN) -> 
         raise FileError(f"expected rows of numbers alone below the header; {aside[0]}", file=file)
     for i in range(width):
         names[i], columns[i] = _united(names[i], columns[i], file, lines_)
-    return Table(file, tuple(names), tuple(columns), lines_, number_, comma, record_of(above), tuple(aside))
+    top = tuple(said[len(header) :])
+    return Table(
+        file, tuple(names), tuple(columns), lines_, number_, comma, record_of(above), top, tuple(aside)
+    )
 
 
 def _united(name: str, cells: Cells, file: str, lines: Sequence[int]) -> tuple[str, Cells]:
@@ -241,9 +248,11 @@ def _all_readings(rows: Sequence[Line]) -> bool:
     """Whether rows have as many cells each, a column of plain numbers, and a first one that never says mean or sum."""
     width = len(rows[0][1])
     begins = (cells[0].strip() for _, cells in rows)
+    ends = [cells[-1].strip() for _, cells in rows]
     return (
         {len(cells) for _, cells in rows} == {width}
         and not any(not word or STATISTICS.fullmatch(word) for word in begins)
+        and (_plain_numbers(ends) or not any(map(MEAN.fullmatch, {*ends})))
         and any(_plain_numbers([cells[i] for _, cells in rows]) for i in reversed(range(width)))
     )
 
@@ -259,6 +268,7 @@ def _plain_numbers(cells: Sequence[str]) -> bool:
 
 def _data(
     rows: Iterable[Line],
+    begun: Line,
     header: Sequence[str],
     names: Sequence[str],
     spelling: Spelling,
@@ -270,10 +280,14 @@ def _data(
 
     `names`: all that stands above the rows.
     """
+    means = MEAN.fullmatch(begun[1][-1].strip())
     for n, cells in rows:
         first = next(c.strip() for c in cells if c.strip())
+        last = cells[-1].strip()
         if STATISTICS.fullmatch(first) and number(first, spelling) is None:
             aside.append(f"row {n}, '{first}', is no reading")
+        elif MEAN.fullmatch(last) and not means and len(cells) == len(header):
+            aside.append(f"row {n}, '{last}', is no reading")
         elif not any(is_finite(c, spelling) for c in cells):
             if _begins_table(cells, names, len(header), spelling, layout):
                 raise FileError(

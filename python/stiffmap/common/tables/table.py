@@ -33,6 +33,8 @@ class Table:
     decimal_comma: bool = False
     record: tuple[tuple[str, str], ...] = ()
     """Operator, instrument and the like, from the lines above the table."""
+    above: tuple[str, ...] = ()
+    """Cells of the lines down to the header."""
     aside: tuple[str, ...] = ()
     """What was left out: rows of means, remarks below the table."""
     sizes: Mapping[str, float] = field(default_factory=dict)

@@ -20,6 +20,7 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.tables.table import Table
 from stiffmap.experiment.spreadsheet.answers import Meant
+from stiffmap.experiment.spreadsheet.joints import MOST_TURNS
 from stiffmap.model.description import Drive, Element, Joint, Leg, MachineDescription, Offset, Pose
 
 CONVENTIONS = ("standard", "modified")
@@ -39,6 +40,15 @@ WORDS = {
     "low": r"low|min|lower",
     "high": r"high|max|upper",
 }
+MODIFIED = re.compile(
+    r"(?i)modified[ -]?(dh|denavit)|(dh|denavit|convention)\W+modified\b|\b(mdh|craig|khalil)\b"
+)
+"""In a line above the table."""
+MORE = r"beta|β|sign|direction|dir|sense|drehsinn"
+NOTHING_MORE = {"", "0", "0.0", "1", "1.0", "+1", "+"}
+"""Cells of such a column that change nothing."""
+TURNS = r"(r|dreh|turn|hinge|cont|0).*|d|c|"
+SLIDES = r"p(ris.*)?|t(rans.*)?|s(lid.*|chub.*)?|l(in.*)?|1(\.0*)?"
 QUANTITIES = {"theta": "angle", "d": "length", "a": "length", "alpha": "angle"}
 LEG = "arm"
 STEP, TRIES = math.radians(30.0), 200
@@ -74,9 +84,10 @@ def read_dh(given: Table, units: Mapping[str, str], convention: str) -> list[DHR
     before = [i for i, h in enumerate(header) if h[0] in "aAαΑ" and (found := INDEX.match(h)) and found[2]]
     if "a" not in at and (r := sheet.find("r")) is not None and len({*NUMBERS} & {*at}) == 3:
         before += _with_r(at, r, sheet)
-    if before and convention != "modified":
+    marks = [given.header[i] for i in before] or [w for w in given.above if MODIFIED.search(w)]
+    if marks and convention != "modified":
         raise StiffmapError(
-            f"{sheet.file}: {', '.join(repr(given.header[i]) for i in before)}: of the link before its joint, which is the "
+            f"{sheet.file}: {', '.join(map(repr, marks))}: of the link before its joint, which is the "
             "modified convention; say --dh-convention modified"
         )
     lost = [n for n in NUMBERS if n not in at]
@@ -85,24 +96,53 @@ def read_dh(given: Table, units: Mapping[str, str], convention: str) -> list[DHR
             f"{sheet.file}: no column is {', '.join(lost)}: a table of Denavit and Hartenberg has theta, d, a and alpha, one "
             f"row a joint; found {', '.join(given.header)}"
         )
+    for name in NUMBERS:
+        if (other := sheet.find(NUMBERS[name], at.values())) is not None:
+            both = f"'{given.header[at[name]]}' and '{given.header[other]}'"
+            sheet.fail(
+                f"{both} are both {name}; leave one, theta being what is added to the joint's coordinate"
+            )
+    more = sheet.find(MORE)
+    if more is not None and not {*sheet.columns[more]} <= NOTHING_MORE:
+        sheet.fail(f"'{given.header[more]}' says more than theta, d, a and alpha, which are all that is read")
     m = Meant(units=dict(units), sheet=sheet)
     units_of = {n: m.unit(at[n], n, quantity=q).size for n, q in QUANTITIES.items()}
-    numbers = {n: units_of[n] * np.nan_to_num(sheet.numbers(at[n])) for n in NUMBERS}
+    numbers = {n: np.nan_to_num(_in_si(sheet, at[n], units_of[n], q)) for n, q in QUANTITIES.items()}
     count = len(sheet.lines)
     words = {n: list(sheet.columns[at[n]]) for n in ("name", "type") if n in at}
-    slides = [w.strip().lower()[:1] in ("p", "t", "s", "l", "1") for w in words.get("type", ["r"] * count)]
+    types = [w.strip().lower() for w in words.get("type", [""] * count)]
+    slides = [re.fullmatch(SLIDES, w) is not None for w in types]
+    for i, w in enumerate(types):
+        if not slides[i] and not re.fullmatch(TURNS, w):
+            sheet.fail(f"joint: expected R or P, one that turns or slides; found '{w}'", i)
     names = [_named(w, i) for i, w in enumerate(words.get("name", [""] * count))]
     if len(set(names)) < count:
         raise StiffmapError(f"{sheet.file}: joints of the same name: {', '.join(names)}")
-    ends = [(sheet.numbers(at["low"]), sheet.numbers(at["high"]))] if {"low", "high"} <= set(at) else []
     out = []
     for i in range(count):
-        scale = units_of["d" if slides[i] else "theta"]
-        range_ = (float(ends[0][0][i] * scale), float(ends[0][1][i] * scale)) if ends else None
-        known = range_ is not None and all(map(math.isfinite, range_))
+        like = "d" if slides[i] else "theta"
+        low, high = (_limit(m, at.get(n), i, units_of[like], QUANTITIES[like]) for n in ("low", "high"))
+        known = math.isfinite(low) and math.isfinite(high)
         theta, d, a, alpha = (float(numbers[n][i]) for n in NUMBERS)
-        out.append(DHRow(names[i], theta, d, a, alpha, slides[i], range_ if known else None))
+        out.append(DHRow(names[i], theta, d, a, alpha, slides[i], (low, high) if known else None))
     return out
+
+
+def _limit(m: Meant, column: int | None, row: int, size: float, quantity: str) -> float:
+    """Of a joint, in the unit of its column, else in that of the joint's coordinate; NaN where there is none."""
+    if column is None:
+        return math.nan
+    own = m.unit(column, "limit", quantity=quantity).size if m.sheet.unit(column) else size
+    return float(_in_si(m.sheet, column, own, quantity)[row])
+
+
+def _in_si(sheet: Table, column: int, size: float, quantity: str) -> Floats:
+    values = size * sheet.numbers(column)
+    turns = ~(np.abs(values) > MOST_TURNS) | (size != 1.0) | (quantity != "angle")
+    sheet.check(
+        turns, lambda i: f"'{sheet.header[column]}': expected radians; found {values[i]:g}, as degrees are"
+    )
+    return values
 
 
 def _with_r(at: dict[str, int], r: int, sheet: Table) -> list[int]:

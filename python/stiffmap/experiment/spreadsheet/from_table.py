@@ -38,7 +38,7 @@ from stiffmap.experiment.spreadsheet.guess import has_meaning
 from stiffmap.experiment.spreadsheet.instrument import Instrument, as_readings, load_instrument
 from stiffmap.experiment.spreadsheet.joints import DIFFERENCES, as_seen, commanded, drives_of, turned
 from stiffmap.experiment.spreadsheet.sockets import seated
-from stiffmap.experiment.spreadsheet.together import oriented, together
+from stiffmap.experiment.spreadsheet.together import one_point_a_row, oriented, together
 from stiffmap.solve.machine import Machine, load_machine
 
 CIRCULAR = ("deviation",)
@@ -227,6 +227,7 @@ def _understood(
         m.said.append(f"answers of an earlier sheet of this form are used: {profile_file(form)}")
     together(m, deflection)
     commanded(m, drives)
+    one_point_a_row(m)
     if m.columns:
         asked(m, ask, partial(seated, m))
         as_seen(m, difference)

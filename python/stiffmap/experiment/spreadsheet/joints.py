@@ -41,7 +41,7 @@ def commanded(m: Meant, drives: Mapping[str, bool]) -> None:
     """
     short = {n.split(".")[-1] for n in drives}
     given = _given(m.chosen, drives, short)
-    numbers = zip(drives, _numbered(m, len(drives)), strict=True)
+    numbers = zip(drives, _numbered(m, len(drives), len(given) == len(drives)), strict=True)
     at = {name: _find(m, name, number, given.get(name)) for name, number in numbers}
     lost = [n for n, i in at.items() if i is None]
     if len(lost) == len(at):
@@ -68,12 +68,16 @@ def _given(chosen: Mapping[str, list[str]], drives: Mapping[str, bool], short: s
     return {name: chosen[key][0] for name, key in keys if key in chosen}
 
 
-def _numbered(m: Meant, count: int) -> list[str]:
-    """Headers of joints by their numbers: from 1, or from 0 where those are as many as the joints."""
+def _numbered(m: Meant, count: int, given: bool) -> list[str]:
+    """Headers of joints by their numbers: from 1, or from 0 where those are as many as the joints; one more must be `given`."""
     turns = quaternion(m.sheet)
     for whose in ("", "target[ _.-]?", "actual[ _.-]?"):
         names = [NUMBERED.format(whose, k) for k in range(count + 1)]
         there = [m.sheet.find(n, turns) is not None for n in names]
+        if all(there) and not given:
+            raise StiffmapError(
+                f"{m.sheet.file}: expected {count} joints, found those from 0 to {count}: say --map JOINT='HEADER' for each"
+            )
         if any(there):
             return names[:-1] if there[0] and not there[-1] else names[1:]
     return names[1:]

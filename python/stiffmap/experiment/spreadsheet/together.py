@@ -7,6 +7,7 @@ import re
 
 import numpy as np
 
+from stiffmap.common.errors import StiffmapError
 from stiffmap.common.tables.header import split_unit
 from stiffmap.common.tables.table import Table, column_letter
 from stiffmap.common.units import Unit, unit_of
@@ -77,6 +78,17 @@ def oriented(m: Meant) -> None:
     _turns(m, taken)
     if "target" not in m.chosen:
         _targets(m, taken)
+
+
+def one_point_a_row(m: Meant) -> None:
+    """StiffmapError where each row is one coordinate of a point, as reports of features are."""
+    for header, cells in zip(m.sheet.header, m.sheet.columns, strict=True):
+        if not {*"xyz"} & {*map(guessed, m.sheet.names)} and {"x", "y"} <= {*map(str.lower, cells)} <= {
+            *"xyz"
+        }:
+            raise StiffmapError(
+                f"{m.sheet.file}: column '{header}': each row is one coordinate of a point; write a row a point, with X, Y, Z side by side"
+            )
 
 
 def _signs(m: Meant) -> None:

@@ -1,4 +1,4 @@
-"""Displacement fields that users already have: CSV, CalculiX/Abaqus .dat, .frd, Ansys listings, VTK/VTU."""
+"""Displacement fields that users already have: CSV, CalculiX .dat, .frd, Ansys listings, VTK/VTU."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ from stiffmap.model.link.gmshmesh import UNITS
 from stiffmap.model.link.optional import need
 
 Rows = tuple[Ints, Floats]
+FIELDS = (".csv", ".dat", ".frd", ".lis", ".txt", ".vtk", ".vtu")
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[EeDd][-+]?\d+)?"
 
 
@@ -69,21 +70,26 @@ def known_columns(
 
 
 def read_dat(path: str | Path) -> Rows:
-    """Node numbers (n,) and displacements (cases, n, 3), in the deck's unit, of a CalculiX or Abaqus .dat."""
-    blocks = re.split(r"^\s*displacements\s*\(.*$", text_of(Path(path)), flags=re.MULTILINE | re.IGNORECASE)[
-        1:
-    ]
-    blocks = [re.split(r"^\s*[A-Za-z]", block, flags=re.MULTILINE)[0] for block in blocks]  # another table
-    return _same_nodes(path, [_node_rows(path, block) for block in blocks])
+    """Node numbers (n,) and displacements (cases, n, 3), in the deck's unit, of a CalculiX .dat."""
+    return _listed(path, r"displacements\s*\(")
 
 
 def read_ansys(path: str | Path) -> Rows:
     """Node numbers and displacements, in the deck's unit, of Ansys PRNSOL listings (``NODE UX UY UZ``)."""
-    blocks = re.split(r"^\s*NODE\s+UX\s+UY\s+UZ.*$", text_of(Path(path)), flags=re.MULTILINE)[1:]
-    # One load case may be printed in several pages; each page repeats the header, not the load step.
+    if turned := re.search(
+        r"RESULTS ARE IN (?!(THE )?GLOBAL COORDINATE|COORDINATE SYSTEM +0\b).*", text_of(Path(path))
+    ):
+        raise StiffmapError(f"{path}: expected results in the global system (RSYS,0), found: {turned[0]}")
+    return _listed(path, r"NODE\s+UX\s+UY\s+UZ", columns=(4, 5))
+
+
+def _listed(path: str | Path, head: str, columns: tuple[int, ...] = (4,)) -> Rows:
+    """Rows of nodes below each line that begins with `head`, up to the next line of words."""
+    blocks = re.split(rf"^\s*{head}.*$", text_of(Path(path)), flags=re.MULTILINE | re.IGNORECASE)[1:]
+    # One load case may be printed in several pages or sets of nodes; each repeats the header, not the load step.
     cases: list[dict[int, list[float]]] = []
     for block in blocks:
-        rows = _node_rows(path, re.split(r"MAXIMUM ABSOLUTE|\*{5}", block)[0], columns=(4, 5))
+        rows = _node_rows(path, re.split(r"^\s*[A-Za-z*]", block, flags=re.MULTILINE)[0], columns)
         if cases and not cases[-1].keys() & rows.keys():
             cases[-1].update(rows)
         else:
@@ -129,8 +135,11 @@ def read_vtk(path: str | Path) -> tuple[Floats, Floats]:
         mesh = meshio.read(path)
     except (Exception, SystemExit) as error:
         raise StiffmapError(f"{path}: meshio cannot read it ({' '.join(str(error).split())[:80]})") from None
+    in_order = sorted(mesh.point_data, key=lambda n: [part.zfill(12) for part in re.split(r"(\d+)", n)])
     fields = [
-        np.asarray(a, dtype=float) for _, a in sorted(mesh.point_data.items()) if np.shape(a)[1:] == (3,)
+        np.asarray(mesh.point_data[n], dtype=float)
+        for n in in_order
+        if np.shape(mesh.point_data[n])[1:] == (3,)
     ]
     if not fields:
         raise StiffmapError(
@@ -155,9 +164,8 @@ def read_field(
     suffix = Path(path).suffix.lower()
     if suffix == ".csv":
         return read_csv_field(path)
-    known = {".dat", ".frd", ".vtk", ".vtu", ".lis", ".txt"}
-    if suffix not in known:
-        raise StiffmapError(f"{path}: expected .csv, {', '.join(sorted(known))}, got {suffix!r}")
+    if suffix not in FIELDS:
+        raise StiffmapError(f"{path}: expected {', '.join(FIELDS)}, got {suffix!r}")
     if unit not in UNITS:
         raise StiffmapError(f"{path}: this format has no units; give --unit, one of {', '.join(UNITS)}")
     if suffix in {".frd", ".vtk", ".vtu"}:
@@ -167,6 +175,12 @@ def read_field(
     if nodes is None:
         raise StiffmapError(f"{path}: it holds node numbers only; give the coordinates with --nodes")
     given = re.sub(r"^\*\*.*$", "", text_of(Path(nodes)), flags=re.MULTILINE)
+    if turned := re.search(
+        r"^\*(SYSTEM|INSTANCE.*\n *[-+.\d]|NODE\b.*SYSTEM *= *[CS]).*$", given, re.MULTILINE | re.I
+    ):
+        raise StiffmapError(
+            f"{nodes}: expected coordinates in the global frame, found {turned[0].splitlines()[0]}"
+        )
     sections = re.findall(r"^\*NODE\b(?!\s+[A-Z]).*\n([^*]*)", given, flags=re.MULTILINE | re.IGNORECASE)
     place = _node_rows(nodes, "".join(sections or [given]).replace(",", " "))
     absent = [int(i) for i in numbers if int(i) not in place]
@@ -196,7 +210,9 @@ def _put(path: str | Path, rows: dict[int, list[float]], node: int, values: list
 
 def _same_nodes(path: str | Path, cases: list[dict[int, list[float]]]) -> Rows:
     if not cases or not cases[0]:
-        raise StiffmapError(f"{path}: expected nodal displacements, found none")
+        raise StiffmapError(
+            f"{path}: expected nodal displacements, found none: 'displacements (' heads them in a .dat, NODE UX UY UZ in an Ansys listing; a table with units in its header is a .csv"
+        )
     numbers = sorted(cases[0])
     for k, case in enumerate(cases):
         if sorted(case) != numbers:

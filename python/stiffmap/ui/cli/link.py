@@ -17,15 +17,13 @@ from stiffmap.model.link.inputs import UNIT_WRENCHES, read_cases, read_material,
 from stiffmap.model.link.linkfile import LinkFile, save_link
 from stiffmap.model.link.mesh import face_area_centre
 from stiffmap.model.link.pipeline import PartLink, Solver, Support, link_from_part
-from stiffmap.model.link.readers import read_field
+from stiffmap.model.link.readers import FIELDS, read_field
 from stiffmap.model.link.result import Link
 from stiffmap.model.link.solve import Material, Setup
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import in_si
 from stiffmap.ui.cli.options import argument, flag, option
 from stiffmap.ui.cli.output import show
-
-FIELDS = {".csv", ".dat", ".frd", ".vtk", ".vtu", ".lis", ".txt"}
 
 
 def command(
@@ -119,7 +117,7 @@ def _part(
     elif suffix in CAD | MESH:
         mesher, name, centre = partial(mesh_file, path, unit=unit), path.stem, None
     else:
-        known = ", ".join(sorted({".yaml"} | CAD | MESH | FIELDS))
+        known = ", ".join(sorted({".yaml", *CAD, *MESH, *FIELDS}))
         raise StiffmapError(f"{path}: expected one of {known}, got {suffix!r}")
     if material is None:
         raise StiffmapError(

@@ -72,6 +72,8 @@ def _table(path: Path) -> MeasuredResponse:
     kind = None if known is None else _derivatives(known)
     if known is None or kind is None or t.units.get("imag") != unit or "frequency" not in t.values:
         t.fail(f"expected the columns {HEAD}, UNIT one of {EXAMPLES}; found {', '.join(t.header.values())}")
+    if t.units.get("coherence", "").endswith(("%", "percent")):
+        t.fail("expected a coherence from 0 to 1, not in percent", "coherence")
     if len(t.lines) < 2:
         t.fail("expected two rows or more below the header")
     f, real, imag = (t.values[n] for n in ("frequency", "real", "imag"))

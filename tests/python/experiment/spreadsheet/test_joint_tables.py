@@ -10,6 +10,7 @@ import pytest
 import stiffmap as sm
 from stiffmap.experiment import Predictor
 from stiffmap.experiment.noise.whitening import LinearProblem, nuisance_part
+from stiffmap.model.description import Joint
 from stiffmap.ui.cli import main
 
 UR10 = (
@@ -215,6 +216,27 @@ def test_units_of_joints_and_of_places_are_said(tmp_path: Path) -> None:
     np.testing.assert_allclose(other.seen, one.seen, rtol=1e-12)
 
 
+DH = "theta [deg],d [mm],a [mm],alpha [deg]"
+MODIFIED = ("Modified DH parameters", "Arm by Craig", "# DH (modified)")
+MORE = (("beta", "2"), ("sign", "-1"), ("direction", "cw"))
+DEGREES = ("90,0,1,0,-3,3", "0,0,1,-90,-3,3", "0,0,1,0,-170,170")
+
+
+@pytest.mark.parametrize("unit", ["deg", "rad", "°"])
+@pytest.mark.parametrize("table_unit", ["deg", "rad"])
+def test_limits_of_joints_have_units_of_their_own(unit: str, table_unit: str, tmp_path: Path) -> None:
+    high = "1.5" if unit == "rad" else "85.943669269623"
+    head = f"kind,theta [{table_unit}],d [m],a [m],alpha [{table_unit}],min [{unit}],max [{unit}]"
+    out = str(tmp_path / "a.yaml")
+    text = f"{head}\nturning,0,0,0.3,0,0,{high}\nrotary,0,0,0.3,0,0,{high}\n"
+    assert main(["import", write(tmp_path, "dh.csv", text), "-o", out]) == 0
+    joints = [e for e in sm.load_machine(out).description.legs[0].elements if getattr(e, "drive", None)]
+    assert len(joints) == 2
+    for element in joints:
+        assert isinstance(element, Joint) and element.drive is not None
+        np.testing.assert_allclose(element.drive.range, (0, 1.5))
+
+
 @pytest.mark.parametrize(
     ("text", "asked"),
     [
@@ -230,6 +252,14 @@ def test_units_of_joints_and_of_places_are_said(tmp_path: Path) -> None:
             "theta [deg],alpha [deg],r [mm],d [mm]\n0,0,0,0\n",
             "columns 'd' and 'r': one is the length along x",
         ),
+        *((f"{title}\n{DH}\n0,0,1,0\n", f"'{title}': of the link before") for title in MODIFIED),
+        *((f"{DH},{name}\n0,0,1,0,{v}\n", f"'{name}' says more than") for name, v in MORE),
+        *(
+            (f"{name},{DH}\n0,0,0,1,0\n", f"'{name}' and")
+            for name in ("offset [deg]", "theta offset [rad]", "d [m]")
+        ),
+        *((f"type,{DH}\n{kind},0,0,1,0\n", f"found '{kind}'") for kind in ("fixed", "ball", "spherical")),
+        *((f"theta [rad],d [m],a [m],alpha [rad],low,high\n{row}\n", "expected radians") for row in DEGREES),
     ],
 )
 def test_tables_of_joints_that_lack_something(

@@ -175,3 +175,42 @@ def test_any_sign_of_a_minus(sign: str, tmp_path: Path) -> None:
 def test_what_a_row_of_numbers_is_stands_in_the_error(text: str, tmp_path: Path) -> None:
     with pytest.raises(StiffmapError, match="a row of numbers has two or more, each alone in its cell"):
         made(tmp_path, text)
+
+
+@pytest.mark.parametrize("word", ["mean", "Mittelwert", "average:"])
+def test_a_row_of_means_may_say_so_behind_its_numbers(word: str, tmp_path: Path) -> None:
+    head, rows = HEAD.replace("\n", ";Remark\n"), ROWS.replace("\n", ";\n")
+    found = made(tmp_path, f"{head}{rows}25;0;0;-150;-62;{word}\n")
+    truth(found.experiment)
+    assert found.remarks == (f"left out: row 4, '{word}', is no reading",)
+
+
+@pytest.mark.parametrize("words", [("mean", "mean"), ("mean of 3", "max load"), ("ok", "min")])
+def test_remarks_that_are_readings_stay(words: tuple[str, str], tmp_path: Path) -> None:
+    rows = "".join(f"{r};{w}\n" for r, w in zip(ROWS.split(), words, strict=True))
+    truth(made(tmp_path, HEAD.replace("\n", ";Remark\n") + rows).experiment)
+
+
+@pytest.mark.parametrize(
+    "head", ["Feature;Axis;Nominal", "Punkt;Achse;Sollwert [mm]", "Name;Coordinate;Actual"]
+)
+@pytest.mark.parametrize("columns", [None, {"x": "3", "y": "3", "z": "3"}])
+def test_a_coordinate_a_row_is_no_position(head: str, columns: dict[str, str] | None, tmp_path: Path) -> None:
+    rows = "P1;X;100;0.012\nP1;Y;50;0.003\nP1;Z;-20;0.009\n"
+    axis = head.split(";")[1]
+    with pytest.raises(StiffmapError, match=f"column '{axis}': each row is one coordinate"):
+        made(tmp_path, f"{head};dx [mm]\n{rows}", constants=LOAD, columns=columns)
+
+
+@pytest.mark.parametrize("name", ["q{}", "joint_{}", "A{}"])
+def test_one_joint_more_from_0_is_asked(name: str, tmp_path: Path) -> None:
+    names = [name.format(k) for k in range(7)]
+    text = ";".join([*names, "dz [mm]"]) + "\n" + ";".join(["0.5", *COMMANDS, "0.1"]) + "\n"
+    units = {"joints": "rad"}
+    with pytest.raises(StiffmapError, match="expected 6 joints, found those from 0 to 6: say --map"):
+        made(tmp_path, text, "ur10", units=units, constants=LOAD)
+    drives = sm.load_machine("ur10").actuators
+    columns = dict(zip(drives, names[1:], strict=True))
+    e = made(tmp_path, text, "ur10", units=units, constants=LOAD, columns=columns).experiment
+    assert e.command is not None
+    np.testing.assert_allclose(e.command, [[float(c) for c in COMMANDS]])

@@ -12,6 +12,7 @@ import pytest
 import stiffmap as sm
 from stiffmap.common.errors import StiffmapError
 from stiffmap.machining.process.force import revolution
+from stiffmap.machining.process.identify.table import read_table
 
 MEASURED = {
     "feed_per_tooth_mm": [0.025, 0.05, 0.075, 0.1, 0.125],
@@ -153,3 +154,31 @@ def test_refused(given: dict[str, Any], message: str) -> None:
     with pytest.raises(StiffmapError) as caught:
         sm.identify_process(table)
     assert message in str(caught.value)
+
+
+@pytest.mark.parametrize("unit", ["krpm", "1/s", "x1000"])
+def test_a_unit_next_to_rpm_counts(unit: str, tmp_path: Path) -> None:
+    def text(head: str) -> str:
+        rows = "".join(f"{c},10,20,30,2,3,6000\n" for c in (0.05, 0.1, 0.15))
+        return f"feed_per_tooth_mm,Fx_N,Fy_N,Fz_N,teeth,axial_mm,{head}\n{rows}"
+
+    (tmp_path / "f.csv").write_text(text(f"rpm [{unit}]"))
+    with pytest.raises(StiffmapError, match="expected a unit such as in spindle_rpm, found"):
+        read_table(tmp_path / "f.csv")
+    for head in ("rpm", "rpm [rpm]", "rpm [1/min]"):
+        (tmp_path / "f.csv").write_text(text(head))
+        assert read_table(tmp_path / "f.csv").cuts[0].spindle == pytest.approx(200 * np.pi)
+
+
+@pytest.mark.parametrize("units", ["s N N N mm mm", "[s] [N] [N] [N] [mm] [mm]", "min N kN N mm mm"])
+def test_times_have_a_unit_in_a_line_of_units(units: str, tmp_path: Path) -> None:
+    size, force = (60.0, 1e3) if units.startswith("min") else (1.0, 1.0)
+    lines = [
+        "Time Fx Fy Fz feed_per_tooth axial teeth spindle_rpm".replace(" ", "\t"),
+        units.replace(" ", "\t"),
+    ]
+    lines += [f"{0.001 * k / size:.9g}\t10\t20\t30\t0.05\t3\t2\t6000" for k in range(21)]
+    (tmp_path / "record.txt").write_text("Date:\t01.02.2026\nSampling rate [Hz]:\t1000\n" + "\n".join(lines))
+    table_ = read_table(tmp_path / "record.txt")
+    np.testing.assert_allclose(np.abs(table_.force), [[10, 20 * force, 30]])
+    np.testing.assert_allclose(table_.signals[0].time[-1], 0.02, atol=0.0011)

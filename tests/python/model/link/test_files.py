@@ -166,6 +166,65 @@ def test_no_row_of_a_listing_is_passed_over(tmp_path, row, words):
         read_field(tmp_path / "a.dat", "m", tmp_path / "a.inp")
 
 
+def listing(tmp_path, text, nodes=NODES, name="a.lis"):
+    (tmp_path / name).write_text(text)
+    (tmp_path / "a.inp").write_text(nodes)
+    return read_field(tmp_path / name, "m", tmp_path / "a.inp")
+
+
+@pytest.mark.parametrize(
+    "head", ["    NODE       FX           FY           FZ", " PRINT F REACTION", "*** NOTE ***"]
+)
+def test_what_follows_displacements_is_none(tmp_path, head):
+    short = "\n".join(ansys_text().splitlines()[:6])
+    rows = [int(m[1]) for m in re.finditer(r"(?m)^ +(\d+) ", short)]
+    points, _ = listing(tmp_path, f"{short}\n{head}\n\n       10  70.0  50.0  1.0\n")
+    assert len(rows) > 0
+    assert points == pytest.approx(POINTS[[r - 1 for r in rows]], rel=1e-8)
+
+
+@pytest.mark.parametrize("axes", ["COORDINATE SYSTEM   1", "COORDINATE SYSTEM  11", "THE LOCAL SYSTEM"])
+def test_results_in_other_axes_are_refused(tmp_path, axes):
+    head = "  THE FOLLOWING DEGREE OF FREEDOM RESULTS ARE IN {}\n"
+    with pytest.raises(StiffmapError, match=f"global system .RSYS,0., found: RESULTS ARE IN {axes}"):
+        listing(tmp_path, head.format(axes) + ansys_text())
+    for same in ("THE GLOBAL COORDINATE SYSTEM", "COORDINATE SYSTEM   0"):
+        np.testing.assert_allclose(listing(tmp_path, head.format(same) + ansys_text())[1], U[:2], rtol=1e-5)
+
+
+@pytest.mark.parametrize(
+    "lines", ["*NODE, SYSTEM=C\n", "*System\n1, 0, 0\n*NODE\n", "*Instance, part=A\n 1., 0, 0\n*NODE\n"]
+)
+def test_coordinates_in_other_axes_are_refused(tmp_path, lines):
+    with pytest.raises(StiffmapError, match=r"a\.inp: expected coordinates in the global frame, found \*"):
+        listing(tmp_path, ansys_text(), lines + NODES)
+
+
+def test_sets_of_nodes_make_one_case(tmp_path):
+    head, *rows = dat_text().split("\n displ")[1].splitlines()
+    rows = [r for r in rows if r.strip()]
+    one, other = ("\n".join(part) for part in (rows[:4], rows[4:]))
+    _, fields = listing(tmp_path, f" displ{head}\n{one}\n\n displ{head}\n{other}\n", name="a.dat")
+    np.testing.assert_allclose(fields, U[1:2], rtol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["case{}", "{} u [mm]", "load_{}_step_1"])
+def test_cases_of_a_mesh_come_by_their_numbers(tmp_path, name):
+    meshio = pytest.importorskip("meshio", reason="needs the extra [fea]")
+    data = {name.format(k): k * U[0] for k in range(1, 13)}
+    mesh = meshio.Mesh(POINTS, [("vertex", np.arange(10)[:, None])], point_data=data)
+    mesh.write(tmp_path / "a.vtu")
+    np.testing.assert_allclose(read_field(tmp_path / "a.vtu", "m")[1], [*data.values()])
+
+
+def test_names_above_the_cases_of_a_table_change_nothing(tmp_path):
+    text = csv_text()
+    width = text.splitlines()[1].count(",") + 1
+    cells = [f"Case {k // 3}" if k % 3 == 1 and k > 3 else "" for k in range(width)]
+    _, u = read_field(write(tmp_path, "a.csv", ",".join(cells) + "\n" + text.partition("\n")[2]))
+    np.testing.assert_allclose(u, U, rtol=1e-12)
+
+
 def test_missing_field_file():
     with pytest.raises(StiffmapError, match="no such file"):
         read_field("absent.csv")

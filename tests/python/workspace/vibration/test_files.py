@@ -295,3 +295,10 @@ def test_a_function_without_phase_is_no_response(values, head, message, tmp_path
     path.write_bytes(_function(tmp_path, values, **head))
     with pytest.raises(sm.StiffmapError, match=message):
         read_responses(path)
+
+
+@pytest.mark.parametrize("head", ["coherence [%]", "coherence_%", "coherence in percent"])
+def test_a_coherence_in_percent_is_none(head, tmp_path):
+    (tmp_path / "f.csv").write_text(f"frequency_Hz,real_m/N,imag_m/N,{head}\n10,1,0,0.5\n20,2,-1,0.9\n")
+    with pytest.raises(sm.StiffmapError, match=r"line 1: .*expected a coherence from 0 to 1, not in percent"):
+        read_responses(tmp_path / "f.csv")

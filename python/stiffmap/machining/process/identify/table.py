@@ -51,7 +51,7 @@ def _renamed(name: str, unit: str) -> tuple[str, str]:
     if name == "feed_per_tooth" and unit.endswith(("/min", "/s")):
         return name, f"{unit}; a feed is in mm/tooth or mm/min"
     if name == "rpm":
-        return name, "rpm"
+        return name, unit or "rpm"
     feed = (name == "feed" and length != unit) or (name == "fz" and length in ("mm", "um", "µm", "in"))
     return ("feed_per_tooth", length) if feed else (name, length if name in PER_EDGE else unit)
 
