@@ -201,11 +201,12 @@ class _World:
         if not found:
             return None
         order = sorted(found, key=lambda b: -b[0])
-        if order[0][0] < beat - SHORT:
+        likely = [b for b in order[:REFITS] if b[0] >= beat - SHORT]
+        if not likely:
             return None
-        refits = [self._with(model, [place], anchor) for _, place, anchor in order[:REFITS]]
+        refits = [self._with(model, [place], anchor) for _, place, anchor in likely]
         scores = {id(p): s for s, p, _ in order}
-        for m, (_, place, _) in zip(refits, order, strict=False):
+        for m, (_, place, _) in zip(refits, likely, strict=True):
             key = id(place)
             scores[key] = max(scores[key], m.score) if np.isfinite(m.score) else -np.inf
         best = max(refits, key=lambda m: m.score)
