@@ -67,9 +67,10 @@ def answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, cross
     effects = _effects(v, best, each, fit)
     others = list(_alternatives(found, v, best, clock)) if best and effects else []
     noise = _noise(found, made, best)
-    rest = _rest(columns, fit, v, each, gap)
+    rest, numbers = _rest(columns, fit, v, each, gap), _numbers(found, v, best)
+    cut_short = clock.stopped and noise.lack_of_fit_before < RARE
     return Diagnosis(
-        verdict=_word(v, effects, rest, clock.stopped and noise.lack_of_fit_before < RARE),
+        verdict=_word(v, effects, rest, cut_short or (numbers is not None and bool(numbers.wide))),
         effects=effects,
         alternatives=[effects_ for effects_, _ in others],
         separations=[
@@ -101,7 +102,7 @@ def answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, cross
         residual_after=made.left[1],
         set_aside=listed,
         gap=gap,
-        calibration=_numbers(found, v, best),
+        calibration=numbers,
         refused=[f"{c.place.candidate}: {why}" for c, why in v.refused],
         which=made.which,
         stopped=clock.stopped or bool(clock.left_out),
@@ -184,13 +185,14 @@ def _alternatives(
             yield effects_of(fitted, places, [{} for _ in places]), fitted
 
 
-def _word(v: Verdict, effects: Sequence[Effect], rest: Sequence[Rest], cut_short: bool) -> str:
-    """`cut_short`: whether the search could not come to an end though the readings are no noise."""
+def _word(v: Verdict, effects: Sequence[Effect], rest: Sequence[Rest], off: bool) -> str:
+    """`off`: whether the machine is not as declared even where nothing is left: its numbers are off as a group, beyond what their
+    uncertainties allow, or the search could not come to an end though the readings are no noise."""
     if v.word == "ambiguous" and effects:
         return "ambiguous"
     if effects or v.beyond:
         return "effects+unattributed" if rest else "effects"
-    return "unattributed" if rest or v.word == "unattributed" or cut_short else "none"
+    return "unattributed" if rest or v.word == "unattributed" or off else "none"
 
 
 def _noise(found: Inferred, made: Written, best: Corrected | None) -> NoiseReport:

@@ -9,6 +9,7 @@ import pytest
 
 import stiffmap as sm
 from stiffmap.experiment import Experiment, Predictor, random_plan
+from stiffmap.identification.diagnosis.report.sentences import next_step, opening
 from stiffmap.identification.numbers import unknowns
 from stiffmap.identification.numbers.sensitivity import predicted
 from stiffmap.machining.compensation.check import prediction_error
@@ -47,6 +48,16 @@ def test_numbers_that_are_further_off_than_stated_are_said_to_be() -> None:
     assert found.calibration is not None and all(3.0 < w.factor < 8.0 for w in found.calibration.wide)
     assert found.calibration.verdict.startswith(("adjusted beyond tolerance", "beyond tolerance"))
     assert any("times as far off" in line for line in found.lines())
+
+
+def test_a_machine_whose_numbers_are_off_as_a_group_is_not_as_declared() -> None:
+    """What `calibrate` calls beyond tolerance is never "nothing to mend" in a diagnosis."""
+    machine, data = twin(4, spread=2.2)
+    d = sm.diagnose(machine, data)
+    assert d.calibration is not None and d.calibration.wide and not d.calibration.beyond and not d.effects
+    assert d.verdict == "unattributed" and not d.unexplained
+    assert "by more than its numbers are uncertain" in opening(d) and "Nothing to mend" not in next_step(d)
+    assert sm.calibrate(machine, data).verdict == "adjusted beyond tolerance"
 
 
 @pytest.mark.slow
