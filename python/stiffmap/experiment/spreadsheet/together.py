@@ -82,10 +82,10 @@ def oriented(m: Meant) -> None:
 
 def one_point_a_row(m: Meant) -> None:
     """StiffmapError where each row is one coordinate of a point, as reports of features are."""
+    if {*"xyz"} & {*map(guessed, m.sheet.names)}:
+        return
     for header, cells in zip(m.sheet.header, m.sheet.columns, strict=True):
-        if not {*"xyz"} & {*map(guessed, m.sheet.names)} and {"x", "y"} <= {*map(str.lower, cells)} <= {
-            *"xyz"
-        }:
+        if all(c.lower() in ("x", "y", "z") for c in cells) and {"x", "y"} <= {*map(str.lower, cells)}:
             raise StiffmapError(
                 f"{m.sheet.file}: column '{header}': each row is one coordinate of a point; write a row a point, with X, Y, Z side by side"
             )

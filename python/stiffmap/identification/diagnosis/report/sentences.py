@@ -102,8 +102,8 @@ def inner_verdict(d: Any) -> str:
 
 
 def off_as_a_group(d: Any) -> bool:
-    """Whether declared numbers are off beyond what their uncertainties allow, and none of them can be named."""
-    return bool(d.calibration and d.calibration.wide and not d.calibration.beyond)
+    """Whether nothing is left but declared numbers that are off beyond what their uncertainties allow, none of which can be named."""
+    return bool(not d.unexplained and d.calibration and d.calibration.wide and not d.calibration.beyond)
 
 
 def _upper(text: str) -> str:
@@ -142,7 +142,7 @@ def _of_machine(d: Any, verdict: str) -> str:
         return f"The diagnosis was stopped before it found anything ({size})."
     if verdict == "none":
         return f"The machine agrees with its file within what these readings can show ({size})."
-    if verdict == "unattributed" and off_as_a_group(d) and not d.unexplained:
+    if verdict == "unattributed" and off_as_a_group(d):
         return f"The machine differs from its file ({size}) by more than its numbers are uncertain, and none of them alone can be named."
     if verdict == "unattributed":
         nothing = "nothing that was tried" if d.stopped else "no single cause known to stiffmap"
@@ -166,7 +166,7 @@ def next_step(d: Any) -> str:
         return "Let it come to its end."
     if d.verdict == "none":
         return "Nothing to correct. Keep the readings as the record of this state."
-    if d.verdict == "unattributed" and off_as_a_group(d) and not d.unexplained:
+    if d.verdict == "unattributed" and off_as_a_group(d):
         return (
             "Read more poses and other loads, which tell numbers apart; or give the uncertainties that they have (u in the machine's "
             "file, or --tolerance). Until then plan and compensate with machine.yaml."
