@@ -21,7 +21,8 @@ from stiffmap.model.link.optional import need
 
 Rows = tuple[Ints, Floats]
 FIELDS = (".csv", ".dat", ".frd", ".lis", ".txt", ".vtk", ".vtu")
-_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[EeDd][-+]?\d+)?"
+_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[EeDd][-+]?\d+|[-+]\d+(?![\d.]))?"
+"""Fortran leaves the E out before three digits: 1.0-105. In -1.0-2.0 two numbers touch."""
 
 
 def read_csv_field(path: str | Path) -> tuple[Floats, Floats]:
@@ -75,12 +76,12 @@ def read_dat(path: str | Path) -> Rows:
 
 
 def read_ansys(path: str | Path) -> Rows:
-    """Node numbers and displacements, in the deck's unit, of Ansys PRNSOL listings (``NODE UX UY UZ``)."""
+    """Node numbers and displacements, in the deck's unit, of Ansys PRNSOL listings (``NODE UX UY UZ``, rotations behind)."""
     if turned := re.search(
         r"RESULTS ARE IN (?!(THE )?GLOBAL COORDINATE|COORDINATE SYSTEM +0\b).*", text_of(Path(path))
     ):
         raise StiffmapError(f"{path}: expected results in the global system (RSYS,0), found: {turned[0]}")
-    return _listed(path, r"NODE\s+UX\s+UY\s+UZ", columns=(4, 5))
+    return _listed(path, r"NODE\s+UX\s+UY\s+UZ", columns=(4, 5, 7))
 
 
 def _listed(path: str | Path, head: str, columns: tuple[int, ...] = (4,)) -> Rows:
@@ -104,16 +105,19 @@ def read_frd(path: str | Path) -> tuple[Floats, Floats]:
     into: dict[int, list[float]] | None = None
     for line in text_of(Path(path)).splitlines():
         key = line[:5].strip()
+        if re.match(r" {4}2C +\d+ +[23]\s*$", line):
+            raise StiffmapError(f"{path}: expected ASCII, found a binary .frd; *NODE FILE writes ASCII")
         if line.startswith("    2C"):
             into = nodes
         elif line.startswith(" -4"):
             into = None
-            if line[5:9] == "DISP":
+            if line[5:13].strip() == "DISP":
                 cases.append({})
                 into = cases[-1]
         elif key.startswith("-1") and into is not None:
+            row = line.rstrip()  # a node of five (short format) or ten characters, then three values
             try:
-                node, values = int(line[3:13]), [number_in(line[13 + 12 * i : 25 + 12 * i]) for i in range(3)]
+                node, values = int(row[3:-36]), [number_in(row[-36 + i :][:12]) for i in (0, 12, 24)]
             except ValueError:
                 raise StiffmapError(
                     f"{path}: expected fixed columns of twelve characters, got {line.strip()[:60]}"
@@ -156,7 +160,8 @@ def read_field(
     Args:
         path: .csv (units in the header), .dat, .frd, .vtk, .vtu, or .lis/.txt from Ansys.
         unit: length unit of a file that does not carry it.
-        nodes: coordinates for .dat and Ansys listings, which hold numbers only: rows "node x y z".
+        nodes: coordinates for .dat and Ansys listings, which hold numbers only: rows "node x y z", in the unit that their
+            header names, else in `unit`.
 
     Raises:
         StiffmapError: unknown suffix, unit missing, coordinates missing, no displacements.
@@ -176,30 +181,48 @@ def read_field(
         raise StiffmapError(f"{path}: it holds node numbers only; give the coordinates with --nodes")
     given = re.sub(r"^\*\*.*$", "", text_of(Path(nodes)), flags=re.MULTILINE)
     if turned := re.search(
-        r"^\*(SYSTEM|INSTANCE.*\n *[-+.\d]|NODE\b.*SYSTEM *= *[CS]).*$", given, re.MULTILINE | re.I
+        r"^(\*(SYSTEM|INSTANCE.*\n *[-+.\d]|NODE\b.*SYSTEM *= *[CS])|.*\bDSYS *= *[1-9]).*$",
+        given,
+        re.MULTILINE | re.I,
     ):
         raise StiffmapError(
             f"{nodes}: expected coordinates in the global frame, found {turned[0].splitlines()[0]}"
         )
     sections = re.findall(r"^\*NODE\b(?!\s+[A-Z]).*\n([^*]*)", given, flags=re.MULTILINE | re.IGNORECASE)
-    place = _node_rows(nodes, "".join(sections or [given]).replace(",", " "))
+    table = re.sub("[,;]", " ", "".join(sections or [given]))
+    place = _node_rows(nodes, table, (7,) if "THXY" in table else (4,))  # NLIST has the axes of a node, too
+    said = unit if sections else _unit_above(nodes, given, unit)
     absent = [int(i) for i in numbers if int(i) not in place]
     if absent:
         raise StiffmapError(f"{nodes}: no coordinates for node {absent[0]} ({len(absent)} missing)")
-    return UNITS[unit] * np.array([place[int(i)] for i in numbers]), UNITS[unit] * fields
+    points = np.array([place[int(i)] for i in numbers])
+    return UNITS[said] * points, UNITS[unit] * fields
+
+
+def _unit_above(path: str | Path, text: str, other: str) -> str:
+    """Length unit in the header of a table of x, y, z or in a line of units above its rows; `other` where neither says one."""
+    unit = r"(?<![^\W_])(?:mm|cm|m|inch|in(?=\s*(?:[\])]|$)))(?![^\W_])"  # not the in of: x in mm
+    above = re.split(r"^\s*\d", text, maxsplit=1, flags=re.MULTILINE)[0]
+    named = r"(?i)coordinates|(?<![^\W_])[xyz](?![^\W_])"
+    lines = [n for n in above.splitlines() if re.search(named, n) or not re.sub(rf"{unit}|[\W_]", "", n)]
+    found = {u for n in lines for u in re.findall(unit, n)}
+    if len(found) > 1:
+        raise StiffmapError(f"{path}: expected coordinates in one unit, found {' and '.join(sorted(found))}")
+    return min(found, default=other)
 
 
 def _node_rows(path: str | Path, text: str, columns: tuple[int, ...] = (4,)) -> dict[int, list[float]]:
-    """Rows "node a b c": the first three numbers behind an integer. Columns may touch: -1.0E-03-2.0E-04."""
+    """Rows "node a b c": the first three numbers behind an integer. Columns may touch: 12-1.0E-03-2.0E-04."""
     rows: dict[int, list[float]] = {}
     for line in text.splitlines():
-        head = re.match(r"\s*(\d+)\s+(\S.*)", line)
+        head = re.match(r"\s*(\d+)(?:\s+|(?=-\d*\.))(\S.*)", line)
         if not head:
             continue
         cells = re.findall(_NUMBER, head[2])
         if len(cells) + 1 not in columns or re.search(r"[A-CF-Za-cf-z]", line):
             raise StiffmapError(f"{path}: expected a node and three numbers, found {line.strip()[:60]}")
-        _put(path, rows, int(head[1]), [number_in(c.replace("D", "E").replace("d", "e")) for c in cells[:3]])
+        numbers = [re.sub(r"(?<=[\d.])[DdEe]?(?=[-+]\d+$)|[Dd]", "E", c) for c in cells[:3]]
+        _put(path, rows, int(head[1]), [number_in(c) for c in numbers])
     return rows
 
 

@@ -411,3 +411,71 @@ def test_missing_and_unwritable_link_file(tmp_path):
     file = LinkFile(bar_compliance(), np.zeros((36, 36)), np.zeros(3), {})
     with pytest.raises(StiffmapError, match="cannot be written"):
         save_link(file, tmp_path / "no" / "link.yaml")
+
+
+COORDINATES = {
+    "node,x [m],y [m],z [m]": 1.0, "node;x_mm;y_mm;z_mm": 1e3, "Node Number\tX Location (mm)\tY Location (mm)\tZ Location (mm)": 1e3,
+    "node x y z\n-, cm, cm, cm": 1e2, "# coordinates in mm": 1e3, "No.,X (in),Y (in),Z (in)": 1 / 0.0254,
+    "plate of 20 mm\nnode, x, y, z in the global frame": 1.0,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("head", COORDINATES)
+def test_coordinates_have_the_unit_of_their_header(tmp_path, head):
+    separator = next(c for c in ";\t," if c in head or c == ",")
+    rows = [
+        separator.join(map(repr, [i + 1, *(COORDINATES[head] * p).tolist()])) for i, p in enumerate(POINTS)
+    ]
+    points, u = listing(tmp_path, ansys_text(), "\n".join([head, *rows]))
+    np.testing.assert_allclose(points, POINTS, rtol=1e-12)
+    np.testing.assert_allclose(u, U[:2], rtol=1e-5)
+
+
+def test_coordinates_in_two_units_are_refused(tmp_path):
+    with pytest.raises(StiffmapError, match=r"a\.inp: expected coordinates in one unit, found m and mm"):
+        listing(tmp_path, ansys_text(), "node,x [mm],y [mm],z [m]\n" + NODES)
+
+
+def nlist(system=0):
+    rows = "".join(
+        f"{i + 1:9d}" + "".join(f" {v:.15f}" for v in p) + "  0.00  0.00 45.00\n"
+        for i, p in enumerate(POINTS)
+    )
+    head = "\n   NODE        X             Y             Z           THXY     THYZ     THZX\n"
+    return f" LIST ALL SELECTED NODES.   DSYS= {system:6d}\n{head}" + rows.replace(
+        "\n        6 ", f"\n{head}        6 "
+    )
+
+
+def test_a_listing_of_nodes_with_their_axes(tmp_path):
+    np.testing.assert_allclose(listing(tmp_path, ansys_text(), nlist())[0], POINTS, rtol=1e-9)
+    with pytest.raises(StiffmapError, match=r"in the global frame, found .*DSYS=      1"):
+        listing(tmp_path, ansys_text(), nlist(1))
+
+
+@pytest.mark.parametrize(
+    "spelled",
+    [
+        lambda row: re.sub(r"^( +\d+) +-", r"\1-", row),
+        lambda row: re.sub(r"(?<=\d)E(?=[-+]\d)", "", row),
+        lambda row: re.sub(r"E([-+])(\d\d)", r"\g<1>0\2", row),
+        lambda row: row.replace("E", "D"),
+        lambda row: row + "  0.1 -0.2",
+    ],
+    ids=["touching its number", "no E", "no E, three digits", "D", "with rotations"],
+)
+def test_rows_as_fortran_writes_them(tmp_path, spelled):
+    lines = [spelled(line) if re.match(r" +\d+ .*E", line) else line for line in ansys_text().splitlines()]
+    points, u = listing(tmp_path, "\n".join(lines))
+    np.testing.assert_allclose(points, POINTS, rtol=1e-8)
+    np.testing.assert_allclose(u, U[:2], rtol=1e-5)
+
+
+def test_short_rows_of_an_frd(tmp_path):
+    short = re.sub(r"(?m)^ -1 {5}", " -1", frd_text()).replace("DISP ", "DISPI", 1)
+    p, fields = read_frd(write(tmp_path, "a.frd", short))
+    assert p == pytest.approx(POINTS, rel=1e-5)
+    assert fields == pytest.approx(U[1:2], rel=1e-5)  # DISPI is the imaginary part
+    binary = re.sub(r"(2C +10)\n", rf"\1{' ' * 37}2\n", frd_text())
+    with pytest.raises(StiffmapError, match=r"a\.frd: expected ASCII, found a binary \.frd"):
+        read_frd(write(tmp_path, "a.frd", binary))
