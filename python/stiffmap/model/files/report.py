@@ -25,7 +25,16 @@ def validated(model: type[M], document: Document, file: str, expected: str) -> M
     try:
         return model.model_validate(document.data)
     except ValidationError as error:
-        raise together([_one(e, document, file) for e in error.errors(include_url=False)]) from error
+        found = _telling(error.errors(include_url=False), document)
+        raise together([_one(e, document, file) for e in found]) from error
+
+
+def _telling(errors: list[Any], document: Document) -> list[Any]:
+    """Without those of a wrong sort where a value may have another form, in which something else is wrong with it."""
+    sorts = [e["type"].endswith("_type") for e in errors]
+    paths = [_path(e["loc"], document.data, False) for e in errors]
+    told = {p[:i] for p, sort in zip(paths, sorts, strict=True) for i in range(1, len(p) + (not sort))}
+    return [e for e, p, sort in zip(errors, paths, sorts, strict=True) if not (sort and p in told)]
 
 
 def _one(error: Any, document: Document, file: str) -> FileError:

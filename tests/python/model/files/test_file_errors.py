@@ -160,6 +160,20 @@ def test_unknown_material() -> None:
     assert "unknown material 'steel'" in message(with_element({"spring": "b", "beam": beam}))
 
 
+@pytest.mark.parametrize(
+    ("material", "said"),
+    [
+        ({"E": "210 000", "nu": 0.3}, "material.E: expected a number; found text ('210 000')"),
+        ({"E": 2, "1e5": None, "nu": 0.3}, "material: unknown key '1e5'; known keys: E, G, nu, density"),
+        ({"E": 1.0}, "material: give exactly one of G and nu"), ({"nu": 0.3}, "material: missing key 'E'"),
+        ([1.0, 0.3], "material: expected a mapping with keys among E, G, nu, density; found a list ([1.0, 0.3])"),
+    ],
+)  # fmt: skip
+def test_a_mistake_in_one_form_of_a_value_is_told_alone(material: object, said: str) -> None:
+    beam = {"length": 1.0, "round": {"diameter": 1.0}, "material": material}
+    assert message(with_element({"spring": "b", "beam": beam})).endswith(said)
+
+
 def test_law_on_a_coupled_direction() -> None:
     entries = {f"k{i}{i}": 1e-4 for i in range(1, 7)} | {"k26": 1e-5}
     spring = {"spring": "s", "compliance": entries, "laws": {"ty": {"stiffness": 1.0}}}
