@@ -13,6 +13,8 @@ FARTHEST = 100.0
 """m: of a way from the first moving joint on, beyond those of cranes."""
 DENSEST, SMALLEST = 2000.0, 0.7
 """kg/m³ and m: as much of all that moves in a cube of the machine's length; known robots have a fiftieth of it."""
+WIDEST = 50.0
+"""Of the machine's length: a radius of gyration beyond it; in kg mm² it is a thousandfold, in g mm² the 31 623-fold."""
 LIMITS = 4 * math.pi, 720.0, 0.5
 """Of a joint in degrees: more than as many rad, at most as much, and a multiple."""
 
@@ -38,6 +40,13 @@ def doubts(model: UrdfModel) -> Iterator[str]:
         yield (
             f"link {link}: mass: found {heavy.mass:.6g} kg, and {mass:.6g} kg in all that moves, in a machine of {size:.3g} m; "
             f"expected kilograms, {heavy.mass / 1e3:.3g} kg if these are grams"
+        )
+    radii = {link: math.sqrt(np.abs(body.inertia).max() / body.mass) for link, body in bodies}
+    link, radius = max(radii.items(), key=lambda one: one[1], default=("", 0.0))
+    if radius > WIDEST * max(size, SMALLEST):
+        yield (
+            f"link {link}: inertia: found a radius of gyration of {radius:.4g} m in a machine of {size:.3g} m; expected kg m^2, "
+            f"{radius / 1e3:.3g} m if these are kg mm^2, {radius / math.sqrt(1e9):.3g} m if g mm^2"
         )
     for joint in model.moving:
         low, high = joint.limits or (0.0, 0.0)

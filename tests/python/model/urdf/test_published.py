@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
@@ -294,6 +295,11 @@ def machine_of(length: float, mass: float, limits: str = "", kind: str = "revolu
     return robot(*parts)
 
 
+def tensors(text: str, moment: float) -> str:
+    """A machine with other moments of inertia."""
+    return re.sub(r'(i[xyz]{2})="[^"]*"', rf'\1="{moment}"', text)
+
+
 DOUBTS = {
     "millimetres": (machine_of(400.0, 5), "joint q2: origin: found it 800 m off; expected metres, 0.8 m if these are millimetres"),
     "inertial in millimetres": (machine_of(0.4, 5).replace('xyz="0 0 0.2"', 'xyz="0 0 200"'),
@@ -302,6 +308,10 @@ DOUBTS = {
                 "joint q0: limit: found -180 to 92.5 rad; expected radians, -3.142 to 1.614 if these are degrees"),
     "grams": (machine_of(0.4, 2500), "link a: mass: found 2500 kg, and 7500 kg in all that moves, in a machine of 0.8 m; expected "
                                      "kilograms, 2.5 kg if these are grams"),
+    "kg mm²": (tensors(machine_of(0.4, 5), 8e3), "link a: inertia: found a radius of gyration of 40 m in a machine of 0.8 m; "
+                                                 "expected kg m^2, 0.04 m if these are kg mm^2"),
+    "g mm²": (tensors(machine_of(0.4, 5), 8e6), "link a: inertia: found a radius of gyration of 1265 m in a machine of 0.8 m; "
+                                                "expected kg m^2, 1.26 m if these are kg mm^2, 0.04 m if g mm^2"),
 }  # fmt: skip
 
 
@@ -319,13 +329,13 @@ def test_numbers_that_no_machine_has_are_warned_of(name: str, tmp_path: Path) ->
 @pytest.mark.parametrize(
     "text",
     [
-        machine_of(30.0, 9e4), machine_of(1.3, 1600), machine_of(0.02, 0.1),
+        machine_of(30.0, 9e4), machine_of(1.3, 1600), machine_of(0.02, 0.1), tensors(machine_of(0.4, 1e-3), 1.0),
         machine_of(0.4, 5, '<limit lower="-12.56" upper="12.56"/>'), machine_of(0.4, 5, '<limit lower="-1e16" upper="1e16"/>'),
         machine_of(0.01, 1500, '<limit lower="0" upper="0.6"/>', "prismatic"),
         robot(arm()).replace('<link name="base"/>', '<link name="map"/><link name="base"/><joint name="m" type="fixed"><parent '
                              'link="map"/><child link="base"/><origin xyz="691000 5334000 0"/></joint>'),
     ],
-    ids=["crane", "heavy arm", "finger", "four turns", "no limit", "machine tool", "place on a map"],
+    ids=["crane", "heavy arm", "finger", "moments of one", "four turns", "no limit", "machine tool", "place on a map"],
 )  # fmt: skip
 def test_real_machines_are_not_doubted(text: str, tmp_path: Path) -> None:
     with warnings.catch_warnings():
