@@ -40,7 +40,7 @@ _BY_NAME: dict[str, type[BaseModel]] = {
 class _Units(BaseModel):
     model_config = ConfigDict(extra="forbid")
     length: Literal["mm", "m", "cm", "in", "inch"]
-    stress: Literal["Pa", "MPa", "GPa", "N/mm2"] = "MPa"
+    stress: Literal["Pa", "MPa", "GPa", "N/mm2"] | None = None
 
 
 class PartFile(BaseModel):
@@ -49,7 +49,7 @@ class PartFile(BaseModel):
     model_config = ConfigDict(extra="forbid")
     units: _Units
     part: dict[str, Any]
-    material: str | dict[str, float] | None = None
+    material: dict[str, float] | str | None = None
     name: str | None = None
 
 
@@ -128,6 +128,8 @@ def _part_material(path: str | Path, file: PartFile) -> Material | None:
         raise StiffmapError(
             f"{path}: material: expected young and poisson, got {', '.join(given) or 'nothing'}"
         )
+    if file.units.stress is None:
+        raise StiffmapError(f"{path}: units.stress: young needs its unit, one of {', '.join(STRESS)}")
     return checked_material(given["young"] * STRESS[file.units.stress], given["poisson"], "part file")
 
 

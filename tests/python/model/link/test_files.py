@@ -317,6 +317,8 @@ def test_part_file_comes_in_si(tmp_path):
         (("length: 310", "length: -310"), "length: .*greater than 0, got -0.31"),
         (("young: 70000, poisson: 0.33", "young: 70000"), "material: expected young and poisson"),
         (("material", "mterial"), "mterial: Extra inputs"),
+        ((", stress: MPa", ""), "units.stress: young needs its unit, one of Pa, MPa"),
+        (("poisson: 0.33", "poisson: '0,33'"), r"material\..*poisson: .*valid number.*got '0,33'"),
         (("part:", "part: ["), "not valid YAML"),
     ],
 )
