@@ -89,4 +89,6 @@ def _message(error: Any) -> str:
     if kind.endswith("_type"):
         sorts = {"list": "a list", "dict": "a mapping", "string": "text", "bool": "true or false"}
         return f"expected {sorts.get(kind.removesuffix('_type'), 'a number')}; found {describe(found)}"
+    if kind.startswith(("greater_than", "less_than")):
+        return f"{error['msg'].replace('Input should be', 'expected a number')}; found {describe(found)}"
     return str(context["error"] if kind == "value_error" else error["msg"])

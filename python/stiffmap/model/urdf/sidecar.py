@@ -5,19 +5,28 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import ConfigDict, Discriminator, Field, Tag
 
 from stiffmap.common.errors import FileError
 from stiffmap.common.yaml_text import read
+from stiffmap.model.files.report import validated
+from stiffmap.model.files.schema.base import FileModel
 
 Numbers6 = Annotated[list[float], Field(min_length=6, max_length=6)]
 Matrix = Annotated[list[Numbers6], Field(min_length=6, max_length=6)]
 
 
-class Strict(BaseModel):
-    """Unknown keys are errors."""
+def _form(terms: object) -> str:
+    return "rows" if isinstance(terms, list) and any(isinstance(row, list) for row in terms) else "diagonal"
 
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+
+Terms = Annotated[Annotated[Numbers6, Tag("diagonal")] | Annotated[Matrix, Tag("rows")], Discriminator(_form)]
+
+
+class Strict(FileModel):
+    """Finite numbers."""
+
+    model_config = ConfigDict(allow_inf_nan=False)
 
 
 class Elasticity(Strict):
@@ -30,8 +39,8 @@ class Elasticity(Strict):
 class LinkSpring(Strict):
     """Six diagonal terms or six rows (SI), translations first, at the link's end in the axes there."""
 
-    stiffness: Numbers6 | Matrix | None = None
-    compliance: Numbers6 | Matrix | None = None
+    stiffness: Terms | None = None
+    compliance: Terms | None = None
 
 
 class Sidecar(Strict):
@@ -57,11 +66,9 @@ def read_sidecar(path: Path | None) -> Sidecar:
     if path is None:
         return Sidecar()
     file = str(path)
-    try:
-        side = Sidecar.model_validate(read(path).data)
-    except ValidationError as error:
-        first = error.errors()[0]
-        raise FileError(first["msg"], file=file, key=".".join(map(str, first["loc"]))) from None
+    side = validated(
+        Sidecar, read(path), file, "a sidecar is a mapping with keys such as actuators, springs and home"
+    )
     for a, b in (("closed_loop", "type"), ("joint_name", "joint_type")):
         if len(getattr(side, a)) != len(getattr(side, b)):
             raise FileError(f"expected one entry per entry of {a} ({len(getattr(side, a))}), "

@@ -205,15 +205,23 @@ BAD_SIDECAR = {
     "name_mot: a machine with closed loops has passive joints": ("[motor_a, motor_b]", "[]"),
     "closed_loop: the loops do not close upon one body": ("closed_loop:", "tip: arm_b\nclosed_loop:"),
     "give exactly one of stiffness and compliance": ("motor_a: {stiffness: 5.0e4}", "motor_a: {}"),
+    "actuators.motor_a.stiffness: expected a number; found text ('5e4 N')": ("motor_a: {stiffness: 5.0e4", "motor_a: {stiffness: 5e4 N"),
+    "motor_a.stiffness: expected a number greater than 0; found a number (-5.0)": ("motor_a: {stiffness: 5.0e4", "motor_a: {stiffness: -5.0"),
+    "unknown key 'actuator' (did you mean 'actuators'?)": ("actuators:", "actuator:"),
+    "robot.yaml, line 11: springs.arm_a.stiffness: expected 6 entries; found 5": ("&arm {stiffness: [7.0e8, ", "{stiffness: ["),
+    "springs.arm_a.stiffness[5][0]: expected a number; found text ('1,5')":
+        ("&arm {stiffness: [7.0e8, 1.0e7, 1.0e7, 1.0e5, 1.0e5, 1.0e5]}", f"{{stiffness: {[[1.0] * 6] * 5 + [['1,5', 0, 0, 0, 0, 1]]}}}"),
     "home configuration does not close": ("motor_b: 0.92730", "motor_b: 2.5"),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("message", BAD_SIDECAR)
 def test_bad_sidecar(message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     old, new = BAD_SIDECAR[message]
     assert old in robots.FIVE_BAR_SIDECAR
-    urdf, side = written(tmp_path, robots.FIVE_BAR, robots.FIVE_BAR_SIDECAR.replace(old, new))
+    text = robots.FIVE_BAR_SIDECAR.replace(old, new)
+    text = text if "&arm" in text else text.replace("  arm_b: *arm\n", "")
+    urdf, side = written(tmp_path, robots.FIVE_BAR, text)
     assert main(["import", str(urdf), "--sidecar", str(side), "-o", str(tmp_path / "m.yaml")]) == 2
     error = capsys.readouterr().err
     assert message in error and error.count("\n") == 1
