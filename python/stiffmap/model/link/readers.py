@@ -21,8 +21,9 @@ from stiffmap.model.link.optional import need
 
 Rows = tuple[Ints, Floats]
 FIELDS = (".csv", ".dat", ".frd", ".lis", ".txt", ".vtk", ".vtu")
-_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[EeDd][-+]?\d+|[-+]\d+(?![\d.]))?"
-"""Fortran leaves the E out before three digits: 1.0-105. In -1.0-2.0 two numbers touch."""
+_NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[Ee][-+]?\d+)?")
+_FORTRAN = re.compile(r"(?<=[\d.])(?:[Dd](?=[-+\d])|(?=[-+]\d+(?![\d.])))")
+"""Where an E belongs: 1.0D-05, and 1.0-105, which Fortran writes with three digits. In -1.0-2.0 two numbers touch."""
 
 
 def read_csv_field(path: str | Path) -> tuple[Floats, Floats]:
@@ -214,15 +215,14 @@ def _unit_above(path: str | Path, text: str, other: str) -> str:
 def _node_rows(path: str | Path, text: str, columns: tuple[int, ...] = (4,)) -> dict[int, list[float]]:
     """Rows "node a b c": the first three numbers behind an integer. Columns may touch: 12-1.0E-03-2.0E-04."""
     rows: dict[int, list[float]] = {}
-    for line in text.splitlines():
+    for line in _FORTRAN.sub("E", text).splitlines():
         head = re.match(r"\s*(\d+)(?:\s+|(?=-\d*\.))(\S.*)", line)
         if not head:
             continue
-        cells = re.findall(_NUMBER, head[2])
+        cells = _NUMBER.findall(head[2])
         if len(cells) + 1 not in columns or re.search(r"[A-CF-Za-cf-z]", line):
             raise StiffmapError(f"{path}: expected a node and three numbers, found {line.strip()[:60]}")
-        numbers = [re.sub(r"(?<=[\d.])[DdEe]?(?=[-+]\d+$)|[Dd]", "E", c) for c in cells[:3]]
-        _put(path, rows, int(head[1]), [number_in(c) for c in numbers])
+        _put(path, rows, int(head[1]), [number_in(c) for c in cells[:3]])
     return rows
 
 
