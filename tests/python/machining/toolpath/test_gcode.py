@@ -291,6 +291,13 @@ def test_cycles_are_cancelled_beside_a_motion(line: str) -> None:
     assert 1e3 * p.end[-1, 0] == pytest.approx(2)
 
 
+@pytest.mark.parametrize("line", ["G0 X1 A0. B-0.0", "G0 A0", "G91 G0 X1 A0\nG90", "A0 X1"])
+def test_a_rotary_axis_at_zero_turns_nothing(line: str) -> None:
+    assert 1e3 * read(f"G0 X0\n{line}\nG1 X2\n").end[-1, 0] == pytest.approx(2)
+    with pytest.raises(FileError, match=r"rotary and secondary axes are not read: A0\.5"):
+        read(f"G0 X0\n{line}\nG1 X2 A.5\n")
+
+
 EXCLUSIVE = [
     "G90 G91", "G20 G21", "G17 G18", "G93 G94", "G54 G55", "G90.1 G91.1", "G61 G64", "G43 G49 H1", "M3 M5", "M7 M9", "M0 M30",
     "G28 G53", "G40 G40", "G97 G97", "G4 G53 P1", "G1 G80 G2 X1 R1", "G98 G99", "G90 G90",

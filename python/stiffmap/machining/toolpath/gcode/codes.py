@@ -180,7 +180,7 @@ class Codes:
                 if letter in values:
                     self.fail(f"{letter} is given twice")
                 values[letter] = value
-            else:
+            elif letter not in "AB" or value:  # a table that stays at zero turns no part
                 what = "rotary and secondary axes are not read" if letter in "ABUVW" else "unknown word"
                 self.fail(f"{what}: {letter}{value:g}")
         if "Q" in values and groups.get("tracking") != "G64":
