@@ -18,13 +18,9 @@ LONGEST_NUMBER = 100
 _ATOM = re.compile(r"^([^\d^]+|1)(?:\^?(\d))?$")
 
 _WORKSHOP = {
-    "m": ("um", "mm"),
-    "rad": ("mrad", "deg"),
-    "m/N": ("mm/N", "um/N"),
-    "N/m": ("N/mm", "N/um"),
-    "m/s": ("mm/min", "m/min"),
+    "m": ("um", "mm"), "rad": ("mrad", "deg"), "m/N": ("mm/N", "um/N"), "N/m": ("N/mm", "N/um"), "m/s": ("mm/min", "m/min"),
     "N/m2": ("N/mm2", "MPa"),
-}
+}  # fmt: skip
 """Units that a workshop writes, so that no message invites metres."""
 
 Dimension = tuple[tuple[str, int], ...]
@@ -52,7 +48,9 @@ def unit_factor(unit: str) -> tuple[Fraction | float, Dimension]:
     powers: Counter[str] = Counter()
     for name, power in _terms(unit):
         if name not in ATOMS:
-            raise StiffmapError(f"unknown unit {name!r} in {unit!r}; known: {', '.join(sorted(ATOMS))}")
+            raise StiffmapError(
+                f"unknown unit {name!r} in {unit!r}; known: {', '.join(sorted([*ATOMS, *STRESSES]))}"
+            )
         size, dimension = ATOMS[name]
         factor = factor * size**power
         powers[dimension] += power
