@@ -8,7 +8,7 @@ from fractions import Fraction
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import bounded, number_in
-from stiffmap.common.units import FORCES, LENGTHS, MASSES, PLANE_ANGLES, SYNONYMS, TIMES
+from stiffmap.common.units import FORCES, LENGTHS, MASSES, PLANE_ANGLES, STRESSES, SYNONYMS, TIMES
 
 _MICRO = Fraction(1, 10**6)
 _PLAIN = {"1": Fraction(1), "%": Fraction(1, 100), "ppm": _MICRO}
@@ -17,7 +17,10 @@ LONGEST_NUMBER = 100
 """Characters."""
 _ATOM = re.compile(r"^([^\d^]+|1)(?:\^?(\d))?$")
 
-_WORKSHOP = {"m": ("um", "mm"), "rad": ("mrad", "deg"), "m/N": ("mm/N", "um/N"), "N/m": ("N/mm", "N/um")}
+_WORKSHOP = {
+    "m": ("um", "mm"), "rad": ("mrad", "deg"), "m/N": ("mm/N", "um/N"), "N/m": ("N/mm", "N/um"), "m/s": ("mm/min", "m/min"),
+    "N/m2": ("N/mm2", "MPa"),
+}  # fmt: skip
 """Units that a workshop writes, so that no message invites metres."""
 
 Dimension = tuple[tuple[str, int], ...]
@@ -38,11 +41,16 @@ ATOMS = _atoms()
 
 def unit_factor(unit: str) -> tuple[Fraction | float, Dimension]:
     """SI factor and dimension of a product or quotient of units; StiffmapError for an unknown one."""
+    unit = unit.strip().replace("²", "2").replace("³", "3")
+    if unit in STRESSES:  # a name for a quotient
+        return STRESSES[unit], (("N", 1), ("m", -2))
     factor: Fraction | float = Fraction(1)
     powers: Counter[str] = Counter()
     for name, power in _terms(unit):
         if name not in ATOMS:
-            raise StiffmapError(f"unknown unit {name!r} in {unit!r}; known: {', '.join(sorted(ATOMS))}")
+            raise StiffmapError(
+                f"unknown unit {name!r} in {unit!r}; known: {', '.join(sorted([*ATOMS, *STRESSES]))}"
+            )
         size, dimension = ATOMS[name]
         factor = factor * size**power
         powers[dimension] += power

@@ -9,6 +9,7 @@ from typing import Any, Literal, NoReturn
 from pydantic import Field
 
 from stiffmap.common.errors import FileError, StiffmapError
+from stiffmap.common.tables.named import TURNING
 from stiffmap.common.yaml_text import Document
 from stiffmap.machining.process.description import Cut, EndMill, Kienzle, Law, Process, Tool, Trimming
 from stiffmap.model.files.report import key_text, validated
@@ -69,8 +70,9 @@ class NumberReader:
     def rate(self, value: object, *keys: str) -> float:
         """rad/s of ``6000 rpm`` or ``100 Hz``."""
         text = str(value).strip()
-        if text.endswith("rpm"):
-            return self.positive(text.removesuffix("rpm"), "", *keys) * 2 * pi / 60
+        for unit, size in TURNING.items():
+            if text.lower().endswith(unit):
+                return self.positive(text[: -len(unit)], "", *keys) * size
         if not text.endswith("Hz"):
             self.fail(f"expected a speed of the spindle such as 6000 rpm, found {text!r}", *keys)
         return self.positive(text, "Hz", *keys) * 2 * pi
@@ -131,6 +133,8 @@ def _feed(value: object, tool: Tool, spindle: float, r: NumberReader) -> float:
         if not tool.teeth:
             r.fail("a coated tool has no feed per tooth; expected such as 10 m/min", "feed")
         return r.positive(text.removesuffix("/tooth"), "m", "feed") * tool.teeth * spindle / (2 * pi)
+    if text.endswith("/rev"):
+        return r.positive(text.removesuffix("/rev"), "m", "feed") * spindle / (2 * pi)
     return r.positive(value, "m/s", "feed")
 
 

@@ -75,7 +75,7 @@ def read_points(path: Path) -> Toolpath:
 
     Raises FileError naming the column or the line.
     """
-    t = read_named(path, Known(COLUMNS, USUAL, {}))
+    t = read_named(path, Known(COLUMNS, USUAL, {"f": "feed", "s": "spindle"}))
     n = len(t.lines)
     if n < 2:
         t.fail("expected a line of names and two or more points")
@@ -100,9 +100,11 @@ def read_points(path: Path) -> Toolpath:
 
 
 SILENT = (
-    "PARTNO", "PPRINT", "REMARK", "TOOLNO", "LOADTL", "LOAD", "CUTTER", "COOLNT", "MACHIN", "MULTAX", "CLRSRF",
+    "PARTNO", "PPRINT", "REMARK", "TOOLNO", "LOADTL", "LOAD", "CUTTER", "COOLNT", "MACHIN", "MULTAX", "CLRSRF", "STOP", "OPSTOP",
 )  # fmt: skip
-ENDS = ("FINI", "END", "STOP", "REWIND")
+TEXTS = ("PARTNO", "PPRINT", "REMARK", "TPRINT")
+"""Words that text follows, with or without a slash."""
+ENDS = ("FINI", "END", "REWIND")
 UNITS = {"MM": 1e-3, "INCHES": 25.4e-3, "INCH": 25.4e-3, "CM": 1e-2}
 Fail = Callable[[str], NoReturn]
 
@@ -113,13 +115,16 @@ def read_cl(path: Path) -> Toolpath:
     Raises FileError naming the line; what is not understood is refused.
     """
     unit, feed, spindle, rapid = 0.0, nan, nan, False
-    number, pending = 0, ""
+    number, pending, remark = 0, "", False
     rows: list[tuple[list[float], list[float], float, float, int, bool]] = []
 
     def fail(message: str) -> NoReturn:
         raise FileError(message, file=str(path), line=number)
 
     for number, raw in enumerate(lines_of(path), 1):
+        if remark := remark or raw.startswith("$$->"):  # these of Creo go on behind a $, as a statement does
+            remark = raw.rstrip().endswith("$")
+            continue
         text = pending + raw.split("$$")[0].strip()
         if text.endswith("$"):
             pending = text[:-1]
@@ -127,7 +132,7 @@ def read_cl(path: Path) -> Toolpath:
         pending = ""
         word, _, rest = text.partition("/")
         word, values = word.strip().upper(), [v.strip().upper() for v in rest.split(",") if v.strip()]
-        if not word or word in SILENT:
+        if not word or word in SILENT or word.split()[0] in TEXTS:
             continue
         if word in ENDS:
             break

@@ -17,10 +17,13 @@ from stiffmap.workspace.vibration.response import Complex
 from stiffmap.workspace.vibration.response_units import FREQUENCIES, ResponseUnit, response_unit
 
 COLUMNS = Known(
-    {"frequency": "Hz", "real": "", "imag": "", "coherence": ""}, {"frequency": "frequency_Hz"}, {}
-)
+    {**dict.fromkeys(("frequency", "real", "imag", "magnitude", "coherence"), ""), "phase": "rad"},
+    {"frequency": "frequency_Hz", "phase": "phase_deg"},
+    {"freq": "frequency", "f": "frequency", "re": "real", "im": "imag", "imaginary": "imag", "mag": "magnitude", "amplitude": "magnitude"},
+)  # fmt: skip
+FORMS = (("real", "imag"), ("magnitude", "phase"))
 EXAMPLES = "m/N, mm/N, um/N, m/s/N, m/s2/N, g/N and the like"
-HEAD = "frequency_Hz, real_UNIT, imag_UNIT and, where there is one, coherence"
+HEAD = "frequency_Hz, real_UNIT, imag_UNIT (or magnitude_UNIT, phase_deg) and, where there is one, coherence"
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,17 +70,21 @@ def read_responses(path: str | PathLike[str]) -> list[MeasuredResponse]:
 
 def _table(path: Path) -> MeasuredResponse:
     t = read_named(path, COLUMNS)
-    unit = t.units.get("real", "")
+    form = next((pair for pair in FORMS if {*pair, "frequency"} == {*t.values} - {"coherence"}), ("", ""))
+    unit = t.units.get(form[0], "")
     known = response_unit(unit)
     kind = None if known is None else _derivatives(known)
-    if known is None or kind is None or t.units.get("imag") != unit or "frequency" not in t.values:
+    if known is None or kind is None or t.units.get("imag", unit) != unit:
         t.fail(f"expected the columns {HEAD}, UNIT one of {EXAMPLES}; found {', '.join(t.header.values())}")
     if t.units.get("coherence", "").endswith(("%", "percent")):
         t.fail("expected a coherence from 0 to 1, not in percent", "coherence")
     if len(t.lines) < 2:
         t.fail("expected two rows or more below the header")
-    f, real, imag = (t.values[n] for n in ("frequency", "real", "imag"))
-    values = np.asarray(known.size * (real + 1j * imag), complex)
+    hertz = FREQUENCIES.get(t.units["frequency"].lower())
+    if hertz is None:
+        t.fail("expected frequencies in Hz, kHz, rad/s or rpm, as in frequency_Hz", "frequency")
+    f, (a, b) = hertz * t.values["frequency"], (t.values[n] for n in form)
+    values = np.asarray(known.size * (a + 1j * b if "real" in form else a * np.exp(1j * b)), complex)
     coherence = t.values.get("coherence", np.full(len(f), np.nan))
     return MeasuredResponse(path.stem, f, _receptance(f, values, kind), coherence)
 
@@ -119,6 +126,8 @@ def _universal(path: Path) -> list[MeasuredResponse]:
         file = pyuff.UFF(str(path))
         sets = file.read_sets()
         marks = MARK.findall(path.read_bytes())
+        if not marks:
+            raise ValueError(f"found no mark -1 in it; a table ends in {', '.join(TABLES)}")
         if len(marks) != 2 * file.get_n_sets():
             raise ValueError(f"found {len(marks)} marks -1 for {file.get_n_sets()}: it is cut off")
     except Exception as problem:  # the reader raises whatever its parsing meets

@@ -48,6 +48,40 @@ BAD = [
 ]  # fmt: skip
 
 
+@pytest.mark.parametrize(
+    ("key", "texts", "si"),
+    [
+        ("modulus", ["580000 MPa", "580 GPa", "580e3 N/mm²", "580e9 Pa"], 580e9),
+        ("feed", ["1200 mm/min", "0.1 mm/tooth", "0.2 mm/rev", "200 um/rev"], 0.02),
+        ("spindle", ["6000 rpm", "6000 RPM", "6000 1/min", "628.3185307 rad/s", "100 Hz"], 628.3185307),
+    ],
+)  # fmt: skip
+def test_units_of_the_workshop(key: str, texts: list[str], si: float) -> None:
+    for text in texts:
+        given = {"feed": "1200 mm/min", key: text}
+        if key == "modulus":
+            given = {"tool": {**TOOL, key: text}}
+        p = sm.load_process(changed(**given))
+        assert getattr(p.tool if key == "modulus" else p, key) == pytest.approx(si, rel=1e-9)
+
+
+def test_no_message_invites_units_that_no_workshop_writes() -> None:
+    for key, value, units in (
+        ("feed", "900", "mm/min"),
+        ("law", {"end_mill": {**END_MILL, "Ktc": 900}}, "N/mm2"),
+    ):
+        with pytest.raises(FileError, match=f"write 900{units}"):
+            sm.load_process(changed(**{key: value}))
+
+
+def test_a_modulus_is_written_as_it_is_read(tmp_path: Path) -> None:
+    base = sm.load_process(changed(tool={**TOOL, "modulus": "580 GPa"}))
+    table = {"feed_per_tooth_mm": [0.05, 0.1, 0.15], "Fx_N": [60, 77, 95], "Fy_N": [107, 171, 240], "Fz_N": [71, 85, 99], "teeth": 2,
+        "axial_mm": 3, "side": "slot"}  # fmt: skip
+    file = sm.identify_process(table).save(tmp_path / "p.yaml", base)
+    assert sm.load_process(file).tool.modulus == pytest.approx(580e9)
+
+
 @pytest.mark.parametrize(("given", "message"), BAD, ids=[m for _, m in BAD])
 def test_refused(given: dict[str, Any], message: str) -> None:
     with pytest.raises(FileError) as caught:

@@ -83,6 +83,16 @@ def made(noise: float = 0.0, signals: bool = False, runout: float = 0.0) -> dict
     return {**out, "teeth": 2, "axial_mm": 3.0, "spindle_rpm": 6000, "diameter_mm": 25, "helix_deg": 30}
 
 
+def test_letters_of_data_sheets_name_columns() -> None:
+    table = {k: v for k, v in MEASURED.items() if k not in ("feed_per_tooth_mm", "teeth")}
+    feed = [c * 2 * 3000 for c in MEASURED["feed_per_tooth_mm"]]
+    other = {**table, "vf [mm/min]": feed, "n [rpm]": 3000, "flutes": 2, "D [mm]": 25}
+    same = sm.identify_process(MEASURED).coefficients
+    assert {k: v[0] for k, v in sm.identify_process(other).coefficients.items()} == pytest.approx(
+        {k: v[0] for k, v in same.items()}
+    )
+
+
 def test_straight_forces_come_back() -> None:
     law = sm.identify_process(made(noise=0.5))
     assert not law.bent
@@ -131,6 +141,40 @@ def test_side_cuts_and_a_file(tmp_path: Path) -> None:
     law = sm.identify_process(path)
     for n, (value, _) in law.coefficients.items():
         assert value == pytest.approx(getattr(p.law, n), rel=1e-6)
+
+
+@pytest.mark.parametrize("side", ["climb", "conventional"])
+def test_forces_on_the_part_are_no_forces_on_the_tool(side: str) -> None:
+    """Of a slot the signs are known; of another cut only that the tangential pressure is above zero."""
+    p, chip = sm.load_process("slot"), np.array([0.05, 0.1, 0.15])
+    cut = replace(p.cut, side=side, radial=8e-3)
+    force = np.array([sm.cutting_force(replace(p, feed=0.2 * c, cut=cut)).mean for c in chip])
+    table = {
+        "feed_per_tooth_mm": chip,
+        "teeth": 2,
+        "axial_mm": 3,
+        "side": side,
+        "radial_mm": 8,
+        "diameter_mm": 25,
+    }
+    on_tool, on_part = (table | {f"F{a}_N": s * force[:, i] for i, a in enumerate("xyz")} for s in (1, -1))
+    good, bad = sm.identify_process(on_tool), sm.identify_process(on_part)
+    assert good.coefficients["Ktc"][0] == pytest.approx(958.8e6, rel=1e-6)
+    assert not any("below zero" in w for w in good.words())
+    assert any("Ktc is below zero" in w and "on the part" in w for w in bad.words())
+
+
+@pytest.mark.parametrize(
+    "given", [{"radial_mm": 8, "diameter_mm": 25}, {"ae [mm]": 8}]
+)  # fmt: skip
+@pytest.mark.parametrize("base", [None, "slot"])
+def test_a_width_that_is_not_the_tool_s_is_no_slot(given: dict[str, Any], base: str | None) -> None:
+    with pytest.raises(
+        StiffmapError, match=r"expected a column side \(climb, .* next to a width, found 8 mm"
+    ):
+        sm.identify_process({**MEASURED, **given}, base and sm.load_process(base))
+    whole = {**MEASURED, "radial_mm": 25, "diameter_mm": 25}
+    assert sm.identify_process(whole).coefficients == sm.identify_process(MEASURED).coefficients
 
 
 BAD = [

@@ -107,6 +107,22 @@ def test_notes_are_kept() -> None:
     assert len(p) == 3
 
 
+@pytest.mark.parametrize(
+    ("text", "part"),
+    [
+        ("G54 G0 X0\nG1 X10\nG55 G1 X0", "several work offsets and none is given"), ("G0 X0\nG53 G1 X5", "G53 and no work offset is given"),
+        ("G54 G0 X0\nG1 X10\nG54 G1 X0", ""), ("G0 X0\nG55 G1 X5", ""),
+    ],
+)  # fmt: skip
+def test_places_that_nobody_told_are_noted(text: str, part: str) -> None:
+    notes = " ".join(read(text).notes)
+    assert part in notes
+    assert ("offset" in notes) == bool(part)
+    assert "offset" not in " ".join(
+        load_gcode((HEAD + text).splitlines(), offsets={"G54": (0, 0, 0), "G55": (0.1, 0, 0)}).notes
+    )
+
+
 BAD = [
     ("G0 X1", "", "unit is missing"),
     ("G1 X1", "G21 S1 M3\n", "F was never given"),
@@ -266,9 +282,25 @@ def test_where_a_program_ends(text: str, moves: int) -> None:
             load_gcode(text.splitlines())
 
 
+@pytest.mark.parametrize(
+    "line", ["G0 G17 G40 G49 G80 G90", "G80 G0", "G0 G80 X1", "G80 G92.1 G0 X1", "G80 G80 G0"]
+)
+def test_cycles_are_cancelled_beside_a_motion(line: str) -> None:
+    p = read(f"G1 X5\n{line}\nX2\n")
+    assert (p.kind[1:] == Kind.RAPID).all()
+    assert 1e3 * p.end[-1, 0] == pytest.approx(2)
+
+
+@pytest.mark.parametrize("line", ["G0 X1 A0. B-0.0", "G0 A0", "G91 G0 X1 A0\nG90", "A0 X1"])
+def test_a_rotary_axis_at_zero_turns_nothing(line: str) -> None:
+    assert 1e3 * read(f"G0 X0\n{line}\nG1 X2\n").end[-1, 0] == pytest.approx(2)
+    with pytest.raises(FileError, match=r"rotary and secondary axes are not read: A0\.5"):
+        read(f"G0 X0\n{line}\nG1 X2 A.5\n")
+
+
 EXCLUSIVE = [
     "G90 G91", "G20 G21", "G17 G18", "G93 G94", "G54 G55", "G90.1 G91.1", "G61 G64", "G43 G49 H1", "M3 M5", "M7 M9", "M0 M30",
-    "G28 G53", "G40 G40", "G97 G97", "G4 G53 P1", "G1 G80 X1", "G98 G99", "G90 G90",
+    "G28 G53", "G40 G40", "G97 G97", "G4 G53 P1", "G1 G80 G2 X1 R1", "G98 G99", "G90 G90",
 ]  # fmt: skip
 
 
@@ -361,7 +393,7 @@ def test_the_quick_way_reads_the_same(line: str, before: str) -> None:
 #: G words of LinuxCNC's quick reference: those that need nothing with them, those that are refused and the word for it.
 STANDARD = {
     "": "G0 G1 G17 G18 G19 G20 G21 G40 G49 G54 G55 G56 G57 G58 G59 G59.1 G59.2 G59.3 G61 G61.1 G64 G80 G90 G90.1 G91 G91.1 "
-    "G94 G97 G98 G99",
+    "G92.1 G92.2 G94 G97 G98 G99",
     "drilling cycles": "G73 G76 G81 G82 G83 G84 G85 G86 G87 G88 G89",
     "cutter radius compensation": "G41 G42",
     "reference points": "G28.1 G30.1",

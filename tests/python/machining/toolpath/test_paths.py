@@ -50,6 +50,25 @@ def test_a_cl_file(tmp_path: Path) -> None:
     assert p.spindle[0] == pytest.approx(200 * pi)
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "STOP", "OPSTOP", "PARTNO BRACKET 10/20", "PPRINT pocket, first side", "REMARK", "TPRINT/T1 end mill",
+        "$$-> CSYS / 1.0, 0.0, 0.0, $\n  0.0, 1.0, 0.0, $\n  0.0, 0.0, 1.0", "$$ costs 5 $",
+    ],
+)  # fmt: skip
+def test_stops_and_texts_of_a_cl_file_leave_its_path_whole(text: str, tmp_path: Path) -> None:
+    head = "UNITS/MM\nSPINDL/6000,CLW\nRAPID\nGOTO/0,0,0\nFEDRAT/600,MMPM\nGOTO/10,0,0\n"
+    p = load_path(write(tmp_path, "p.cl", f"{head}{text}\nGOTO/20,0,0\nFINI\n"))
+    assert (1e3 * p.end).tolist() == [[10, 0, 0], [20, 0, 0]]
+
+
+def test_letters_of_a_controller_name_columns(tmp_path: Path) -> None:
+    text = "X (mm),Y (mm),Z (mm),F (mm/min),S (rpm)\n0,0,0,600,60\n10,0,0,1200,60\n"
+    p = load_path(write(tmp_path, "p.csv", text))
+    assert (p.feed[0], p.spindle[0]) == pytest.approx((0.02, 2 * pi))
+
+
 @pytest.mark.parametrize("name", outline_names())
 def test_outlines_close_without_corners(name: str) -> None:
     p = outline(name)

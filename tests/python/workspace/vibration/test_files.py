@@ -23,9 +23,42 @@ def test_a_csv_file_is_read_in_its_units(tmp_path):
     assert one.variance(5)[2] == pytest.approx(0.1 / (2 * 5 * 0.9))
 
 
+TURN = 2 * np.pi
+
+
+@pytest.mark.parametrize(
+    ("head", "columns"),
+    [
+        ("Frequency (Hz),Real (g/N),Imaginary (g/N)", lambda f, r: (f, r.real / 9.80665, r.imag / 9.80665)),
+        ("f [Hz],Re [m/s^2/N],Im [m/s^2/N]", lambda f, r: (f, r.real, r.imag)),
+        ("Freq [kHz],Mag [m/s²/N],Phase [deg],Coherence", lambda f, r: (f / 1e3, abs(r), np.degrees(np.angle(r)), 0 * f + 0.9)),
+        ("frequency_rad/s,phase_rad,magnitude_mm/s2/N", lambda f, r: (TURN * f, np.angle(r) + TURN, 1e3 * abs(r))),
+        ("Frequency [rpm];Amplitude [g/N];Phase [°]", lambda f, r: (60 * f, abs(r) / 9.80665, np.degrees(np.angle(r)))),
+    ],
+)  # fmt: skip
+def test_tables_as_analysers_write_them(tmp_path, head, columns):
+    f = np.array([10.0, 20.0, 30.0])
+    accelerance = np.array([-0.5 + 0.1j, -1.5 + 0.4j, 2 - 1j])
+    path, comma = tmp_path / "tap.csv", ";" if ";" in head else ","
+    rows = (comma.join(f"{v:.12f}" for v in row) for row in zip(*columns(f, accelerance), strict=True))
+    path.write_text("\n".join([head, *rows]) + "\n", encoding="utf-8")
+    (one,) = read_responses(path)
+    np.testing.assert_allclose(one.frequency, f, rtol=1e-9)
+    np.testing.assert_allclose(one.receptance, accelerance / -((TURN * f) ** 2), rtol=1e-9)
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
+        (
+            "frequency,real_m/N,imag_m/N\n1,1,0\n2,1,0\n",
+            "frequency: expected frequencies in Hz, kHz, rad/s or rpm",
+        ),
+        ("f_Hz,magnitude_m/N,phase\n1,1,0\n2,1,0\n", "phase: the unit is missing: write phase_deg"),
+        ("f_Hz,magnitude_dB,phase_deg\n1,1,0\n2,1,0\n", "UNIT one of m/N"),
+        ("f_Hz,magnitude_m/N,imag_m/N\n1,1,0\n2,1,0\n", "expected the columns"),
+        ("f_Hz,real_m/N,imag_m/N,phase_deg\n1,1,0,0\n2,1,0,0\n", "expected the columns"),
+        ("f_Hz,magnitude_m/N\n1,1\n2,1\n", "expected the columns"),
         (
             "frequency_Hz,real_m/N,imag_m/N\n10,1,0\n5,1,0\n",
             "rising frequencies; point 2 has 5 Hz after 10 Hz",
@@ -46,6 +79,13 @@ def test_bad_files_are_one_message(tmp_path, text, message):
     path = tmp_path / "tap.csv"
     path.write_text(text)
     with pytest.raises(sm.StiffmapError, match=message):
+        read_responses(path)
+
+
+def test_a_table_by_another_ending_is_told_so(tmp_path):
+    path = tmp_path / "tap.txt"
+    path.write_text("frequency_Hz,real_m/N,imag_m/N\n1,1,0\n2,1,0\n")
+    with pytest.raises(sm.StiffmapError, match=r"universal file .* no mark -1 in it; a table ends in \.csv"):
         read_responses(path)
 
 

@@ -259,6 +259,12 @@ def identify_process(
             "are what does not change with the feed", file=t.file, key="feed_per_tooth_mm",
         )  # fmt: skip
     straight = fit(STRAIGHT, t)
+    if straight.numbers["Ktc"][3] < 0:  # the end of its interval
+        note = (
+            "Ktc is below zero, which no tool has: the forces are to be those on the tool, along the feed, to its left (seen "
+            "against the tool) and from holder to tip; those on the part have the other signs"
+        )
+        t = replace(t, notes=(*t.notes, note))
     runout = runout_of(t, straight)
     if runout is not None:  # with the coefficients of teeth that leave the cut
         runout = runout_of(t, fit(RUNOUT, t, np.array([runout.offset])))

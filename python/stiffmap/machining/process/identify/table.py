@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from math import pi
+from math import isclose, pi
 from os import PathLike
 from typing import Any
 
@@ -29,7 +29,8 @@ COLUMNS = {
 NEEDED = ("feed_per_tooth", "fx", "fy", "fz", "teeth", "axial")
 ALIASES = {
     "c": "feed_per_tooth", "chip": "feed_per_tooth", "depth": "axial", "ap": "axial", "ae": "radial", "width": "radial",
-    "rpm": "spindle", "z": "teeth", "n_teeth": "teeth", "t": "time",
+    "rpm": "spindle", "z": "teeth", "n_teeth": "teeth", "flutes": "teeth", "t": "time", "vf": "feed", "n": "spindle",
+    "d": "diameter",
 }  # fmt: skip
 PER_TOOTH = re.compile(r"(/|_per_|_)tooth$")
 PER_EDGE = ("feed_per_tooth", "c", "chip")
@@ -231,6 +232,11 @@ def _cut(c: NamedTable, i: int) -> Process:
     chip, axial, teeth = (above_zero(c, n, i) for n in ("feed_per_tooth", "axial", "teeth"))
     diameter, spindle = above_zero(c, "diameter", i, 0.01), above_zero(c, "spindle", i, 200 * pi)
     radial = diameter if way == "slot" else above_zero(c, "radial", i)
+    if way == "slot" and "radial" in c.header and "side" not in c.header:  # a width, but on no side
+        own = c.values["radial"][i]
+        if "diameter" not in c.values or not isclose(own, diameter):
+            what = f"a column side ({', '.join(SIDES)}) and diameter_mm next to a width"
+            c.fail(f"expected {what}, found {1e3 * own:g} mm", "radial", i)
     if teeth != int(teeth) or teeth > 1000:
         c.fail(f"expected a whole number from 1 to 1000, found {teeth:g}", "teeth", i)
     if radial > diameter * (1 + 1e-12):

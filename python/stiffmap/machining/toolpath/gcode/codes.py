@@ -21,8 +21,8 @@ CENTRES = {2: "IJ", 1: "IK", 0: "JK"}
 """Words of an arc's centre by the axis that it turns about."""
 STARTS = {"distance": "G90", "feed mode": "G94", "plane": "G17", "centres": "G91.1", "offset": "G54"}
 """What is taken where a program says nothing; a controller may stand otherwise, so that a written program says it."""
-IGNORED_G = {40.0, 49.0, 61.0, 61.1, 64.0, 97.0, 98.0, 99.0}
-"""Without meaning for the path: modes of tracking, cancelled compensation and cycles."""
+IGNORED_G = {40.0, 49.0, 61.0, 61.1, 64.0, 92.1, 92.2, 97.0, 98.0, 99.0}
+"""Without meaning for the path: modes of tracking, cancelled compensation, offsets and cycles."""
 IGNORED_M = {7.0, 8.0, 9.0, 48.0, 49.0}
 BREAKS_M = {0.0, 1.0, 6.0, 60.0}
 """Stops and the change of a tool: somebody may move the axes meanwhile."""
@@ -134,6 +134,8 @@ class Codes:
             self.fail("G53 goes with G0 or G1")
         if "G53" in own and not s.absolute:
             self.fail("G53 needs absolute positions (G90)")
+        if "G53" in own and moving and not self.offsets:
+            self.note("G53 and no work offset is given: the machine's origin is taken to lie at the part's")
         if "G4" in own:
             if not values.get("P", -1.0) >= 0:
                 self.fail("G4 needs the time of the dwell: P of zero or more")
@@ -162,7 +164,9 @@ class Codes:
                 group = (GROUPS if letter == "G" else GROUPS_M).get(value)
                 if group:
                     word = f"{letter}{value:g}"
-                    if group in groups:
+                    if word == "G80" and group in groups:
+                        continue  # many programs cancel cycles in the line that starts: G0 G17 G40 G49 G80 G90
+                    if groups.get(group, "G80") != "G80":
                         what = "two motions" if group == "motion" else "two words that exclude each other"
                         self.fail(f"{what} in one line: {groups[group]} and {word}")
                     groups[group] = word
@@ -176,7 +180,7 @@ class Codes:
                 if letter in values:
                     self.fail(f"{letter} is given twice")
                 values[letter] = value
-            else:
+            elif letter not in "AB" or value:  # a table that stays at zero turns no part
                 what = "rotary and secondary axes are not read" if letter in "ABUVW" else "unknown word"
                 self.fail(f"{what}: {letter}{value:g}")
         if "Q" in values and groups.get("tracking") != "G64":
@@ -203,6 +207,8 @@ class Codes:
             s.inverse_time, s.feed = value == 93.0, None
         elif value in OFFSETS:
             s.breaks += s.offset != f"G{value:g}" or "offset" not in s.said
+            if not self.offsets and s.offset != f"G{value:g}" and "offset" in s.said:
+                self.note("several work offsets and none is given: all are taken to lie at the part's origin")
             s.offset = f"G{value:g}"
             if self.offsets and s.offset not in self.offsets:
                 self.fail(f"no work offset {s.offset}; given: {', '.join(self.offsets)}")
