@@ -105,7 +105,7 @@ def _answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, star
     models = {CALIBRATED: at} if at else {}
     listed = stands_out(columns, best.fit, found.suspects, models.values())
     clock.say("readings that no fit saw")
-    made = written(models, base, given, listed, seed, lambda: clock.over)
+    made = written(models, base, predictor, sigma, listed, seed, lambda: clock.over)
     rows, rank = table_of(columns, found.search.calibrated or fit, at)
     verdict, wide = judged(columns, found.search), too_wide(fit)
     at_name = {r.name: r for r in rows}

@@ -29,7 +29,7 @@ from stiffmap.identification.inference.amplitudes import Fit
 from stiffmap.identification.inference.chosen import Chosen
 from stiffmap.identification.inference.columns import Columns
 from stiffmap.identification.inference.constants import ODDS, RARE
-from stiffmap.identification.inference.corrected import Corrected, Term, corrected, instead
+from stiffmap.identification.inference.corrected import Corrected, Term, along_travel, corrected, instead
 from stiffmap.identification.inference.inference import Inferred, terms
 from stiffmap.identification.inference.machines import (
     CALIBRATED,
@@ -39,7 +39,7 @@ from stiffmap.identification.inference.machines import (
     vouched,
     written,
 )
-from stiffmap.identification.inference.names import put_instead
+from stiffmap.identification.inference.names import put_instead, with_travel
 from stiffmap.identification.inference.parts import GAPS
 from stiffmap.identification.inference.readings import Readings, readings
 from stiffmap.identification.inference.shares import gap_of, of_numbers, shares, tolerance_word, too_wide
@@ -56,18 +56,25 @@ def answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, cross
     base, sigma = found.plan.base, found.noise.sigma
     clock.say("corrected machine")
     nameless = [_change(predictor, c) for c, _ in v.refused]
-    given = readings(predictor, found.uncertain, columns, fit, sigma, found.suspects, nameless, v.as_effects)
-    models, v, notes = _models(predictor, found, v, given)
+
+    def given(fit: Fit) -> Readings:
+        return readings(
+            predictor, found.uncertain, columns, fit, sigma, found.suspects, nameless, v.as_effects
+        )
+
+    models, v, notes = _models(predictor, found, v, given(fit))
+    best = models.get(CORRECTED)
+    if best and (more := with_travel(fit)) is not fit:
+        models[CORRECTED] = along_travel(best, given(more))
     listed = stands_out(columns, fit, found.suspects, models.values())
     clock.say("readings that no fit saw")
-    made = written(models, base, given, listed, seed, lambda: clock.over or not cross_validate)
+    made = written(models, base, predictor, sigma, listed, seed, lambda: clock.over or not cross_validate)
     held, late = made.held_out, made.over_time
-    best = models.get(CORRECTED)
     each, gap = shares(columns, fit), gap_of(columns, fit)
     effects = _effects(v, best, each, fit)
     others = list(_alternatives(found, v, best, clock)) if best and effects else []
     noise = _noise(found, made, best)
-    rest, numbers = _rest(columns, fit, v, each, gap), _numbers(found, v, best)
+    rest, numbers = _rest(columns, fit, v, each, gap), _numbers(found, v, models.get(CORRECTED))
     cut_short = clock.stopped and noise.lack_of_fit_before < RARE
     return Diagnosis(
         verdict=_word(v, effects, rest, cut_short or (numbers is not None and bool(numbers.wide))),
@@ -127,6 +134,7 @@ def _models(
     out: dict[str, Corrected] = {}
     plain = found.search.calibrated
     if v.named and plain is not None:
+        plain = with_travel(plain)
         own = readings(predictor, found.uncertain, found.columns, plain, found.noise.sigma, found.suspects)
         if len(own.spread):
             out[CALIBRATED] = corrected(own, ())

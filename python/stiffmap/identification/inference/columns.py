@@ -123,15 +123,11 @@ def columns(
     sigma: Floats,
     unknowns: Sequence[Unknown],
     seed: int = 0,
-    *,
-    travel: bool = False,
 ) -> Columns:
     """Columns of everything that the readings of an experiment can hold.
 
     sigma
         (n, c) standard deviation of each reading, m or rad.
-    travel
-        Whether drives may err along their travel in any smooth way.
     """
     e, base = predictor.experiment, plan.base
     all_rows, all_channels = readings_of(e, base)
@@ -173,7 +169,7 @@ def columns(
         use,
         tuple((kind, name, k * len(k) / np.trace(k)) for kind, name, k in found if np.trace(k) > NULL),
         places(plan, free, noise, use, predictor.machine.description),
-        tuple(_along_travel(predictor, s, index, noise, free)) if travel else (),
+        tuple(_along_travel(predictor, s, index, noise, free)),
         (float(within @ within), float(len(rows) - mean.shape[1])),
     )
 

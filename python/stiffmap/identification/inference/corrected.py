@@ -135,14 +135,21 @@ def instead(found: Corrected, terms: Sequence[Term]) -> Corrected:
     return _optimum(found.given, terms, found.others)
 
 
-def corrected(given: Readings, terms: Sequence[Term]) -> Corrected:
-    """The optimum, from the values of the terms and the declared numbers."""
-    found = _optimum(given, terms)
+def along_travel(found: Corrected, given: Readings) -> Corrected:
+    """The optimum of readings whose drives err along their travel, next to effects that keep their values: what they leave."""
+    more = corrected(given, found.terms, np.zeros_like(found.slopes))
+    return replace(more, covariance=found.covariance, slopes=found.slopes)
+
+
+def corrected(given: Readings, terms: Sequence[Term], held: Floats | None = None) -> Corrected:
+    """The optimum, from the values of the terms and the declared numbers; `held`: slopes (k, n, c) that are taken wherever the search
+    stands, in place of those there: where they are zero, the terms keep their values."""
+    found = _optimum(given, terms, held=held)
     for _ in range(WEIGHINGS):
         if _bends(given, found):
             anew = sensitivity_at(given.predictor, given.sensitivity, found.numbers)
             given = replace(given, sensitivity=anew)
-            found = _optimum(given, found.terms, found.others)
+            found = _optimum(given, found.terms, found.others, held)
         left = given.white(np.nan_to_num(given.predictor.experiment.reading - found.prediction))
         q = given.frames(found.prediction)
         noise = (
@@ -153,7 +160,7 @@ def corrected(given: Readings, terms: Sequence[Term]) -> Corrected:
             break
         weights = (DEGREES + 1.0) / (DEGREES + (noise / given.kappa) ** 2)
         given = given.weighed(np.minimum(weights, 1.0))
-        found = _optimum(given, found.terms, found.others)
+        found = _optimum(given, found.terms, found.others, held)
     return found
 
 

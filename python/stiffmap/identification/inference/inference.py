@@ -64,7 +64,7 @@ def infer(
     every = unknowns(predictor.machine.description, e, certified(tolerances, e))
     uncertain = tuple(u for u in every if u.group not in exclude)
     clock.say("columns of the declared numbers")
-    found = columns(predictor, plan, noise.sigma, uncertain, seed, travel=travel)
+    found = columns(predictor, plan, noise.sigma, uncertain, seed)
 
     def predict(chosen: Sequence[Chosen]) -> Floats:
         try:
@@ -75,7 +75,8 @@ def infer(
         return found.rotated(change)
 
     clock.say("all effects at once")
-    return Inferred(plan, noise, suspects, uncertain, found, searched(found, predict, lambda: clock.over))
+    search = searched(found, predict, lambda: clock.over, travel=travel)
+    return Inferred(plan, noise, suspects, uncertain, found, search)
 
 
 def terms(chosen: Sequence[Chosen]) -> tuple[AppliedEffect, ...]:

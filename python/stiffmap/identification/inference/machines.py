@@ -20,7 +20,6 @@ from stiffmap.identification.inference.amplitudes import Fit
 from stiffmap.identification.inference.columns import MOST_READINGS, Columns, drawn
 from stiffmap.identification.inference.constants import DEGREES, STANDS_OUT
 from stiffmap.identification.inference.corrected import Corrected, columns_of, machine_of, without
-from stiffmap.identification.inference.readings import Readings
 from stiffmap.identification.validity import covered
 from stiffmap.solve.machine import Machine
 
@@ -71,16 +70,17 @@ class Written:
 def written(
     models: dict[str, Corrected],
     declared: Floats,
-    given: Readings,
+    predictor: Predictor,
+    sigma: Floats,
     listed: Mask,
     seed: int,
     over: Callable[[], bool],
 ) -> Written:
     """The last of some machines, by name, unless another of them or the declared one is clearly better; `declared` (n, c) is what that
-    one shows, `listed` (n,) rows that stand alone."""
-    e, sigma = given.predictor.experiment, given.sigma
-    which, held = _chosen(models, declared, given, listed, seed, over)
-    machine, prediction, promise = given.predictor.machine, declared, None
+    one shows, `sigma` (n, c) the standard deviation of each reading, m or rad, `listed` (n,) rows that stand alone."""
+    e = predictor.experiment
+    which, held = _chosen(models, declared, predictor, sigma, listed, seed, over)
+    machine, prediction, promise = predictor.machine, declared, None
     if which != DECLARED:
         best = models[which]
         machine, prediction, promise = machine_of(best), best.prediction, promised(best)
@@ -96,13 +96,14 @@ def written(
 def _chosen(
     models: dict[str, Corrected],
     declared: Floats,
-    given: Readings,
+    predictor: Predictor,
+    sigma: Floats,
     listed: Mask,
     seed: int,
     over: Callable[[], bool],
 ) -> tuple[str, HeldOut | None]:
     """Which machine is handed over, each fold of readings predicted from all others."""
-    e, sigma = given.predictor.experiment, given.sigma
+    e = predictor.experiment
     label, by = folds(e, seed)
     number = int(label.max()) + 1
     last = list(models)[-1] if models else DECLARED

@@ -80,15 +80,21 @@ class Search:
 
 
 def searched(
-    columns: Columns, predict: Predict | None = None, over: Callable[[], bool] = lambda: False
+    columns: Columns,
+    predict: Predict | None = None,
+    over: Callable[[], bool] = lambda: False,
+    *,
+    travel: bool = False,
 ) -> Search:
-    """The best set of effects over all worlds; no step begins once time is `over`."""
+    """The best set of effects over all worlds; no step begins once time is `over`. `travel`: whether drives may err along their
+    travel in any smooth way."""
     parts = Parts(columns)
+    gaps = (*parts.gaps, *parts.travel) if travel else parts.gaps
     worlds: dict[str, tuple[Part, ...]] = {EXACT: ()}
     if columns.unknowns and not over():
         worlds |= {"together": parts.together, "groups": parts.numbers}
     optima: dict[tuple[tuple[int, int], ...], Floats] = {}
-    searches = [_World(columns, parts.gaps, name, own, predict, over, optima) for name, own in worlds.items()]
+    searches = [_World(columns, gaps, name, own, predict, over, optima) for name, own in worlds.items()]
     searches.sort(key=lambda w: -w.null.score)
     found: dict[str, Search] = {}
     for w in searches:
@@ -115,6 +121,16 @@ def _with_rivals(model: Model, searches: Sequence[_World], found: Mapping[str, S
     each = zip(model.chosen, near, strict=True)
     instead = tuple(_without(c, places, model, own.price, others, found) for c, places in each)
     return Search(model, own.null, tuple(odds for odds, _ in rivals), near, instead)
+
+
+def with_travel(fit: Fit) -> Fit:
+    """The fit where drives may also err along their travel in any smooth way; the same fit if that is no likelier."""
+    more = Parts(fit.columns).travel
+    if not more:
+        return fit
+    return max(
+        fit, fitted(fit.columns, (*fit.parts, *more), amplitudes(fit), fit.weights), key=lambda f: f.score
+    )
 
 
 def put_instead(fit: Fit, c: Chosen, place: Place) -> Chosen:

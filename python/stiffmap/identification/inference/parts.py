@@ -48,6 +48,8 @@ class Parts:
     together: tuple[Part, ...] = field(init=False)
     """One for all groups, and one for each that a set-up has for itself."""
     gaps: tuple[Part, ...] = field(init=False)
+    travel: tuple[Part, ...] = field(init=False)
+    """Errors along the travel of the drives."""
 
     def __post_init__(self) -> None:
         c = self.columns
@@ -55,5 +57,5 @@ class Parts:
         shared = c.numbers[:, [not u.setup for u in c.unknowns]]
         alone = [p for p, i in zip(self.numbers, c.groups.values(), strict=True) if c.unknowns[i[0]].setup]
         self.together = (Part(ALL_NUMBERS, "number", shared), *alone) if c.unknowns else ()
-        along = (Part(name, "travel", f) for name, f, _ in c.travel)
-        self.gaps = (*(Part(name, kind, full=k) for kind, name, k in c.gaps), *along)
+        self.gaps = tuple(Part(name, kind, full=k) for kind, name, k in c.gaps)
+        self.travel = tuple(Part(name, "travel", f) for name, f, _ in c.travel)

@@ -161,7 +161,7 @@ def readings(
     known = [(u, size[k]) for k, u in enumerate(columns.unknowns) if u not in exact]
     unknowns = tuple(u for u, s in known if s > 0.0)
     s = zeros_anew(sensitivity(predictor, uncertain), e)
-    drives = tuple(_erring(predictor, s, columns, amplitude)) if columns.travel else ()
+    drives = tuple(_erring(predictor, s, columns, amplitude))
     index = [s.unknowns.index(u) for u in unknowns]
     s = replace(s, unknowns=unknowns, columns=s.columns[..., index])
     return Readings(
@@ -183,6 +183,6 @@ def _erring(
 ) -> Iterator[tuple[DriveErrors, Floats]]:
     """Drives that err along their travel in a fit, with the roots at their knots; `amplitude`: variances of its parts, in noise."""
     variance = {name: amplitude[name] * sd**2 for name, _, sd in columns.travel if name in amplitude}
-    for drive in drives_of(predictor, s):
+    for drive in drives_of(predictor, s) if variance else ():
         if any(name in variance for name, _ in drive.names()):
             yield drive, drive.root(variance)

@@ -15,6 +15,7 @@ from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.virtual.plans import plan_of_joints
 from stiffmap.identification.calibration import Calibration, calibrate
 from stiffmap.identification.inference.travel import DriveErrors, apart, hats
+from stiffmap.model.with_errors import edited
 from stiffmap.ui.cli.calibrate import write
 
 POSES = 250
@@ -118,3 +119,25 @@ def test_drives_of_the_platform_have_a_travel_too() -> None:
     assert c.verdict == "unattributed"
     assert set(c.validity.drives) == {"a.carriage", "b.carriage", "c.carriage", "a", "b"}
     assert "a 0 deg" in str(c.validity)
+
+
+def test_a_corrected_machine_has_what_waves_leave_along_the_travel() -> None:
+    """A bump of one screw next to a wave of another: no effect is a bump, and a file without it predicts worse than a calibration."""
+    machine = sm.load_machine("orthoglide-original")
+    plan = random_plan(machine, "position", poses=80, repeats=1, seed=2)
+    rippled = machine.with_effect(
+        "periodic_error", element="actuator", legs=["y"], amplitude=5e-5, period=0.05, phase=0.2
+    )
+    at = np.linspace(-0.42, -0.177, 9)
+    bump = 8e-5 * np.array([0.0, 0.0, 0.0, 1.0, 1.0, -0.3, 0.0, 0.0, 0.0])
+    knots = {"z.actuator": tuple(zip(at.tolist(), bump.tolist(), strict=True))}
+    off = sm.Machine(edited(rippled.description, {}, knots), like=rippled)
+    e = read(plan, Predictor(off, plan)())
+    d, c = sm.diagnose(machine, e), calibrate(machine, e)
+    assert d.which == "corrected" and ("periodic_error", ("y",)) in [
+        (f.kind, tuple(f.legs)) for f in d.effects
+    ]
+    assert c.held_out is not None and d.after.rms < c.held_out.after.rms
+    (y,) = (f for f in d.effects if tuple(f.legs) == ("y",))
+    (kept,) = (f for f in d.machine.description.effects if f.legs == ("y",))
+    assert dict(kept.parameters)["amplitude"] == y.parameters["amplitude"][0]

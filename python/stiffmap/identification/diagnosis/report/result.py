@@ -184,9 +184,9 @@ def _more(d: Diagnosis) -> list[str]:
     shared = largest(d.shares)
     if d.verdict != "none" and len(shared) > 1:
         out.append(f"shares of the squares: {'; '.join(shared)}")
-    if d.which == "declared" and d.effects:
+    if d.effects and d.which != "corrected":
         out.append(
-            "machine.yaml is the declared machine: none that was corrected predicts unseen readings better"
+            f"machine.yaml is the {d.which} machine: none with effects predicts unseen readings better"
         )
     if d.calibration is not None:
         out += [f"declared numbers: {d.calibration.verdict}", *map(str, d.calibration.wide)]

@@ -187,7 +187,7 @@ def next_step(d: Any) -> str:
         )
     if d.which == "declared":
         return "Inspect this place, and read more poses: no corrected machine predicts unseen readings better than the declared one yet."
-    return "Inspect this place; until it is mended, plan and compensate with the corrected machine file."
+    return "Inspect this place; until it is mended, plan and compensate with machine.yaml."
 
 
 def number_text(n: FoundNumber) -> str:
