@@ -38,7 +38,7 @@ class Row:
     unseen_by: str = ""
     """How the unseen rows were chosen."""
     cause: str = ""
-    """The verdict in the words of the public function."""
+    """The verdict, and what is named."""
     seconds: float | None = None
     """CPU time of stiffmap, with all folds and the verdict."""
     peers: tuple[Peer, ...] = ()

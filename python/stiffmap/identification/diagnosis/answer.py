@@ -39,7 +39,7 @@ from stiffmap.identification.inference.machines import (
     vouched,
     written,
 )
-from stiffmap.identification.inference.names import put_instead, with_travel
+from stiffmap.identification.inference.names import put_instead, searched, with_travel
 from stiffmap.identification.inference.parts import GAPS
 from stiffmap.identification.inference.readings import Readings, readings
 from stiffmap.identification.inference.shares import gap_of, of_numbers, shares, tolerance_word, too_wide
@@ -134,7 +134,8 @@ def _models(
     out: dict[str, Corrected] = {}
     plain = found.search.calibrated
     if v.named and plain is not None:
-        plain = with_travel(plain)
+        if found.columns.travel:  # as a calibration has it
+            plain = searched(replace(found.columns, places=()), travel=True).calibrated or plain
         own = readings(predictor, found.uncertain, found.columns, plain, found.noise.sigma, found.suspects)
         if len(own.spread):
             out[CALIBRATED] = corrected(own, ())
@@ -227,7 +228,7 @@ def _rest(columns: Columns, fit: Fit, v: Verdict, each: dict[str, float], gap: F
         return []
     e = columns.experiment
     gap = np.abs(np.nan_to_num(gap))
-    share = sum(each.get(p.name, 0.0) for p in fit.parts if p.kind in GAPS)
+    share = sum(each.get(p.name, 0.0) for p in fit.parts if p.kind in GAPS or p.name == v.rest)
     noise = np.full(gap.shape, np.inf)
     noise[columns.rows, columns.channel] = columns.sigma
     in_noise = gap / noise

@@ -20,6 +20,7 @@ from stiffmap.identification.inference.columns import Columns, columns
 from stiffmap.identification.inference.names import Search, searched
 from stiffmap.identification.numbers.certificate import Tolerances, certified
 from stiffmap.identification.numbers.unknowns import Unknown, unknowns
+from stiffmap.model import effects
 from stiffmap.model.description import AppliedEffect
 from stiffmap.solve.machine import Machine
 
@@ -66,12 +67,17 @@ def infer(
     clock.say("columns of the declared numbers")
     found = columns(predictor, plan, noise.sigma, uncertain, seed)
 
+    used = np.isin(np.arange(len(e)), found.rows)
+    drawn = predictor if used.all() else predictor.beside(rows=used)
+
     def predict(chosen: Sequence[Chosen]) -> Floats:
+        added = terms(chosen)
+        whole = any(effects.get(t.kind).drive for t in added)  # what drives remember is of the rows before
         try:
-            shown = predictor(terms(chosen))
+            shown = predictor(added)[used] if whole else drawn(added)
         except StiffmapError:  # too large for the machine: the columns alone must do
             return np.full(len(found), np.nan)
-        change = (shown - plan.base)[found.rows, found.channel]
+        change = (shown - plan.base[used])[(np.cumsum(used) - 1)[found.rows], found.channel]
         return found.rotated(change)
 
     clock.say("all effects at once")

@@ -12,7 +12,14 @@ from stiffmap.experiment.experiment import Experiment, Floats, Integers
 from stiffmap.identification.inference.amplitudes import OFF, Fit, noise_prior
 from stiffmap.identification.inference.chosen import Chosen
 from stiffmap.identification.inference.columns import Columns
-from stiffmap.identification.inference.constants import ALIKE, EQUAL_SHARE, ODDS, RARE, TOLERANCES
+from stiffmap.identification.inference.constants import (
+    ALIKE,
+    EQUAL_SHARE,
+    NOISE_SD,
+    ODDS,
+    RARE,
+    TOLERANCES,
+)
 from stiffmap.identification.inference.names import EXACT, Model, Search
 from stiffmap.identification.inference.parts import GAPS, Part
 from stiffmap.identification.inference.places import Place
@@ -28,6 +35,8 @@ LEAST_SCALE = 0.01
 """Of a compliance or a mass that a straight line would make negative."""
 KAPPA_SDS = 4.0
 """Prior standard deviations of ln κ beyond which the noise is no noise."""
+LARGEST_TIME = 2.0 * KAPPA_SDS * NOISE_SD
+"""ln variance, in the declared noise, beyond which what carries over in time is no noise either."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -275,6 +284,7 @@ def left(fit: Fit) -> tuple[str, str]:
     centre, sd = noise_prior(fit.columns)
     if float(fit.t[0]) - centre > KAPPA_SDS * sd:
         rest = rest or "noise larger than declared"
+    rest = rest or largest([p for p in over if on[p] > LARGEST_TIME])
     if not rest and not time and gaps and over:
         rest = largest([*gaps, *over], len(gaps) + len(over))  # either may be the noise, not both
     return rest, time
