@@ -117,3 +117,32 @@ def test_what_is_no_argument_is_one_error(name: str, arguments: dict[str, Any], 
 def test_a_force_is_one_positive_number(force: Any) -> None:
     with pytest.raises(sm.StiffmapError, match="force: expected a positive number"):
         sm.worst_deflection("five-bar", P, force=force)
+
+
+MANY = [[0.0, 0.416, 0.0], [0.05, 0.416, 0.0]]
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: sm.stability_lobes("five-bar", "slot", MANY), "position: expected one pose for a diagram, got 2"),
+        (lambda: sm.worst_deflection("five-bar", np.zeros((3, 5)), force=1.0), r"position: expected .* \(3, 5\)"),
+        (lambda: sm.worst_deflection("five-bar", P, box=[P, P], force=1.0), "expected position or box, got both"),
+        (lambda: sm.worst_deflection("five-bar", P, force=1.0, direction=[0, 0, 0]), "direction: expected one or 1"),
+        (lambda: sm.worst_deflection("five-bar", MANY, force=1.0, direction=np.ones((3, 3))), "one or 2 vectors"),
+        (lambda: sm.workspace_volume("five-bar", cells=4).at(np.zeros((3, 2))), r"position: expected .* \(3, 2\)"),
+    ],
+)  # fmt: skip
+def test_poses_are_neither_left_out_nor_reshaped(call: Any, words: str) -> None:
+    with pytest.raises(sm.StiffmapError, match=words):
+        call()
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [({"force": -3.0}, "force"), ({"force": 0.0}, "force"), ({"force": np.nan}, "force"), ({"plane": "XY"}, "plane"),
+     ({"plane": ""}, "plane"), ({"nodes": 1}, "nodes"), ({"nodes": 2.5}, "nodes"), ({"coarse": 0}, "coarse")],
+)  # fmt: skip
+def test_measures_refuse_what_would_leave_rows_without_a_number(given: dict[str, Any], words: str) -> None:
+    with pytest.raises(sm.StiffmapError, match=f"{words}: expected"):
+        sm.measures("five-bar", **{"only": ["velocity"], "nodes": 3, **given})
