@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from stiffmap.common.broadcasting import Floats, real_array, thread_count, whole_number
+from stiffmap.common.broadcasting import Floats, names_of, real_array, thread_count, whole_number
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import place_text
 from stiffmap.common.short import short_repr
@@ -167,7 +167,7 @@ def measures(
     """
     task = Requirements() if requirements is None else requirements
     task = task if isinstance(task, Requirements) else load_requirements(task)
-    chosen = all_measures() if only is None else tuple(get_measure(n) for n in only)
+    chosen = all_measures() if only is None else tuple(get_measure(n) for n in names_of(only, "only"))
     low, high, notes = _box(machine, box, task)
     size = force if force is not None else task.force if task.force is not None else 100.0
     path = toolpath or task.toolpath
