@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import os
 import warnings
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from decimal import Decimal
 from numbers import Real
 from operator import index
@@ -82,6 +82,12 @@ def instance_of(value: object, kind: Any, name: str, what: str) -> Any:
     if not isinstance(value, kind):
         raise _refused(name, what, repr(value) if isinstance(value, str) else type(value).__name__)
     return value
+
+
+def names_of(value: Any, name: str) -> tuple[str, ...]:
+    """Names, of which one may stand by itself; StiffmapError with the argument's name for what is none."""
+    given = (value,) if isinstance(value, str) else tuple(instance_of(value, Iterable, name, "names"))
+    return tuple(instance_of(n, str, name, "names") for n in given)
 
 
 def one_of(value: object, known: Collection[str], name: str) -> str:

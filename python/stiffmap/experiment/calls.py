@@ -9,7 +9,7 @@ from os import PathLike
 import numpy as np
 from scipy.stats import chi2
 
-from stiffmap.common.broadcasting import given_path, instance_of, random_numbers
+from stiffmap.common.broadcasting import given_path, instance_of, random_numbers, real_number
 from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.comparison.limitations import limitations, refuse_unreachable
 from stiffmap.experiment.comparison.residual import Residual
@@ -131,6 +131,8 @@ def simulate(
     plan = predictor.experiment
     refuse_unreachable(plan, exact)
     rng = random_numbers(seed)
+    if not 0 <= real_number(outlier_share, "outlier_share", "a share") <= 1:
+        raise StiffmapError(f"outlier_share: expected a share from 0 to 1, got {outlier_share}")
     reading = exact + np.nan_to_num(plan.sigma) * rng.standard_normal(exact.shape)
     zeros = rng.standard_normal((int(plan.groups.max()) + 1, len(plan.channels))) * plan.zeros
     unknown = nuisance_columns(plan, predictor())

@@ -10,6 +10,8 @@ from dataclasses import dataclass, field
 from threading import current_thread, main_thread
 from types import FrameType
 
+from stiffmap.common.broadcasting import real_number
+
 Progress = Callable[[str], None]
 
 
@@ -30,7 +32,8 @@ class Clock:
     @staticmethod
     def of(budget: float | None, progress: Progress | None = None) -> Clock:
         """A clock that starts now; `budget` in seconds, None: no end."""
-        return Clock(float("inf") if budget is None else time.monotonic() + budget, progress)
+        most = float("inf") if budget is None else real_number(budget, "time_limit", "seconds")
+        return Clock(time.monotonic() + most, progress)
 
     def leave_out(self, what: str) -> None:
         """Note what is not tried."""

@@ -12,6 +12,7 @@ from stiffmap.common.broadcasting import (
     Floats,
     batch,
     instance_of,
+    names_of,
     rows,
     rows_or_one,
     thread_count,
@@ -141,6 +142,7 @@ def _solve(
     loaded = [o.point, *extra]
     types = load_types(o, loaded)
     read = reading_points(machine, o, loaded)
+    instance_of(o.stiffness, bool | np.bool_, "stiffness", "True or False")
     steps = 0  # adaptive
     if o.load_steps != "auto":
         steps = whole_number(o.load_steps, "load_steps", 1, what="'auto' or a positive number")
@@ -164,7 +166,7 @@ def _solve(
     if unloaded is not None:
         flags = answer.flags  # also how sure the branch is
         flags |= rows(unloaded.flags, shape, ())  # type: ignore[arg-type]
-    order = (0, *(read.index(n) for n in o.read_points))
+    order = (0, *(read.index(n) for n in names_of(o.read_points, "read_points")))
     solution = Solution(answer, shape, machine.names, o.point, order, unloaded=unloaded)
     return solution, answer.variants.reshape((*shape, len(variants), 6) if variants else (0,))
 
@@ -181,7 +183,8 @@ def _stacked(wrenches: Sequence[Floats], shape: tuple[int, ...]) -> Floats:
 def _arrays(machine: CompiledMachine, call: Call) -> tuple[Floats, Floats, Floats, dict[str, Floats]]:
     p, r = commanded(machine, call.position, call.options.rotation)
     w = wrench_array(call.wrench)
-    extra = {n: wrench_array(v, f"wrenches[{n!r}]") for n, v in call.options.wrenches.items()}
+    given = instance_of(call.options.wrenches, Mapping, "wrenches", "a mapping point -> wrench")
+    extra = {n: wrench_array(v, f"wrenches[{n!r}]") for n, v in given.items()}
     return p, w, r, extra
 
 
@@ -201,8 +204,8 @@ def load_types(options: SolveOptions, loaded: Sequence[str]) -> list[str]:
 
 def reading_points(machine: CompiledMachine, options: SolveOptions, loaded: Sequence[str]) -> list[str]:
     """Points to read, each once, that of the wrench first; StiffmapError for one that does not exist."""
-    there = machine.names.points
-    for name in (*loaded, *options.read_points):
+    there, more = machine.names.points, names_of(options.read_points, "read_points")
+    for name in (*loaded, *more):
         if name not in there:
             raise StiffmapError(f"point: expected one of {', '.join(there)}, got {name!r}")
-    return list(dict.fromkeys((options.point, *options.read_points)))
+    return list(dict.fromkeys((options.point, *more)))

@@ -30,6 +30,9 @@ CALLS: dict[str, dict[str, Any]] = {
     "velocity_transmission": {"position": P},
     "why_unreachable": {"position": P},
     "worst_deflection": {"position": P, "force": 10.0},
+    "compensate": {"position": P, "wrench": W},
+    "map_statistics": {"wrench": W, **FEW},
+    "measures": {"only": ["velocity"], "nodes": 3},
 }
 """Right arguments of calls that take a moment."""
 OTHER = {"progress", "out", "resume", "scheduler", "chunk"}
@@ -117,3 +120,88 @@ def test_what_is_no_argument_is_one_error(name: str, arguments: dict[str, Any], 
 def test_a_force_is_one_positive_number(force: Any) -> None:
     with pytest.raises(sm.StiffmapError, match="force: expected a positive number"):
         sm.worst_deflection("five-bar", P, force=force)
+
+
+MANY = [[0.0, 0.416, 0.0], [0.05, 0.416, 0.0]]
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: sm.stability_lobes("five-bar", "slot", MANY), "position: expected one pose for a diagram, got 2"),
+        (lambda: sm.worst_deflection("five-bar", np.zeros((3, 5)), force=1.0), r"position: expected .* \(3, 5\)"),
+        (lambda: sm.worst_deflection("five-bar", P, box=[P, P], force=1.0), "expected position or box, got both"),
+        (lambda: sm.worst_deflection("five-bar", P, force=1.0, direction=[0, 0, 0]), "direction: expected one or 1"),
+        (lambda: sm.worst_deflection("five-bar", MANY, force=1.0, direction=np.ones((3, 3))), "one or 2 vectors"),
+        (lambda: sm.workspace_volume("five-bar", cells=4).at(np.zeros((3, 2))), r"position: expected .* \(3, 2\)"),
+    ],
+)  # fmt: skip
+def test_poses_are_neither_left_out_nor_reshaped(call: Any, words: str) -> None:
+    with pytest.raises(sm.StiffmapError, match=words):
+        call()
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [({"force": -3.0}, "force"), ({"force": 0.0}, "force"), ({"force": np.nan}, "force"), ({"plane": "XY"}, "plane"),
+     ({"plane": ""}, "plane"), ({"nodes": 1}, "nodes"), ({"nodes": 2.5}, "nodes"), ({"coarse": 0}, "coarse")],
+)  # fmt: skip
+def test_measures_refuse_what_would_leave_rows_without_a_number(given: dict[str, Any], words: str) -> None:
+    with pytest.raises(sm.StiffmapError, match=f"{words}: expected"):
+        sm.measures("five-bar", **{"only": ["velocity"], "nodes": 3, **given})
+
+
+A_SERVO = "examples/experiments/A-servo"
+CIRCLE: dict[str, Any] = {"machine": "orthoglide-revised", "path": "circle", "process": "trimming"}
+
+
+@pytest.mark.parametrize("bad", [{}, [1, 2], "zzz"])
+@pytest.mark.parametrize(
+    ("name", "arguments"),
+    [
+        *(("mill", {**CIRCLE, n: ...}) for n in
+          ("path", "at", "turn", "size", "step", "within", "passes", "place", "tolerance", "thickness", "stock")),
+        *((call, {"machine": "orthoglide-revised", "experiment": A_SERVO, n: ...})
+          for call in ("diagnose", "calibrate") for n in ("exclude", "time_limit", "tolerances")),
+        ("simulate", {"machine": "orthoglide-revised", "plan": A_SERVO, "outlier_share": ...}),
+        ("load_experiment", {"path": ...}),
+        ("compensate", {"machine": "five-bar", "position": P, "gravity": ...}),
+    ],
+)  # fmt: skip
+def test_what_is_no_argument_of_long_calls_is_one_error(
+    name: str, arguments: dict[str, Any], bad: Any
+) -> None:
+    if bad == {} and {"exclude", "tolerances"} & {k for k, v in arguments.items() if v is ...}:
+        return  # none
+    with pytest.raises(sm.StiffmapError):
+        getattr(sm, name)(**{k: bad if v is ... else v for k, v in arguments.items()})
+
+
+def test_more_is_refused_by_name() -> None:
+    machine = sm.load_machine("five-bar")
+    with pytest.raises(sm.StiffmapError, match="wrench: expected one row or 2"):
+        sm.compensate(machine, MANY, wrench=[W, W, W])
+    with pytest.raises(sm.StiffmapError, match="outlier_share: expected a share from 0 to 1, got 5"):
+        sm.simulate("orthoglide-revised", A_SERVO, outlier_share=5)
+    with pytest.raises(sm.StiffmapError, match="points: expected a whole number"):
+        sm.error_map(machine, points=3.5)
+    for bad in ("no", None):
+        with pytest.raises(sm.StiffmapError, match="stiffness: expected True or False"):
+            machine.solve(P, W, stiffness=bad)  # type: ignore[arg-type]
+    with pytest.raises(sm.StiffmapError, match="wrenches: expected a mapping point -> wrench, got list"):
+        machine.solve(P, wrenches=W)  # type: ignore[arg-type]
+
+
+def test_one_name_may_stand_by_itself() -> None:
+    machine = sm.load_machine("five-bar")
+    assert machine.solve(P, W, read_points="tcp").status == sm.Status.CONVERGED
+    assert [r.measure.name for r in sm.measures(machine, only="condition", nodes=3).rows] == ["condition"]
+    assert (
+        sm.error_map(machine, wrench=W, cases="cut", **FEW).sizes
+        == sm.error_map(machine, wrench=W, cases=["cut"], **FEW).sizes
+    )
+    with pytest.raises(sm.StiffmapError, match="unknown group 'stifness'"):
+        sm.calibrate("orthoglide-revised", A_SERVO, exclude="stifness")
+    assert sm.map_statistics(machine, wrench=W, percentiles=95, **FEW).percentile.size == 1
+    circle = [sm.mill(**CIRCLE, at=(0.05, 0.05, 0), step=0.02, size=size) for size in (0.06, [0.06])]
+    assert np.array_equal(circle[0].error, circle[1].error)

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from stiffmap.common.broadcasting import given_path
 from stiffmap.common.errors import FileError, MissingColumnError
 from stiffmap.common.tables.table import Table
 from stiffmap.common.units import name_and_unit
@@ -32,7 +33,7 @@ def load_experiment(path: str | PathLike[str]) -> Experiment:
 
     Raises `FileError` naming file, row, column or key, what was expected and what was found.
     """
-    place = Path(path)
+    place = given_path(path, "path", "an experiment's folder or its YAML file")
     file = place / "experiment.yaml" if place.is_dir() else place
     if not file.is_file():
         raise FileError(

@@ -9,7 +9,7 @@ from os import PathLike
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffmap.common.broadcasting import whole_number
+from stiffmap.common.broadcasting import names_of, whole_number
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.one_thread import on_one_thread
 from stiffmap.experiment.calls import as_experiment
@@ -82,6 +82,7 @@ def calibrate(
     """
     whole_number(seed, "seed", 0)
     declared, data = as_machine(machine), as_experiment(experiment)
+    exclude = names_of(exclude, "exclude")
     for name in exclude:
         if name not in GROUPS:
             raise StiffmapError(f"calibration: unknown group '{name}'; there are: {', '.join(GROUPS)}")

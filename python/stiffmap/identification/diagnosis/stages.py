@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from os import PathLike
 
-from stiffmap.common.broadcasting import whole_number
+from stiffmap.common.broadcasting import names_of, whole_number
 from stiffmap.common.number_text import within
 from stiffmap.common.one_thread import on_one_thread
 from stiffmap.experiment.calls import as_experiment
@@ -78,6 +78,7 @@ def diagnose(
     whole_number(seed, "seed", 0)
     declared, data = as_machine(machine), as_experiment(experiment)
     clock = Clock.of(time_limit, progress)
+    exclude = names_of(exclude, "exclude")
     for name in exclude:
         if name not in GROUPS:
             get(name)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
+from stiffmap.common.broadcasting import instance_of
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.noise.nuisance import nuisance_columns
 from stiffmap.experiment.setups import setups_of
@@ -63,7 +64,8 @@ class Tolerances:
 
 def certified(tolerances: Tolerances | None, experiment: Experiment) -> Tolerances:
     """The tolerances with what the experiment's certificate says in place of the instrument's."""
-    t, given = tolerances or Tolerances(), dict(experiment.certificate)
+    t: Tolerances = instance_of(tolerances or Tolerances(), Tolerances, "tolerances", "Tolerances")
+    given = dict(experiment.certificate)
     named = {"scale": "instrument", "tool": "tool", "frame": "frame", "frame_direction": "frame_direction"}
     return replace(t, **{named[k]: v for k, v in given.items()})
 

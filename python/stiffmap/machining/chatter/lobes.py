@@ -198,6 +198,8 @@ def _modes(
             )
         return mode_rows(machine), "of the modes as given"
     found = tip_modes(machine, machine.description.home.p if position is None else position, **pose)
+    if len(found.square) != 1:
+        raise StiffmapError(f"position: expected one pose for a diagram, got {len(found.square)}")
     return modes_of_machine(found).turned(axes), found.damping.said
 
 

@@ -219,15 +219,22 @@ def _plan(
         ids=tuple(str(i + 1) for i in range(n)),
         position=at.position,
         rotation=at.rotation,
-        wrench=np.broadcast_to(wrench_array(wrench), (n, 6)).copy(),
+        wrench=_each(wrench_array(wrench), n, "wrench"),
         reading=np.zeros((n, len(AXES))),
         sigma=np.ones((n, len(AXES))),
         joints=at.coordinates[:, list(names.joints.values())],
         joint_names=tuple(names.joints),
         load_point=point,
-        approach=None if way is None else np.broadcast_to(way, (n, 3)).copy(),
-        gravity=None if gravity is None else tuple(float(v) for v in np.asarray(gravity)),  # type: ignore[arg-type]
+        approach=None if way is None else _each(way, n, "approach"),
+        gravity=None if gravity is None else tuple(machine.compiled.gravity(gravity).tolist()),
     )
+
+
+def _each(values: Floats, n: int, name: str) -> Floats:
+    """(n, k) of one row for all poses, or of one for each."""
+    if values.shape[:-1] not in ((), (1,), (n,)):
+        raise StiffmapError(f"{name}: expected one row or {n}, one for each pose, got shape {values.shape}")
+    return np.broadcast_to(values, (n, values.shape[-1])).copy()
 
 
 def _components(machine: Machine, given: tuple[str, ...] | None) -> list[int]:

@@ -24,6 +24,7 @@ from stiffmap.machining.toolpath import Placement, Toolpath, box, load_path, sam
 from stiffmap.machining.toolpath.engagement import part_side
 from stiffmap.machining.toolpath.entry import entered_at, outline_of, turned_round
 from stiffmap.solve.machine import Machine
+from stiffmap.workspace.maps.inputs import magnitude
 
 OFFSETS = tuple(f"G{n}" for n in range(54, 60))
 """Work offsets that a program can name."""
@@ -82,9 +83,7 @@ def choices(
     """In this order: the sense, the placement, the entry, the turns; arguments as of `mill`. Raises StiffmapError."""
     cut = as_process(process)
     if tolerance is not None:
-        if not tolerance > 0:
-            raise StiffmapError(f"tolerance: expected a length above zero (m), got {tolerance}")
-        cut = replace(cut, tolerance=tolerance)
+        cut = replace(cut, tolerance=magnitude(tolerance, "tolerance", "m"))
     if isinstance(path, Toolpath):
         if size is not None or offset:
             raise StiffmapError(

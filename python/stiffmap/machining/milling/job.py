@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from stiffmap.common.broadcasting import Floats
+from stiffmap.common.broadcasting import Floats, whole_number
 from stiffmap.common.errors import StiffmapError
 from stiffmap.machining.milling.choices import Choices, choices
 from stiffmap.machining.milling.dataset import along, dataset_of, verdict
@@ -26,6 +26,7 @@ from stiffmap.machining.toolpath import Toolpath, sampled
 from stiffmap.solve.machine import Machine, as_machine
 from stiffmap.solve.options import keywords_of
 from stiffmap.solve.status import Status
+from stiffmap.workspace.maps.inputs import magnitude
 from stiffmap.workspace.performance.motion.inertia import natural_frequencies
 
 BAND = 0.2
@@ -78,8 +79,8 @@ def mill_job(
     **chosen: Any,
 ) -> Milled:
     """The same with the program and all states, for reports."""
-    if passes < 1:
-        raise StiffmapError(f"passes: expected 1 or more, got {passes}")
+    whole_number(passes, "passes", 1)
+    magnitude(within, "within", "m")
     made_of = choices(machine, path, process, step=step, thickness=thickness, threads=threads, **chosen)
     p, cut, where, box, angle = made_of.path, made_of.process, made_of.place, made_of.stock, made_of.angle
     if angle is not None:

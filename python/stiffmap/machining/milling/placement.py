@@ -8,7 +8,7 @@ import numpy as np
 from scipy.optimize import minimize
 from scipy.stats import qmc
 
-from stiffmap.common.broadcasting import Floats
+from stiffmap.common.broadcasting import Floats, whole_number
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import place_text
 from stiffmap.common.tasks import workers
@@ -90,8 +90,8 @@ def placements(
     the search. scheduler: address of a dask scheduler, or a `distributed.Client`, whose workers try the placements, with the same
     answer. Raises StiffmapError where no placement holds the path.
     """
-    if count < 1 or points < 2:
-        raise StiffmapError(f"count and points: expected 1 or more and 2 or more, got {count} and {points}")
+    whole_number(count, "place", 1)
+    whole_number(points, "points", 2)
     search = PlacementSearch(machine, path, process, points, threads)
     naive = Placement((search.low + search.high) / 2 - search.middle, 0.0)
     power = int(np.ceil(np.log2(max(count, 2))))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from stiffmap.common.broadcasting import Floats
+from stiffmap.common.broadcasting import Floats, real_array, real_number
 from stiffmap.common.errors import StiffmapError
 from stiffmap.machining.process.description import Process
 from stiffmap.machining.toolpath.path import Toolpath
@@ -21,7 +21,7 @@ OUTMOST = np.radians(170.0)
 
 def box(corners: ArrayLike) -> Floats:
     """(2, 3) m: stock by its lowest and its highest corner, axes of the part; checked."""
-    out = np.asarray(corners, dtype=float)
+    out = real_array(corners, "stock")
     if out.size != 6 or not (np.diff(out.reshape(2, 3), axis=0) > 0).all():
         raise StiffmapError(f"stock: expected two corners (2, 3) in m, the lower first; got {corners!r}")
     return out.reshape(2, 3)
@@ -58,7 +58,7 @@ def engagement(
     """Width and depth at each point: the process's own, or a `thickness` to trim (m), or what a box of stock holds."""
     m = len(points)
     side = part_side(process)
-    radial = np.full(m, process.cut.radial if thickness is None else float(thickness))
+    radial = np.full(m, process.cut.radial if thickness is None else real_number(thickness, "thickness"))
     if thickness is not None and not 0 < thickness <= process.tool.diameter:
         raise StiffmapError(
             f"thickness: expected above zero and at most the tool's diameter of {1e3 * process.tool.diameter:g} mm, "

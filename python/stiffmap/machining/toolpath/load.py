@@ -10,7 +10,7 @@ from typing import NoReturn
 
 import numpy as np
 
-from stiffmap.common.broadcasting import Floats
+from stiffmap.common.broadcasting import Floats, given_path
 from stiffmap.common.errors import FileError, refuse_folder, suggestion
 from stiffmap.common.number_text import number_in
 from stiffmap.common.tables.named import Known, read_named
@@ -38,6 +38,7 @@ def load_path(
 
     feed (m/s) and spindle (rad/s): of a built-in outline. offsets: work offsets of G-code by name, m. progress: called with the number of lines read. Raises FileError.
     """
+    given_path(name_or_file, "path", "a file or the name of a built-in outline")
     if offsets and Path(name_or_file).suffix.lower() not in GCODE:
         raise FileError("offsets: only a program in G-code takes them", file=str(name_or_file))
     if str(name_or_file) in outline_names():

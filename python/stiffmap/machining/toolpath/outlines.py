@@ -6,6 +6,9 @@ from collections.abc import Callable
 from math import acos, cos, hypot, isfinite, sin
 from typing import NamedTuple
 
+import numpy as np
+
+from stiffmap.common.broadcasting import real_array
 from stiffmap.common.errors import StiffmapError
 from stiffmap.machining.toolpath.gcode.load import load_gcode
 from stiffmap.machining.toolpath.gcode.words import decimal
@@ -121,7 +124,7 @@ def outline_text(
     if name not in SHAPES:
         raise StiffmapError(f"unknown outline {name!r}; known: {', '.join(outline_names())}")
     make, usual, words = SHAPES[name]
-    given = usual if size is None else tuple(size)
+    given = usual if size is None else tuple(np.atleast_1d(real_array(size, "size")).tolist())
     if len(given) != len(usual) or not all(isfinite(v) for v in given):
         raise StiffmapError(f"{name}: expected the size {words}, got {len(given)} numbers")
     (x, y), pieces = make(*given)

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from stiffmap.common.broadcasting import Floats
+from stiffmap.common.broadcasting import Floats, real_array, real_number
 from stiffmap.common.errors import StiffmapError
 
 Integers = NDArray[np.int64]
@@ -126,7 +126,7 @@ class Toolpath:
 
     def placed(self, at: ArrayLike = (0.0, 0.0, 0.0), turn: float = 0.0) -> Placement:
         """Where the part's origin lies (m, base axes) and how it is turned about z (rad)."""
-        where = np.asarray(at, dtype=float)
+        where, turn = real_array(at, "at"), real_number(turn, "turn", "an angle (rad)")
         if where.shape != (3,) or not np.isfinite(where).all() or not np.isfinite(turn):
             raise StiffmapError(
                 f"placement: expected three finite numbers (m) and an angle, got {at!r}, {turn!r}"

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.machining.toolpath.path import Integers, Kind, Toolpath
+from stiffmap.workspace.maps.inputs import magnitude
 
 CORNER = np.radians(15.0)
 """Turn of a polyline from which on it is a corner and not a curve."""
@@ -68,8 +69,7 @@ class Points:
 
 def sampled(path: Toolpath, step: float = 2e-3) -> Points:
     """Points no further apart than `step` (m); every cut has its two ends. Raises StiffmapError where nothing cuts."""
-    if not (step > 0 and np.isfinite(step)):
-        raise StiffmapError(f"step: expected a length above zero (m), got {step}")
+    magnitude(step, "step", "m")
     cuts = np.flatnonzero(path.cuts)
     if not cuts.size:
         raise StiffmapError(f"{path.name}: no move cuts (moves at a feed across the tool)")

@@ -93,16 +93,19 @@ def draw_ellipse(ax: Axes, pol: xr.Dataset, plane: str, tolerance: float | None)
 
 
 def sweep_figure(
-    panels: Mapping[str, xr.Dataset] | Sequence[Mapping[str, xr.Dataset]],
+    panels: xr.Dataset | Mapping[str, xr.Dataset] | Sequence[Mapping[str, xr.Dataset]],
     *,
     variable: str = "deflection_xy",
     tolerance: float | None = 0.25e-3,
 ) -> Figure:
-    """Lines of force against deflection (mm), by label; several panels where several mappings are given.
+    """Lines of force against deflection (mm), by label or one alone; several panels where several mappings are given.
 
     Unstable equilibria are drawn as open circles; failed ones leave a gap and a cross on the axis.
     """
-    many = [panels] if isinstance(panels, Mapping) else list(panels)
+    given = (
+        {"deflection": panels} if isinstance(panels, xr.Dataset) else panels
+    )  # a Dataset is a mapping as well
+    many = [given] if isinstance(given, Mapping) else list(given)
     with paper(max(2.3 * len(many) + 0.6, 4.0), 3.1) as figure:
         first = [next(iter(lines.values())) for lines in many]
         axes = _panels(figure, first)

@@ -117,6 +117,7 @@ def grid_of(
     A coordinate that is not commanded has one value, its home; planes lie at three heights where none is named. StiffmapError where an
     axis is wanted of a machine without a workspace.
     """
+    whole_number(points, "points", 1)
     out: dict[str, ArrayLike] = {a: v for a, v in given.items() if v is not None}
     if len(out) == 3:
         return out
@@ -132,9 +133,9 @@ def grid_of(
             middle = 0.0 if low[2] < 0 < high[2] else (low[2] + high[2]) / 2
             out[a] = [low[2], middle, high[2]]
         else:
-            out[a] = np.linspace(low[i], high[i], max(points, 0))
+            out[a] = np.linspace(low[i], high[i], points)
     if task and np.size(out["x"]) == np.size(out["y"]) == 1 and not named:
-        out["z"] = np.linspace(low[2], high[2], max(points, 0))  # only the height is commanded
+        out["z"] = np.linspace(low[2], high[2], points)  # only the height is commanded
     return {a: out[a] for a in "xyz"}
 
 

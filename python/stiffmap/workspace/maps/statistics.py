@@ -60,9 +60,9 @@ def map_statistics(
     StiffmapError
         For bad input.
     """
-    wanted = real_array(percentiles, "percentiles")
+    wanted = np.atleast_1d(real_array(percentiles, "percentiles"))
     if wanted.ndim != 1 or wanted.size == 0 or not ((wanted >= 0) & (wanted <= 100)).all():
-        raise StiffmapError(f"percentiles: expected numbers from 0 to 100, got {list(percentiles)}")
+        raise StiffmapError(f"percentiles: expected numbers from 0 to 100, got {wanted.tolist()}")
     plan = map_plan(as_machine(machine), **call)
     tiles, work = tiles_of(plan), work_of(chunk, scheduler)
     found = {v.name: _Deflection(plan, tiles, v) for v in plan.variables if DEFLECTION.fullmatch(v.name)}

@@ -12,14 +12,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from stiffmap.common.broadcasting import Floats, real_array, thread_count
+from stiffmap.common.broadcasting import Floats, names_of, real_array, thread_count, whole_number
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import place_text
 from stiffmap.common.short import short_repr
 from stiffmap.common.tasks import client_of
 from stiffmap.solve.machine import Machine, takes_machine
 from stiffmap.solve.status import Status
-from stiffmap.workspace.maps.inputs import box_nodes, magnitude, read_box
+from stiffmap.workspace.maps.inputs import box_nodes, magnitude, plane_axes, read_box
 from stiffmap.workspace.performance.motion.closing import drive_kinematics
 from stiffmap.workspace.performance.motion.motion_files import Motion, load_motion
 from stiffmap.workspace.performance.registry import Case, Found, Measure, all_measures, get_measure
@@ -167,12 +167,16 @@ def measures(
     """
     task = Requirements() if requirements is None else requirements
     task = task if isinstance(task, Requirements) else load_requirements(task)
-    chosen = all_measures() if only is None else tuple(get_measure(n) for n in only)
+    chosen = all_measures() if only is None else tuple(get_measure(n) for n in names_of(only, "only"))
     low, high, notes = _box(machine, box, task)
     size = force if force is not None else task.force if task.force is not None else 100.0
     path = toolpath or task.toolpath
+    plane = task.plane if plane is None else plane
+    plane_axes(plane)  # refused here: a row would only lack its number
+    for name, number in {"nodes": nodes, "coarse": coarse}.items():
+        whole_number(number, name, 2)
     case = Case(
-        machine, low, high, size, plane or task.plane,
+        machine, low, high, magnitude(size, "force", "N"), plane,
         transmission=task.transmission, proportions=task.proportions, nodes=nodes, coarse=coarse, gap=box_tolerance,
         length=length, gravity=None if gravity is None else real_array(gravity, "gravity"),
         rotation=None if rotation is None else real_array(rotation, "rotation"), threads=threads,

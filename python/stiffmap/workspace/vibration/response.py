@@ -37,7 +37,7 @@ def receptance(modes: TipModes, frequency: Floats, threads: int | None = None) -
     def block(first: int) -> None:
         rows = np.arange(first, min(n, first + BLOCK))
         ok = np.isfinite(modes.rest[rows, 0, 0])
-        out[rows[~ok]] = np.nan
+        out[rows[~ok]] = complex(np.nan, np.nan)
         if ok.any():
             out[rows[ok]] = solve(modes.only(rows[ok]), s)
 

@@ -33,7 +33,7 @@ DATA = Path(__file__).parents[4] / "tests/data/experiments/C-backlash"
             ["map", "five-bar", "--points", "2", "--threads", "1000000000", "-o", "m"],
             "threads: expected at most 4096",
         ),
-        (["map", "five-bar", "--points", "-3", "-o", "m"], "x: expected at least one number"),
+        (["map", "five-bar", "--points", "-3", "-o", "m"], "points: expected 1 or more, got -3"),
     ],
 )
 def test_numbers_out_of_range(

@@ -60,7 +60,7 @@ def test_arguments() -> None:
         mill_job(M, LINE, "trimming", at=(0, 0, 0.3), passes=0)
     with pytest.raises(StiffmapError, match="placement: expected three finite numbers"):
         mill_job(M, LINE, "trimming", at=(0, 0))
-    with pytest.raises(StiffmapError, match="step: expected a length above zero"):
+    with pytest.raises(StiffmapError, match="step: expected a positive number"):
         mill_job(M, LINE, "trimming", at=(0, 0, 0.3), step=0.0)
     with pytest.raises(StiffmapError, match="true_machine: expected the actuators"):
         mill_job(M, LINE, "trimming", at=(0, 0, 0.3), true_machine=sm.load_machine("ur10"))

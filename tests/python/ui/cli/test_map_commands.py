@@ -184,7 +184,7 @@ def test_paper(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
 
 BAD = [
     (("map", "nope"), "unknown machine 'nope'"),
-    (("map", NAME, "--points", "0"), "empty grid"),
+    (("map", NAME, "--points", "0"), "points: expected 1 or more, got 0"),
     (("map", NAME, "--force", "-1"), "a size is a positive number"),
     (("map", NAME, "-o", "/dev/null/x"), "cannot be written"),
     (("map", NAME, "--z", "nan"), "z: expected finite numbers"),

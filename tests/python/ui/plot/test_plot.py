@@ -86,6 +86,8 @@ def test_sweep_shows_unstable_equilibria_apart(machine: sm.Machine) -> None:
     assert "Fx: unstable" in legend(figure)
     stable = np.asarray(figure.axes[0].lines[0].get_ydata())
     assert np.isfinite(stable).sum() == int((swp.status == 0).sum()) < 4
+    alone = plot.sweep_figure(swp).axes[0].lines[0].get_ydata()
+    np.testing.assert_array_equal(np.asarray(alone), stable)
 
 
 def test_skeleton_has_the_bars_at_their_length(machine: sm.Machine) -> None:

@@ -147,6 +147,11 @@ def test_failed_poses_are_nan_with_their_status():
     v = sm.velocity_transmission(machine, [[0, 0, 0], [2.0, 0, 0]])
     assert list(v.status) == [sm.Status.CONVERGED, sm.Status.UNREACHABLE]
     assert np.isnan(v.sphere_min[1]) and np.isnan(v.cube_max[1]) and not np.isnan(v.sphere_min[0])
+    far = [[0, 0, 0], [2.0, 0, 0]]
+    bias, corner = sm.force_transmission(machine, far).bias, sm.accuracy_transmission(machine, far).corner
+    response = sm.frequency_response(machine, far, [10.0], damping=0.02).values
+    for found in (bias, corner, response.real, response.imag):
+        assert np.isfinite(found[0]).all() and np.isnan(found[1]).all()
 
 
 @pytest.mark.parametrize("bad", [-1.0, 0.0, float("nan")])

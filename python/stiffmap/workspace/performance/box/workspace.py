@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
-from stiffmap.common.broadcasting import Floats, random_numbers, real_array, real_number, whole_number
+from stiffmap.common.broadcasting import Floats, random_numbers, real_number, trailing, whole_number
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.short import short_repr
 from stiffmap.model.files.load import Source
@@ -58,7 +58,7 @@ class Workspace:
 
     def at(self, position: ArrayLike) -> JudgedPoses:
         """Poses (n, 3) m judged likewise, each begun at the nearest one drawn."""
-        return self.ask(real_array(position, "position").reshape(-1, 3), self.drawn)
+        return self.ask(trailing(position, (3,), "position", "positions (m)").reshape(-1, 3), self.drawn)
 
 
 @keywords_of(Bounds)

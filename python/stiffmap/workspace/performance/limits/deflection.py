@@ -8,7 +8,8 @@ from itertools import product
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from stiffmap.common.broadcasting import Floats, real_array, whole_number
+from stiffmap.common.broadcasting import Floats, trailing, whole_number
+from stiffmap.common.errors import StiffmapError
 from stiffmap.common.short import short_repr
 from stiffmap.solve.machine import Machine, takes_machine
 from stiffmap.solve.solution import Solution
@@ -95,7 +96,9 @@ def worst_deflection(
     loading = Loading(machine, rotation=rotation, gravity=gravity, threads=threads)
     ask = _Ask(loading, force, axes, direction, linear, turns)
     if position is not None:
-        p = real_array(position, "position").reshape(-1, 3)
+        if box is not None:
+            raise StiffmapError("worst_deflection: expected position or box, got both")
+        p = trailing(position, (3,), "position", "positions (m)").reshape(-1, 3)
         return _result(ask, p, *ask.at(p), plane)
     low, high = read_box(machine, box)
     p = box_nodes(low, high, nodes)
@@ -121,8 +124,12 @@ class _Ask:
         axes, unit = list(self.axes), np.zeros((len(p), 3))
         start = self._solve(p, unit, stiffness=True)
         if self.direction is not None:
-            unit = np.broadcast_to(real_array(self.direction, "direction"), p.shape)
-            unit = unit / np.linalg.norm(unit, axis=1, keepdims=True)
+            unit = trailing(self.direction, (3,), "direction", "directions")
+            size = np.linalg.norm(unit, axis=-1, keepdims=True)
+            if unit.shape not in ((3,), (1, 3), p.shape) or not (np.isfinite(size) & (size > 0)).all():
+                raise StiffmapError(f"direction: expected one or {len(p)} vectors of 3 finite numbers, not all 0, "
+                                    f"got {unit.tolist()}")  # fmt: skip
+            unit = np.broadcast_to(unit / size, p.shape)
             return self._loaded(p, unit, start)
         unit[:, axes] = np.linalg.svd(np.nan_to_num(start.compliance[:, axes][:, :, axes]))[2][:, 0]
         value, way, status = self._loaded(p, unit, start)

@@ -136,7 +136,7 @@ def rest_efforts(
     shape, drives = k.status.shape, k.actuators.shape[-1]
     g = machine.compiled.gravity(gravity)
     if velocity is None and not g.any():
-        return np.zeros((*shape, drives))
+        return np.where(np.isnan(k.actuators), np.nan, 0.0)
     need_masses(machine, "gravity" if velocity is None else "motion")
     flat = k.coordinates.reshape(-1, k.coordinates.shape[-1])
     twist = np.zeros((len(flat), 6))

@@ -28,10 +28,11 @@ def farthest_vertex(j: Floats) -> Floats:
 
 
 def worst_corner(j: Floats) -> Floats:
-    """(..., drives) the corner whose image is farthest."""
+    """(..., drives) the corner whose image is farthest; NaN where there is none."""
     signs = corners(j.shape[-1])
     images = j @ signs.T
-    return np.asarray(signs[np.argmax((images**2).sum(axis=-2), axis=-1)])
+    size = (images**2).sum(axis=-2)
+    return np.where(np.isnan(size).any(axis=-1, keepdims=True), np.nan, signs[np.argmax(size, axis=-1)])
 
 
 def inverse_rows(j: Floats) -> Floats:
