@@ -58,7 +58,8 @@ def misfit(machine: sm.Machine, data: Set) -> Misfit:
     back = back.reshape(-1)
     predicted = machine.solve(unique[:, :3], unique[:, 3:]).displacement
     if data.loaded:
-        predicted = predicted - machine.solve(unique[:, :3]).displacement
+        places, of = np.unique(unique[:, :3], axis=0, return_inverse=True)
+        predicted = predicted - machine.solve(places).displacement[of.reshape(-1)]
     residual = (data.reading - predicted[back, :3]) / data.noise
     count = np.bincount(back)
     means = np.array([residual[back == i].mean(axis=0) for i in range(len(unique))])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import pytest
 from tests.python.model.effects.measured import misfit, read, usual
 
@@ -27,26 +29,31 @@ WRONG = [
 ]
 
 
-def with_effect(machine, effect):
-    return machine if effect is None else machine.with_effect(**effect)
+@cache
+def found_with_truth(machine, name):
+    return found_with(machine, name, TRUTH[name])
+
+
+def found_with(machine, name, effect):
+    return misfit(machine if effect is None else machine.with_effect(**effect), read(name))
 
 
 @pytest.mark.parametrize("name", TRUTH)
 def test_residual_is_noise(orthoglide, name):
-    found = misfit(with_effect(orthoglide, TRUTH[name]), read(name))
+    found = found_with_truth(orthoglide, name)
     assert usual(found.means, found.n_means)
 
 
 @pytest.mark.parametrize("name", ["A-servo", "B-none", "D-gravity", "E-leglength"])
 def test_all_residuals_are_noise(orthoglide, name):
-    found = misfit(with_effect(orthoglide, TRUTH[name]), read(name))
+    found = found_with_truth(orthoglide, name)
     assert usual(found.all, found.n_all)
 
 
 def test_set_c_is_quieter_than_its_declared_noise(orthoglide):
     """Its rms is 0.963 of the declared noise, under the 95 % range, because its repeats scatter as little
     about their own means (0.951, also under), which no model can change: the model part is usual."""
-    found = misfit(with_effect(orthoglide, TRUTH["C-backlash"]), read("C-backlash"))
+    found = found_with_truth(orthoglide, "C-backlash")
     assert found.all == pytest.approx(0.963**2, abs=1e-3)
     assert found.repeats == pytest.approx(0.951**2, abs=1e-3)
     assert not usual(found.repeats, found.n_all - found.n_means)
@@ -55,6 +62,6 @@ def test_set_c_is_quieter_than_its_declared_noise(orthoglide):
 @pytest.mark.parametrize(("name", "change"), WRONG)
 def test_residual_is_not_noise(orthoglide, name, change):
     effect = None if change is None else {**(TRUTH[name] or {}), **change}
-    found = misfit(with_effect(orthoglide, effect), read(name))
+    found = found_with(orthoglide, name, effect)
     assert not usual(found.means, found.n_means)
     assert not usual(found.all, found.n_all)
