@@ -103,7 +103,7 @@ def make_workshop(at: Path) -> Path:
         simulate(
             "orthoglide-revised", month, "--seed", seed, "--effect", "dead_zone actuator y half_width=10um"
         )
-    assert main(["map", "orthoglide-revised", "--points", "5", "-o", str(at / "results")]) == 0
+    assert main(["map", "orthoglide-revised", "--points", "5", "--no-pictures", "-o", str(at / "results")]) == 0
     (at / "poses.csv").write_text("x [mm],y [mm],z [mm]\n0,0,0\n100,-50,80\n", encoding="utf-8")
     (at / "my_poses.csv").write_text("x,y,z,fx\n0,0,0,100\n100,-50,80,200\n", encoding="utf-8")
     p = np.array(sm.load_machine("ur10").description.home.p) * 1e3
@@ -198,7 +198,7 @@ def test_examples_run(
     if name == "link":
         pytest.importorskip("gmsh", reason="needs the extra [fea]", exc_type=(ImportError, OSError))
     if name == "compensate":  # goes on from a map, which the examples of `map` replace
-        main(["map", "orthoglide-revised", "--points", "5", "-o", str(workshop / "results")])
+        main(["map", "orthoglide-revised", "--points", "5", "--no-pictures", "-o", str(workshop / "results")])
     if name == "monitor":  # goes on from a diagnosis
         diagnosed(workshop / "january", workshop / "january")
     if name == "bench":
