@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from functools import cache
 
 import numpy as np
 import pytest
@@ -81,6 +82,7 @@ RESIDUES = {
 }
 
 
+@cache
 def published_receptance():
     f = np.linspace(100, 3000, 20001)
     s = 2j * np.pi * f
@@ -313,19 +315,26 @@ def test_limiting_depth_is_no_deeper_than_any_sample(name):
     assert float(ds.limiting_depth[0]) <= least * (1 + 1e-5)
 
 
+@cache
+def dense_limits(name):
+    """Samples so dense that no limit lies between them: machine, frequencies, depths, angles."""
+    machine = sm.load_machine(name)
+    at = machine.description.home.p
+    own = sm.natural_frequencies(machine, at, modes=6).frequency
+    axes = cut_axes(np.array([1.0, 0, 0]), np.array([0, 0, 1.0]))
+    many = np.linspace(0.3 * np.nanmin(own), 2 * np.nanmax(own), 20_001)
+    H = sm.frequency_response(machine, at, many).values[:, :3, :3]
+    return machine, many, *limits(axes @ H @ axes.T, milling_process("slot"))
+
+
 @pytest.mark.parametrize("name", ["ur10", "linear-delta", "orthoglide-revised", "hexapod"])
 @pytest.mark.parametrize(("count", "noise"), [(5, 0.0), (10, 0.0), (20, 0.0), (60, 0.0), (60, 1e-3)])
 @pytest.mark.parametrize("speed", [None, "6000 rpm"])
 def test_few_or_noisy_samples_are_safe_or_an_estimate(name, count, noise, speed):
-    machine = sm.load_machine(name)
-    at = machine.description.home.p
-    own = sm.natural_frequencies(machine, at, modes=6).frequency
-    f = np.linspace(0.3 * np.nanmin(own), 2 * np.nanmax(own), count)
-    axes, p = cut_axes(np.array([1.0, 0, 0]), np.array([0, 0, 1.0])), milling_process("slot")
-    many = np.linspace(f[0], f[-1], 20_001)
-    depth, angle = limits(axes @ sm.frequency_response(machine, at, many).values[:, :3, :3] @ axes.T, p)
+    machine, many, depth, angle = dense_limits(name)
+    f, p = np.linspace(many[0], many[-1], count), milling_process("slot")
     dense = depth.min() if speed is None else at_periods(many, depth, angle, np.array([np.pi / p.spindle]))[0]
-    H = sm.frequency_response(machine, at, f)
+    H = sm.frequency_response(machine, machine.description.home.p, f)
     rng = np.random.default_rng(1)
     H = H + noise * np.abs(H) * (rng.normal(size=H.shape) + 1j * rng.normal(size=H.shape))
     with warnings.catch_warnings(record=True) as said:
