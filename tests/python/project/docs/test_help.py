@@ -103,7 +103,9 @@ def make_workshop(at: Path) -> Path:
         simulate(
             "orthoglide-revised", month, "--seed", seed, "--effect", "dead_zone actuator y half_width=10um"
         )
-    assert main(["map", "orthoglide-revised", "--points", "5", "--no-pictures", "-o", str(at / "results")]) == 0
+    assert (
+        main(["map", "orthoglide-revised", "--points", "5", "--no-pictures", "-o", str(at / "results")]) == 0
+    )
     (at / "poses.csv").write_text("x [mm],y [mm],z [mm]\n0,0,0\n100,-50,80\n", encoding="utf-8")
     (at / "my_poses.csv").write_text("x,y,z,fx\n0,0,0,100\n100,-50,80,200\n", encoding="utf-8")
     p = np.array(sm.load_machine("ur10").description.home.p) * 1e3
