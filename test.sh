@@ -15,4 +15,5 @@ export PATH="$PWD/${VENV:-.venv}/bin:$PATH"
 python -m pip install --quiet --no-compile --group test
 ctest --test-dir build/core --output-on-failure --parallel 2
 export OPENBLAS_NUM_THREADS=1  # the workers share the processors: with threads of their own they take three times as long
+export PYTHONDONTWRITEBYTECODE=  # a hundred tests start processes of their own: each would compile all modules anew
 python -m pytest -n auto --dist worksteal "${lane[@]}" "$@"

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from scipy.stats import norm
 
-from stiffmap.common.broadcasting import thread_count
 from stiffmap.experiment.experiment import Floats
 from stiffmap.identification.inference.amplitudes import Fit
 from stiffmap.identification.inference.constants import SIZES
@@ -29,23 +27,15 @@ def evidence(fit: Fit, places: tuple[Place, ...]) -> list[Floats]:
             fit.gain[id(p)] = np.empty(len(p.shapes))
             for k, s in enumerate(p.shapes):
                 by_rank.setdefault(s.directions.shape[1], []).append((fit.gain[id(p)], k, s))
-    some = [
-        members[begin : begin + max(1, AT_ONCE // rank)]
-        for rank, members in by_rank.items()
-        for begin in range(0, len(members), max(1, AT_ONCE // rank))
-    ]
-    with ThreadPoolExecutor(thread_count(None)) as pool:
-        for members, found in zip(
-            some, pool.map(lambda m: _of_rank(fit, [s for _, _, s in m]), some), strict=True
-        ):
-            for (to, k, _), gain in zip(members, found, strict=True):
+    for rank, members in by_rank.items():
+        for begin in range(0, len(members), max(1, AT_ONCE // rank)):
+            some = members[begin : begin + max(1, AT_ONCE // rank)]
+            for (to, k, _), gain in zip(some, _of_rank(fit, [s for _, _, s in some], rank), strict=True):
                 to[k] = gain
     return [fit.gain[id(p)] for p in places]
 
 
-def _of_rank(fit: Fit, shapes: list[Shape]) -> Floats:
-    """(shapes,) of shapes that have equally many directions."""
-    rank = shapes[0].directions.shape[1]
+def _of_rank(fit: Fit, shapes: list[Shape], rank: int) -> Floats:
     directions = np.concatenate([s.directions for s in shapes], axis=1)
     scale = len(fit.columns) / rank  # of a factor's square over that of the directions
     white = fit.white(directions).T.reshape(len(shapes), rank, -1)

@@ -49,7 +49,7 @@ def test_what_can_only_grow_is_worth_twice_as_much_one_way_and_little_the_other(
     _, fit, shapes, _ = setting(7, (1,))
     u = shapes[0].directions
     both = [Shape(shapes[0].variant, u, s) for s in (0, 1, -1)]
-    free, up, down = np.exp(candidates._of_rank(fit, both))
+    free, up, down = np.exp(candidates._of_rank(fit, both, 1))
     assert up + down == pytest.approx(2.0 * free, rel=1e-9)
     assert (up > down) == (float(u[:, 0] @ fit.solved) > 0.0)
 
