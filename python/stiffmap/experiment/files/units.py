@@ -6,7 +6,7 @@ from collections.abc import Collection
 from dataclasses import replace
 
 from stiffmap.common.errors import FileError
-from stiffmap.common.tables.header import refuse_twice
+from stiffmap.common.tables.header import refuse_twice, split_unit
 from stiffmap.common.tables.table import Table
 from stiffmap.common.units import known, name_and_unit, size_of, unit_of
 from stiffmap.experiment.files.fields import base_of, quantity_of
@@ -34,9 +34,9 @@ class Units:
         self.joints = {name: "angle" if unit in ANGLES else "length" for name, unit in joints.items()}
 
     def of_header(self, table: Table, whole: Collection[str] = ()) -> Table:
-        """The table with the bare names of columns such as ``x [mm]`` and the SI sizes of their units: those of the header,
-        else those of the file. Names in `whole` are bare. Raises `FileError`."""
-        split = [(h, "") if h in whole else name_and_unit(h) for h in table.header]
+        """The table with the bare names of columns such as ``x [mm]``, ``x_mm`` and ``X`` and the SI sizes of their units: those of
+        the header, else those of the file. Names in `whole` are bare. Raises `FileError`."""
+        split = [(h, "") if h in whole else self._split(h) for h in table.header]
         names = tuple(name for name, _ in split)
         refuse_twice(names, table.file, 1)
         of_header = {name: self._written(name, unit, table) for name, unit in split if unit}
@@ -60,6 +60,13 @@ class Units:
                 f"units: the unit '{lost}' is not declared (column '{column}' needs it)", file=self.file
             )
         return size
+
+    def _split(self, header: str) -> tuple[str, str]:
+        """Name and unit: in the first way of writing that makes it a known column."""
+        ways = (name_and_unit(header), split_unit(header))
+        each = ((name, unit) for text, unit in ways for name in (text, text.lower()))
+        columns = (*known_columns(), *self.joints)
+        return next((way for way in each if base_of(way[0]) in columns), ways[0])
 
     def _written(self, column: str, text: str, table: Table) -> float:
         """SI size of the unit in a header; where the file declares none, it is that of the column's noise as well."""

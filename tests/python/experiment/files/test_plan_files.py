@@ -17,9 +17,18 @@ def plan(folder: Path, text: str) -> sm.Experiment:
     return load_plan(folder / "p.csv", sm.load_machine("linear-delta"), "position")
 
 
-def test_headers_may_name_their_units(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "text",
+    [
+        "x [cm],y [µm],z,fx [kN]\n1,20000,300,0.1\n",
+        "x_mm,y_um,z_cm,fx_kN\n10,20000,30,0.1\n",
+        "X (mm);Y (cm);Z (mm);Fx (N)\n10,0;2,0;300;100\n",
+        "X / mm,Y / mm,Z / mm,FX / N\n10,20,300,100\n",
+    ],
+)
+def test_headers_may_name_their_units(text: str, tmp_path: Path) -> None:
     bare = plan(tmp_path, "x,y,z,fx\n10,20,300,100\n")
-    own = plan(tmp_path, "x [cm],y [µm],z,fx [kN]\n1,20000,300,0.1\n")
+    own = plan(tmp_path, text)
     np.testing.assert_allclose(own.position, bare.position, rtol=1e-15)
     np.testing.assert_allclose(own.position, [[0.01, 0.02, 0.3]], rtol=1e-15)
     np.testing.assert_allclose(own.wrench, bare.wrench, rtol=1e-15)
