@@ -299,6 +299,8 @@ def _optimum(
         begun = _optimum(columns, parts, t, weights)
         t, weights = begun.t, _heavy(begun, *noise_part(begun))
     damping, noise = SHRINK, columns.spared.of_noise(1.0 / weights)
+    most = np.array([np.inf, *(p.most for p in parts)])
+    t = np.minimum(t, most)
     fit, along = _evaluate(columns, parts, t, weights, noise)
     gradient, information = None, _information(fit, along)
     for _ in range(WEIGHINGS if heavy else STEPS):
@@ -310,8 +312,12 @@ def _optimum(
                 weights = _heavy(fit, *noise_part(fit, at_readings))
                 noise = columns.spared.of_noise(1.0 / weights)
         scale = np.maximum(np.diag(information), 1e-2)
-        step = np.linalg.solve(information + damping * np.diag(scale), gradient)
-        step = np.clip(step, -LARGEST_STEP, LARGEST_STEP)
+        free = np.flatnonzero((fit.t < most) | (gradient < 0.0))
+        step = np.zeros(len(t))
+        step[free] = np.linalg.solve(
+            (information + damping * np.diag(scale))[np.ix_(free, free)], gradient[free]
+        )
+        step = np.clip(step, -LARGEST_STEP, np.minimum(LARGEST_STEP, most - fit.t))
         sinks = (fit.t + step < SINKS) & (step < 0.0)
         moved, along_there = _evaluate(columns, parts, np.where(sinks, OFF, fit.t + step), weights, noise)
         gain = moved.score - fit.score

@@ -8,7 +8,7 @@ import numpy as np
 
 from stiffmap.experiment.experiment import Floats
 from stiffmap.identification.inference.columns import Columns
-from stiffmap.identification.inference.constants import NUMBERS_SD
+from stiffmap.identification.inference.constants import NUMBERS_SD, WIDEST
 
 GAPS = ("field", "pose")
 """Kinds of parts that nobody can name."""
@@ -31,6 +31,12 @@ class Part:
             return np.asarray(self.factor @ (self.factor.T @ values))
         assert self.full is not None
         return np.asarray(self.full @ values)
+
+    @property
+    def most(self) -> float:
+        """Largest ln variance: what carries over in time is noise, if not of what is stated; else it takes whatever is smooth in a
+        series that was read in order, and effects are judged by what they change from one reading to the next."""
+        return WIDEST if self.kind == "time" else np.inf
 
     @property
     def sd(self) -> float:

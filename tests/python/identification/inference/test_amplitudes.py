@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import multivariate_normal, norm, t
 from tests.python.identification.inference.synthetic import READINGS, columns, parts
 
 from stiffmap.identification.inference import amplitudes
-from stiffmap.identification.inference.constants import DEGREES, NOISE_SD, NUMBERS_SD, SIZES
+from stiffmap.identification.inference.constants import DEGREES, NOISE_SD, NUMBERS_SD, SIZES, WIDEST
 from stiffmap.identification.inference.shares import shares
 
 
@@ -146,3 +148,26 @@ def test_shares_are_those_of_the_readings_that_do_not_stand_alone():
     means.append(np.exp(at[0]) * (c.free @ solved)[kept])
     squares = np.array([np.sum(m**2) for m in means])
     assert list(found.values()) == pytest.approx(list(squares / squares.sum()), rel=1e-8)
+
+
+def test_what_carries_over_in_time_is_bounded_and_all_else_is_best_next_to_it():
+    rng = np.random.default_rng(2)
+    c, (numbers, gap, effect) = columns(rng), parts(rng)
+    some = (numbers, replace(gap, name="wander", kind="time"), effect)
+    truth = np.array([0.0, -30.0, 9.0, 5.0])
+    drawn = np.linalg.cholesky(dense(c, some, truth, np.ones(READINGS))) @ rng.normal(size=len(c))
+    c = columns(np.random.default_rng(2), drawn)
+    fit = amplitudes._optimum(c, some, np.zeros(4), np.ones(READINGS))
+    assert (
+        fit.t[2]
+        == WIDEST
+        < amplitudes._optimum(c, (numbers, gap, effect), np.zeros(4), np.ones(READINGS)).t[2]
+    )
+    for k in (0, 3):
+        for step in (-0.3, 0.3):
+            other = fit.t + step * np.eye(4)[k]
+            noise = c.free.T @ c.free
+            assert (
+                amplitudes._evaluate(c, some, other, fit.weights, noise)[0].score
+                < amplitudes._evaluate(c, some, fit.t, fit.weights, noise)[0].score
+            )
