@@ -20,6 +20,7 @@ from board.row import Row
 from board.sources import SOURCES, absent
 from stiffmap.experiment import Experiment
 from stiffmap.experiment.files.load import load_experiment
+from stiffmap.identification.calibration import Calibration
 from stiffmap.identification.diagnosis import Diagnosis
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
@@ -136,7 +137,7 @@ def ur10(data: Path, asked: Asked) -> Iterator[dict[str, Any]]:
             yield {
                 "set": f"UR10, laser tracker, series {series} ({kind})",
                 "quantity": "rms length of the position error, mm",
-                **_left_out(d, LENGTH, begun),
+                **_left_out(d, _cause(d), LENGTH, begun),
                 "unseen_by": "five folds of poses" + (f", one row of {every}" if every > 1 else ""),
                 "peers": beside_arm(folder, asked.peers) if series == "C" else (),
             }
@@ -196,13 +197,14 @@ def _cause(d: Diagnosis) -> str:
     )
 
 
-def _left_out(d: Diagnosis, factor: float, begun: float) -> dict[str, Any]:
+def _left_out(found: Diagnosis | Calibration, cause: str, factor: float, begun: float) -> dict[str, Any]:
     """Fields of a set that is predicted fold by fold, begun at a processor time; factor: from SI."""
+    assert found.held_out is not None
     return {
-        "before": factor * d.before.size[0],
-        "after": factor * d.after.size[0],
-        "unseen_rows": len(d.experiment),
-        "cause": _cause(d),
+        "before": factor * found.held_out.before.size[0],
+        "after": factor * found.held_out.after.size[0],
+        "unseen_rows": len(found.experiment),
+        "cause": cause,
         "seconds": time.process_time() - begun,
     }
 
@@ -222,18 +224,13 @@ def delta(data: Path, asked: Asked) -> Iterator[dict[str, Any]]:
         lines = [["id", "setup", "qa", "qb", "qc", "contact"], *example.rows(data, every)]
         text = "\n".join(",".join(map(str, line)) for line in lines)
         (folder / "heights" / "data.csv").write_text(text + "\n", encoding="utf-8")
-        c = sm.calibrate(
-            folder / "flsun.yaml", folder / "heights"
-        )  # a diagnosis of all rows takes a quarter of an hour
+        # a diagnosis of all rows takes more than ten minutes
+        c = sm.calibrate(folder / "flsun.yaml", folder / "heights")
         assert c.held_out is not None
         yield {
             "quantity": "rms of the height, mm",
-            "before": 1e3 * c.held_out.before.rms,
-            "after": 1e3 * c.held_out.after.rms,
-            "unseen_rows": len(c.experiment),
+            **_left_out(c, f"calibration: {c.verdict}", 1e3, begun),
             "unseen_by": f"left out: {c.held_out.by}, one after the other",
-            "cause": f"calibration: {c.verdict}",
-            "seconds": time.process_time() - begun,
         }
 
 
@@ -252,7 +249,7 @@ def gearbox(data: Path, asked: Asked) -> Iterator[dict[str, Any]]:
             yield {
                 "set": f"Cycloidal actuator, {variant.replace('_', ' ')}, {state.replace('_', ' ')}",
                 "quantity": "rms of the twist, deg",
-                **_left_out(d, math.degrees(1.0), begun),
+                **_left_out(d, _cause(d), math.degrees(1.0), begun),
                 "unseen_by": "ramps of torque, one after the other",
             }
 

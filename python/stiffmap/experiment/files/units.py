@@ -32,6 +32,7 @@ class Units:
         joints |= {name: c.unit for name, c in (model.joints | model.command).items()}
         self.own = {name: size_of(u) for name, u in (given | joints).items()}
         self.joints = {name: "angle" if unit in ANGLES else "length" for name, unit in joints.items()}
+        self.columns = {*known_columns(), *self.joints}
 
     def of_header(self, table: Table, whole: Collection[str] = ()) -> Table:
         """The table with the bare names of columns such as ``x [mm]``, ``x_mm`` and ``X`` and the SI sizes of their units: those of
@@ -65,13 +66,12 @@ class Units:
         """Name and unit: in the first way of writing that makes it a known column."""
         ways = (name_and_unit(header), split_unit(header))
         each = ((name, unit) for text, unit in ways for name in (text, text.lower()))
-        columns = (*known_columns(), *self.joints)
-        return next((way for way in each if base_of(way[0]) in columns), ways[0])
+        return next((way for way in each if base_of(way[0]) in self.columns), ways[0])
 
     def _written(self, column: str, text: str, table: Table) -> float:
         """SI size of the unit in a header; where the file declares none, it is that of the column's noise as well."""
         base = base_of(column)
-        if text.lower() in TIMES.get(base, ()) or base not in (*known_columns(), *self.joints):
+        if text.lower() in TIMES.get(base, ()) or base not in self.columns:
             return 1.0  # what is not known is refused by its name later
         quantity = self.joints.get(base) or quantity_of(base)
         unit = unit_of(text, quantity) if quantity else None

@@ -69,6 +69,8 @@ def infer(
 
     used = np.isin(np.arange(len(e)), found.rows)
     drawn = predictor if used.all() else predictor.beside(rows=used)
+    at = (np.cumsum(used) - 1)[found.rows], found.channel
+    before = plan.base[found.rows, found.channel]
 
     def predict(chosen: Sequence[Chosen]) -> Floats:
         added = terms(chosen)
@@ -77,8 +79,7 @@ def infer(
             shown = predictor(added)[used] if whole else drawn(added)
         except StiffmapError:  # too large for the machine: the columns alone must do
             return np.full(len(found), np.nan)
-        change = (shown - plan.base[used])[(np.cumsum(used) - 1)[found.rows], found.channel]
-        return found.rotated(change)
+        return found.rotated(shown[at] - before)
 
     clock.say("all effects at once")
     search = searched(found, predict, lambda: clock.over, travel=travel)

@@ -102,9 +102,8 @@ def sweep_figure(
 
     Unstable equilibria are drawn as open circles; failed ones leave a gap and a cross on the axis.
     """
-    given = (
-        {"deflection": panels} if isinstance(panels, xr.Dataset) else panels
-    )  # a Dataset is a mapping as well
+    # a Dataset is a mapping as well
+    given = {"deflection": panels} if isinstance(panels, xr.Dataset) else panels
     many = [given] if isinstance(given, Mapping) else list(given)
     with paper(max(2.3 * len(many) + 0.6, 4.0), 3.1) as figure:
         first = [next(iter(lines.values())) for lines in many]
