@@ -14,6 +14,9 @@ from stiffmap.experiment import Experiment, Predictor, random_plan
 from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.virtual.plans import plan_of_joints
 from stiffmap.identification.calibration import Calibration, calibrate
+from stiffmap.identification.diagnosis import answer
+from stiffmap.identification.inference.corrected import Corrected, machine_of
+from stiffmap.identification.inference.machines import written
 from stiffmap.identification.inference.travel import DriveErrors, apart, hats
 from stiffmap.model.with_errors import edited
 from stiffmap.ui.cli.calibrate import write
@@ -121,7 +124,7 @@ def test_drives_of_the_platform_have_a_travel_too() -> None:
     assert "a 0 deg" in str(c.validity)
 
 
-def test_a_corrected_machine_has_what_waves_leave_along_the_travel() -> None:
+def test_a_corrected_machine_has_what_waves_leave_along_the_travel(monkeypatch: pytest.MonkeyPatch) -> None:
     """A bump of one screw next to a wave of another: no effect is a bump, and a file without it predicts worse than a calibration."""
     machine = sm.load_machine("orthoglide-original")
     plan = random_plan(machine, "position", poses=80, repeats=1, seed=2)
@@ -133,6 +136,8 @@ def test_a_corrected_machine_has_what_waves_leave_along_the_travel() -> None:
     knots = {"z.actuator": tuple(zip(at.tolist(), bump.tolist(), strict=True))}
     off = sm.Machine(edited(rippled.description, {}, knots), like=rippled)
     e = read(plan, Predictor(off, plan)())
+    models: dict[str, Corrected] = {}
+    monkeypatch.setattr(answer, "written", lambda some, *a: models.update(some) or written(some, *a))
     d, c = sm.diagnose(machine, e), calibrate(machine, e)
     assert d.which == "corrected" and ("periodic_error", ("y",)) in [
         (f.kind, tuple(f.legs)) for f in d.effects
@@ -141,3 +146,5 @@ def test_a_corrected_machine_has_what_waves_leave_along_the_travel() -> None:
     (y,) = (f for f in d.effects if tuple(f.legs) == ("y",))
     (kept,) = (f for f in d.machine.description.effects if f.legs == ("y",))
     assert dict(kept.parameters)["amplitude"] == y.parameters["amplitude"][0]
+    beside, alone = (Predictor(m, plan)() for m in (machine_of(models["calibrated"]), c.machine))
+    assert beside == pytest.approx(alone, abs=1e-9, nan_ok=True)  # it competes with what `calibrate` gives

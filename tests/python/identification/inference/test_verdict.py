@@ -200,3 +200,15 @@ def test_of_a_compliance_its_logarithm_is_within_tolerance(unit, value, beyond):
     c = replace(c, numbers=20.0 * c.numbers, residual=20.0 * value * c.numbers[:, 0])
     c = replace(c, unknowns=(replace(one, unit=unit, u=0.2),))
     assert len(list(verdict.out_of_tolerance(c, amplitudes.fitted(c, Parts(c).numbers)))) == beyond
+
+
+@pytest.mark.parametrize(("ln_variance", "named"), [(3.0, "wander"), (0.7, "")])
+def test_what_carries_over_in_time_far_beyond_the_noise_is_left_over(ln_variance: float, named: str) -> None:
+    rng = np.random.default_rng(4)
+    c = columns(rng)
+    place = np.arange(len(c))
+    wander = Part("wander", "time", full=np.exp(-np.abs(place[:, None] - place) / 8.0))
+    v = np.eye(len(c)) + np.exp(ln_variance) * wander.full
+    c = replace(c, residual=np.linalg.cholesky(v) @ rng.normal(size=len(c)), zero=np.zeros_like(v))
+    fit = amplitudes.evaluated(c, [wander], np.array([0.0, ln_variance]), np.ones(READINGS))
+    assert verdict.left(fit) == (named, "wander")
