@@ -43,7 +43,8 @@ struct Laws {
     }
   }
 
-  /// As the reference: what bears nothing stays at its centre, friction opposes the deflection.
+  /// As the reference: what bears nothing stays at its centre, a preload is borne besides, friction opposes the
+  /// deflection.
   /// Returns the lanes in which it is doubtful whether something bears and that matters: round-off decides, and the
   /// reference's counts.
   [[gnu::noinline]] M start(M active) {
@@ -63,7 +64,7 @@ struct Laws {
       const LawProgram& law = P.laws[k.law];
       const V tau = select(bears, s.linear[q] * linear, splat(0)), side = sign(tau);
       const V spring = tau - law.friction * side;
-      const V z = k.by_force ? spring / s.linear[q] : from_force(law, spring, s.linear[q]);
+      const V z = k.by_force ? spring / s.linear[q] : from_force(law, preload(law, s.linear[q]) + spring, s.linear[q]);
       s.friction_sign[q] = select(active, side, s.friction_sign[q]);
       s.z[q] = select(active, select(bears, z, splat(0)), s.z[q]);
     }
@@ -113,6 +114,17 @@ struct Laws {
  private:
   static constexpr double unloaded = 1e-11;
   static constexpr double doubt = 1.5;  ///< factor about it; closures of the two paths differ by some 1e-14
+
+  /// What the law bears at parameter zero.
+  V preload(const LawProgram& law, V k) const {
+    if (law.count == 0) return splat(0);
+    const double* n = P.knots + 3 * law.first;
+    const double* last = n + 3 * (law.count - 1);
+    if (n[2] >= 0) return splat(n[1]) - k * splat(n[0]);
+    if (last[2] <= 0) return splat(last[1]) - k * splat(last[0]);
+    while (n[5] < 0) n += 3;
+    return splat(n[1] - n[2] / (n[5] - n[2]) * (n[4] - n[1]));
+  }
 
   /// At the law's own parameter.
   void put(const LawProgram& law, int q) {

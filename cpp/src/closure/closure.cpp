@@ -296,7 +296,9 @@ ClosureResult follow_actuators(const Mechanism& m, const VecX& actuators, Closur
       trial[j] = from[j] + s * (actuators[static_cast<Index>(i)] - from[j]);
     }
   };
-  bool ok = continuation(m, Target{}, set, ws, x, out);
+  const bool closed = ws.unknown.empty() && m.loops.empty() && m.cables.empty();  // an arm: wherever its drives stand
+  if (closed) set(1.0, x);
+  bool ok = closed || continuation(m, Target{}, set, ws, x, out);
   if (!ok) {
     set(1.0, x);
     ok = across_fold(m, ws, x, out.iterations);

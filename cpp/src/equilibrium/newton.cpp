@@ -18,9 +18,9 @@ constexpr double unloaded = 1e-11;
 /// The same for the force that a gap would have to bear at an equilibrium: certainly noise, and certainly a force.
 constexpr double gap_noise = 1e-15, gap_force = 1e-14;
 
-/// After an iteration with all laws linear: put each law where it carries the force just found. One
-/// that bears nothing stays at its centre, friction opposes the deflection just found: at any share of the load as at
-/// the whole of it.
+/// After an iteration with all laws linear: put each law where it carries the force just found besides what it carried
+/// before. One that bears nothing stays at its centre, friction opposes the deflection just found: at any share of the
+/// load as at the whole of it.
 void start_laws(const Mechanism& m, Problem& p, State& state) {
   for (Index j = 0; j < m.size(); ++j) {
     const Coordinate& c = m.coordinates[at(j)];
@@ -31,7 +31,7 @@ void start_laws(const Mechanism& m, Problem& p, State& state) {
     const double tau = bears ? law.stiffness() / p.drive_scale[j] * state.z[j] : 0.0;
     p.friction_sign[j] = tau > 0 ? 1 : tau < 0 ? -1 : 0;
     const double in_spring = tau - law.friction() * p.friction_sign[j];
-    state.z[j] = bears ? law.from_force(in_spring, p.drive_scale[j]) : 0.0;
+    state.z[j] = bears ? law.from_force(law.at(0, p.drive_scale[j]).tau + in_spring, p.drive_scale[j]) : 0.0;
   }
 }
 

@@ -16,8 +16,9 @@ void forward(const Mechanism& m, Geometry geometry, const VecX& x, Frames& out, 
     const Vec3 w = T.R * n.axis;
     out.axis.col(n.coordinate) = w;
     out.origin.col(n.coordinate) = T.p;
-    if (n.type == JointType::prismatic) T.p += x[n.coordinate] * w;
-    else T.R = (T.R * rotation_about(n.axis, x[n.coordinate])).eval();
+    const double q = x[n.coordinate];
+    if (n.type == JointType::prismatic) T.p += q * w;
+    else if (q != 0) T.R = (T.R * rotation_about(n.axis, q)).eval();  // springs mostly stand at zero
     if (ball >= 0 && m.balls[at(ball)].first + 2 == n.coordinate) T.R = (T.R * charts->turns[at(ball)].after).eval();
   }
 }
