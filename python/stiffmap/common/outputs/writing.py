@@ -13,7 +13,6 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from stiffmap.common.broadcasting import given_path
 from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.outputs.alone import is_device, only_job, refused, reserved, short
 from stiffmap.common.outputs.keeping import check_replaceable, note_written
@@ -29,7 +28,9 @@ def writing(path: str | os.PathLike[str]) -> Iterator[Path]:
     A symbolic link stays and its file is replaced; a device or a pipe is given the whole file at its end. Raises
     FileError where it cannot be written or another job writes it.
     """
-    target = Path(os.path.realpath(given_path(path, "path")))
+    if not isinstance(path, str | os.PathLike):
+        raise StiffmapError(f"path: expected a file, got {type(path).__name__}")
+    target = Path(os.path.realpath(path))
     try:
         if target.is_dir():
             raise FileError("cannot be written: it is a folder", file=os.fspath(path))
