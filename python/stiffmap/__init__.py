@@ -127,6 +127,11 @@ if not TYPE_CHECKING:  # type checkers then know which names there are
             raise AttributeError(f"module 'stiffmap' has no attribute {name!r}")
         home = import_module(_HOME[name])
         value = home if _HOME[name].endswith(f".{name}") else getattr(home, name)
+        if callable(value) and not isinstance(value, type):
+            from stiffmap.common.arguments import checked
+
+            value = checked(value)
+            value.__module__ = __name__  # where it is found again when it is pickled
         globals()[name] = value
         return value
 

@@ -46,9 +46,9 @@ def real_array(values: object, name: str, what: str = "numbers") -> Floats:
     if isinstance(values, list | tuple) and any(
         type(v) is bool for row in values for v in (row if isinstance(row, list | tuple) else (row,))
     ):
-        raise _refused(name, what, KINDS["b"])  # numpy takes them for numbers where numbers are among them
+        raise refused(name, what, KINDS["b"])  # numpy takes them for numbers where numbers are among them
     if isinstance(values, np.ma.MaskedArray) and np.ma.is_masked(values):
-        raise _refused(
+        raise refused(
             name, what, f"{int(np.ma.getmaskarray(values).sum())} masked values; fill or leave them out"
         )
     try:
@@ -56,17 +56,17 @@ def real_array(values: object, name: str, what: str = "numbers") -> Floats:
             warnings.simplefilter("error")  # a masked element in a list
             given = np.asarray(values)
             if given.dtype.kind not in "fiuO":
-                raise _refused(name, what, KINDS.get(given.dtype.kind, str(given.dtype)))
+                raise refused(name, what, KINDS.get(given.dtype.kind, str(given.dtype)))
             if given.dtype.kind == "O":
                 wrong = [v for v in given.flat if isinstance(v, bool) or not isinstance(v, Real | Decimal)]
                 if wrong:
-                    raise _refused(name, what, f"{type(wrong[0]).__name__} among them")
+                    raise refused(name, what, f"{type(wrong[0]).__name__} among them")
             out: Floats = given.astype(np.float64)
             return out
     except StiffmapError:
         raise
     except (TypeError, ValueError, OverflowError, Warning) as problem:
-        raise _refused(name, what, f"{type(values).__name__} ({problem})") from None
+        raise refused(name, what, f"{type(values).__name__} ({problem})") from None
 
 
 def given_path(value: Any, name: str, what: str = "a file") -> Path:
@@ -74,13 +74,13 @@ def given_path(value: Any, name: str, what: str = "a file") -> Path:
     try:
         return Path(value)
     except TypeError:
-        raise _refused(name, what, type(value).__name__) from None
+        raise refused(name, what, type(value).__name__) from None
 
 
 def instance_of(value: object, kind: Any, name: str, what: str) -> Any:
     """The value itself where it is of this kind; else StiffmapError with the argument's name and what is expected."""
     if not isinstance(value, kind):
-        raise _refused(name, what, repr(value) if isinstance(value, str) else type(value).__name__)
+        raise refused(name, what, repr(value) if isinstance(value, str) else type(value).__name__)
     return value
 
 
@@ -93,11 +93,12 @@ def names_of(value: Any, name: str) -> tuple[str, ...]:
 def one_of(value: object, known: Collection[str], name: str) -> str:
     """One of these words; StiffmapError with the argument's name and the words for anything else."""
     if not isinstance(value, str) or value not in known:
-        raise _refused(name, ", ".join(known), repr(value))
+        raise refused(name, f"one of {', '.join(known)}", repr(value))
     return value
 
 
-def _refused(name: str, what: str, found: str) -> StiffmapError:
+def refused(name: str, what: str, found: str) -> StiffmapError:
+    """The error of an argument that is something else than what is expected."""
     return StiffmapError(f"{name}: expected {what}, got {found}")
 
 
@@ -105,7 +106,7 @@ def real_number(value: object, name: str, what: str = "a number") -> float:
     """One real number; StiffmapError with the argument's name for anything else."""
     out = real_array(value, name, what)
     if out.ndim:
-        raise _refused(name, what, f"an array of shape {out.shape}")
+        raise refused(name, what, f"an array of shape {out.shape}")
     return float(out)
 
 
@@ -117,10 +118,10 @@ def whole_number(value: Any, name: str, least: int, most: int | None = None, wha
             raise TypeError
         out = index(value)
     except TypeError:
-        raise _refused(name, what or f"a whole number, {least} or more", repr(value)) from None
+        raise refused(name, what or f"a whole number, {least} or more", repr(value)) from None
     if out < least or (most is not None and out > most):
         expected = f"{least} or more" if out < least else f"at most {most}"
-        raise _refused(name, what or expected, str(out))
+        raise refused(name, what or expected, str(out))
     return out
 
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffmap.common.broadcasting import Floats
+from stiffmap.common.broadcasting import Floats, trailing
 from stiffmap.common.errors import StiffmapError
 
 ORTHOGONAL = 1e-6  # entries of R^T R - I that the digits of an input may leave
@@ -17,6 +17,7 @@ EXACT = 1e-13
 def as_rotations(r: Floats) -> Floats:
     """Matrices (..., 3, 3) as rotations: those that are off by the digits of the input are replaced by the
     nearest rotation, poses that are not finite are kept. StiffmapError for anything else."""
+    r = trailing(r, (3, 3), "rotation", "rotation matrices")
     finite = np.asarray(np.isfinite(r).all(axis=(-2, -1)))
     with np.errstate(invalid="ignore", over="ignore"):
         off, mirrored = _off(r)

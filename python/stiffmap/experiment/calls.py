@@ -152,15 +152,15 @@ def as_experiment(given: Experiment | str | PathLike[str]) -> Experiment:
     return load_experiment(given)
 
 
-def effects_of(machine: Machine, given: Effects) -> list[AppliedEffect]:
+def effects_of(machine: Machine, given: Effects, name: str = "effects") -> list[AppliedEffect]:
     """Records of effects; texts are read with the machine's own names of element and legs filled in."""
     several = (
         [given]
         if isinstance(given, str | AppliedEffect)
-        else list(instance_of(given, Sequence, "effects", EFFECTS))
+        else list(instance_of(given, Sequence, name, EFFECTS))
     )
     for one in several:
-        instance_of(one, (str, AppliedEffect), "effects", EFFECTS)
+        instance_of(one, (str, AppliedEffect), name, EFFECTS)
     return [placed(machine, one) if isinstance(one, str) else one for one in several]
 
 

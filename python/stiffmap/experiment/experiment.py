@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffmap.common.broadcasting import Floats
+from stiffmap.common.broadcasting import Floats, trailing
+from stiffmap.common.errors import StiffmapError
 from stiffmap.common.short import short_repr
 from stiffmap.experiment.channels import AXES, AXIS_CHANNELS, Channel
 from stiffmap.experiment.notebook import experiment_html
@@ -238,13 +239,19 @@ class Experiment:
 
     def rows(self, keep: NDArray[np.bool_] | Integers) -> Experiment:
         """The experiment with some of its rows: (n,) of which to keep, or (k,) their numbers."""
-        index = (np.flatnonzero(keep) if np.asarray(keep).dtype == bool else np.asarray(keep)).astype(np.intp)
+        try:
+            index = np.arange(len(self))[np.atleast_1d(keep) if np.size(keep) else []]
+        except IndexError:
+            raise StiffmapError(
+                f"keep: expected truth values or numbers of {len(self)} rows, got {keep!r}"
+            ) from None
         picked = {name: _pick(getattr(self, name), index) for name in PER_ROW}
         return replace(self, **picked, absolute={k: v[index] for k, v in self.absolute.items()})
 
     def with_readings(self, reading: Floats) -> Experiment:
         """The same plan with other readings (n, c) m, rad."""
-        return replace(self, reading=np.where(self.read, reading, np.nan))
+        given = trailing(reading, self.read.shape, "reading", "readings")
+        return replace(self, reading=np.where(self.read, given, np.nan))
 
 
 def _pick(values: Any, index: Integers) -> Any:

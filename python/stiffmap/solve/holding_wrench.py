@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from stiffmap.common.broadcasting import Floats, batch, rows, thread_count, trailing
-from stiffmap.common.errors import StiffmapError
+from stiffmap.common.broadcasting import Floats, batch, one_of, rows, thread_count, trailing
 from stiffmap.common.short import short_repr
 from stiffmap.solve.closing import commanded
 from stiffmap.solve.compiled import CompiledMachine, Flag, Status
@@ -81,8 +80,7 @@ def holding_wrench(
     """See `Machine.wrench`."""
     p, r = commanded(machine, position, rotation)
     d = trailing(displacement, (6,), "displacement", "displacements [dx dy dz rx ry rz] (m, rad)")
-    if point not in machine.names.points:
-        raise StiffmapError(f"point: expected one of {', '.join(machine.names.points)}, got {point!r}")
+    one_of(point, machine.names.points, "point")
     shape = batch(p.shape[:-1], d.shape[:-1], r.shape[:-2])
     out = machine.impose(
         rows(p, shape, (3,)),

@@ -7,11 +7,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from itertools import product
 from os import PathLike
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from stiffmap.common.broadcasting import given_path, instance_of
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.json_text import plain
 from stiffmap.common.outputs import write_rows, write_text, writing
@@ -58,7 +58,7 @@ def batch_dims(axes: int, dims: Sequence[str] | None = None) -> tuple[str, ...]:
     """Names of the batch axes of an answer; StiffmapError where their number is another."""
     if dims is None:
         return ("pose",) if axes == 1 else tuple(f"pose_{i}" for i in range(axes))
-    if isinstance(dims, str) or len(dims) != axes or len(set(dims)) != axes:
+    if isinstance(dims, str) or not isinstance(dims, Sequence) or len(dims) != axes or len(set(dims)) != axes:
         raise StiffmapError(f"dims: expected {axes} different names, one for each batch axis, got {dims!r}")
     return tuple(dims)
 
@@ -98,7 +98,8 @@ def solution_dataset(s: Any, dims: Sequence[str] | None, coords: Mapping[str, An
         "coordinate": list(s.coordinate_names),
         **({"cable": list(s.cables)} if s.cables else {}),
     }
-    return xr.Dataset(data, coords={**labels, **(coords or {})}, attrs={"point": s.point})
+    more = {} if coords is None else instance_of(coords, Mapping, "coords", "a mapping name -> coordinate")
+    return xr.Dataset(data, coords={**labels, **more}, attrs={"point": s.point})
 
 
 AXES = {3: ("axis", ("x", "y", "z"))}
@@ -156,7 +157,7 @@ class OverPoses:
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write ``.json``, ``.csv`` or ``.nc`` (NetCDF), as the ending says. StiffmapError for another ending."""
-        to = Path(path)
+        to = given_path(path, "path")
         if to.suffix not in ENDINGS:
             raise StiffmapError(f"{to.name}: expected a name that ends in {', '.join(ENDINGS)}")
         if to.suffix == ".json":

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from functools import cached_property, wraps
 from os import PathLike
 from typing import TYPE_CHECKING, Concatenate, ParamSpec, TypeVar, Unpack
@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Concatenate, ParamSpec, TypeVar, Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
-from stiffmap.common.broadcasting import Floats
+from stiffmap.common.arguments import checked
+from stiffmap.common.broadcasting import Floats, instance_of
 from stiffmap.common.errors import StiffmapError, frames_of_this_package
 from stiffmap.common.from_above import from_above
 from stiffmap.common.html import machine_html
@@ -34,7 +35,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
 MOST_PREPARED = 4  # sets of derivatives whose machines are kept
-PLAIN = ({"threads": 1}, {"threads": None})  # options that one pose does not notice
 
 
 class Machine:
@@ -170,7 +170,10 @@ class Machine:
         -----
         Poses never raise: see `Solution.status`. Raises StiffmapError for bad input.
         """
-        if not derivatives and (not given or given in PLAIN):
+        if not isinstance(derivatives, tuple | list):
+            derivatives = tuple(instance_of(derivatives, Iterable, "derivatives", "effects or inputs"))
+        threads = given.get("threads", 0) if len(given) == 1 else 0
+        if not derivatives and (not given or threads is None or (type(threads) is int and threads == 1)):
             one = self._compiled.solve_one(position, wrench)
             if one is not None:
                 s = Solution(one, (), self._compiled.names, "tcp")
@@ -231,6 +234,7 @@ class Machine:
         """
         return holding_wrench(self._compiled, position, displacement, rotation, point, gravity, threads)
 
+    @checked
     def with_effect(
         self,
         kind: str,
@@ -259,7 +263,7 @@ class Machine:
 
     def with_number(self, address: str, value: float) -> Machine:
         """A machine with another number (SI) at an address: see `with_numbers`."""
-        return self.with_numbers({address: value})
+        return self.with_numbers({instance_of(address, str, "address", "text"): value})
 
     def with_numbers(self, values: Mapping[str, float]) -> Machine:
         """A new machine of another design: numbers (SI: m, rad, N, kg) at addresses ``name/field``.

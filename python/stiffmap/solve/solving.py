@@ -13,6 +13,7 @@ from stiffmap.common.broadcasting import (
     batch,
     instance_of,
     names_of,
+    one_of,
     rows,
     rows_or_one,
     thread_count,
@@ -137,14 +138,13 @@ def _solve(
     """At coordinates that are closed already where `unloaded` holds them."""
     p, w, r, extra = arrays
     shape = batch(p.shape[:-1], w.shape[:-1], r.shape[:-2], *(v.shape[:-1] for v in extra.values()))
-    if o.method not in METHODS:
-        raise StiffmapError(f"method: expected 'fast' or 'reference', got {o.method!r}")
+    one_of(o.method, METHODS, "method")
     loaded = [o.point, *extra]
     types = load_types(o, loaded)
     read = reading_points(machine, o, loaded)
     instance_of(o.stiffness, bool | np.bool_, "stiffness", "True or False")
     steps = 0  # adaptive
-    if o.load_steps != "auto":
+    if not isinstance(o.load_steps, str) or o.load_steps != "auto":
         steps = whole_number(o.load_steps, "load_steps", 1, what="'auto' or a positive number")
     answer = machine.solve(
         rows(p, shape, (3,)),
@@ -195,8 +195,7 @@ def load_types(options: SolveOptions, loaded: Sequence[str]) -> list[str]:
     instance_of(kinds, (str, Mapping), "load_type", "a word, or a mapping point -> word")
     given = {options.point: kinds} if isinstance(kinds, str) else dict(kinds)
     for name, kind in given.items():
-        if kind not in LOAD_TYPES:
-            raise StiffmapError(f"load_type: expected one of {', '.join(LOAD_TYPES)}, got {kind!r}")
+        one_of(kind, LOAD_TYPES, "load_type")
         if name not in loaded:
             raise StiffmapError(f"load_type: no wrench acts at {name!r}, only at {', '.join(loaded)}")
     return [given.get(name, "dead") for name in loaded]

@@ -1,9 +1,12 @@
-"""What is no argument at all is one clear error of every public function: None, text, a mapping."""
+"""What is no argument at all is one clear error of every public function: None, text, a mapping, an array of another shape."""
 
 from __future__ import annotations
 
 import inspect
+import pickle
+from collections.abc import Callable
 from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,9 +14,14 @@ import pytest
 
 import stiffmap as sm
 from stiffmap.experiment.virtual.plans import plan_of_poses
+from stiffmap.workspace.performance.motion.trajectory import Trajectory
 
 P, W = [0.0, 0.416, 0.0], [10.0, 0, 0, 0, 0, 0]
 FEW: dict[str, Any] = {"x": [0.0, 0.05], "y": [0.4, 0.42], "z": 0.0}
+FIVE_BAR = sm.load_machine("five-bar")
+A_SERVO = "examples/experiments/A-servo"
+CIRCLE: dict[str, Any] = {"machine": "orthoglide-revised", "path": "circle", "process": "trimming"}
+MODES = [[200.0, 0.02, 1.0, [1.0, 0, 0]]]
 CALLS: dict[str, dict[str, Any]] = {
     "accuracy_transmission": {"position": P},
     "assembly_wrenches": {"position": P},
@@ -33,22 +41,157 @@ CALLS: dict[str, dict[str, Any]] = {
     "compensate": {"position": P, "wrench": W},
     "map_statistics": {"wrench": W, **FEW},
     "measures": {"only": ["velocity"], "nodes": 3},
-}
+    "cutting_force": {"process": "slot"},
+    "floquet_multiplier": {"modes": MODES, "process": "slot", "depth": 1e-4, "speed": 100.0},
+    "forward_kinematics": {"actuators": sm.inverse_kinematics(FIVE_BAR, P).actuators},
+    "frequency_response": {"position": P, "frequencies": [10.0, 20.0]},
+    "identify_link": {
+        "points": np.eye(4, 3), "displacements": np.ones((6, 4, 3)), "wrenches": np.eye(6), "reference": [0.0, 0, 0],
+    },
+    "limiting_depth": {"receptance": MODES, "process": "slot"},
+    "load_experiment": {"path": A_SERVO},
+    "load_machine": {"source": "five-bar"},
+    "load_process": {"source": "slot"},
+    "load_requirements": {"source": "trimming"},
+    "polar": {"position": P},
+    "uncertainty_ranking": {"ds": sm.error_map("five-bar", wrench=W, **FEW)},
+    "vibration_map": {"position": P, "process": "slot", "frequencies": [50.0]},
+}  # fmt: skip
 """Right arguments of calls that take a moment."""
+METHODS: dict[str, tuple[Any, dict[str, Any]]] = {
+    "save": (FIVE_BAR, {"path": ...}),
+    "solve": (FIVE_BAR, {"position": P, "wrench": W}),
+    "solve_joints": (FIVE_BAR, {"actuators": CALLS["forward_kinematics"]["actuators"]}),
+    "with_effect": (FIVE_BAR, {"kind": "zero_offset", "element": "motor", "error": 1e-3}),
+    "with_number": (FIVE_BAR, {"address": "arm/length", "value": 0.3}),
+    "with_numbers": (FIVE_BAR, {"values": {"arm/length": 0.3}}),
+    "wrench": (FIVE_BAR, {"position": P, "displacement": [1e-4, 0, 0, 0, 0, 0]}),
+    "to_xarray": (FIVE_BAR.solve([P]), {}),
+    "save ": (FIVE_BAR.solve(P), {"path": ...}),
+    "save  ": (sm.inverse_kinematics(FIVE_BAR, P), {"path": ...}),
+    "rms": (sm.compensate(FIVE_BAR, P), {"errors": ...}),
+    "write": (sm.compensate(FIVE_BAR, P), {"path": ...}),
+    "rows": (sm.load_experiment(A_SERVO), {"keep": ...}),
+    "with_readings": (sm.load_experiment(A_SERVO), {"reading": ...}),
+    "worst": (sm.residual("orthoglide-revised", A_SERVO), {}),
+}
+"""Methods, each of an object, with right arguments."""
 OTHER = {"progress", "out", "resume", "scheduler", "chunk"}
 """Of long maps: they have tests of their own."""
+BAD: dict[str, Any] = {
+    "None": None, "1.5": 1.5, "-1": -1, "text": "zzz", "no text": "", "list": [1, 2], "nothing": {}, "mapping": {"zzz": 1},
+    "nan": np.nan, "inf": np.inf, "True": True, "object": object(), "array": np.arange(6.0).reshape(2, 3), "function": lambda *_: 1,
+}  # fmt: skip
+KINDS: dict[str, set[str]] = {
+    "None": {"None"},
+    "bool": {"True"},
+    "int": {"-1"},
+    "float": {"1.5", "-1", "inf"},
+    "str": {"text", "no text"},
+    "PathLike[str]": set(),
+    "Callable[[int], None]": {"function"},
+    "Progress": {"function"},
+    "Experiment": set(),
+    "Machine": set(),
+    "Process": set(),
+    "Tolerances": set(),
+    "Mapping[str, str]": {"nothing", "mapping"},
+    "Mapping[str, float]": {"nothing", "mapping"},
+    "Mapping[str, ArrayLike]": {"nothing", "mapping"},
+}
+"""Of BAD, what is no mistake of kind, by the words of an annotation."""
+FUNCTIONS: dict[str, Callable[..., Any]] = {
+    n: f for n in sm.__all__ if inspect.isfunction(f := getattr(sm, n))
+}
+OF_KIND = [
+    (name, p.name, set().union(*(KINDS[w] for w in words)))
+    for name, function in FUNCTIONS.items()
+    for p in inspect.signature(function).parameters.values()
+    if p.name != "machine" and (words := str(p.annotation).split(" | ")) and set(words) <= KINDS.keys()
+]
+"""Function, argument and what of BAD is of its kind: every argument of these kinds, of new functions too."""
+
+
+@pytest.mark.parametrize(("call", "name", "sound"), OF_KIND, ids=[f"{c}-{n}" for c, n, _ in OF_KIND])
+def test_an_argument_of_another_kind_is_refused_by_its_name(call: str, name: str, sound: set[str]) -> None:
+    """Before anything else is looked at: nothing but the argument is given, as a keyword and in its place."""
+    for label in BAD.keys() - sound:
+        with pytest.raises(sm.StiffmapError, match=rf"^{name}: expected \w.*, got \S"):
+            FUNCTIONS[call](**{name: BAD[label]})
+    before = list(inspect.signature(FUNCTIONS[call]).parameters).index(name)
+    if before == 0:
+        with pytest.raises(sm.StiffmapError, match=f"^{name}: expected"):
+            FUNCTIONS[call](BAD["object"])
+
+
+OF_NO_KIND = {
+    "cutting_force", "drive_efforts", "load_machine", "load_process", "machine_names", "uncertainty_ranking", "why_unreachable",
+}  # fmt: skip
+"""Functions without an argument of these kinds."""
+
+
+def test_most_arguments_are_of_a_kind() -> None:
+    assert len(OF_KIND) > 200
+    assert FUNCTIONS.keys() - {c for c, _, _ in OF_KIND} <= OF_NO_KIND
 
 
 @pytest.mark.parametrize("name", CALLS)
 def test_every_argument_is_checked(name: str) -> None:
-    call, machine = getattr(sm, name), sm.load_machine("five-bar")
-    for p in inspect.signature(call).parameters.values():
-        if p.kind in (p.VAR_POSITIONAL, p.VAR_KEYWORD) or p.name in OTHER:
-            continue
-        for bad in (None, "zzz", {}):
+    call = FUNCTIONS[name]
+    parameters = inspect.signature(call).parameters
+    own = {"machine": FIVE_BAR} if "machine" in parameters else {}
+    call(**own, **CALLS[name]) if name not in (
+        "accuracy_transmission",
+        "uncertainty_ranking",
+        "identify_link",
+    ) else None
+    for p in parameters.values():
+        for bad in BAD.values() if p.name not in OTHER else ():
             if bad is not None or p.default is not None:
                 with suppress(sm.StiffmapError):  # and no other error
-                    call(**{"machine": machine, **CALLS[name], p.name: bad})
+                    call(**{**own, **CALLS[name], p.name: bad})
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_every_argument_of_a_method_is_checked(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    of, given = METHODS[name]
+    call = getattr(of, name.strip())
+    for p in inspect.signature(call).parameters.values():
+        for bad in BAD.values() if p.kind is not p.VAR_KEYWORD else ():
+            if bad is not None or p.default is not None:
+                with suppress(sm.StiffmapError):  # and no other error
+                    call(**{**given, p.name: bad})
+
+
+@pytest.mark.parametrize(
+    "name", [n for n, f in FUNCTIONS.items() if "machine" in inspect.signature(f).parameters]
+)
+def test_machines_are_taken_by_name(name: str) -> None:
+    """A shipped name that there is not is refused as such: the call has looked it up."""
+    right = {
+        "experiment": A_SERVO,
+        "plan": A_SERVO,
+        "before": A_SERVO,
+        "after": A_SERVO,
+        "effects": [],
+        **CIRCLE,
+    }
+    needed = {n for n, p in inspect.signature(FUNCTIONS[name]).parameters.items() if p.default is p.empty}
+    given = (
+        {k: v for k, v in right.items() if k in needed} | CALLS.get(name, {}) | {"machine": "no-such-machine"}
+    )
+    given |= {"table": "t.csv", "folder": "f"} if name == "experiment_from_table" else {}
+    if name == "drive_efforts":
+        given["trajectory"] = Trajectory(np.arange(2.0), *np.zeros((4, 2, 3)))
+    with pytest.raises(sm.StiffmapError, match="unknown machine 'no-such-machine'"):
+        FUNCTIONS[name](**given)
+
+
+def test_public_functions_are_pickled_by_their_names() -> None:
+    assert all(pickle.loads(pickle.dumps(f)) is f for f in FUNCTIONS.values())
 
 
 @pytest.mark.parametrize("bad", [None, "zzz", {}, -1.5])
@@ -118,7 +261,7 @@ def test_what_is_no_argument_is_one_error(name: str, arguments: dict[str, Any], 
 
 @pytest.mark.parametrize("force", ["300", [1.0, 2.0], np.nan, -1.0, None])
 def test_a_force_is_one_positive_number(force: Any) -> None:
-    with pytest.raises(sm.StiffmapError, match="force: expected a positive number"):
+    with pytest.raises(sm.StiffmapError, match=r"force: expected a (positive )?number"):
         sm.worst_deflection("five-bar", P, force=force)
 
 
@@ -149,10 +292,6 @@ def test_poses_are_neither_left_out_nor_reshaped(call: Any, words: str) -> None:
 def test_measures_refuse_what_would_leave_rows_without_a_number(given: dict[str, Any], words: str) -> None:
     with pytest.raises(sm.StiffmapError, match=f"{words}: expected"):
         sm.measures("five-bar", **{"only": ["velocity"], "nodes": 3, **given})
-
-
-A_SERVO = "examples/experiments/A-servo"
-CIRCLE: dict[str, Any] = {"machine": "orthoglide-revised", "path": "circle", "process": "trimming"}
 
 
 @pytest.mark.parametrize("bad", [{}, [1, 2], "zzz"])

@@ -164,19 +164,6 @@ def test_signatures_are_explicit_and_alike(name: str, function: Any) -> None:
     )
 
 
-@pytest.mark.parametrize("name", [n for n, f in functions() if "machine" in inspect.signature(f).parameters])
-def test_machines_are_taken_by_name(name: str) -> None:
-    """A shipped name that there is not is refused as such: the call has looked it up."""
-    function = getattr(sm, name)
-    given = {
-        n: {"numbers": {"a/b": [1.0]}}.get(n, [0.0] * 6)
-        for n, p in inspect.signature(function).parameters.items()
-        if p.default is inspect.Parameter.empty and n != "machine"
-    }
-    with pytest.raises(sm.StiffmapError, match="unknown machine 'no-such-machine'"):
-        function("no-such-machine", **given)
-
-
 def test_type_checkers_know_every_public_name() -> None:
     text = (ROOT / "python/stiffmap/__init__.py").read_text(encoding="utf-8")
     block = text[text.index("if TYPE_CHECKING:") : text.index("# Loaded when first used")]

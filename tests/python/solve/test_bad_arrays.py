@@ -29,7 +29,7 @@ BAD = [
     ({"wrenches": {"nose": np.zeros(6)}}, "point: expected one of tcp.*got 'nose'"),
     ({"read_points": ("nose",)}, "point: expected one of tcp.*got 'nose'"),
     ({"load_type": "lively"}, "load_type: expected one of dead, follower, semitangential, got 'lively'"),
-    ({"method": "quick"}, "method: expected 'fast' or 'reference', got 'quick'"),
+    ({"method": "quick"}, "method: expected one of fast, reference, got 'quick'"),
     ({"gravity": 9.81}, "gravity: expected 3 finite numbers"),
     ({"gravity": (0, 0, np.inf)}, "gravity: expected 3 finite numbers"),
     ({"load_steps": 0}, "load_steps: expected 'auto' or a positive number, got 0"),

@@ -147,7 +147,7 @@ def test_modes_that_buckle_together_are_said_so() -> None:
     [
         ({"limit": 1000.0, "cross": 2}, "cross: the path has 1 bifurcations, got 2"),
         ({"limit": 10.0, "cross": -1}, "cross: the path has 0 bifurcations, got -1"),
-        ({"limit": 10.0, "cross": 1.5}, "cross: expected the number of a bifurcation"),
+        ({"limit": 10.0, "cross": 1.5}, "cross: expected a whole number"),
         ({"forces": [1.0], "cross": 1}, "cross: not together with forces"),
     ],
 )

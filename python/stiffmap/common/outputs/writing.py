@@ -28,6 +28,8 @@ def writing(path: str | os.PathLike[str]) -> Iterator[Path]:
     A symbolic link stays and its file is replaced; a device or a pipe is given the whole file at its end. Raises
     FileError where it cannot be written or another job writes it.
     """
+    if not isinstance(path, str | os.PathLike):
+        raise StiffmapError(f"path: expected a file, got {type(path).__name__}")
     target = Path(os.path.realpath(path))
     try:
         if target.is_dir():

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from stiffmap.common.broadcasting import whole_number
 from stiffmap.common.outputs import number_cells, write_rows
 from stiffmap.common.short import short_repr
 from stiffmap.experiment.comparison.summary import Summary
@@ -90,6 +91,7 @@ class Residual:
 
     def worst(self, number: int = 10) -> list[tuple[str, str, float]]:
         """Rows by their worst reading, most noise floors first: id, channel, residual (m or rad)."""
+        whole_number(number, "number", 0)
         z = self.values / self.noise.sigma
         np.nan_to_num(np.abs(z, out=z), copy=False)
         at = [(int(i), int(np.argmax(z[i]))) for i in np.argsort(-z.max(axis=1), kind="stable")[:number]]

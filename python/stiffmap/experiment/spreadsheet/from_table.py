@@ -122,12 +122,6 @@ def experiment_from_table(
     quantity = quantity or (wrote.quantity if wrote else "deflection")
     one_of(quantity, ("deflection", "position"), "quantity")
     one_of(difference, DIFFERENCES, "difference")
-    said = {"columns": columns, "units": units, "constants": constants, "noise": noise, "record": record}
-    for name, value in said.items():
-        if value is not None and not isinstance(value, Mapping):
-            raise StiffmapError(
-                f"{name}: expected a mapping of columns to what is said of them, got {value!r}"
-            )
     new_file(output / "experiment.yaml", overwrite, output)
     wrong = sorted(set(record or ()) - {*RECORD})
     if wrong:

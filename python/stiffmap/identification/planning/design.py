@@ -44,6 +44,7 @@ from stiffmap.model.files.load import Source
 from stiffmap.solve.kinematics import inverse_kinematics
 from stiffmap.solve.machine import Machine, as_machine
 from stiffmap.solve.status import Flag
+from stiffmap.workspace.maps.inputs import magnitude
 
 AIMS = ("identify", "separate", "map")
 UNKNOWN = ("known", "offset_unknown", "unknown")
@@ -145,7 +146,8 @@ def plan(
     Raises StiffmapError for bad input.
     """
     machine = as_machine(machine)
-    terms, others = tuple(effects_of(machine, identify)), tuple(effects_of(machine, rival))
+    terms = tuple(effects_of(machine, identify, "identify"))
+    others = tuple(effects_of(machine, rival, "rival"))
     if not terms:
         raise StiffmapError("identify: expected at least one effect, got none")
     aim = ("separate" if others else "identify") if aim is None else aim
@@ -160,7 +162,7 @@ def plan(
     one_of(frame, UNKNOWN, "frame")
     one_of(tool, UNKNOWN, "tool")
     if pool is None:
-        where, loads = random_poses(machine, poses, seed), load_set("axes", [force])
+        where, loads = random_poses(machine, poses, seed), load_set("axes", [magnitude(force, "force", "N")])
         pool = plan_of_poses(machine, quantity, where, loads, axes=axes, noise=noise)
     both, old = replace(in_limits(machine, pool), frame=frame, tool=tool), 0
     if measured is not None:

@@ -10,6 +10,7 @@ from collections.abc import Iterable
 from math import pi
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import Floats, real_number, thread_count, whole_number
 from stiffmap.common.errors import StiffmapError
@@ -18,6 +19,7 @@ from stiffmap.machining.process.description import EndMill, Process
 from stiffmap.machining.process.load import GivenProcess, as_process
 from stiffmap.machining.process.mean import own_arc, with_coefficients
 from stiffmap.solve.compiled import multipliers
+from stiffmap.workspace.maps.inputs import unit
 
 
 def milling_process(process: GivenProcess) -> Process:
@@ -58,10 +60,10 @@ def mean_chips(process: Process) -> Floats:
     return np.asarray(chips(process, 1)[0])
 
 
-def cut_axes(feed: Floats, tool: Floats) -> Floats:
+def cut_axes(feed: ArrayLike, tool: ArrayLike) -> Floats:
     """(3, 3) rows feed, normal, tool axis of a feed and of the tool from tip to holder, both in base axes."""
-    along = tool / np.linalg.norm(tool)
-    ahead = feed - (feed @ along) * along
+    along, ahead = unit(tool, "tool"), unit(feed, "feed")
+    ahead = ahead - (ahead @ along) * along
     size = float(np.linalg.norm(ahead))
     if size < 1e-6:
         raise StiffmapError("feed: expected a direction across the tool, got one along it")

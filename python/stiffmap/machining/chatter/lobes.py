@@ -11,8 +11,9 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from stiffmap.common.broadcasting import Floats, real_array, whole_number
+from stiffmap.common.broadcasting import Floats, one_of, real_array, whole_number
 from stiffmap.common.errors import StiffmapError
+from stiffmap.common.rotations import as_rotations
 from stiffmap.common.tasks import workers
 from stiffmap.machining.chatter.cut import cut_axes, milling_process, multiplier_map
 from stiffmap.machining.chatter.modes import ToolModes, mode_rows, modes_of_machine
@@ -29,6 +30,7 @@ from stiffmap.machining.process.description import Process
 from stiffmap.machining.process.load import GivenProcess
 from stiffmap.solve.machine import Machine, as_machine
 from stiffmap.solve.options import keywords_of
+from stiffmap.workspace.maps.inputs import unit
 from stiffmap.workspace.vibration.modes import tip_modes
 
 METHODS = ("semi-discretization", "zero order")
@@ -102,17 +104,18 @@ def stability_lobes(
 
     Raises StiffmapError for bad input. Source: docs/theory.md, V4 to V6.
     """
-    if method not in METHODS:
-        raise StiffmapError(f"method: expected one of {', '.join(METHODS)}, got {method!r}")
+    one_of(method, METHODS, "method")
     if np.shape(diagram) != (2,):
         raise StiffmapError(f"diagram: expected numbers of speeds and of depths, got {diagram!r}")
+    if intervals is not None:
+        whole_number(intervals, "intervals", 2, 10_000)
     for count in diagram:
         whole_number(count, "diagram", 2, what="numbers of speeds and of depths, 2 or more")
     if isinstance(machine, str | PathLike):
         machine = as_machine(machine)
     p = milling_process(process)
-    along = flange(machine, pose.get("rotation")) if tool is None else real_array(tool, "tool")
-    ahead = _across(along) if feed is None else real_array(feed, "feed")
+    along = flange(machine, pose.get("rotation")) if tool is None else unit(tool, "tool")
+    ahead = _across(along) if feed is None else unit(feed, "feed")
     modes, said = _modes(machine, position, cut_axes(ahead, along), pose)
     if extra := list(also):
         modes = modes.and_also(mode_rows(extra))
@@ -155,7 +158,7 @@ def flange(machine: object, rotation: ArrayLike | None) -> Floats:
     if not isinstance(machine, Machine):
         return np.array(TOOL)
     home = machine.description.home.r
-    r = home if rotation is None else real_array(rotation, "rotation")
+    r = home if rotation is None else as_rotations(real_array(rotation, "rotation"))
     return np.asarray((1.0 if home[2, 2] > np.sqrt(0.5) else -1.0) * r[..., :, 2].reshape(-1, 3)[0])
 
 

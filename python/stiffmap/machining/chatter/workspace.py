@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from stiffmap.common.broadcasting import Floats, real_array, trailing
+from stiffmap.common.broadcasting import Floats, trailing
 from stiffmap.common.tasks import workers
 from stiffmap.machining.chatter.cut import cut_axes, milling_process
 from stiffmap.machining.chatter.zero_order import FEED, TOOL, frequencies_of, least_depth
@@ -70,7 +70,7 @@ def vibration_map(
     machine = as_machine(machine)
     p = trailing(position, (3,), "position", "positions (m)")
     cut = None if process is None else milling_process(process)
-    axes = cut_axes(real_array(feed, "feed"), real_array(tool, "tool"))
+    axes = cut_axes(feed, tool)
     found = tip_modes(machine, p, modes=modes, **pose)
     f = _around(found) if frequencies is None else frequency_axis(frequencies)
     n = len(found.square)
@@ -85,7 +85,7 @@ def vibration_map(
             stiffness[rows], at[rows], way[rows], depth[rows] = some
     shape = p.shape[:-1]
     dims = batch_dims(len(shape))
-    lowest = np.where(np.isfinite(found.rest[:, 0, 0]), found.frequency[:, 0], np.nan)
+    lowest = np.where(np.isfinite(found.rest[:, 0, 0]), found.frequency.min(axis=1, initial=np.inf), np.nan)
     values = {
         "lowest_frequency": (lowest, "Hz"),
         "dynamic_stiffness": (stiffness, "N/m"),

@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from stiffmap.common.broadcasting import Floats, real_array
+from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError, frames_of_this_package
 from stiffmap.machining.chatter.cut import cut_axes, mean_chips, milling_process, spindle_speed
 from stiffmap.machining.chatter.modes import ToolModes, mode_rows
@@ -61,7 +61,7 @@ def limiting_depth(
     p, modes = milling_process(process), None
     if isinstance(receptance, xr.DataArray):
         frequency, values = _from_array(receptance)
-        axes = cut_axes(real_array(feed, "feed"), real_array(tool, "tool"))
+        axes = cut_axes(feed, tool)
         G = axes @ values[..., :3, :3] @ axes.T
     else:
         modes = mode_rows(receptance)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
-from stiffmap.common.broadcasting import Floats, trailing, wrench_array
+from stiffmap.common.broadcasting import Floats, names_of, one_of, trailing, wrench_array
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs import number_cells, write_rows
 from stiffmap.common.short import short_repr
@@ -74,7 +74,8 @@ class Commands:
 
     def rms(self, errors: Floats) -> float:
         """Root mean square distance (m) of the tool from where it is wanted, over the rows of errors (n, 6) with an answer."""
-        return float(np.sqrt(np.mean(np.sum(errors[self.ok, :3] ** 2, axis=1))))
+        e = trailing(errors, (len(self.ok), 6), "errors", "errors (m, rad)")[self.ok, :3]
+        return float(np.sqrt(np.mean(np.sum(e**2, axis=1))))
 
     def write(self, path: str | PathLike[str]) -> None:
         """CSV in mm and deg: wanted pose, commands (declared and compensated), pose to command, errors.
@@ -238,9 +239,9 @@ def _each(values: Floats, n: int, name: str) -> Floats:
 
 
 def _components(machine: Machine, given: tuple[str, ...] | None) -> list[int]:
-    wrong = [c for c in given or () if c not in TASK]
-    if wrong:
-        raise StiffmapError(f"components: expected some of {', '.join(TASK)}, got {wrong[0]!r}")
+    given = None if given is None else names_of(given, "components")
+    for c in given or ():
+        one_of(c, TASK, "components")
     task = [i for i, c in enumerate(TASK) if c in (given or machine.description.task)]
     return task if given else task[: len(machine.actuators)]
 

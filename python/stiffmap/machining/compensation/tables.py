@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from stiffmap.common.broadcasting import Floats
+from stiffmap.common.broadcasting import Floats, one_of
 from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.outputs import write_text
 from stiffmap.common.texts import lines_of
@@ -93,8 +93,7 @@ FORMATS = {"csv": _csv, "linuxcnc": _linuxcnc, "siemens": _siemens, "heidenhain"
 
 def compensation_table(errors: AxisErrors, form: str) -> str:
     """Text of a table: csv, linuxcnc, siemens or heidenhain. Raises StiffmapError for another form."""
-    if form not in FORMATS:
-        raise StiffmapError(f"format: expected one of {', '.join(FORMATS)}, got '{form}'")
+    one_of(form, FORMATS, "format")
     return FORMATS[form](errors)
 
 
@@ -108,8 +107,7 @@ def read_table(path: str | PathLike[str], form: str) -> tuple[Floats, Floats, Fl
 
     A Siemens table holds one value for both directions. Raises FileError where the text is no such table.
     """
-    if form not in FORMATS:
-        raise StiffmapError(f"format: expected one of {', '.join(FORMATS)}, got '{form}'")
+    one_of(form, FORMATS, "format")
     text = "".join(lines_of(Path(path)))
     try:
         x, forward, backward = READERS[form](text)

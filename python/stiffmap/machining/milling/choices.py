@@ -117,8 +117,6 @@ def choices(
             return None
         return best_turns(job(path, None), redundancy, scheduler=scheduler)
 
-    if isinstance(entry, str) and entry != "best":
-        raise StiffmapError(f"entry: expected a length (m) or 'best', got {entry!r}")
     turns = turned(p)
     here = None
     if entry is not None:

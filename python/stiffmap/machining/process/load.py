@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
 
-from stiffmap.common.errors import FileError, StiffmapError, refuse_folder, suggestion
+from stiffmap.common.errors import FileError, refuse_folder, suggestion
 from stiffmap.common.yaml_text import Document, read
 from stiffmap.machining.process.build import process_of
 from stiffmap.machining.process.description import Process
@@ -33,8 +33,6 @@ def load_process(source: str | PathLike[str] | Mapping[str, object]) -> Process:
     """
     if isinstance(source, Mapping):
         return process_of(Document(dict(source)), "process")
-    if not isinstance(source, str | PathLike):
-        raise StiffmapError(f"process: expected a name, a file or a mapping; got {type(source).__name__}")
     path = FOLDER / f"{source}.yaml" if str(source) in process_names() else Path(source)
     if not path.is_file():
         refuse_folder(source, "a process file or the name of a shipped process")

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 
-from stiffmap.common.broadcasting import real_number
+from stiffmap.common.broadcasting import instance_of, real_number
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.addresses.fields import Field, field_of, fields, vector_fields
 from stiffmap.model.addresses.places import bar_offset, full_names, machine_fields, number_at, split
@@ -34,8 +34,8 @@ def with_values(description: MachineDescription, values: Mapping[str, float]) ->
 
     StiffmapError for an address that the machine has not (it names the nearest), or a value that cannot be.
     """
-    for address, value in values.items():
-        number = real_number(value, address, "a finite number (SI)")
+    for address, value in instance_of(values, Mapping, "values", "numbers by address").items():
+        number = real_number(value, instance_of(address, str, "address", "text"), "a finite number (SI)")
         if not math.isfinite(number):
             raise StiffmapError(f"{address}: expected a finite number (SI), got {value!r}")
         try:

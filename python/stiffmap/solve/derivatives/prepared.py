@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from stiffmap.common.broadcasting import Floats
+from stiffmap.common.broadcasting import Floats, one_of
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.description import AppliedEffect, MachineDescription
 from stiffmap.model.effects import add_effect, apply_records, get
@@ -50,8 +50,7 @@ def read_requests(given: Sequence[Request], of: Sequence[str]) -> Requests:
     if isinstance(of, str):
         of = (of,)
     for name in of:
-        if name not in QUANTITIES:
-            raise StiffmapError(f"derivatives_of: expected some of {', '.join(QUANTITIES)}, got {name!r}")
+        one_of(name, QUANTITIES, "derivatives_of")
     effects, inputs = [], []
     for request in given:
         if isinstance(request, str):

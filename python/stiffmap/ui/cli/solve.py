@@ -92,7 +92,7 @@ def command(
     told += [f"reason: {why}"] if why else []
     if int(s.status) == Status.SINGULAR and (ways := free_motions(m, s.free_twists)):
         told.append(f"free: the platform can {'; '.join(ways)}")
-    found = {"machine": m.name, "point": point, "wrench": load} | s.as_plain()
+    found = {"machine": m.name, "point": point, "position": place, "wrench": load} | s.as_plain()
     show(as_json, found | {"reason": why}, told)
     finish(int(s.status) != Status.CONVERGED)
 

@@ -82,9 +82,9 @@ def _changed(ds: xr.Dataset, kind: str, change: Callable[[xr.Variable], np.ndarr
 
 def partial_folder(path: Path) -> Path:
     """Folder next to `path` in which an unfinished map grows; made where it is missing."""
-    folder = path.with_name(f"{path.name}.partial")
     if path.is_dir() and not is_zarr(path):
         raise FileError("cannot be written: it is a folder", file=str(path))
+    folder = path.with_name(f"{path.name}.partial")
     try:
         folder.mkdir(exist_ok=True)
     except OSError as error:

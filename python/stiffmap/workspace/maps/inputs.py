@@ -45,14 +45,12 @@ def place(position: ArrayLike) -> Floats:
     return out
 
 
-def unit(direction: ArrayLike) -> Floats:
+def unit(direction: ArrayLike, name: str = "direction") -> Floats:
     """Direction (3,) as a unit vector."""
-    out = trailing(direction, (3,), "direction", "a direction")
+    out = trailing(direction, (3,), name, "a direction")
     length = float(np.linalg.norm(out))
     if out.shape != (3,) or not np.isfinite(length) or length == 0:
-        raise StiffmapError(
-            f"direction: expected one vector of 3 finite numbers, not all 0, got {out.tolist()}"
-        )
+        raise StiffmapError(f"{name}: expected one vector of 3 finite numbers, not all 0, got {out.tolist()}")
     return np.asarray(out / length)
 
 

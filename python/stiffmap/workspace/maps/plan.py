@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from stiffmap.common.broadcasting import Floats, instance_of, names_of, whole_number
+from stiffmap.common.broadcasting import Floats, names_of, whole_number
 from stiffmap.solve.labels import (
     COMPLIANCE_UNITS,
     COMPONENTS,
@@ -242,7 +242,6 @@ def map_plan(
     """
     loading = Loading(machine, **how)
     grid = grid_of(machine, {"x": x, "y": y, "z": z}, points)
-    instance_of(compliance, (bool, np.bool_), "compliance", "True or False")
     wrenches, names = wrench_cases(wrench, None if cases is None else names_of(cases, "cases"))
     directions = whole_number(directions, "directions", 3)
     return MapPlan(

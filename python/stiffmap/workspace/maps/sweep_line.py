@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from stiffmap.common.broadcasting import Floats, real_number, whole_number
+from stiffmap.common.broadcasting import Floats, one_of, real_number, whole_number
 from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.compiled import Role
 from stiffmap.solve.compiled.machine import PATH_CONTROLS as CONTROLS
@@ -104,8 +104,7 @@ def load_path(
 ) -> xr.Dataset:
     """See `sweep`: what it does with a `limit`."""
     machine, options = loading.machine, loading.options
-    if options.point not in machine.points:
-        raise StiffmapError(f"point: expected one of {', '.join(machine.points)}, got {options.point!r}")
+    one_of(options.point, machine.points, "point")
     turned = machine.compiled.home_rotation if options.rotation is None else options.rotation
     flags, *branches = machine.compiled.path(
         position,
@@ -156,15 +155,12 @@ def _crossing_end(cross: int, critical: list[Critical], points: Sequence[object]
 
 def check_control(control: str, limit: float | None, steps: int, load_type: object, cross: int) -> float:
     """The limit as a number; StiffmapError where the options do not fit together."""
-    if control not in CONTROLS:
-        raise StiffmapError(f"control: expected one of {', '.join(CONTROLS)}, got {control!r}")
+    one_of(control, CONTROLS, "control")
     if limit is None or not np.isfinite(real_number(limit, "limit")) or limit == 0:
         raise StiffmapError(
             f"limit: expected a number other than 0 ({UNITS[control]} for control {control!r}), got {limit!r}"
         )
     whole_number(steps, "steps", 1, what="a positive number")
-    if isinstance(cross, bool) or not isinstance(cross, int):
-        raise StiffmapError(f"cross: expected the number of a bifurcation, 1, -1, 2 …, got {cross!r}")
     if load_type != "dead":
         raise StiffmapError(f"load_type: a path needs a conservative force, 'dead'; got {load_type!r}")
     return float(limit)

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
-from stiffmap.common.broadcasting import Floats, real_array, thread_count
+from stiffmap.common.broadcasting import Floats, one_of, real_array, thread_count
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.files.load import Source
 from stiffmap.solve.labels import WRENCH, batch_dims
@@ -157,8 +157,7 @@ def frequency_response(
     """
     machine = as_machine(machine)
     f = frequency_axis(frequencies)
-    if kind not in KINDS:
-        raise StiffmapError(f"kind: expected one of {', '.join(KINDS)}, got {kind!r}")
+    one_of(kind, KINDS, "kind")
     found = tip_modes(machine, position, wrench, **call)
     values = receptance(found, f, call.get("threads"))
     if KINDS[kind]:

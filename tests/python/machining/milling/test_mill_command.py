@@ -139,7 +139,7 @@ def test_python_does_what_the_command_does(capsys: pytest.CaptureFixture[str]) -
     assert 1e3 * ds.attrs["entry"] == pytest.approx(said["entry"]["way_mm"])
     assert ds.attrs["tolerance"] == 1e-4
     assert ds.attrs["program"].count("\n") > 10
-    with pytest.raises(sm.StiffmapError, match="entry: expected a length"):
+    with pytest.raises(sm.StiffmapError, match="entry: expected a number or 'best', got 'first'"):
         sm.mill("orthoglide-revised", "circle", "trimming", entry="first")
     with pytest.raises(sm.StiffmapError, match="stock: expected two corners"):
         sm.mill("orthoglide-revised", "circle", "trimming", stock=[1, 2, 3])

@@ -176,7 +176,7 @@ def test_machines_from_text_and_plain_data(tmp_path: Path, monkeypatch: pytest.M
     data["home"]["translaton"] = [0, 0, 0]
     with pytest.raises(StiffmapError, match=r"home: unknown key 'translaton' \(did you mean 'translation'"):
         sm.load_machine(data)
-    with pytest.raises(StiffmapError, match="expected a machine: a shipped name, a path"):
+    with pytest.raises(StiffmapError, match="source: expected text or a path or a mapping, got"):
         sm.load_machine(3)  # type: ignore[arg-type]
     assert (
         sm.error_map(data | {"home": {"translation": [0, 416, 0]}}, force=100, x=[0.0], y=[0.4]).sizes["z"]

@@ -189,7 +189,7 @@ def test_a_box_is_turned_to_where_it_fits():
         ({"transmission": (2.0, 0.5)}, "transmission"),
         ({"tolerance": 0.0}, "tolerance"),
         ({"clearance": -1.0}, "clearance"),
-        ({"norm": "ball"}, "norm: expected 'sphere'"),
+        ({"norm": "ball"}, "norm: expected one of sphere, cube"),
         ({"orientation": "best"}, "orientation: expected 'search'"),
         ({"deflection": (300.0, "xy", 0.0)}, "deflection"),
         ({"region": [[0, 0, 0], [0, 1, 1]]}, "region"),

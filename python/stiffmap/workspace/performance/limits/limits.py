@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
-from stiffmap.common.broadcasting import Floats, instance_of, real_array
+from stiffmap.common.broadcasting import Floats, instance_of, one_of, real_array, real_number
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.rotations import as_rotations
 from stiffmap.model.description.machine import TASK
@@ -88,18 +88,14 @@ class Bounds:
                 raise StiffmapError(
                     f"transmission: expected (lowest, highest) with 0 <= lowest < highest, got ({low}, {high})"
                 )
-        if self.norm not in ("sphere", "cube"):
-            raise StiffmapError(
-                f"norm: expected 'sphere' (singular values) or 'cube' (each drive within its limit), got {self.norm!r}"
-            )
+        one_of(self.norm, ("sphere", "cube"), "norm")
         if self.clearance is not None:
             magnitude(self.clearance, "clearance", "m")
         if self.deflection is not None:
-            instance_of(self.deflection, (tuple, list), "deflection", "(force in N, plane, most in m)")
-        if self.deflection is not None and not (self.deflection[0] > 0 and self.deflection[2] > 0):
-            raise StiffmapError(
-                f"deflection: expected (force in N, plane, most in m), both positive, got {self.deflection!r}"
-            )
+            what = "(force in N, plane, most in m)"
+            given = instance_of(self.deflection, (tuple, list), "deflection", what)
+            if len(given) != 3 or not all(real_number(given[i], "deflection", what) > 0 for i in (0, 2)):
+                raise StiffmapError(f"deflection: expected {what}, both positive, got {given!r}")
 
     @cached_property
     def bars(self) -> Bars:

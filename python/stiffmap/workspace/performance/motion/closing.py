@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from stiffmap.common.broadcasting import Floats, batch, real_array, rows, thread_count, trailing
+from stiffmap.common.broadcasting import Floats, batch, one_of, real_array, rows, thread_count, trailing
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import place_text
 from stiffmap.model.description import Drive
@@ -34,17 +34,18 @@ def declared(machine: Machine, field: str, otherwise: float) -> Floats:
     return np.array([otherwise if v is None else v for v in given], dtype=float)
 
 
-def drive_values(machine: Machine, field: str, given: ArrayLike | None, unit: str) -> Floats:
+def drive_values(machine: Machine, field: str, given: ArrayLike | None, unit: str, name: str = "") -> Floats:
     """(drives,) of one number of the drives: as given (one, or one each), else what the file declares.
 
-    StiffmapError names the actuators without one.
+    StiffmapError names the actuators without one, and the argument: `name`, or the field.
     """
+    name = name or field
     n = len(machine.actuators)
     if given is not None:
-        out = real_array(given, field)
+        out = real_array(given, name)
         if out.shape not in ((), (n,)) or not (np.isfinite(out).all() and (out >= 0).all()):
             raise StiffmapError(
-                f"{field}: expected one number or {n} (drives {', '.join(machine.actuators)}), finite and "
+                f"{name}: expected one number or {n} (drives {', '.join(machine.actuators)}), finite and "
                 f"not negative, {unit}; got {given!r}"
             )
         return np.broadcast_to(out, (n,)).copy()
@@ -53,7 +54,7 @@ def drive_values(machine: Machine, field: str, given: ArrayLike | None, unit: st
     if missing:
         raise StiffmapError(
             f"{machine.name}: no {field} declared for {', '.join(missing)}; add it to the machine file or "
-            f"give {field}= ({unit})"
+            f"give {name}= ({unit})"
         )
     return values
 
@@ -61,7 +62,7 @@ def drive_values(machine: Machine, field: str, given: ArrayLike | None, unit: st
 def drive_limits(machine: Machine, field: str, limits: ArrayLike | str, unit: str) -> Floats:
     """(drives,) limits: ``unit``, ``declared`` in the machine file, or numbers."""
     word = limits if isinstance(limits, str) else ""
-    return drive_values(machine, field, {"unit": 1.0, "declared": None}.get(word, limits), unit)
+    return drive_values(machine, field, {"unit": 1.0, "declared": None}.get(word, limits), unit, "limits")
 
 
 def revolute_drives(machine: Machine) -> np.ndarray:
@@ -79,8 +80,7 @@ def characteristic_length(machine: Machine, length: float | None) -> float:
 
 def weighted(machine: Machine, jacobian: Floats, length: float, part: str) -> Floats:
     """Rows of `part` with rotations times the length, columns of revolute drives per that length."""
-    if not isinstance(part, str) or part not in PARTS:
-        raise StiffmapError(f"part: expected one of {', '.join(PARTS)}, got {part!r}")
+    one_of(part, PARTS, "part")
     out = jacobian.copy()
     out[..., 3:, :] *= length
     out[..., revolute_drives(machine)] /= length

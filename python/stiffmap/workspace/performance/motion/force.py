@@ -87,7 +87,7 @@ def accuracy_of(
     machine: Machine, k: DriveKinematics, *, errors: ArrayLike | None = None, plane: str = "xy"
 ) -> AccuracyTransmission:
     """The same from kinematics that are at hand, first order."""
-    e = drive_values(machine, "encoder_error", errors, "m or rad")
+    e = drive_values(machine, "encoder_error", errors, "m or rad", "errors")
     j = k.jacobian * e
     return AccuracyTransmission(
         translation=farthest_vertex(j[..., :3, :]),

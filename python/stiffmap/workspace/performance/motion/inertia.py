@@ -8,12 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from stiffmap.common.broadcasting import (
-    Floats,
-    real_array,
-    thread_count,
-    whole_number,
-)
+from stiffmap.common.broadcasting import Floats, batch, rows, thread_count, trailing, whole_number
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.short import short_repr
 from stiffmap.model.description import Body
@@ -141,7 +136,10 @@ def rest_efforts(
     flat = k.coordinates.reshape(-1, k.coordinates.shape[-1])
     twist = np.zeros((len(flat), 6))
     if velocity is not None:
-        twist[:, :3] = np.broadcast_to(real_array(velocity, "velocity"), (*shape, 3)).reshape(-1, 3)
+        v = trailing(velocity, (3,), "velocity", "velocities (m/s)")
+        if batch(shape, v.shape[:-1]) != shape:
+            raise StiffmapError(f"velocity: expected one or one for each pose, got shape {v.shape}")
+        twist[:, :3] = rows(v, shape, (3,))
     zero = np.zeros_like(twist)
     out = rigid_dynamics(machine, flat, twist, zero, zero, g, sharing=sharing)
     effort = out["effort"]

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from stiffmap.common.broadcasting import Floats, thread_count
+from stiffmap.common.broadcasting import Floats, one_of, thread_count
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.description import Cable, Joint
 from stiffmap.model.description.tree import joints
@@ -29,8 +29,7 @@ def drive_weights(machine: Machine, sharing: str) -> Floats:
     springs share, each drive in proportion to its stiffness; a commanded mismatch moves the tool as it would move
     the elastic drives. StiffmapError for another word, or for a drive that is rigid.
     """
-    if sharing not in KINDS:
-        raise StiffmapError(f"sharing: expected one of {', '.join(KINDS)}, got {sharing!r}")
+    one_of(sharing, KINDS, "sharing")
     if sharing == "least_norm":
         return np.zeros(0)
     found = joints(machine.description)
