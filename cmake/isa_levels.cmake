@@ -12,6 +12,11 @@ check_cxx_compiler_flag("${copies}" STIFFMAP_HAS_VECTOR_COPIES)
 if(STIFFMAP_HAS_VECTOR_COPIES)
   target_compile_options(stiffmap_kernel_options INTERFACE ${copies})
 endif()
+# Costs of a recent processor, also where another one runs them: up to a tenth less time than with the generic ones.
+check_cxx_compiler_flag(-mtune=icelake-server STIFFMAP_HAS_TUNING)
+if(STIFFMAP_HAS_TUNING)
+  target_compile_options(stiffmap_kernel_options INTERFACE -mtune=icelake-server)
+endif()
 
 # Each wide level has a narrow companion for calls on one or two poses: `name` is the level or the level and _pair.
 function(stiffmap_kernel name lanes)
