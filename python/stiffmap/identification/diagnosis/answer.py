@@ -73,11 +73,12 @@ def answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, cross
     each, gap = shares(columns, fit), gap_of(columns, fit)
     effects = _effects(v, best, each, fit)
     others = list(_alternatives(found, v, best, clock)) if best and effects else []
+    several = bool(others or clock.left_out or any(n.numbers or n.equivalents[RIVALS:] for n in v.named))
     noise = _noise(found, made, best)
     rest, numbers = _rest(columns, fit, v, each, gap), _numbers(found, v, models.get(CORRECTED))
     cut_short = clock.stopped and noise.lack_of_fit_before < RARE
     return Diagnosis(
-        verdict=_word(v, effects, rest, cut_short or (numbers is not None and bool(numbers.wide))),
+        verdict=_word(v, effects, rest, several, cut_short or (numbers is not None and bool(numbers.wide))),
         effects=effects,
         alternatives=[effects_ for effects_, _ in others],
         separations=[
@@ -146,13 +147,15 @@ def _models(
             best = corrected(given, starts)
         except StiffmapError as problem:
             return out, v, [f"the effects have no corrected machine: {problem}"]
-        nothing = best.nothing
-        if nothing is None:
+        if best.refused is None:
             out[CORRECTED] = best
             break
-        gone = v.named[nothing]
-        kept = tuple(n for n in v.named if n is not gone)
-        why = "its interval holds nothing at all"
+        k, why = best.refused
+        gone = v.named[k]
+        heirs = gone.equivalents if best.terms[k].undetermined.any() else ()
+        places = (put_instead(found.search.best.fit, gone.chosen, p) for p in heirs[:1])
+        heir = [replace(gone, chosen=c, equivalents=heirs[1:]) for c in places]
+        kept = (*v.named[:k], *heir, *v.named[k + 1 :])
         v = replace(
             v, named=kept, refused=(*v.refused, (gone.chosen, why)), rest=v.rest or ("" if kept else why)
         )
@@ -191,13 +194,14 @@ def _alternatives(
             except StiffmapError:
                 continue
             places = [*named[:k], place, *named[k + 1 :]]
-            yield effects_of(fitted, places, [{} for _ in places]), fitted
+            if not fitted.terms[k].undetermined.any():
+                yield effects_of(fitted, places, [{} for _ in places]), fitted
 
 
-def _word(v: Verdict, effects: Sequence[Effect], rest: Sequence[Rest], off: bool) -> str:
-    """`off`: whether the machine is not as declared even where nothing is left: its numbers are off as a group, beyond what their
-    uncertainties allow, or the search could not come to an end though the readings are no noise."""
-    if v.word == "ambiguous" and effects:
+def _word(v: Verdict, effects: Sequence[Effect], rest: Sequence[Rest], several: bool, off: bool) -> str:
+    """`several`: whether something would do in an effect's stead. `off`: whether the machine is not as declared even where nothing is
+    left: its numbers are off as a group, or the search could not come to an end though the readings are no noise."""
+    if effects and several and v.word == "ambiguous":
         return "ambiguous"
     if effects or v.beyond:
         return "effects+unattributed" if rest else "effects"
