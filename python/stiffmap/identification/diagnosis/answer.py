@@ -14,15 +14,10 @@ from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.noise.checks import checks
 from stiffmap.experiment.noise.nuisance import nuisance_columns
 from stiffmap.experiment.prediction.predict import Predictor
+from stiffmap.identification.calibration.calibrate import table_of
 from stiffmap.identification.clock import Clock
 from stiffmap.identification.diagnosis.report.effects import detectable, effects_of
-from stiffmap.identification.diagnosis.report.findings import (
-    Effect,
-    FoundNumber,
-    FoundNumbers,
-    NoiseReport,
-    Rest,
-)
+from stiffmap.identification.diagnosis.report.findings import Effect, FoundNumbers, NoiseReport, Rest
 from stiffmap.identification.diagnosis.report.result import Diagnosis
 from stiffmap.identification.diagnosis.report.separation import separation
 from stiffmap.identification.inference.amplitudes import Fit
@@ -42,7 +37,7 @@ from stiffmap.identification.inference.machines import (
 from stiffmap.identification.inference.names import put_instead, searched, with_travel
 from stiffmap.identification.inference.parts import GAPS
 from stiffmap.identification.inference.readings import Readings, readings
-from stiffmap.identification.inference.shares import gap_of, of_numbers, shares, tolerance_word, too_wide
+from stiffmap.identification.inference.shares import gap_of, shares, tolerance_word, too_wide
 from stiffmap.identification.inference.verdict import Named, Verdict, judged, not_as_stated
 
 RIVALS = 3
@@ -273,18 +268,11 @@ def _or_numbers(n: Named) -> str:
 def _numbers(found: Inferred, v: Verdict, best: Corrected | None) -> FoundNumbers | None:
     if best is None or not len(best.numbers):
         return None
-    said = zip(found.columns.unknowns, of_numbers(found.columns, found.search.best.fit), strict=True)
-    at = dict(zip((u.name for u in best.given.sensitivity.unknowns), best.numbers.tolist(), strict=True))
-    table = [
-        FoundNumber(u.name, u.group, u.leg, u.unit, at[u.name] * u.u, u.u, sd * u.u, share)
-        for u, (_, sd, share) in said
-        if u.name in at
-    ]
-    off = {b.unknown.name for b in v.beyond}
-    beyond = sorted((n for n in table if n.name in off), key=lambda n: -n.share)
-    names = ", ".join(n.name for n in beyond)
-    wide = too_wide(found.search.best.fit)
-    return FoundNumbers(tolerance_word(names, wide), wide, tuple(beyond), tuple(table))
+    fit, known = found.search.best.fit, {u.name for u in best.given.sensitivity.unknowns}
+    table = tuple(n for n in table_of(found.columns, fit, best)[0] if n.name in known)
+    off, wide = {b.unknown.name for b in v.beyond}, too_wide(fit)
+    beyond = tuple(sorted((n for n in table if n.name in off), key=lambda n: -n.share))
+    return FoundNumbers(tolerance_word(", ".join(n.name for n in beyond), wide), wide, beyond, table)
 
 
 def _unobservable(found: Inferred) -> list[str]:
