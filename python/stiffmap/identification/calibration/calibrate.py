@@ -17,7 +17,7 @@ from stiffmap.experiment.comparison.limitations import refuse
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.noise.outliers import swapped
 from stiffmap.experiment.prediction.predict import Predictor
-from stiffmap.identification.calibration.result import Calibration, CalibrationRow
+from stiffmap.identification.calibration.result import Calibration, FoundNumber
 from stiffmap.identification.candidates.plan import CandidatePlan
 from stiffmap.identification.clock import Clock, Progress
 from stiffmap.identification.inference.amplitudes import Fit
@@ -25,12 +25,7 @@ from stiffmap.identification.inference.columns import Columns
 from stiffmap.identification.inference.constants import ODDS
 from stiffmap.identification.inference.corrected import Corrected, corrected
 from stiffmap.identification.inference.inference import Inferred, infer
-from stiffmap.identification.inference.machines import (
-    CALIBRATED,
-    stands_out,
-    vouched,
-    written,
-)
+from stiffmap.identification.inference.machines import CALIBRATED, stands_out, vouched, written
 from stiffmap.identification.inference.names import EXACT
 from stiffmap.identification.inference.readings import readings
 from stiffmap.identification.inference.shares import of_numbers, shares, tolerance_word, too_wide
@@ -148,12 +143,11 @@ def _answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, star
     )
 
 
-def table_of(columns: Columns, fit: Fit, best: Corrected | None) -> tuple[tuple[CalibrationRow, ...], int]:
+def table_of(columns: Columns, fit: Fit, best: Corrected | None) -> tuple[tuple[FoundNumber, ...], int]:
     """Rows of all numbers that the readings show, with their values at the optimum, and how many directions the readings
     determine."""
-    at = {}
-    if best is not None:
-        at = {u.name: float(v) for u, v in zip(best.given.sensitivity.unknowns, best.numbers, strict=True)}
+    found = zip(best.given.sensitivity.unknowns, best.numbers, strict=True) if best else ()
+    at = {u.name: float(v) for u, v in found}
     numbers = [p.name for p in fit.parts if p.kind == "number"]
     white = fit.without(numbers).white(columns.numbers)
     gram = white.T @ white
@@ -164,12 +158,13 @@ def table_of(columns: Columns, fit: Fit, best: Corrected | None) -> tuple[tuple[
         prior[index] = max(1.0, fit.spread(group))
     spread = np.sqrt(np.diag(np.linalg.inv(np.diag(prior**-2) + gram)))
     out = []
-    for k, (u, (value, _, _)) in enumerate(zip(columns.unknowns, of_numbers(columns, fit), strict=True)):
+    for k, (u, (value, _, share)) in enumerate(zip(columns.unknowns, of_numbers(columns, fit), strict=True)):
         value, sd = at.get(u.name, value), float(spread[k])
         informed = 1.0 - (sd / prior[k]) ** 2
         pull = float(value / np.sqrt(informed)) if informed > 1e-9 else 0.0
         more = bool(informed > 0.5), float(prior[k] / sd), k in minimal
-        out.append(CalibrationRow(u.name, u.group, u.leg, u.unit, value * u.u, u.u, sd * u.u, pull, *more))
+        own = value * u.u, u.u, sd * u.u, pull
+        out.append(FoundNumber(u.name, u.group, u.leg, u.unit, *own, *more, share))
     return tuple(out), int((np.linalg.eigvalsh(gram) > SEEN**2).sum())
 
 

@@ -31,8 +31,8 @@ FACTOR = 0.5
 
 
 @dataclass(frozen=True)
-class CalibrationRow:
-    """One unknown: declared standard uncertainty, posterior, and whether the readings determine it."""
+class FoundNumber:
+    """A declared number as the readings have it, SI: its standard uncertainty before and after them, and whether they determine it."""
 
     name: str
     group: str
@@ -40,8 +40,9 @@ class CalibrationRow:
     unit: str
     """``m``, ``rad``, ``1`` or ``ln`` (logarithm of a factor)."""
     value: float
-    """Posterior mean of its error."""
+    """What it is off by: posterior mean."""
     u: float
+    """Declared standard uncertainty."""
     sigma: float
     """Posterior standard deviation."""
     pull: float
@@ -52,6 +53,12 @@ class CalibrationRow:
     """How many times the readings sharpen its prior."""
     minimal: bool
     """Whether it belongs to the minimal set that spans all that the readings determine."""
+    share: float
+    """Of the squares of the readings' difference from the declared machine."""
+
+    def __str__(self) -> str:
+        off = measured(self.value, self.sigma, self.unit)
+        return f"{self.name}: {off} off ({abs(self.value) / self.u:.2g} standard uncertainties)"
 
 
 @short_repr
@@ -89,8 +96,8 @@ class Calibration:
     """Both on readings that no fit saw; None where there are not two folds, or time was over."""
     over_time: OverTime | None
     """What `machine` leaves over time; None where no times were recorded."""
-    rows: tuple[CalibrationRow, ...]
-    beyond: tuple[CalibrationRow, ...]
+    rows: tuple[FoundNumber, ...]
+    beyond: tuple[FoundNumber, ...]
     """Numbers that no tolerance allows."""
     wide: tuple[WideGroup, ...]
     """Groups whose numbers are further off than their standard uncertainties say, where that is beyond doubt."""
@@ -116,7 +123,7 @@ class Calibration:
             return in_display_units(s.size[0], unit)
 
         out = [f"calibration: {self.verdict}{' (stopped early)' if self.stopped else ''}"]
-        out += [f"  {b.name}: {measured(b.value, b.sigma, b.unit)}" for b in self.beyond]
+        out += [f"  {b}" for b in self.beyond]
         out += not_as_stated(self.scale)
         out += map(str, self.wide)
         out.append(f"identifiable from the readings: {self.rank} directions of {len(self.rows)} unknowns")

@@ -14,15 +14,10 @@ from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.noise.checks import checks
 from stiffmap.experiment.noise.nuisance import nuisance_columns
 from stiffmap.experiment.prediction.predict import Predictor
+from stiffmap.identification.calibration.calibrate import table_of
 from stiffmap.identification.clock import Clock
 from stiffmap.identification.diagnosis.report.effects import detectable, effects_of
-from stiffmap.identification.diagnosis.report.findings import (
-    Effect,
-    FoundNumber,
-    FoundNumbers,
-    NoiseReport,
-    Rest,
-)
+from stiffmap.identification.diagnosis.report.findings import Effect, FoundNumbers, NoiseReport, Rest
 from stiffmap.identification.diagnosis.report.result import Diagnosis
 from stiffmap.identification.diagnosis.report.separation import separation
 from stiffmap.identification.inference.amplitudes import Fit
@@ -42,7 +37,7 @@ from stiffmap.identification.inference.machines import (
 from stiffmap.identification.inference.names import put_instead, searched, with_travel
 from stiffmap.identification.inference.parts import GAPS
 from stiffmap.identification.inference.readings import Readings, readings
-from stiffmap.identification.inference.shares import gap_of, of_numbers, shares, tolerance_word, too_wide
+from stiffmap.identification.inference.shares import gap_of, shares, tolerance_word, too_wide
 from stiffmap.identification.inference.verdict import Named, Verdict, judged, not_as_stated
 
 RIVALS = 3
@@ -73,11 +68,12 @@ def answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, cross
     each, gap = shares(columns, fit), gap_of(columns, fit)
     effects = _effects(v, best, each, fit)
     others = list(_alternatives(found, v, best, clock)) if best and effects else []
+    several = bool(others or clock.left_out or any(n.numbers or n.equivalents[RIVALS:] for n in v.named))
     noise = _noise(found, made, best)
     rest, numbers = _rest(columns, fit, v, each, gap), _numbers(found, v, models.get(CORRECTED))
     cut_short = clock.stopped and noise.lack_of_fit_before < RARE
     return Diagnosis(
-        verdict=_word(v, effects, rest, cut_short or (numbers is not None and bool(numbers.wide))),
+        verdict=_word(v, effects, rest, several, cut_short or (numbers is not None and bool(numbers.wide))),
         effects=effects,
         alternatives=[effects_ for effects_, _ in others],
         separations=[
@@ -146,13 +142,15 @@ def _models(
             best = corrected(given, starts)
         except StiffmapError as problem:
             return out, v, [f"the effects have no corrected machine: {problem}"]
-        nothing = best.nothing
-        if nothing is None:
+        if best.refused is None:
             out[CORRECTED] = best
             break
-        gone = v.named[nothing]
-        kept = tuple(n for n in v.named if n is not gone)
-        why = "its interval holds nothing at all"
+        k, why = best.refused
+        gone = v.named[k]
+        heirs = gone.equivalents if best.terms[k].undetermined.any() else ()
+        places = (put_instead(found.search.best.fit, gone.chosen, p) for p in heirs[:1])
+        heir = [replace(gone, chosen=c, equivalents=heirs[1:]) for c in places]
+        kept = (*v.named[:k], *heir, *v.named[k + 1 :])
         v = replace(
             v, named=kept, refused=(*v.refused, (gone.chosen, why)), rest=v.rest or ("" if kept else why)
         )
@@ -191,13 +189,14 @@ def _alternatives(
             except StiffmapError:
                 continue
             places = [*named[:k], place, *named[k + 1 :]]
-            yield effects_of(fitted, places, [{} for _ in places]), fitted
+            if not fitted.terms[k].undetermined.any():
+                yield effects_of(fitted, places, [{} for _ in places]), fitted
 
 
-def _word(v: Verdict, effects: Sequence[Effect], rest: Sequence[Rest], off: bool) -> str:
-    """`off`: whether the machine is not as declared even where nothing is left: its numbers are off as a group, beyond what their
-    uncertainties allow, or the search could not come to an end though the readings are no noise."""
-    if v.word == "ambiguous" and effects:
+def _word(v: Verdict, effects: Sequence[Effect], rest: Sequence[Rest], several: bool, off: bool) -> str:
+    """`several`: whether something would do in an effect's stead. `off`: whether the machine is not as declared even where nothing is
+    left: its numbers are off as a group, or the search could not come to an end though the readings are no noise."""
+    if effects and several and v.word == "ambiguous":
         return "ambiguous"
     if effects or v.beyond:
         return "effects+unattributed" if rest else "effects"
@@ -269,18 +268,11 @@ def _or_numbers(n: Named) -> str:
 def _numbers(found: Inferred, v: Verdict, best: Corrected | None) -> FoundNumbers | None:
     if best is None or not len(best.numbers):
         return None
-    said = zip(found.columns.unknowns, of_numbers(found.columns, found.search.best.fit), strict=True)
-    at = dict(zip((u.name for u in best.given.sensitivity.unknowns), best.numbers.tolist(), strict=True))
-    table = [
-        FoundNumber(u.name, u.group, u.leg, u.unit, at[u.name] * u.u, u.u, sd * u.u, share)
-        for u, (_, sd, share) in said
-        if u.name in at
-    ]
-    off = {b.unknown.name for b in v.beyond}
-    beyond = sorted((n for n in table if n.name in off), key=lambda n: -n.share)
-    names = ", ".join(n.name for n in beyond)
-    wide = too_wide(found.search.best.fit)
-    return FoundNumbers(tolerance_word(names, wide), wide, tuple(beyond), tuple(table))
+    fit, known = found.search.best.fit, {u.name for u in best.given.sensitivity.unknowns}
+    table = tuple(n for n in table_of(found.columns, fit, best)[0] if n.name in known)
+    off, wide = {b.unknown.name for b in v.beyond}, too_wide(fit)
+    beyond = tuple(sorted((n for n in table if n.name in off), key=lambda n: -n.share))
+    return FoundNumbers(tolerance_word(", ".join(n.name for n in beyond), wide), wide, beyond, table)
 
 
 def _unobservable(found: Inferred) -> list[str]:

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import compress
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -29,12 +30,13 @@ from stiffmap.identification.inference.readings import Readings
 from stiffmap.identification.inference.travel import Profile, profiles
 from stiffmap.identification.numbers.sensitivity import bends, moves_of, sensitivity_at, with_moves
 from stiffmap.model.description import AppliedEffect
+from stiffmap.model.effects import get
 from stiffmap.solve.machine import Machine
 
 WIDE = float(norm.isf(0.025))
 """Standard deviations of a 95 % interval to either side."""
 STEP = 1e-3
-"""Of a parameter's scale, for differences."""
+"""Of a parameter's scale, for differences, and within which it is at a bound."""
 STEPS, STEPS_OF_A_FOLD = 30, 6
 """Evaluations at most, of all readings and of those outside a fold."""
 FRAMINGS, SETTLED = 4, 0.3
@@ -53,6 +55,8 @@ class Term:
     candidate: Candidate
     values: Floats
     """(q,)."""
+    sd: Floats = field(default_factory=lambda: np.zeros(0))
+    """(q,) their standard deviations at an optimum, everything else integrated out; infinite where the readings determine nothing."""
 
     @staticmethod
     def of(candidate: Candidate, term: AppliedEffect) -> Term:
@@ -74,6 +78,38 @@ class Term:
         p = self.candidate.parameters
         return self.candidate.term([float(v) * q.scale for v, q in zip(values, p, strict=True)])
 
+    @property
+    def ends(self) -> tuple[Floats, Floats]:
+        """(q,) lower and upper ends of 95 % intervals, whatever the bounds."""
+        return self.values - WIDE * self.sd, self.values + WIDE * self.sd
+
+    @property
+    def nulls(self) -> Floats:
+        """(q,) values at which the effect vanishes; NaN where there is none."""
+        return np.array([np.nan if p.null is None else p.null / p.scale for p in self.candidate.parameters])
+
+    @property
+    def undetermined(self) -> Mask:
+        """(q,) parameters whose interval is all that they can be, or that are at a bound other than their null."""
+        (low, high), (least, most) = self.bounds, self.ends
+        at = [(np.abs(self.values - b) < STEP) & (b != self.nulls) for b in (low, high)]
+        return np.asarray(((least <= low) & (most >= high)) | at[0] | at[1])
+
+    @property
+    def spare(self) -> Mask:
+        """(q,) parameters that are not determined and that the effect can do without: at their null, or their default."""
+        p, vector = self.candidate.parameters, get(self.candidate.kind).vector
+        may = [q.default is not None or q.name in vector for q in p]
+        shape = np.isnan(self.nulls)
+        least, most = self.ends
+        idle = (least <= self.nulls) & (self.nulls <= most) & (len(self.candidate.linear) > 1)
+        return np.asarray(self.undetermined & may & (shape | idle))
+
+    def without(self, k: int) -> Term:
+        """Without one parameter, from the same values."""
+        p = self.candidate.parameters
+        return Term(replace(self.candidate, parameters=p[:k] + p[k + 1 :]), np.delete(self.values, k))
+
 
 @dataclass(frozen=True, eq=False)
 class Corrected:
@@ -83,9 +119,6 @@ class Corrected:
     """At the optimum."""
     numbers: Floats
     """(p,) declared numbers, in standard uncertainties."""
-    covariance: Floats
-    """(k, k) of all values of the terms, in scales, one term after the other; numbers integrated out. Infinite variances of what the
-    readings do not determine."""
     prediction: Floats
     """(n, c) m, rad."""
     slopes: Floats
@@ -98,20 +131,17 @@ class Corrected:
     """The same over each drive's coordinate."""
 
     @property
-    def nothing(self) -> int | None:
-        """Number of the effect that is least in its standard deviations, if the 95 % intervals of all its strengths hold their null."""
-        sd = np.sqrt(np.maximum(np.diag(self.covariance), 1e-300))
-        size, k = [], 0
-        for t in self.terms:
-            far = [
-                abs(v - p.null / p.scale) / s
-                for p, v, s in zip(t.candidate.parameters, t.values, sd[k:], strict=False)
-                if p.null is not None
-            ]
-            size.append(max(far, default=np.inf))
-            k += len(t.values)
-        least = int(np.argmin(size)) if size else 0
-        return least if size and size[least] < WIDE else None
+    def refused(self) -> tuple[int, str] | None:
+        """Number of an effect that has no name, and why: that which is least, if the 95 % intervals of all its strengths hold their
+        null; one that a parameter which is not determined leaves without meaning."""
+        far = [np.abs(t.values - t.nulls) / t.sd for t in self.terms]
+        size = [np.inf if np.isnan(f).all() else float(np.nanmax(f)) for f in far]
+        if min(size, default=np.inf) < WIDE:
+            return size.index(min(size)), "its interval holds nothing at all"
+        for k, t in enumerate(self.terms):
+            for p in compress(t.candidate.parameters, t.undetermined):
+                return k, f"these readings do not determine its {p.name}"
+        return None
 
     @property
     def others(self) -> Floats:
@@ -132,13 +162,13 @@ def without(found: Corrected, keep: Mask) -> Corrected:
 
 def instead(found: Corrected, terms: Sequence[Term]) -> Corrected:
     """The optimum with other terms under the same weights, from the same numbers."""
-    return _optimum(found.given, terms, found.others)
+    return _determined(_optimum(found.given, terms, found.others))
 
 
 def along_travel(found: Corrected, given: Readings) -> Corrected:
     """The optimum of readings whose drives err along their travel, next to effects that keep their values: what they leave."""
     more = corrected(given, found.terms, np.zeros_like(found.slopes))
-    return replace(more, covariance=found.covariance, slopes=found.slopes)
+    return replace(more, terms=found.terms, slopes=found.slopes)
 
 
 def corrected(given: Readings, terms: Sequence[Term], held: Floats | None = None) -> Corrected:
@@ -161,13 +191,27 @@ def corrected(given: Readings, terms: Sequence[Term], held: Floats | None = None
         weights = (DEGREES + 1.0) / (DEGREES + (noise / given.kappa) ** 2)
         given = given.weighed(np.minimum(weights, 1.0))
         found = _optimum(given, found.terms, found.others, held)
-    return found
+    return found if held is not None else _determined(found)
 
 
-def _parts(terms: Sequence[Term], x: Floats) -> tuple[Term, ...]:
-    """The terms with the values at the head of x, one term after the other."""
-    ends = np.cumsum([0, *(len(t.values) for t in terms)])
-    return tuple(replace(t, values=x[a:b]) for t, a, b in zip(terms, ends[:-1], ends[1:], strict=True))
+def _determined(found: Corrected) -> Corrected:
+    """The optimum without the parameters that effects can spare, left out one after the other: that which shows least first."""
+    shown = _each(found.terms, np.array([np.linalg.norm(found.given.white(c)) for c in found.slopes]))
+    least = [
+        (float(c[j] * np.subtract(*t.bounds[::-1])[j]), k, int(j))
+        for k, (t, c) in enumerate(zip(found.terms, shown, strict=True))
+        for j in np.flatnonzero(t.spare)
+    ]
+    if not least:
+        return found
+    _, k, j = min(least)
+    terms = [*found.terms[:k], found.terms[k].without(j), *found.terms[k + 1 :]]
+    return _determined(_optimum(found.given, terms, found.others))
+
+
+def _each(terms: Sequence[Term], x: Floats) -> list[Floats]:
+    """The numbers of the terms at the head of x, one term after the other."""
+    return np.split(x, np.cumsum([len(t.values) for t in terms]))[: len(terms)]
 
 
 def _remembered(function: Callable[[Floats], Floats]) -> Callable[[Floats], Floats]:
@@ -197,7 +241,7 @@ def _optimum(
     m = along.shape[1]
 
     def effects(x: Floats) -> list[AppliedEffect]:
-        return [t.effect(t.values) for t in _parts(terms, x)]
+        return [t.effect(v) for t, v in zip(terms, _each(terms, x), strict=True)]
 
     @_remembered
     def at(x: Floats) -> Floats:
@@ -254,8 +298,9 @@ def _optimum(
     numbers, travel = x[k : k + p] * given.spread, x[k + p :]
     found = profiles(given.drives, travel, spread[k + p :, k + p :])
     shows = given.predicted(numbers, effects(x), given.knots(found)) if found else shown(x)
-    own = np.asarray(spread[:k, :k])
-    return Corrected(_parts(terms, x), numbers, own, shows, slopes(x[: k + p]), given, travel, found)
+    own = zip(terms, _each(terms, x), _each(terms, np.sqrt(np.diag(spread))), strict=True)
+    at_best = tuple(replace(t, values=v, sd=sd) for t, v, sd in own)
+    return Corrected(at_best, numbers, shows, slopes(x[: k + p]), given, travel, found)
 
 
 def columns_of(found: Corrected) -> tuple[Floats, Floats]:

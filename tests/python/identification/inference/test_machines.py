@@ -14,11 +14,12 @@ from stiffmap.experiment import Predictor, random_plan
 from stiffmap.experiment.channels import AXIS_CHANNELS
 from stiffmap.identification.candidates.candidates import Candidate
 from stiffmap.identification.inference import machines
-from stiffmap.identification.inference.corrected import Term, corrected, without
+from stiffmap.identification.inference.corrected import Corrected, Term, corrected, without
 from stiffmap.identification.inference.covariance import Covariance
 from stiffmap.identification.inference.readings import Readings
 from stiffmap.identification.numbers import unknowns
 from stiffmap.identification.numbers.sensitivity import predicted, sensitivity, zeros_anew
+from stiffmap.model.description import AppliedEffect
 from stiffmap.model.effects import registry
 
 
@@ -141,7 +142,36 @@ def test_a_turn_that_changes_nothing_is_not_determined() -> None:
     n = len(rows)
     rest = Covariance(np.ones(n), np.zeros((n, 0)))
     found = corrected(Readings(p, e.sigma, rows, channel, 1.0, np.ones(n), rest, s, np.zeros(0)), (term,))
-    assert np.isinf(np.diag(found.covariance)).tolist().count(True) == 1
+    (left,) = found.terms
+    assert len(left.values) == 2 and np.isfinite(left.sd).all() and not left.undetermined.any()
+    assert dict(left.effect(left.values).parameters).keys() < {p.name for p in kind.parameters}
+
+
+@pytest.mark.parametrize(
+    ("kind", "values", "sd", "spare", "why"),
+    [
+        ("bilinear", (3.0, 1e-5), (0.1, 1e-3), "", "knee"),  # it must be given
+        ("bilinear", (3.0, 0.5), (0.1, np.inf), "", "knee"),
+        ("bilinear", (10.0, 0.5), (1.0, np.inf), "", "nothing"),
+        ("hysteresis", (5.0, 0.0, 1e6), (0.1, np.inf, 1.0), "half_width seat", "half_width"),
+        ("zero_offset", (1e9,), (1.0,), "", "error"),
+        ("tilt", (1e9, 1.0, 2.0), (1e9, 0.1, 0.1), "angle_x", "angle_x"),
+        ("tilt", (1e9, 1.0, 2.0), (1.0, 0.1, 0.1), "", "angle_x"),  # it must be more than a machine can have
+        ("tilt", (3.0, 1.0, 2.0), (0.1, 0.1, 0.1), "", None),
+    ],
+)
+def test_an_effect_has_a_name_by_what_is_determined(
+    kind: str, values: tuple[float, ...], sd: tuple[float, ...], spare: str, why: str | None
+) -> None:
+    effect = registry.get(kind)
+    p = tuple(q for q in effect.parameters if (q.name in effect.moved if effect.moved else q.fitted))
+    start = Term.of(Candidate(kind, "x", (), p), AppliedEffect(kind, "x", (), ()))
+    term = replace(start, values=np.clip(np.array(values), *start.bounds), sd=np.array(sd))
+    none = np.zeros(0)
+    given: Any = None
+    refused = Corrected((term,), none, none, none, given).refused
+    assert " ".join(np.array([q.name for q in p])[term.spare]) == spare
+    assert (refused is None) if why is None else (refused is not None and why in refused[1])
 
 
 def test_a_fold_is_the_fit_of_its_own_readings() -> None:
@@ -162,6 +192,6 @@ def test_a_fold_is_the_fit_of_its_own_readings() -> None:
     whole = corrected(Readings(p, e.sigma, rows, channel, 1.0, np.ones(n), rest, s, np.zeros(0)), (term,))
     keep = np.arange(len(e)) % 2 == 0
     fold, own = without(whole, keep), corrected(whole.given.only(keep), (term,))
-    sd = np.sqrt(np.diag(own.covariance))
+    sd = own.terms[0].sd
     np.testing.assert_allclose(fold.terms[0].values, own.terms[0].values, atol=1e-2 * sd.min())
     assert np.abs(fold.terms[0].values - whole.terms[0].values).max() > 0.1 * sd.min()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -12,6 +13,7 @@ import stiffmap as sm
 from stiffmap.identification.diagnosis.report.findings import Effect
 from stiffmap.identification.diagnosis.report.sentences import measured, sentence
 from stiffmap.ui.cli import main
+from stiffmap.ui.report.diagnosis.pictures import before_after, maps
 from stiffmap.ui.report.page import write_page
 
 
@@ -61,6 +63,14 @@ def test_a_broken_page_is_seen(tmp_path: Path) -> None:
     assert found["console"] >= 1
 
 
+@pytest.mark.parametrize("which", ["declared", "calibrated", "corrected"])
+def test_pictures_say_which_machine_is_handed_over(which: str) -> None:
+    d = replace(soft_drive(), which=which)
+    named = [t.get_text() for t in before_after(d).axes[0].get_yticklabels()]
+    assert named == ["your file", f"machine.yaml ({which})", "noise"]
+    assert f"machine.yaml ({which})" in [ax.get_title() for ax in maps(d).axes]
+
+
 def test_the_report_says_what_a_workshop_signs(tmp_path: Path) -> None:
     (tmp_path / "data.csv").write_text("x", encoding="utf-8")
     d = soft_drive()
@@ -71,7 +81,7 @@ def test_the_report_says_what_a_workshop_signs(tmp_path: Path) -> None:
         "What to do next",
         "Evidence",
         "without load (dashed), under it (enlarged)",
-        "Where the corrected machine",
+        "Where the deflection of machine.yaml",
         "What is left",
         "What this experiment could have seen",
         "Provenance",

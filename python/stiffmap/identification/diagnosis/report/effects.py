@@ -13,7 +13,7 @@ from stiffmap.identification.diagnosis.report.findings import Detectability, Eff
 from stiffmap.identification.inference.amplitudes import Fit
 from stiffmap.identification.inference.columns import Columns
 from stiffmap.identification.inference.constants import ODDS
-from stiffmap.identification.inference.corrected import WIDE, Corrected, Term
+from stiffmap.identification.inference.corrected import Corrected, Term
 from stiffmap.identification.inference.places import Place, reach
 from stiffmap.model.description import MachineDescription
 from stiffmap.model.effects import Placed, registry
@@ -27,25 +27,14 @@ def effects_of(
 ) -> list[Effect]:
     """The effects of an optimum with their 95 % intervals, SI, at their places; `evidence` per effect."""
     description = found.given.predictor.machine.description
-    sd = np.sqrt(np.maximum(np.diag(found.covariance), 0.0))
-    ends = np.cumsum([0, *(len(t.values) for t in found.terms)])
-    return [
-        _effect(description, term, sd[a:b], place, how)
-        for term, a, b, place, how in zip(found.terms, ends[:-1], ends[1:], places, evidence, strict=True)
-    ]
+    return [_effect(description, *each) for each in zip(found.terms, places, evidence, strict=True)]
 
 
-def _effect(
-    description: MachineDescription,
-    term: Term,
-    sd: Floats,
-    place: Place,
-    evidence: dict[str, float],
-) -> Effect:
+def _effect(description: MachineDescription, term: Term, place: Place, evidence: dict[str, float]) -> Effect:
     c, e = term.candidate, registry.get(term.candidate.kind)
     scale = np.array([[p.scale] for p in c.parameters])
     low, high = (side[:, None] for side in term.bounds)
-    ends = np.stack([term.values - WIDE * sd, term.values + WIDE * sd], axis=1)
+    ends = np.stack(term.ends, axis=1)
     inside = np.clip(ends, low, high)
     rows = np.column_stack([term.values, inside]) * scale
     named = zip(c.parameters, rows.tolist(), strict=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from stiffmap.identification.calibration.result import FoundNumber
 from stiffmap.identification.candidates.candidates import words
 from stiffmap.identification.inference.shares import WideGroup
 
@@ -52,24 +53,6 @@ class Rest:
     """Commanded position of the pose where it is largest, m."""
     size: float = float("nan")
     """rms of it there, m or rad."""
-
-
-@dataclass(frozen=True)
-class FoundNumber:
-    """A declared number as the readings have it, SI."""
-
-    name: str
-    group: str
-    leg: str
-    unit: str
-    value: float
-    """What it is off by."""
-    sigma: float
-    """Its standard uncertainty before any reading."""
-    u: float
-    """After them."""
-    share: float
-    """Of the squares of the difference from the declared machine."""
 
 
 @dataclass(frozen=True)

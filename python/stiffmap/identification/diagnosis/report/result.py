@@ -31,7 +31,6 @@ from stiffmap.identification.diagnosis.report.sentences import (
     LISTED,
     effect_text,
     next_step,
-    number_text,
     opening,
     separation_text,
 )
@@ -137,10 +136,7 @@ class Diagnosis:
             f"verdict: {self.verdict} - {VERDICTS[self.verdict]}",
             *(f"readings: {_slip(s)}" for s in self.slips),
             "effects: " + ("; ".join(effect_text(e) for e in self.effects) or "none") + _others(self),
-            *(
-                f"number: {number_text(n)}"
-                for n in (self.calibration.beyond if self.calibration else ())[:LISTED]
-            ),
+            *(f"number: {n}" for n in (self.calibration.beyond if self.calibration else ())[:LISTED]),
             f"held-out readings: rms {_thousandth(*self.before.size)} before, {_thousandth(*self.after.size)} after "
             f"(noise {_thousandth(self.noise_size, self.before.size[1])}, ratio {self.after.size[0] / self.noise_size:.3f}, n = {self.after.n}){_promise(self)}",
             _left(self),

@@ -8,7 +8,7 @@ from typing import Any
 
 from stiffmap.common.number_text import with_uncertainty, within
 from stiffmap.identification.candidates.candidates import words
-from stiffmap.identification.diagnosis.report.findings import Effect, FoundNumber
+from stiffmap.identification.diagnosis.report.findings import Effect
 from stiffmap.identification.diagnosis.report.separation import Separation
 from stiffmap.identification.diagnosis.slips.slip import Slip
 from stiffmap.model.effects import registry
@@ -132,7 +132,7 @@ def _of_machine(d: Any, verdict: str) -> str:
     before, unit = d.before.size
     size = f"{1e6 * before:.1f} µ{unit} rms, noise {1e6 * d.noise_size:.1f} µ{unit}"
     found = [(e.evidence.get("share", 0.0), sentence(e) + aliases(e)) for e in d.effects]
-    found += [(n.share, number_text(n)) for n in (d.calibration.beyond if d.calibration else ())]
+    found += [(n.share, str(n)) for n in (d.calibration.beyond if d.calibration else ())]
     named = "; ".join(text for _, text in sorted(found, key=lambda f: -f[0]))
     if verdict == "none" and d.calibration is not None:
         return (
@@ -188,16 +188,6 @@ def next_step(d: Any) -> str:
     if d.which == "declared":
         return "Inspect this place, and read more poses: no corrected machine predicts unseen readings better than the declared one yet."
     return "Inspect this place; until it is mended, plan and compensate with machine.yaml."
-
-
-def number_text(n: FoundNumber) -> str:
-    """``zero of j4: 0.81 ± 0.02 mrad off (8.1 standard uncertainties)``."""
-    factor, label = DISPLAY_UNITS.get(n.unit, (1.0, n.unit))
-    off = with_uncertainty(factor * n.value, factor * n.u)
-    many = abs(n.value) / n.sigma
-    return f"{n.name}: {off} {'' if label == '1' else label} off ({many:.2g} standard uncertainties)".replace(
-        "  ", " "
-    )
 
 
 def digits(factor: float, value: float, low: float, high: float) -> list[str]:

@@ -90,8 +90,8 @@ def html(d: Diagnosis, *, date: str | None = None, inputs: Iterable[str | PathLi
             (
                 n.name,
                 in_shop_units(n.value, n.unit),
-                in_shop_units(n.u, n.unit, 2),
-                f"{abs(n.value) / n.sigma:.1f}",
+                in_shop_units(n.sigma, n.unit, 2),
+                f"{abs(n.value) / n.u:.1f}",
             )
             for n in (d.calibration.beyond if d.calibration else ())
         ],
@@ -137,7 +137,7 @@ def _effect(e: Effect) -> dict[str, object]:
 
 
 def _budget(d: Diagnosis) -> dict[str, object] | None:
-    """Shares of the corrected machine's deflection at the worst pose of the map in the pictures; None where it has play without load."""
+    """Shares of the deflection of the machine that is handed over at the worst pose of the map in the pictures; None where it has play without load."""
     from stiffmap.ui.plot.loaded import budget_rows
     from stiffmap.ui.report.diagnosis.pictures import worst_pose
 

@@ -21,17 +21,17 @@ from stiffmap.ui.report.diagnosis.place import place_figure
 
 CAPTIONS = {
     "residual_vectors": "Mean residual (reading less prediction) of each pose as arrows, with the machine of your file and "
-    "with the corrected one; both enlarged alike.",
+    "with that of machine.yaml; both enlarged alike.",
     "place": "The machine at home. The parts that the diagnosis names are red; where it names none that can be drawn, the tool is marked.",
-    "before_after": "What the machine of your file and the corrected one leave of the readings, rms: of those that no fit saw, unless "
+    "before_after": "What the machine of your file and that of machine.yaml leave of the readings, rms: of those that no fit saw, unless "
     "the title says otherwise.",
     "residual_trends": "Residual of every reading against the conditions on which it depends.",
     "residual_others": "Residual of every reading against conditions on which it does not depend.",
     "residual_histogram": "Residuals over the noise. With the right machine they follow the dashed line.",
     "loops": "Reading over load in the order of time, each set-up from its own zero: what was measured, and what the machine of your file "
-    "and the corrected one show.",
-    "maps": "Error of the tool over a plane of the workspace: the machine of your file, the corrected one, and what the finding changes.",
-    "loaded": "The corrected machine where it deflects most in that plane: without load (dashed), under it (enlarged), and the part "
+    "and that of machine.yaml show.",
+    "maps": "Error of the tool over a plane of the workspace: the machine of your file, that of machine.yaml, and what changes.",
+    "loaded": "The machine of machine.yaml where it deflects most in that plane: without load (dashed), under it (enlarged), and the part "
     "of each spring and drive.",
     "shares": "How the squares of the difference from your file are shared out among noise, declared numbers, effects, and what "
     "has no known cause.",
@@ -81,7 +81,7 @@ def drawn(make: Callable[[Diagnosis], Figure], d: Diagnosis) -> Figure:
 
 
 def loaded(d: Diagnosis) -> Figure:
-    """The corrected machine under the load where it deflects most."""
+    """The machine that is handed over under the load where it deflects most."""
     worst = worst_pose(d)
     if worst is None:
         raise StiffmapError("no pose of the plane of the maps has an equilibrium under load")
@@ -115,7 +115,7 @@ def loops(d: Diagnosis) -> Figure:
     ]
     channel = int(np.argmax(np.array(size)))
     scale, unit = (MM, "mm") if e.channels[channel].unit == "m" else (1e3, "mrad")
-    told = (("as declared", d.residual_before, BEFORE), ("corrected", d.residual_after, AFTER))
+    told = (("as declared", d.residual_before, BEFORE), (d.which, d.residual_after, AFTER))
     figure = new_figure(9, 5)
     ax = figure.subplots()
     assert e.order is not None
@@ -180,7 +180,7 @@ def before_after(d: Diagnosis) -> Figure:
     values = [UM * d.before.size[0], UM * d.after.size[0], UM * d.noise_size]
     figure = new_figure(4.6, 2.4)
     texts = [f"{v:#.3g} µ{unit}".replace(". ", " ") for v in values]
-    named = (("your file", BEFORE), ("corrected", AFTER), ("noise", "0.7"))
+    named = (("your file", BEFORE), (f"machine.yaml ({d.which})", AFTER), ("noise", "0.7"))
     ax = _bars(figure, [(n, v, c, text) for (n, c), v, text in zip(named, values, texts, strict=True)])
     ax.invert_yaxis()
     ax.set_xlim(0, 1.3 * max(values))
@@ -215,7 +215,7 @@ def histogram(d: Diagnosis) -> Figure:
 
 
 def maps(d: Diagnosis) -> Figure:
-    """Error over a z-plane: the file's machine, the corrected machine, and what changes."""
+    """Error over a z-plane: the file's machine, the one that is handed over, and what changes."""
     position, force, one, other = plane_errors(d)
     x, y, z = MM * position[0, :, 0], MM * position[:, 0, 1], MM * position[0, 0, 2]
     if not np.isfinite(one).any() or not np.isfinite(other).any():
@@ -223,7 +223,7 @@ def maps(d: Diagnosis) -> Figure:
     figure = new_figure(11, 3.8)
     axes = figure.subplots(1, 3)
     top = float(np.nanmax([np.nanmax(np.linalg.norm(v, axis=-1)) for v in (one, other)])) * MM
-    titles = ("machine of the file", "corrected machine", "difference of the two")
+    titles = ("machine of the file", f"machine.yaml ({d.which})", "difference of the two")
     for ax, title, v in zip(axes, titles, (one, other, other - one), strict=True):
         size = np.linalg.norm(v, axis=-1) * MM
         limit = {} if title.startswith("difference") else {"vmin": 0.0, "vmax": top}
@@ -236,7 +236,7 @@ def maps(d: Diagnosis) -> Figure:
 
 
 def worst_pose(d: Diagnosis) -> tuple[Floats, Floats] | None:
-    """Position (3,) m in the plane of the maps where the corrected machine deflects most, and the wrench (6,) N, N·m.
+    """Position (3,) m in the plane of the maps where the machine that is handed over deflects most, and the wrench (6,) N, N·m.
 
     None without a force or a workspace, or where no pose of the plane has an answer.
     """
