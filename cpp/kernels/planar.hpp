@@ -18,7 +18,7 @@ inline M close_planar(const PlanarLeg& leg, const Frame& end, V* x, M& never) {
   const V dx = dot(u, arm), dy = dot(v, arm);
   const V cosine = (dx * dx + dy * dy - leg.sum) * leg.inverse;
   const V square = 1.0 - cosine * cosine;
-  const M reached = square > 1e-4;
+  const M reached = square > 1e-5;
   never |= square < -1e-6;
   const V sine = leg.branch * root(select(reached, square, splat(1)));
   const V gx = leg.a[0] + cosine * leg.b[0] - sine * leg.b[1], gy = leg.a[1] + cosine * leg.b[1] + sine * leg.b[0];

@@ -52,6 +52,9 @@ void estimate_multipliers(const Mechanism& m, const VecX& x, const Target& targe
 double nearest_step(const Mechanism& m, const VecX& x, const Target& target, ClosureWorkspace& ws);
 bool is_nearest(const Mechanism& m, const VecX& x, const Target& target, ClosureWorkspace& ws);
 
+/// Flags of closed coordinates beyond a range, and of balls that are not free near their lock.
+std::uint32_t limits_met(const Mechanism& m, const VecX& x);
+
 /// Newton to the target, or to the nearest configuration where equations that contradict each other
 /// leave no more than the input tolerance (theory C9).
 bool close(const Mechanism& m, const Target& target, Pace pace, ClosureWorkspace& ws, VecX& x, int& iterations);

@@ -95,6 +95,18 @@ static void apply(ClosureWorkspace& ws, VecX& x, double factor) {
   for (std::size_t k = 0; k < ws.unknown.size(); ++k) x[ws.unknown[k]] += factor * ws.step[static_cast<Index>(k)];
 }
 
+std::uint32_t limits_met(const Mechanism& m, const VecX& x) {
+  std::uint32_t flags = 0;
+  for (Index j = 0; j < m.size(); ++j) {
+    const Coordinate& c = m.coordinates[at(j)];
+    if (x[j] >= c.lower && x[j] <= c.upper) continue;
+    flags |= c.role == Role::actuator ? flag::drive_range : flag::joint_limit;
+  }
+  for (const Ball& b : m.balls)
+    if (!b.free && b.spread(x[b.first + 1]) < near_lock) flags |= flag::gimbal_lock;
+  return flags;
+}
+
 bool close(const Mechanism& m, const Target& target, Pace pace, ClosureWorkspace& ws, VecX& x, int& iterations) {
   const int most = pace == Pace::contracting ? 12 : 120;
   double previous = 0, error = residual(m, x, target, ws);
@@ -192,14 +204,7 @@ void finish(const Mechanism& m, const Target& target, bool ok, ClosureWorkspace&
   out.exact = error < round_off;
   out.tip = ws.frames.at(m.tip);
   out.status = ok ? Status::converged : Status::unreachable;
-  if (!ok) return;
-  for (Index j = 0; j < m.size(); ++j) {
-    const Coordinate& c = m.coordinates[at(j)];
-    if (x[j] >= c.lower && x[j] <= c.upper) continue;
-    out.flags |= c.role == Role::actuator ? flag::drive_range : flag::joint_limit;
-  }
-  for (const Ball& b : m.balls)
-    if (!b.free && b.spread(x[b.first + 1]) < near_lock) out.flags |= flag::gimbal_lock;
+  if (ok) out.flags |= limits_met(m, x);
 }
 
 }  // namespace

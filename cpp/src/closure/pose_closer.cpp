@@ -10,10 +10,12 @@
 namespace stiffmap {
 namespace {
 
-constexpr double closed = 1e-12;          // relative to the mechanism's length
-constexpr double nearest = 0.3;           // of the length: a last pose within it is a start
-constexpr double shortest_stride = 0.02;  // of the way from home
-constexpr double shortest_step = 0.05;    // of the way from a start
+constexpr double closed = 1e-12;      // relative to the mechanism's length
+constexpr double exact = 3e-15;       // the same: needs no step
+constexpr double last_step = 1e-7;    // its square, what it leaves, is round-off
+constexpr double nearest = 0.3;       // of the length: a last pose within it is a start
+constexpr double longest_step = 0.1;  // relative to the length: farther ones may end at another configuration
+constexpr double shortest = 0.02;     // leap, of the way from home or from a start
 
 }  // namespace
 
@@ -97,17 +99,17 @@ void PoseCloser::normal(const Mechanism& m, const Pose& pose) {
 /// Undamped and trusted only while its steps shrink fast, so that the answer continues the start.
 bool PoseCloser::newton(const Mechanism& m, const Pose& pose, VecX& x) {
   if (m.redundancy > 0) return close_nearest(m, pose, x);
-  double error = residual(m, pose, x), previous = 0;
+  double error = residual(m, pose, x), previous = 1;
   for (int k = 0; k < 8; ++k) {
     if (!std::isfinite(error)) return false;
-    if (error < closed) return true;
+    if (error < exact || (error < closed && previous < last_step)) return true;
     if (unit_.size() == 0) return false;
     normal(m, pose);
     if (!cholesky_.compute(N_)) return false;
     VecX step;
     cholesky_.solve(right_, step);
     const double norm = step.norm() / m.length;
-    if (!(norm < 0.3) || (k > 0 && norm > 0.25 * previous && norm > 1e-9)) return false;
+    if (!(norm < longest_step) || (k > 0 && norm > 0.25 * previous && norm > 1e-9)) return false;
     const auto& moving = tree_.moving();
     for (std::size_t u = 0; u < moving.size(); ++u)
       x[moving[u]] -= step[static_cast<Index>(u)] / unit_[static_cast<Index>(u)];
@@ -133,7 +135,7 @@ double PoseCloser::pivot(const Mechanism& m, const Pose& pose) {
 }
 
 /// Straight continuation from closed coordinates `x` at another pose, in leaps that may be halved to `shortest`.
-bool PoseCloser::continued(const Mechanism& m, const Pose& from, const Pose& pose, double shortest, VecX& x) {
+bool PoseCloser::continued(const Mechanism& m, const Pose& from, const Pose& pose, VecX& x) {
   const Vec3 turn = log_so3(pose.R * from.R.transpose());
   double done = 0, leap = 1;
   while (done < 1) {
@@ -153,7 +155,7 @@ bool PoseCloser::continued(const Mechanism& m, const Pose& from, const Pose& pos
 
 bool PoseCloser::from_home(const Mechanism& m, const Pose& pose, VecX& x) {
   x = m.home_coordinates;
-  return continued(m, m.home, pose, shortest_stride, x);
+  return continued(m, m.home, pose, x);
 }
 
 void PoseCloser::remember(const Pose& pose, const VecX& x) {
@@ -216,7 +218,7 @@ ClosureResult PoseCloser::continue_from(const Mechanism& m, const Pose& pose, Ve
     at_rest(m, x);
     tree_.forward(x, ws_.frames);
     const Pose from = ws_.frames.at(m.tip);
-    ok = continued(m, from, pose, shortest_step, x);
+    ok = continued(m, from, pose, x);
   }
   return answer(m, pose, x, ok, {});
 }
@@ -234,12 +236,7 @@ ClosureResult PoseCloser::answer(const Mechanism& m, const Pose& pose, VecX& x, 
     forward(m, Geometry::nominal, x, ws_.frames);
     wind(m, ws_.frames, x);
   }
-  out.flags &= flag::branch_unverified;
-  for (Index j = 0; j < m.size(); ++j) {
-    const Coordinate& c = m.coordinates[at(j)];
-    if (x[j] >= c.lower && x[j] <= c.upper) continue;
-    out.flags |= c.role == Role::actuator ? flag::drive_range : flag::joint_limit;
-  }
+  out.flags = (out.flags & flag::branch_unverified) | closing::limits_met(m, x);
   remember(pose, x);
   return out;
 }

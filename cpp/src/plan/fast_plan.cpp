@@ -327,11 +327,10 @@ FastPlan::FastPlan(const Mechanism& m, const Vec3& low, const Vec3& high, int gr
   if (heavy_spins_ && !p.deficient && let_spins_hang(m, spins, *data_)) link_hanging(*data_);
 }
 
-bool FastPlan::nearest_start(const Mechanism& m, const Vec3& position, VecX& x, Pose& at) const {
+bool FastPlan::nearest_start(const Mechanism& m, const Vec3& position, VecX& x) const {
   const Program& p = data_->program;
   if (!p.grid) return false;
   std::size_t node = 0, stride = 1;
-  at = m.home;
   for (int k = 0; k < 3; ++k) {
     const double u = (position[k] - p.grid_low[k]) / p.grid_step[k];
     const double beyond = p.grid_n[k] > 1 ? 1e-9 : 0.5;
@@ -339,7 +338,6 @@ bool FastPlan::nearest_start(const Mechanism& m, const Vec3& position, VecX& x, 
     const double i = std::clamp(std::round(u), 0.0, p.grid_n[k] - 1.0);
     node += static_cast<std::size_t>(i) * stride;
     stride *= static_cast<std::size_t>(p.grid_n[k]);
-    at.p[k] = p.grid_low[k] + i * p.grid_step[k];
   }
   x = m.home_coordinates;
   const double* g = p.grid + node * static_cast<std::size_t>(p.grid_row);

@@ -62,8 +62,8 @@ Answers closures(const Mechanism& m, const FastPlan* plan, const Rows& given, co
   std::uint32_t* const flags = out.each("flags", 0u);
   parallel_chunks(given.rows(), 64, threads, [&](int, long begin, long end) {
     ClosureWorkspace ws(m);
+    PoseCloser closer(m);
     VecX x = VecX::Zero(m.size()), from = x;
-    Pose near;
     for (long i = begin; i < end; ++i) {
       ClosureResult r;
       if (started) from = start.row(i).transpose();
@@ -72,8 +72,12 @@ Answers closures(const Mechanism& m, const FastPlan* plan, const Rows& given, co
         r = started ? forward_closure(m, a, ws, x, from) : forward_closure(m, a, ws, x);
       } else {
         const Pose pose = pose_of(given, rotation, i);
-        if (started) r = branch_closure(m, pose, ws, x, from);
-        else if (plan && plan->nearest_start(m, pose.p, from, near)) r = inverse_closure(m, pose, ws, x, from, near);
+        if (started) {
+          r = branch_closure(m, pose, ws, x, from);
+        } else if (m.redundancy == 0) {  // else it is asked whether the nearest configuration was found
+          if (!plan || !plan->nearest_start(m, pose.p, x)) x = m.home_coordinates;
+          r = closer.continue_from(m, pose, x);
+        }
         if (!started && (r.status != Status::converged || r.flags & flag::branch_unverified))
           r = inverse_closure(m, pose, ws, x);
       }

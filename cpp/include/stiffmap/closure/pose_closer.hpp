@@ -29,7 +29,7 @@ class PoseCloser {
   bool newton(const Mechanism& m, const Pose& pose, VecX& x);
   bool close_nearest(const Mechanism& m, const Pose& pose, VecX& x);  ///< of a redundant machine
   void normal(const Mechanism& m, const Pose& pose);
-  bool continued(const Mechanism& m, const Pose& from, const Pose& pose, double shortest, VecX& x);
+  bool continued(const Mechanism& m, const Pose& from, const Pose& pose, VecX& x);
   bool from_home(const Mechanism& m, const Pose& pose, VecX& x);
   void at_rest(const Mechanism& m, VecX& x) const;
   ClosureResult answer(const Mechanism& m, const Pose& pose, VecX& x, bool ok, ClosureResult out);

@@ -31,9 +31,9 @@ class FastPlan {
   bool hangs(Index coordinate) const;
   const Program& program() const;
 
-  /// Coordinates of the nearest node of the grid of closure starts and the tip pose there; false
-  /// outside the box or where no node is within reach.
-  bool nearest_start(const Mechanism& m, const Vec3& position, VecX& x, Pose& at) const;
+  /// Coordinates of the nearest node of the grid of closure starts; false outside the box or where no node is within
+  /// reach.
+  bool nearest_start(const Mechanism& m, const Vec3& position, VecX& x) const;
 
  private:
   std::unique_ptr<FastPlanData> data_;
