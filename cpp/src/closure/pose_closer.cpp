@@ -10,12 +10,12 @@
 namespace stiffmap {
 namespace {
 
-constexpr double closed = 1e-12;      // relative to the mechanism's length
-constexpr double exact = 3e-15;       // the same: needs no step
-constexpr double last_step = 1e-7;    // its square, what it leaves, is round-off
-constexpr double nearest = 0.3;       // of the length: a last pose within it is a start
-constexpr double longest_step = 0.1;  // relative to the length: farther ones may end at another configuration
-constexpr double shortest = 0.02;     // leap, of the way from home or from a start
+constexpr double closed = 1e-12;              // relative to the mechanism's length
+constexpr double round_off_alone = 3e-15;     // the same: needs no step
+constexpr double last_step = 1e-7;            // its square, what it leaves, is round-off
+constexpr double nearest = 0.3;               // of the length: a last pose within it is a start
+constexpr double longest_closing_step = 0.1;  // relative to the length: farther ones may end at another configuration
+constexpr double shortest_stride = 0.02;      // leap, of the way from home or from a start
 
 }  // namespace
 
@@ -102,14 +102,14 @@ bool PoseCloser::newton(const Mechanism& m, const Pose& pose, VecX& x) {
   double error = residual(m, pose, x), previous = 1;
   for (int k = 0; k < 8; ++k) {
     if (!std::isfinite(error)) return false;
-    if (error < exact || (error < closed && previous < last_step)) return true;
+    if (error < round_off_alone || (error < closed && previous < last_step)) return true;
     if (unit_.size() == 0) return false;
     normal(m, pose);
     if (!cholesky_.compute(N_)) return false;
     VecX step;
     cholesky_.solve(right_, step);
     const double norm = step.norm() / m.length;
-    if (!(norm < longest_step) || (k > 0 && norm > 0.25 * previous && norm > 1e-9)) return false;
+    if (!(norm < longest_closing_step) || (k > 0 && norm > 0.25 * previous && norm > 1e-9)) return false;
     const auto& moving = tree_.moving();
     for (std::size_t u = 0; u < moving.size(); ++u)
       x[moving[u]] -= step[static_cast<Index>(u)] / unit_[static_cast<Index>(u)];
@@ -134,7 +134,7 @@ double PoseCloser::pivot(const Mechanism& m, const Pose& pose) {
   return pivots.minCoeff() / pivots.maxCoeff();
 }
 
-/// Straight continuation from closed coordinates `x` at another pose, in leaps that may be halved to `shortest`.
+/// Straight continuation from closed coordinates `x` at another pose, in leaps that may be halved to `shortest_stride`.
 bool PoseCloser::continued(const Mechanism& m, const Pose& from, const Pose& pose, VecX& x) {
   const Vec3 turn = log_so3(pose.R * from.R.transpose());
   double done = 0, leap = 1;
@@ -146,7 +146,7 @@ bool PoseCloser::continued(const Mechanism& m, const Pose& from, const Pose& pos
       x = trial_;
       done = s;
       leap *= 2;
-    } else if ((leap *= 0.5) < shortest) {
+    } else if ((leap *= 0.5) < shortest_stride) {
       return false;
     }
   }
