@@ -90,10 +90,12 @@ class Term:
 
     @property
     def undetermined(self) -> Mask:
-        """(q,) parameters whose interval is all that they can be, or that are at a bound other than their null."""
+        """(q,) parameters whose interval is all that they can be, shapes at a bound, and strengths if all are at one."""
         (low, high), (least, most) = self.bounds, self.ends
-        at = [(np.abs(self.values - b) < STEP) & (b != self.nulls) for b in (low, high)]
-        return np.asarray(((least <= low) & (most >= high)) | at[0] | at[1])
+        shape = np.isnan(self.nulls)
+        near = [(np.abs(self.values - b) < STEP) & (b != self.nulls) for b in (low, high)]
+        at = near[0] | near[1]
+        return np.asarray(((least <= low) & (most >= high)) | (at & (shape | at[~shape].all())))
 
     @property
     def spare(self) -> Mask:

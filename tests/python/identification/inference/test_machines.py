@@ -156,7 +156,9 @@ def test_a_turn_that_changes_nothing_is_not_determined() -> None:
         ("hysteresis", (5.0, 0.0, 1e6), (0.1, np.inf, 1.0), "half_width seat", "half_width"),
         ("zero_offset", (1e9,), (1.0,), "", "error"),
         ("tilt", (1e9, 1.0, 2.0), (1e9, 0.1, 0.1), "angle_x", "angle_x"),
-        ("tilt", (1e9, 1.0, 2.0), (1.0, 0.1, 0.1), "", "angle_x"),  # it must be more than a machine can have
+        ("tilt", (1e9, 1.0, 2.0), (1.0, 0.1, 0.1), "", None),  # more than is looked for, and certainly there
+        ("tilt", (1e9, 1e9, 1e9), (1.0, 1.0, 1.0), "", "angle_x"),
+        ("hysteresis", (5.0, 1e9, 3.0), (0.1, 0.1, 0.1), "", None),
         ("tilt", (3.0, 1.0, 2.0), (0.1, 0.1, 0.1), "", None),
     ],
 )
