@@ -12,7 +12,7 @@ namespace {
 
 constexpr double closed = 1e-12;              // relative to the mechanism's length
 constexpr double round_off_alone = 3e-15;     // the same: needs no step
-constexpr double last_step = 1e-7;            // its square, what it leaves, is round-off
+constexpr double last_step = 1e-8;            // its square, what it leaves, is round-off
 constexpr double nearest = 0.3;               // of the length: a last pose within it is a start
 constexpr double longest_closing_step = 0.1;  // relative to the length: farther ones may end at another configuration
 constexpr double shortest_stride = 0.02;      // leap, of the way from home or from a start

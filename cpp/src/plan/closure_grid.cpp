@@ -114,7 +114,8 @@ std::shared_ptr<const std::vector<double>> make_grid(const Mechanism& m, const F
         double* const unknowns = grid->data() + node * row;
         std::fill_n(unknowns, d.unknowns.size(), std::nan(""));
         const auto keep = [&](const VecX& found) {
-          for (std::size_t u = 0; u < d.unknowns.size(); ++u) unknowns[u] = found[d.unknowns[u]];
+          // In single precision: with all digits answers would keep those in which libraries of sines differ.
+          for (std::size_t u = 0; u < d.unknowns.size(); ++u) unknowns[u] = static_cast<float>(found[d.unknowns[u]]);
         };
         VecX found = from ? *from : VecX::Constant(m.size(), std::nan(""));
         if (m.redundancy == 0 && quick.close(m, pose, found, false).status == Status::converged &&
