@@ -22,7 +22,10 @@ NAMES: Test = (lambda v: isinstance(v, Iterable) and getattr(v, "dtype", np.dtyp
 PLAIN: dict[Any, Test] = {
     Sequence[str]: NAMES,
     tuple[str, ...]: NAMES,
-    Mapping[str, str]: (lambda v: isinstance(v, Mapping) and {*map(type, v.values())} <= {str}, "a mapping to texts"),
+    Mapping[str, str]: (
+        lambda v: isinstance(v, Mapping) and {*map(type, v.values())} <= {str},
+        "a mapping to texts",
+    ),
     Iterable[object]: (lambda v: isinstance(v, Iterable), "several"),
     bool: (lambda v: isinstance(v, bool | np.bool_), "True or False"),
     int: (lambda v: whole_number(v, "", v) == v, "a whole number"),

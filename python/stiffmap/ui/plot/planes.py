@@ -72,10 +72,9 @@ def planes(values: xr.DataArray) -> Planes:
         return Planes("", several[0], "", (), False)
     across = min(("z", "y", "x"), key=lambda a: sizes[a])
     right, up = (a for a in AXES if a != across)
-    first = values.isel({across: [0]}).values
-    same = sizes[across] > 1 and all(
-        np.array_equal(values.isel({across: [i]}).values, first, equal_nan=True) for i in range(sizes[across])
-    )
+    first = values.isel({across: [0]})
+    digits = 1e-9 * float(np.abs(first).max())  # beside which round-off is nothing, and which nobody sees
+    same = sizes[across] > 1 and np.allclose(values, first.values, rtol=0, atol=digits, equal_nan=True)
     at = tuple(float(v) for v in values[across].values)
     return Planes(across, right, up, at[:1] if same else at, same)
 
