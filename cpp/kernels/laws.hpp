@@ -64,7 +64,8 @@ struct Laws {
       const LawProgram& law = P.laws[k.law];
       const V tau = select(bears, s.linear[q] * linear, splat(0)), side = sign(tau);
       const V spring = tau - law.friction * side;
-      const V z = k.by_force ? spring / s.linear[q] : from_force(law, preload(law, s.linear[q]) + spring, s.linear[q]);
+      const V before = law.count > 0 ? point(law, s.linear[q], s.scale[q], splat(0)).tau : splat(0);
+      const V z = k.by_force ? spring / s.linear[q] : from_force(law, before + spring, s.linear[q]);
       s.friction_sign[q] = select(active, side, s.friction_sign[q]);
       s.z[q] = select(active, select(bears, z, splat(0)), s.z[q]);
     }
@@ -115,17 +116,6 @@ struct Laws {
   static constexpr double unloaded = 1e-11;
   static constexpr double doubt = 1.5;  ///< factor about it; closures of the two paths differ by some 1e-14
 
-  /// What the law bears at parameter zero.
-  V preload(const LawProgram& law, V k) const {
-    if (law.count == 0) return splat(0);
-    const double* n = P.knots + 3 * law.first;
-    const double* last = n + 3 * (law.count - 1);
-    if (n[2] >= 0) return splat(n[1]) - k * splat(n[0]);
-    if (last[2] <= 0) return splat(last[1]) - k * splat(last[0]);
-    while (n[5] < 0) n += 3;
-    return splat(n[1] - n[2] / (n[5] - n[2]) * (n[4] - n[1]));
-  }
-
   /// At the law's own parameter.
   void put(const LawProgram& law, int q) {
     const V k = s.linear[q], z = s.z[q];
@@ -145,10 +135,23 @@ struct Laws {
       s.x[q] = s.a_base[q] + z;
       return;
     }
+    const Point at = point(law, k, s.scale[q], z);
+    s.tau[q] = at.tau + law.friction * s.friction_sign[q];
+    s.da[q] = at.da;
+    s.dtau[q] = at.dtau;
+    s.x[q] = s.a_base[q] + at.a;
+  }
+
+  struct Point {
+    V a, tau, da, dtau;
+  };
+
+  /// Of a law with corners, without dry friction.
+  Point point(const LawProgram& law, V k, V scale, V z) const {
     const double* n = P.knots + 3 * law.first;
     const double* last = n + 3 * (law.count - 1);
     // Beyond the ends with the drive's own slope, then the pieces between.
-    const V beyond = s.scale[q] / (1.0 + s.scale[q]);
+    const V beyond = scale / (1.0 + scale);
     const M low = z <= n[2];
     const V a0 = select(low, splat(n[0]), splat(last[0])), t0 = select(low, splat(n[1]), splat(last[1]));
     const V z0 = select(low, splat(n[2]), splat(last[2]));
@@ -165,10 +168,7 @@ struct Laws {
       da = select(here, splat((u[3] - u[0]) / width), da);
       dtau = select(here, splat((u[4] - u[1]) / width), dtau);
     }
-    s.tau[q] = tau + law.friction * s.friction_sign[q];
-    s.da[q] = da;
-    s.dtau[q] = dtau;
-    s.x[q] = s.a_base[q] + a;
+    return {a, tau, da, dtau};
   }
 
   /// Where the law carries the force that the linear start found: middle of a gap.
