@@ -15,6 +15,7 @@ constexpr double round_off_alone = 3e-15;     // the same: needs no step
 constexpr double last_step = 1e-8;            // its square, what it leaves, is round-off
 constexpr double nearest = 0.3;               // of the length: a last pose within it is a start
 constexpr double longest_closing_step = 0.1;  // relative to the length: farther ones may end at another configuration
+constexpr double on_the_way = 1e-3;           // a step of a pose that is only passed: what it leaves is a good start
 constexpr double shortest_stride = 0.02;      // leap, of the way from home or from a start
 
 }  // namespace
@@ -96,19 +97,22 @@ void PoseCloser::normal(const Mechanism& m, const Pose& pose) {
   }
 }
 
-/// Undamped and trusted only while its steps shrink fast, so that the answer continues the start.
-bool PoseCloser::newton(const Mechanism& m, const Pose& pose, VecX& x) {
+/// Undamped and trusted only while its steps shrink fast, so that the answer continues the start. `passed`: nearly is
+/// enough.
+bool PoseCloser::newton(const Mechanism& m, const Pose& pose, VecX& x, bool passed) {
   if (m.redundancy > 0) return close_nearest(m, pose, x);
   double error = residual(m, pose, x), previous = 1;
   for (int k = 0; k < 8; ++k) {
     if (!std::isfinite(error)) return false;
     if (error < round_off_alone || (error < closed && previous < last_step)) return true;
+    if (passed && previous < on_the_way) return true;
     if (unit_.size() == 0) return false;
     normal(m, pose);
     if (!cholesky_.compute(N_)) return false;
     VecX step;
     cholesky_.solve(right_, step);
     const double norm = step.norm() / m.length;
+    if (k == 0) first_step_ = norm;
     if (!(norm < longest_closing_step) || (k > 0 && norm > 0.25 * previous && norm > 1e-9)) return false;
     const auto& moving = tree_.moving();
     for (std::size_t u = 0; u < moving.size(); ++u)
@@ -142,15 +146,27 @@ bool PoseCloser::continued(const Mechanism& m, const Pose& from, const Pose& pos
     const double s = std::min(1.0, done + leap);
     const Pose way = s == 1 ? pose : Pose{from.p + s * (pose.p - from.p), exp_so3(s * turn) * from.R};
     trial_ = x;
-    if (newton(m, way, trial_)) {
+    first_step_ = 0;
+    const bool reached = newton(m, way, trial_, s < 1);
+    // As far as first steps are trusted, but for a part that keeps the next from failing.
+    const double trusted = 0.8 * longest_closing_step / first_step_;
+    leap *= reached ? std::min(2.0, trusted) : std::clamp(trusted, 0.25, 0.5);
+    if (reached) {
       x = trial_;
       done = s;
-      leap *= 2;
-    } else if ((leap *= 0.5) < shortest_stride) {
+    } else if (leap < shortest_stride) {
       return false;
     }
   }
   return true;
+}
+
+/// From where the coordinates `x` are.
+bool PoseCloser::from_there(const Mechanism& m, const Pose& pose, VecX& x) {
+  at_rest(m, x);
+  tree_.forward(x, ws_.frames);
+  const Pose from = ws_.frames.at(m.tip);
+  return continued(m, from, pose, x);
 }
 
 bool PoseCloser::from_home(const Mechanism& m, const Pose& pose, VecX& x) {
@@ -193,14 +209,12 @@ ClosureResult PoseCloser::close(const Mechanism& m, const Pose& pose, VecX& x, b
   const VecX given = x;
   bool ok = false;
   if (pose.p.allFinite() && pose.R.allFinite()) {
-    if (given.allFinite()) {
-      at_rest(m, x);
-      ok = newton(m, pose, x);
-    }
+    if (given.allFinite()) ok = from_there(m, pose, x);
     const bool near = has_last_ && distance(pose, last_pose_, m.length) < nearest * m.length;
     if (!ok && near) {
-      if (!extrapolated(pose, x)) x = last_;
-      ok = newton(m, pose, x);
+      ok = extrapolated(pose, x) && newton(m, pose, x);
+      if (!ok) x = last_;
+      ok = ok || continued(m, last_pose_, pose, x);
     }
     if (!ok) ok = from_home(m, pose, x);
     if (!ok && patient) {
@@ -213,13 +227,7 @@ ClosureResult PoseCloser::close(const Mechanism& m, const Pose& pose, VecX& x, b
 }
 
 ClosureResult PoseCloser::continue_from(const Mechanism& m, const Pose& pose, VecX& x) {
-  bool ok = pose.p.allFinite() && pose.R.allFinite() && x.allFinite();
-  if (ok) {
-    at_rest(m, x);
-    tree_.forward(x, ws_.frames);
-    const Pose from = ws_.frames.at(m.tip);
-    ok = continued(m, from, pose, x);
-  }
+  const bool ok = pose.p.allFinite() && pose.R.allFinite() && x.allFinite() && from_there(m, pose, x);
   return answer(m, pose, x, ok, {});
 }
 

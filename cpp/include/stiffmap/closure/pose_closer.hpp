@@ -26,10 +26,11 @@ class PoseCloser {
   double pivot(const Mechanism& m, const Pose& pose);
 
  private:
-  bool newton(const Mechanism& m, const Pose& pose, VecX& x);
+  bool newton(const Mechanism& m, const Pose& pose, VecX& x, bool passed = false);
   bool close_nearest(const Mechanism& m, const Pose& pose, VecX& x);  ///< of a redundant machine
   void normal(const Mechanism& m, const Pose& pose);
   bool continued(const Mechanism& m, const Pose& from, const Pose& pose, VecX& x);
+  bool from_there(const Mechanism& m, const Pose& pose, VecX& x);
   bool from_home(const Mechanism& m, const Pose& pose, VecX& x);
   void at_rest(const Mechanism& m, VecX& x) const;
   ClosureResult answer(const Mechanism& m, const Pose& pose, VecX& x, bool ok, ClosureResult out);
@@ -43,6 +44,7 @@ class PoseCloser {
   MatX A_, N_;
   VecX e_, right_, unit_, last_, trial_;
   Cholesky cholesky_;
+  double first_step_ = 0;  ///< of Newton's last search, over the length
   Pose last_pose_;
   bool has_last_ = false;
   // the poses before the last, while they are evenly spaced along a line
