@@ -38,6 +38,7 @@ INNER = {
         "chosen",
         ("names", "shares"),
         ("verdict", "readings"),
+        "term",
         "corrected",
         ("machines", "inference"),
     ),

@@ -24,7 +24,7 @@ from stiffmap.identification.inference.amplitudes import Fit
 from stiffmap.identification.inference.chosen import Chosen
 from stiffmap.identification.inference.columns import Columns
 from stiffmap.identification.inference.constants import ODDS, RARE
-from stiffmap.identification.inference.corrected import Corrected, Term, along_travel, corrected, instead
+from stiffmap.identification.inference.corrected import Corrected, along_travel, corrected, instead
 from stiffmap.identification.inference.inference import Inferred, terms
 from stiffmap.identification.inference.machines import (
     CALIBRATED,
@@ -38,6 +38,7 @@ from stiffmap.identification.inference.names import put_instead, searched, with_
 from stiffmap.identification.inference.parts import GAPS
 from stiffmap.identification.inference.readings import Readings, readings
 from stiffmap.identification.inference.shares import gap_of, shares, tolerance_word, too_wide
+from stiffmap.identification.inference.term import Term
 from stiffmap.identification.inference.verdict import Named, Verdict, judged, not_as_stated
 
 RIVALS = 3

@@ -13,8 +13,9 @@ from stiffmap.identification.diagnosis.report.findings import Detectability, Eff
 from stiffmap.identification.inference.amplitudes import Fit
 from stiffmap.identification.inference.columns import Columns
 from stiffmap.identification.inference.constants import ODDS
-from stiffmap.identification.inference.corrected import Corrected, Term
+from stiffmap.identification.inference.corrected import Corrected
 from stiffmap.identification.inference.places import Place, reach
+from stiffmap.identification.inference.term import Term
 from stiffmap.model.description import MachineDescription
 from stiffmap.model.effects import Placed, registry
 
