@@ -165,6 +165,9 @@ def test_streaming_keeps_memory_small(machine: sm.Machine, tmp_path: Path) -> No
         tracemalloc.stop()
         return top
 
+    def least(rows: int) -> int:
+        return min(peak(rows) for _ in range(3))  # threads that other tests leave allocate as well
+
     peak(10)  # imports
     result = 180 * 3 * 2 * (6 + 36 + 2) * 8
-    assert peak(200) - peak(20) < 0.2 * result
+    assert least(200) - least(20) < 0.2 * result
