@@ -174,6 +174,7 @@ def test_what_is_no_reading_is_found_anywhere_in_a_long_table(tmp_path: Path) ->
     assert list(table.lines) == [i + 2 for i in range(2000) if i not in left_out]
     assert table.aside == (
         "row 5, 'Mean', is no reading",
+        "row 1205 is a remark: # a remark  5",
         "row 2001 is a remark: checked by hand",
         "row 1501, 'seen twice' behind the last column",
     )
@@ -191,3 +192,10 @@ def test_a_decimal_fraction_below_one_is_never_thousands(text: str, tmp_path: Pa
     assert not read_sheet(file).decimal_comma
     file.write_text(f'x [mm],y [mm],z [mm]\n"1,500",2,{text}\n"3,25",4,5\n')
     assert not read_sheet(file).decimal_comma
+
+
+@pytest.mark.parametrize("mark", ["#", "%", "//"])
+def test_a_heading_between_rows_is_said_where_it_is_a_comment(mark: str, tmp_path: Path) -> None:
+    rows = f"{mark} loading\nx [mm],fx [N],dx [mm]\n0,50,0.1\n1,50,0.1\n{mark}\n{mark}----\n{mark} unloading\n0,50,0.2\n"
+    (tmp_path / "t.csv").write_text(rows)
+    assert read_sheet(tmp_path / "t.csv").aside == (f"row 7 is a remark: {mark} unloading",)

@@ -74,14 +74,20 @@ def lines_of(path: Path, sheet: str | None = None) -> tuple[str, Lines, str]:
     return _text(path)
 
 
-def kept(lines: Iterable[tuple[int, list[str]]]) -> Iterator[tuple[int, list[str]]]:
-    """Lines with something in them that are no comments."""
+def kept(
+    lines: Iterable[tuple[int, list[str]]], aside: list[str] | None = None
+) -> Iterator[tuple[int, list[str]]]:
+    """Lines with something in them that are no comments; comments with a word in them are said in `aside`."""
     for block in blocks(lines):
         begins = {c[0].lstrip()[:1] if c else "" for _, c in block}
         if begins.isdisjoint(("", *(mark[0] for mark in COMMENTS))):
             yield from block
         else:
-            yield from ((n, c) for n, c in block if filled(c) and not c[0].strip().startswith(COMMENTS))
+            for n, c in filter(lambda line: filled(line[1]), block):
+                if not c[0].strip().startswith(COMMENTS):
+                    yield n, c
+                elif aside is not None and re.search(r"[^\W_]", text := " ".join(c)):
+                    aside.append(f"row {n} is a remark: {text.strip()[:40]}")
 
 
 def even(

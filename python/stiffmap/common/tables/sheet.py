@@ -114,7 +114,7 @@ def read_sheet(path: Path, sheet: str | None = None, layout: Layout = PLAIN) -> 
     aside = [f"row {n}, of numbers above the header" for n, _ in begun[:-1]]
     clear = (
         b if _all_readings(b) else _data(b, first, header, said, spelling, aside, layout, str(path))
-        for b in blocks(chain([first], kept(rows)))
+        for b in blocks(chain([first], kept(rows, None if layout.strict else aside)))
     )
     data = even(chain.from_iterable(clear), width, str(path), separator, None if layout.strict else aside)
     cells_of, lines_ = packed(data, width)
