@@ -20,6 +20,7 @@ from stiffmap.experiment.experiment import WRENCH
 from stiffmap.experiment.files.fields import POSE, quantity_of
 from stiffmap.experiment.spreadsheet.answers import Meant
 from stiffmap.experiment.spreadsheet.guess import READINGS, Column
+from stiffmap.experiment.spreadsheet.instrument import load_instrument
 from stiffmap.experiment.spreadsheet.together import weight
 
 WORDS = ("id", "setup", "branch", "target")
@@ -106,6 +107,12 @@ def _ask(m: Meant, known_: set[str], joints: bool) -> None:
         )
     if not known_ & set(READINGS):
         places = "--map px='HEADER' (py, pz) for measured positions; of differences " if joints else ""
+        seen = map(m.sheet.find, () if joints else load_instrument("tracker").measured.values())
+        names = [n for i in seen if i is not None and (n := m.sheet.names[i]).lower() not in ("x", "y", "z")]
+        if names:
+            places = (
+                f"--instrument tracker, which takes the commanded place off '{names[0]}'; of differences "
+            )
         m.ask_column(
             f"which column is a reading? Say {places}--map dx='HEADER' (dy, dz, rx, ry, rz), several headers with | between them for "
             "repeats, or length='HEADER'; where a ball stood in one socket, --set px=0 --set py=0 --set pz=0",

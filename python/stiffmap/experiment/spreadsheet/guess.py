@@ -50,7 +50,8 @@ def guess(headers: Sequence[str], chosen: Mapping[str, Sequence[str]]) -> list[C
             meaning, repeat = given[index]
             out.append(Column(index, name, unit, meaning, repeat if len(chosen[meaning]) > 1 else 0))
         else:
-            meaning, repeat = ("note", 0) if unit in (*TIMES, "ms", "h") else _meaning(name)
+            time = unit in (*TIMES, "ms", "h") or (name == "t" and not unit)  # T is a temperature
+            meaning, repeat = ("note", 0) if time else _meaning(name)
             out.append(Column(index, name, unit, "note" if meaning in chosen else meaning, repeat))
     if "ll" not in chosen and any(c.meaning in READINGS and c.meaning != "ll" for c in out):
         # a length of something else

@@ -11,7 +11,7 @@ import numpy as np
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.yaml_text import read
-from stiffmap.experiment.files.fields import SEEN
+from stiffmap.experiment.files.fields import SEEN, quantity_of
 from stiffmap.experiment.spreadsheet.answers import Meant
 
 FOLDER = Path(__file__).parent / "instruments"
@@ -71,6 +71,9 @@ def as_readings(m: Meant, instrument: Instrument) -> None:
 
     Raises StiffmapError where the sheet lacks a column that the instrument needs.
     """
+    of = {k: quantity_of(k) or {"angle": "angle"}.get(k, "length") for k in instrument.units}
+    usual = {k: u for k, u in instrument.units.items() if of[k] not in m.units}
+    instrument = replace(instrument, units=usual)  # --unit length=m speaks of every length without one
     if instrument.circle:
         _of_circle(m, instrument)
         return

@@ -94,3 +94,43 @@ def test_every_mapping_file_loads_and_bad_ones_are_named(tmp_path: Path) -> None
     call = ["experiment", "new", str(tmp_path / "f.csv"), "--machine", "five-bar", "-o", str(tmp_path / "o")]
     assert main([*call, "--instrument", "ball-bar"]) == 2  # no radius
     assert main([*call, "--instrument", "tracker"]) == 2  # not a tracker's file
+
+
+@pytest.mark.parametrize(
+    ("instrument", "text", "units"),
+    [
+        ("tracker", "cmd_x,cmd_y,cmd_z,actual_x,actual_y,actual_z\n0.05,0.42,0,0.0501,0.42,0\n0,0.4,0,0.0001,0.4,0\n", "length=m"),
+        ("iso-9283", "x ref,y ref,z ref,achieved x,achieved y,achieved z\n5,42,0,5.01,42,0\n0,40,0,0.01,40,0\n", "length=cm"),
+        ("dial-gauges", "x,y,z,fx,dial x\n0.05,0.42,0,50,0.0001\n0,0.4,0,50,0.0001\n", "length=m"),
+        ("tracker", "x_des,x_desired,y_desired,z_desired,x_meas,y_meas,z_meas\n1,50,420,0,50.1,420,0\n2,0,400,0,0.1,400,0\n", "length=mm"),
+    ],
+)  # fmt: skip
+def test_a_unit_of_all_lengths_goes_before_those_of_the_instrument(
+    instrument: str, text: str, units: str, tmp_path: Path
+) -> None:
+    noise = [f"--noise=d{a}=0.01" for a in ("x" if "dial" in text else "xyz")]
+    e = made(tmp_path, instrument, text, "--unit", units, *noise)
+    np.testing.assert_allclose(e.position, [[0.05, 0.42, 0], [0, 0.4, 0]], atol=1e-12)
+    np.testing.assert_allclose(e.reading[:, 0], 1e-4, rtol=1e-9)
+
+
+def test_a_ball_bar_keeps_its_angle_next_to_a_unit_of_lengths(tmp_path: Path) -> None:
+    circle = [f"--set={k}" for k in ("centre_x=0", "centre_y=400", "centre_z=0", "radius=30")]
+    e = made(tmp_path, "ball-bar", BALL_BAR, *circle, "--unit", "length=mm", "--noise", "dd=0.001")
+    np.testing.assert_allclose(e.reading[:, -1], [1.5e-3, -2e-3, 0.25e-3])
+
+
+@pytest.mark.parametrize(
+    ("header", "named"),
+    [
+        ("x_ref,y_ref,z_ref,x_meas,y_meas,z_meas", "x_meas"),
+        ("actual_x,actual_y,actual_z,cmd_x,cmd_y,cmd_z", "actual_x"),
+        ("X Soll,Y Soll,Z Soll,X Ist,Y Ist,Z Ist", "X Ist"),
+    ],
+)
+def test_places_side_by_side_are_asked_for_by_the_instrument(header: str, named: str, tmp_path: Path) -> None:
+    (tmp_path / "t.csv").write_text(f"{header}\n0,400,0,0.01,400,0\n50,420,0,50.01,420,0\n")
+    with pytest.raises(
+        StiffmapError, match=f"a reading.*--instrument tracker, which takes the commanded place off '{named}'"
+    ):
+        sm.experiment_from_table("five-bar", tmp_path / "t.csv", tmp_path / "o", units={"length": "mm"})
