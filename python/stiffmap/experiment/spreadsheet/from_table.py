@@ -255,7 +255,8 @@ def _of_sheet(error: FileError, found: ImportedSheet, sheet: Table, fresh: Path)
 
     reason = re.sub(r"column '([^']*)'", named, reason).replace(str(fresh), sheet.file)
     if isinstance(error, MissingColumnError):
-        reason += f"; say which by --map fx='HEADER'; columns: {', '.join(repr(h) for h in sheet.header)}"
+        lost = re.match(r"missing column '(\w+)'", error.reason)
+        reason += f"; say which by --map {lost[1] if lost else 'fx'}='HEADER'; columns: {', '.join(repr(h) for h in sheet.header)}"
     at = None
     if (
         error.line is not None

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import stiffmap as sm
+from stiffmap.common.errors import StiffmapError
 from stiffmap.ui.cli.app import main
 
 SHEET = """Name;Uhr 1 [µm];Uhr 2 [µm];Last X [N];x [mm];y [mm]
@@ -53,3 +54,33 @@ def test_what_is_wrong_is_one_error(tmp_path: Path, change: dict[str, object], m
     with pytest.raises(sm.StiffmapError, match=message):
         sm.experiment_from_table(**{**call, **change})
     assert not (tmp_path / "own").exists()
+
+
+@pytest.mark.parametrize(
+    "header",
+    [
+        "t,x,y,z,Fx,dx",  # seconds, as logs write them; T is a temperature
+        "Nr,x,y,z,Fx,Disp X",
+        "Nr,Pos X,Pos Y,Pos Z,Fx,x-displacement",
+        "Nr,cmd_x,desired_y,z_ref,Fx,x-disp.",
+    ],
+)
+def test_names_of_logs_and_of_image_correlation(header: str, tmp_path: Path) -> None:
+    (tmp_path / "t.csv").write_text(f"{header}\n1,0,400,0,50,0.1\n2,50,420,0,50,0.2\n")
+    made = sm.experiment_from_table(
+        "five-bar",
+        tmp_path / "t.csv",
+        tmp_path / "out",
+        units={"length": "mm", "force": "N"},
+        noise={"dx": 0.01},
+    )
+    np.testing.assert_allclose(made.experiment.position, [[0, 0.4, 0], [0.05, 0.42, 0]])
+    np.testing.assert_allclose(made.experiment.reading[:, 0], [1e-4, 2e-4])
+
+
+@pytest.mark.parametrize("lost", ["px", "py", "pz"])
+def test_a_place_without_one_of_its_axes_is_asked_for_by_its_name(lost: str, tmp_path: Path) -> None:
+    header = "x [mm],y [mm],z [mm],fx [N],px [mm],py [mm],pz [mm]".replace(lost, "other")
+    (tmp_path / "t.csv").write_text(f"{header}\n0,400,0,0,1,2,3\n50,420,0,0,1,2,3\n")
+    with pytest.raises(StiffmapError, match=f"missing column '{lost}'.*say which by --map {lost}='HEADER'"):
+        sm.experiment_from_table("five-bar", tmp_path / "t.csv", tmp_path / "o", quantity="position")
