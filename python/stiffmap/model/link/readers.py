@@ -1,4 +1,4 @@
-"""Displacement fields that users already have: CSV, CalculiX .dat, .frd, Ansys listings, VTK/VTU."""
+"""Displacement fields that users already have: CSV, CalculiX .dat, .frd, listings of Ansys and Abaqus, VTK/VTU."""
 
 from __future__ import annotations
 
@@ -20,7 +20,9 @@ from stiffmap.model.link.gmshmesh import UNITS
 from stiffmap.model.link.optional import need
 
 Rows = tuple[Ints, Floats]
-FIELDS = (".csv", ".dat", ".frd", ".lis", ".txt", ".vtk", ".vtu")
+FIELDS = (".csv", ".dat", ".frd", ".lis", ".rpt", ".txt", ".vtk", ".vtu")
+_ABAQUS = r"NODE\s+(?:FOOT-\s+)?(?:U\.)?U1\s+(?:U\.)?U2\s+(?:U\.)?U3\b.*\n\s*(?:NOTE|LABEL)\b"
+"""Above rows of a .dat (NODE PRINT) and of a field report, .rpt."""
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[Ee][-+]?\d+)?")
 _FORTRAN = re.compile(r"(?<=[\d.])(?:[Dd](?=[-+\d])|(?=[-+]\d+(?![\d.])))")
 """Where an E belongs: 1.0D-05, and 1.0-105, which Fortran writes with three digits. In -1.0-2.0 two numbers touch."""
@@ -72,22 +74,28 @@ def known_columns(
 
 
 def read_dat(path: str | Path) -> Rows:
-    """Node numbers (n,) and displacements (cases, n, 3), in the deck's unit, of a CalculiX .dat."""
-    return _listed(path, r"displacements\s*\(")
+    """Node numbers (n,) and displacements (cases, n, 3), in the deck's unit, of a .dat of CalculiX or Abaqus."""
+    return _listed(path, rf"displacements\s*\(|{_ABAQUS}", columns=(4, 7))
 
 
 def read_ansys(path: str | Path) -> Rows:
-    """Node numbers and displacements, in the deck's unit, of Ansys PRNSOL listings (``NODE UX UY UZ``, rotations behind)."""
+    """Node numbers and displacements, in the deck's unit, of Ansys PRNSOL listings (``NODE UX UY UZ``, rotations behind) and
+    of field reports of Abaqus."""
     if turned := re.search(
         r"RESULTS ARE IN (?!(THE )?GLOBAL COORDINATE|COORDINATE SYSTEM +0\b).*", text_of(Path(path))
     ):
         raise StiffmapError(f"{path}: expected results in the global system (RSYS,0), found: {turned[0]}")
-    return _listed(path, r"NODE\s+UX\s+UY\s+UZ", columns=(4, 5, 7))
+    return _listed(path, rf"NODE\s+UX\s+UY\s+UZ|{_ABAQUS}", columns=(4, 5, 7))
 
 
 def _listed(path: str | Path, head: str, columns: tuple[int, ...] = (4,)) -> Rows:
     """Rows of nodes below each line that begins with `head`, up to the next line of words."""
-    blocks = re.split(rf"^\s*{head}.*$", text_of(Path(path)), flags=re.MULTILINE | re.IGNORECASE)[1:]
+    text = text_of(Path(path))
+    if len(parts := {*re.findall(r"at nodes for (part: .*\S)", text)}) > 1:
+        raise StiffmapError(
+            f"{path}: expected nodes of one part, which numbers its own; found {', '.join(sorted(parts))}"
+        )
+    blocks = re.split(rf"^\s*(?:{head}).*$", text, flags=re.MULTILINE | re.IGNORECASE)[1:]
     # One load case may be printed in several pages or sets of nodes; each repeats the header, not the load step.
     cases: list[dict[int, list[float]]] = []
     for block in blocks:
@@ -159,9 +167,9 @@ def read_field(
     """Points (n, 3) m and displacements (cases, n, 3) m of any of the formats, by suffix.
 
     Args:
-        path: .csv (units in the header), .dat, .frd, .vtk, .vtu, or .lis/.txt from Ansys.
+        path: .csv (units in the header), .dat, .frd, .vtk, .vtu, or .lis/.txt from Ansys, .rpt/.txt from Abaqus.
         unit: length unit of a file that does not carry it.
-        nodes: coordinates for .dat and Ansys listings, which hold numbers only: rows "node x y z", in the unit that their
+        nodes: coordinates for .dat and listings, which hold numbers only: rows "node x y z", in the unit that their
             header names, else in `unit`.
 
     Raises:
@@ -234,7 +242,7 @@ def _put(path: str | Path, rows: dict[int, list[float]], node: int, values: list
 def _same_nodes(path: str | Path, cases: list[dict[int, list[float]]]) -> Rows:
     if not cases or not cases[0]:
         raise StiffmapError(
-            f"{path}: expected nodal displacements, found none: 'displacements (' heads them in a .dat, NODE UX UY UZ in an Ansys listing; a table with units in its header is a .csv"
+            f"{path}: expected nodal displacements, found none: 'displacements (' heads them in a .dat, NODE UX UY UZ in an Ansys listing, Node U.U1 U.U2 U.U3 in a report of Abaqus; a table with units in its header is a .csv"
         )
     numbers = sorted(cases[0])
     for k, case in enumerate(cases):

@@ -84,6 +84,60 @@ def test_dat_frd_and_ansys_hold_the_same_field(tmp_path):
     assert u == pytest.approx(1e-3 * U[:2], rel=1e-5)
 
 
+def abaqus_report(frames=2, part="BAR-1", turns=""):
+    text = ""
+    for u in U[:frames]:
+        text += f"Field Output Report\n\nSource 1\n---------\n   Step: load\n\nField Output reported at nodes for part: {part}\n\n"
+        text += (
+            "            Node            U.U1            U.U2            U.U3"
+            + ("".join(f"          UR.UR{i}" for i in (1, 2, 3)) if turns else "")
+            + "\n"
+        )
+        text += "           Label          @Loc 1          @Loc 1          @Loc 1\n" + "-" * 65 + "\n"
+        text += "".join(
+            f"{i + 1:16d}" + "".join(f"{1e6 * v:15.6f}E-06" for v in row) + turns + "\n"
+            for i, row in enumerate(u)
+        )
+        text += "\n\n  Minimum           -2.6E-03    -806.3E-06    -49.4E-03\n      At Node                  1               2               1\n"
+    return text
+
+
+def abaqus_printed():
+    text = " THE FOLLOWING TABLE IS PRINTED FOR ALL NODES\n"
+    for u in U[:2]:
+        text += "\n       NODE FOOT-  U1             U2             U3\n            NOTE\n\n"
+        text += "".join(
+            f"{i + 1:11d}     " + "".join(f"{v:15.6E}" for v in row) + "\n" for i, row in enumerate(u)
+        )
+        text += (
+            "\n MAXIMUM         5.0E-03   1.0E-03   2.0E-03\n AT NODE               2         3         4\n"
+        )
+    return text
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("a.rpt", abaqus_report()),
+        ("a.txt", abaqus_report(turns="    1.E-06    -0.    -2.5E-06")),
+        ("a.dat", abaqus_printed()),
+    ],
+)
+def test_listings_of_abaqus(tmp_path, name, text):
+    (tmp_path / name).write_text(text)
+    places = "".join(f"{i + 1}, {x}, {y}, {z}\n" for i, (x, y, z) in enumerate(POINTS))
+    (tmp_path / "bar.inp").write_text(f"*NODE\n{places}*ELEMENT, TYPE=C3D4\n1, 1, 2, 3, 4\n")
+    p, u = read_field(tmp_path / name, "mm", tmp_path / "bar.inp")
+    assert p == pytest.approx(1e-3 * POINTS)
+    assert u == pytest.approx(1e-3 * U[:2], rel=1e-5, abs=1e-15)
+
+
+def test_parts_of_abaqus_number_their_own_nodes(tmp_path):
+    (tmp_path / "a.rpt").write_text(abaqus_report(1) + abaqus_report(1, "FOOT-1"))
+    with pytest.raises(StiffmapError, match=r"nodes of one part.*found part: BAR-1, part: FOOT-1"):
+        read_field(tmp_path / "a.rpt", "mm", tmp_path / "bar.inp")
+
+
 @pytest.mark.parametrize("name", ["a.vtu", "a.vtk"])
 def test_vtu_and_vtk_through_meshio(tmp_path, name):
     meshio = pytest.importorskip("meshio", reason="needs the extra [fea]")
