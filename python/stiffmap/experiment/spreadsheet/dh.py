@@ -18,6 +18,7 @@ from scipy.spatial.transform import Rotation
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
+from stiffmap.common.tables.cells import Cells
 from stiffmap.common.tables.table import Table
 from stiffmap.experiment.spreadsheet.answers import Meant
 from stiffmap.experiment.spreadsheet.joints import MOST_TURNS
@@ -31,9 +32,12 @@ NUMBERS = {
     "alpha": "alpha|α",
 }
 INDEX = re.compile(
-    r"^(theta|θ|alpha|α|sigma|σ|[adr])[ _-]*[({\[]?[ijkn]( ?[-−–_] ?1)?[)}\]]?(?![^\W_])", re.IGNORECASE
+    r"^((?:theta|θ|q)[ _-]?offset|theta|θ|alpha|α|sigma|σ|[adr])[ _-]*[({\[]?[ijkn]( ?[-−–_] ?1)?[)}\]]?(?![^\W_])",
+    re.IGNORECASE,
 )
 """``theta_i``, ``d(i)``, ``aᵢ₋₁``: the symbol, and whether it is of the link before."""
+VARIABLE = r"(?i)(?:\+ *)?\\?(?:{}|q)[ _]?\{{?(?:\d+|i)\}}?\*?(?= *(?:[+−–-]|$))|\*$"
+"""The joint's coordinate in a cell, as in ``q2``, ``θ2 - 90``, ``90 + \\theta_2``, ``0*``; what is left is added to it."""
 WORDS = {
     "name": r"name|joint|axis|achse|gelenk|id|link",
     "type": r"type|kind|art|sigma|σ",
@@ -77,7 +81,7 @@ def read_dh(given: Table, units: Mapping[str, str], convention: str) -> list[DHR
 
     Raises StiffmapError that names the column which is missing or has no unit, or the columns of another convention.
     """
-    header = [unicodedata.normalize("NFKC", h) for h in given.header]
+    header = [re.sub(r"[\\$]", "", unicodedata.normalize("NFKC", h)) for h in given.header]
     sheet = replace(given, header=tuple(INDEX.sub(r"\1", h) for h in header))
     columns = {n: sheet.find(pattern) for n, pattern in (NUMBERS | WORDS).items()}
     at = {n: i for n, i in columns.items() if i is not None}
@@ -105,12 +109,13 @@ def read_dh(given: Table, units: Mapping[str, str], convention: str) -> list[DHR
     more = sheet.find(MORE)
     if more is not None and not {*sheet.columns[more]} <= NOTHING_MORE:
         sheet.fail(f"'{given.header[more]}' says more than theta, d, a and alpha, which are all that is read")
+    types = [*sheet.columns[at["type"]]] if "type" in at else [""] * len(sheet.lines)
+    sheet, types = _constants(sheet, at, [w.strip().lower() for w in types])
     m = Meant(units=dict(units), sheet=sheet)
     units_of = {n: m.unit(at[n], n, quantity=q).size for n, q in QUANTITIES.items()}
     numbers = {n: np.nan_to_num(_in_si(sheet, at[n], units_of[n], q)) for n, q in QUANTITIES.items()}
     count = len(sheet.lines)
-    words = {n: list(sheet.columns[at[n]]) for n in ("name", "type") if n in at}
-    types = [w.strip().lower() for w in words.get("type", [""] * count)]
+    words = {n: list(sheet.columns[at[n]]) for n in ("name",) if n in at}
     slides = [re.fullmatch(SLIDES, w) is not None for w in types]
     for i, w in enumerate(types):
         if not slides[i] and not re.fullmatch(TURNS, w):
@@ -126,6 +131,21 @@ def read_dh(given: Table, units: Mapping[str, str], convention: str) -> list[DHR
         theta, d, a, alpha = (float(numbers[n][i]) for n in NUMBERS)
         out.append(DHRow(names[i], theta, d, a, alpha, slides[i], (low, high) if known else None))
     return out
+
+
+def _constants(sheet: Table, at: Mapping[str, int], types: list[str]) -> tuple[Table, list[str]]:
+    """The table without the joints' coordinates, and the types: a joint whose type nobody says slides where its d is the coordinate."""
+    columns = list(sheet.columns)
+    for name, symbol, sliding in (("theta", "theta|θ", False), ("d", "d", True)):
+        cells = [c.strip() for c in columns[at[name]]]
+        for i, cell in enumerate(cells):
+            left = re.sub(VARIABLE.format(symbol), "", cell, count=1).strip()
+            of_it = not types[i] or sliding == (re.fullmatch(SLIDES, types[i]) is not None)
+            if of_it and left != cell and not left.endswith((*"+−–-",)):  # 90 - q2 turns the other way
+                cells[i] = re.sub(r"^([+−–-]) +", r"\1", left) or "0"
+                types[i] = types[i] or ("p" if sliding else "r")
+        columns[at[name]] = Cells.of(cells)
+    return replace(sheet, columns=tuple(columns)), types
 
 
 def _limit(m: Meant, column: int | None, row: int, size: float, quantity: str) -> float:

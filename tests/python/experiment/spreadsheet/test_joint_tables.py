@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import stiffmap as sm
+from stiffmap.common.errors import StiffmapError
+from stiffmap.common.tables.sheet import read_sheet
 from stiffmap.experiment import Predictor
 from stiffmap.experiment.noise.whitening import LinearProblem, nuisance_part
+from stiffmap.experiment.spreadsheet.dh import read_dh
 from stiffmap.model.description import Joint
 from stiffmap.ui.cli import main
 
@@ -332,3 +336,27 @@ def test_gauges_that_say_target_minus_actual(tmp_path: Path, capsys: pytest.Capt
     assert main([*arguments, "-o", str(tmp_path / "f"), "--difference", "target-minus-actual"]) == 2
     assert "--difference: no column is a difference" in capsys.readouterr().err
     assert sm.load_experiment(tmp_path / "e").reading[:, 0] == pytest.approx([-5e-6, -7e-6])
+
+
+@pytest.mark.parametrize(
+    ("text", "convention"),
+    [
+        ("i,a [mm],alpha [deg],d [mm],theta [deg]\n1,225,0,100,q1\n2,175,180,0,θ2 - 90\n3,0,0,d3,30\n4,0,0,10,90 + \\theta_4\n", "standard"),
+        ("i,a [mm],alpha [deg],d [mm],theta_offset_i [deg],type\n1,225,0,100,0*,R\n2,175,180,0,-90,R\n3,0,0,q3,30,P\n4,0,0,10,+90,R\n", "standard"),
+        ("| i | $\\alpha_{i-1}$ [deg] | $a_{i-1}$ [mm] | $\\theta_i$ [deg] | $d_i$ [mm] |\n|--|--|--|--|--|\n| 1 | 0 | 0 | \\theta_1 | 100 |\n"
+         "| 2 | 0 | 225 | −90+θ_2 | 0 |\n| 3 | 180 | 175 | 30 | d_3 |\n| 4 | 0 | 0 | 90+θ4* | 10 |\n", "modified"),
+    ],
+)  # fmt: skip
+def test_the_coordinate_of_a_joint_stands_in_its_cell(text: str, convention: str, tmp_path: Path) -> None:
+    (tmp_path / "dh.csv").write_text(text, encoding="utf-8")
+    rows = read_dh(read_sheet(tmp_path / "dh.csv"), {}, convention)
+    assert [r.slides for r in rows] == [False, False, True, False]
+    assert [math.degrees(r.theta) for r in rows] == pytest.approx([0, -90, 30, 90])
+    assert [r.d for r in rows] == pytest.approx([0.1, 0, 0, 0.01])
+
+
+@pytest.mark.parametrize("cell", ["180 - q2", "-q2", "2*q2", "q2 + q3", "d2"])
+def test_a_coordinate_that_is_not_simply_added_is_refused(cell: str, tmp_path: Path) -> None:
+    (tmp_path / "dh.csv").write_text(f"i,a [mm],alpha [deg],d [mm],theta [deg]\n1,2,0,1,0\n2,1,0,0,{cell}\n")
+    with pytest.raises(StiffmapError, match=r"column .theta.*expected a number"):
+        read_dh(read_sheet(tmp_path / "dh.csv"), {}, "standard")
