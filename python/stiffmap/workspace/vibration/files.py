@@ -19,7 +19,12 @@ from stiffmap.workspace.vibration.response_units import FREQUENCIES, ResponseUni
 COLUMNS = Known(
     {**dict.fromkeys(("frequency", "real", "imag", "magnitude", "coherence"), ""), "phase": "rad"},
     {"frequency": "frequency_Hz", "phase": "phase_deg"},
-    {"freq": "frequency", "f": "frequency", "re": "real", "im": "imag", "imaginary": "imag", "mag": "magnitude", "amplitude": "magnitude"},
+    {
+        "freq": "frequency", "f": "frequency", "coh": "coherence", "phase_angle": "phase",
+        **dict.fromkeys(("re", "re(h)", "re(frf)", "real_part"), "real"),
+        **dict.fromkeys(("im", "im(h)", "im(frf)", "imaginary", "imaginary_part", "imag_part"), "imag"),
+        **dict.fromkeys(("mag", "amplitude", "|h|", "|frf|", "accelerance", "inertance", "mobility", "receptance"), "magnitude"),
+    },
 )  # fmt: skip
 FORMS = (("real", "imag"), ("magnitude", "phase"))
 EXAMPLES = "m/N, mm/N, um/N, m/s/N, m/s2/N, g/N and the like"

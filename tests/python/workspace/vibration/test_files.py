@@ -342,3 +342,21 @@ def test_a_coherence_in_percent_is_none(head, tmp_path):
     (tmp_path / "f.csv").write_text(f"frequency_Hz,real_m/N,imag_m/N,{head}\n10,1,0,0.5\n20,2,-1,0.9\n")
     with pytest.raises(sm.StiffmapError, match=r"line 1: .*expected a coherence from 0 to 1, not in percent"):
         read_responses(tmp_path / "f.csv")
+
+
+@pytest.mark.parametrize(
+    ("header", "columns"),
+    [
+        ("Frequency (Hz),Accelerance (m/s^2/N),Phase (deg)", lambda a: (abs(a), np.degrees(np.angle(a)))),
+        ("f [Hz],Re(H) [mm/s²/N],Im(H) [mm/s²/N]", lambda a: (1e3 * a.real, 1e3 * a.imag)),
+        ("Freq (Hz),Real Part (m/s2/N),Imaginary Part (m/s2/N),Coh", lambda a: (a.real, a.imag, 0 * abs(a) + 0.9)),
+    ],
+)  # fmt: skip
+def test_names_of_analysers(header, columns, tmp_path):
+    f = np.array([10.0, 20.0, 30.0])
+    receptance = np.array([1e-6 - 2e-7j, -1e-6 - 3e-6j, -2e-7 - 1e-7j])
+    rows = np.column_stack([f, *columns(-((2 * np.pi * f) ** 2) * receptance)])
+    text = "\n".join(",".join(map(repr, row.tolist())) for row in rows)
+    (tmp_path / "r.csv").write_text(f"{header}\n{text}\n", encoding="utf-8")
+    (one,) = read_responses(tmp_path / "r.csv")
+    np.testing.assert_allclose(one.receptance, receptance, rtol=1e-12)
