@@ -112,6 +112,16 @@ def contradictions(experiment: Experiment) -> list[str]:
     ]
 
 
+def no_difference(experiment: Experiment) -> str:
+    """What to say where readings change along with the commanded places, as places that were seen do; empty where they do not."""
+    at, read = experiment.position, experiment.reading[:, :3]
+    same = np.ptp(read - at, axis=0) < 0.1 * np.ptp(at, axis=0)  # not where one of the two is NaN
+    if experiment.seen is not None or not same.any():
+        return ""
+    names = ", ".join(c.name for c, s in zip(experiment.channels, same, strict=False) if s)
+    return f"{names} change as the commanded places do: places that were seen are no differences; --instrument tracker takes what was commanded off"
+
+
 def not_at_zero(experiment: Experiment) -> str:
     """What to say where a deflection is read without a load; empty where none is, or where its zero is unknown."""
     e = experiment

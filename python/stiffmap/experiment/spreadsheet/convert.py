@@ -110,9 +110,7 @@ def _ask(m: Meant, known_: set[str], joints: bool) -> None:
         seen = map(m.sheet.find, () if joints else load_instrument("tracker").measured.values())
         names = [n for i in seen if i is not None and (n := m.sheet.names[i]).lower() not in ("x", "y", "z")]
         if names:
-            places = (
-                f"--instrument tracker, which takes the commanded place off '{names[0]}'; of differences "
-            )
+            places = f"--instrument tracker, which takes the command off '{names[0]}'; of differences "
         m.ask_column(
             f"which column is a reading? Say {places}--map dx='HEADER' (dy, dz, rx, ry, rz), several headers with | between them for "
             "repeats, or length='HEADER'; where a ball stood in one socket, --set px=0 --set py=0 --set pz=0",

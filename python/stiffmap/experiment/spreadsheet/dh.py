@@ -115,12 +115,11 @@ def read_dh(given: Table, units: Mapping[str, str], convention: str) -> list[DHR
     units_of = {n: m.unit(at[n], n, quantity=q).size for n, q in QUANTITIES.items()}
     numbers = {n: np.nan_to_num(_in_si(sheet, at[n], units_of[n], q)) for n, q in QUANTITIES.items()}
     count = len(sheet.lines)
-    words = {n: list(sheet.columns[at[n]]) for n in ("name",) if n in at}
     slides = [re.fullmatch(SLIDES, w) is not None for w in types]
     for i, w in enumerate(types):
         if not slides[i] and not re.fullmatch(TURNS, w):
             sheet.fail(f"joint: expected R or P, one that turns or slides; found '{w}'", i)
-    names = [_named(w, i) for i, w in enumerate(words.get("name", [""] * count))]
+    names = [_named(w, i) for i, w in enumerate(sheet.columns[at["name"]] if "name" in at else [""] * count)]
     if len(set(names)) < count:
         raise StiffmapError(f"{sheet.file}: joints of the same name: {', '.join(names)}")
     out = []

@@ -21,7 +21,7 @@ from stiffmap.common.tables.workbook import WORKBOOKS, sheet_names
 from stiffmap.common.units import SPELLINGS, known, unit_of
 from stiffmap.experiment.experiment import Experiment
 from stiffmap.experiment.files.load import load_experiment
-from stiffmap.experiment.noise.level import against_the_load, contradictions, not_at_zero
+from stiffmap.experiment.noise.level import against_the_load, contradictions, no_difference, not_at_zero
 from stiffmap.experiment.spreadsheet.answers import Answers, Meant, Question
 from stiffmap.experiment.spreadsheet.convert import ImportedSheet, write_folder
 from stiffmap.experiment.spreadsheet.dh import LEG, QUANTITIES, arm, read_dh
@@ -154,7 +154,8 @@ def experiment_from_table(
     if rows is not None and dh is not None:
         source = f"from {Path(dh).name}"
         Machine(arm(rows, dh_convention, output.name, source, m.middle())).save(declared)
-    of_loads = not_at_zero(made) or against_the_load(made)  # a gauge that is not at zero has no sign
+    # a gauge that is not at zero has no sign
+    of_loads = no_difference(made) or not_at_zero(made) or against_the_load(made)
     warnings = tuple(line for line in (of_loads, *contradictions(made)) if line)
     remarks = (*m.said, *(f"left out: {text}" for text in own.aside))
     return FromTable(made, output, declared, warnings, remarks, own, found, m if m.columns else None)

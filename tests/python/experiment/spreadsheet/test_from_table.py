@@ -84,3 +84,24 @@ def test_a_place_without_one_of_its_axes_is_asked_for_by_its_name(lost: str, tmp
     (tmp_path / "t.csv").write_text(f"{header}\n0,400,0,0,1,2,3\n50,420,0,0,1,2,3\n")
     with pytest.raises(StiffmapError, match=f"missing column '{lost}'.*say which by --map {lost}='HEADER'"):
         sm.experiment_from_table("five-bar", tmp_path / "t.csv", tmp_path / "o", quantity="position")
+
+
+@pytest.mark.parametrize(
+    ("text", "columns", "said"),
+    [
+        ("x,y,z,Fx,a,b\n0,400,0,50,0.1,400\n50,420,0,50,50.1,420\n90,410,0,50,90.1,410\n", {"dx": "a", "dy": "b"}, "dx, dy change"),
+        ("x,y,z,Fx,a\n0,400,0,50,1200.1\n50,420,0,50,1250.3\n90,410,0,50,1290.2\n", {"dx": "a"}, "dx change"),  # in another frame
+        ("x,y,z,Fx,a\n0,400,0,50,0.1\n50,420,0,50,0.15\n90,410,0,50,0.2\n", {"dx": "a"}, ""),
+        ("x,y,z,Fx,a\n0,400,0,50,0.1\n0,400,0,50,0.1\n0,400,0,80,0.2\n", {"dx": "a"}, ""),
+    ],
+)  # fmt: skip
+def test_places_that_are_given_as_differences_are_said(
+    text: str, columns: dict[str, str], said: str, tmp_path: Path
+) -> None:
+    (tmp_path / "t.csv").write_text(text)
+    units, noise = {"length": "mm", "force": "N"}, dict.fromkeys(columns, 0.1)
+    made = sm.experiment_from_table(
+        "five-bar", tmp_path / "t.csv", tmp_path / "o", columns=columns, units=units, noise=noise
+    )
+    first = " ".join(made.warnings)
+    assert first.startswith(said) if said else "change as the commanded" not in first

@@ -131,6 +131,6 @@ def test_a_ball_bar_keeps_its_angle_next_to_a_unit_of_lengths(tmp_path: Path) ->
 def test_places_side_by_side_are_asked_for_by_the_instrument(header: str, named: str, tmp_path: Path) -> None:
     (tmp_path / "t.csv").write_text(f"{header}\n0,400,0,0.01,400,0\n50,420,0,50.01,420,0\n")
     with pytest.raises(
-        StiffmapError, match=f"a reading.*--instrument tracker, which takes the commanded place off '{named}'"
+        StiffmapError, match=f"a reading.*--instrument tracker, which takes the command off '{named}'"
     ):
         sm.experiment_from_table("five-bar", tmp_path / "t.csv", tmp_path / "o", units={"length": "mm"})
