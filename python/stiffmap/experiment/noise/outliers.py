@@ -133,6 +133,6 @@ def without_suspects(experiment: Experiment, base: Floats) -> tuple[Noise, Mask]
         bare -= nuisance_part(problem, bare, robust=True)
         bare[out] = np.nan
         more = whole_stays(experiment, out | suspects(experiment, bare, noise.sigma))
-        if not (more & ~out).any():
-            return noise, out
+        if not (more & ~out).any() or LinearProblem.of(experiment, noise.sigma, base, ~more).freedom < 1:
+            return noise, out  # as many unknowns as readings fit anything
         out |= more
