@@ -18,7 +18,7 @@ if(STIFFMAP_HAS_TUNING)
   target_compile_options(stiffmap_kernel_options INTERFACE -mtune=icelake-server)
 endif()
 
-# Each wide level has a narrow companion for calls on one or two poses: `name` is the level or the level and _pair.
+# Wide levels have a narrow companion for calls on one or two poses, v3_pair: `name` is the level or the level and _pair.
 function(stiffmap_kernel name lanes)
   set(target stiffmap_kernel_${name})
   string(REPLACE "_pair" "" level ${name})
@@ -42,7 +42,6 @@ if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
     stiffmap_kernel(v3 4 -march=x86-64-v3)
     stiffmap_kernel(v3_pair 2 -march=x86-64-v3)
     stiffmap_kernel(v4 8 -march=x86-64-v4 -mprefer-vector-width=512)
-    stiffmap_kernel(v4_pair 2 -march=x86-64-v4)
-    list(APPEND STIFFMAP_KERNELS stiffmap_kernel_v3 stiffmap_kernel_v3_pair stiffmap_kernel_v4 stiffmap_kernel_v4_pair)
+    list(APPEND STIFFMAP_KERNELS stiffmap_kernel_v3 stiffmap_kernel_v3_pair stiffmap_kernel_v4)
   endif()
 endif()

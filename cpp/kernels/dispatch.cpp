@@ -10,7 +10,6 @@ extern "C" void stiffmap_kernel_base(stiffmap::KernelTable*);
 extern "C" void stiffmap_kernel_v3(stiffmap::KernelTable*);
 extern "C" void stiffmap_kernel_v3_pair(stiffmap::KernelTable*);
 extern "C" void stiffmap_kernel_v4(stiffmap::KernelTable*);
-extern "C" void stiffmap_kernel_v4_pair(stiffmap::KernelTable*);
 #endif
 
 namespace stiffmap {
@@ -51,7 +50,7 @@ const std::vector<Level>& levels() {
     std::vector<Level> out{{base, base}};
 #ifdef STIFFMAP_X86_LEVELS
     if (has_v3()) out.push_back({table_of(&stiffmap_kernel_v3), table_of(&stiffmap_kernel_v3_pair)});
-    if (has_v4()) out.push_back({table_of(&stiffmap_kernel_v4), table_of(&stiffmap_kernel_v4_pair)});
+    if (has_v4()) out.push_back({table_of(&stiffmap_kernel_v4), table_of(&stiffmap_kernel_v3_pair)});
 #endif
     return out;
   }();
