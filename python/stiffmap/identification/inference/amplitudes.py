@@ -31,7 +31,7 @@ from stiffmap.identification.inference.constants import (
     STANDS_OUT,
     WIDEST,
 )
-from stiffmap.identification.inference.parts import ALL_NUMBERS, NOISE, Part
+from stiffmap.identification.inference.parts import ALL_NUMBERS, GAPS, NOISE, Part
 from stiffmap.identification.inference.sizes import of_size
 
 STEPS, LARGEST_STEP, ENOUGH = 30, 2.0, 0.01
@@ -46,8 +46,8 @@ OFF, SINKS = -14.0, -8.0
 """ln variance of a part that the readings do not ask for, and below which one on its way down is taken out."""
 ROUND_OFF = 1e-13
 """Of the largest variance: what is added to the diagonal where a covariance cannot be factorised."""
-BEGIN = -2.0
-"""ln variance with which a part begins."""
+BEGIN, QUIET = -2.0, -6.0
+"""ln variance with which a part begins, and what nobody can name where it may be noise instead."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,20 +135,29 @@ def fitted(
     if weights is not None and np.any(weights != 1.0):
         heavy = _optimum(columns, tuple(parts), first, weights, heavy=True)
         return max(light, heavy, key=lambda f: f.score)
-    mean, sd = noise_part(light)
-    typical = min(light.noise, 1.4826 * float(np.median(np.abs(mean))))
-    starts = []
-    if np.any(np.abs(mean) > STANDS_OUT * typical):
-        starts.append(_heavy(light, mean, sd))
+    typical = min(light.noise, _typical(noise_part(light)[0]))
+    begun = np.array([2.0 * np.log(typical), *first[1:]])  # what sank may rise
+    starts = [(begun, _standing_out(light))]
+    if not given:  # what nobody can name may have taken what stands out
+        quiet = np.where([False, *(p.kind in (*GAPS, "time") for p in parts)], QUIET, begun)
+        starts.append((quiet, _standing_out(evaluated(columns, parts, quiet, light.weights))))
     if columns.alone.any():
-        starts.append(np.where(columns.alone, NOTHING, 1.0))
-    best = light
-    for w in starts:
-        begun = np.array([2.0 * np.log(typical), *first[1:]])  # what sank may rise
-        heavy = _optimum(columns, tuple(parts), begun, w, heavy=True)
-        if heavy.score > best.score:
-            best = heavy
-    return best
+        starts.append((begun, np.where(columns.alone, NOTHING, 1.0)))
+    found = [_optimum(columns, tuple(parts), t, w, heavy=True) for t, w in starts if w is not None]
+    return max([light, *found], key=lambda f: f.score)
+
+
+def _typical(noise: Floats) -> float:
+    """Robust standard deviation."""
+    return 1.4826 * float(np.median(np.abs(noise)))
+
+
+def _standing_out(fit: Fit) -> Floats | None:
+    """(N,) weights of heavy tails at the posterior of the noise; None where no reading stands out of it."""
+    mean, sd = noise_part(fit)
+    if not np.any(np.abs(mean) > STANDS_OUT * min(fit.noise, _typical(mean))):
+        return None
+    return _heavy(fit, mean, sd)
 
 
 def refitted(fit: Fit, residual: Floats) -> Fit:
@@ -159,7 +168,9 @@ def refitted(fit: Fit, residual: Floats) -> Fit:
 
 def _heavy(fit: Fit, mean: Floats, sd: Floats) -> Floats:
     """(N,) weights of heavy tails at the posterior of the noise, its mean and standard deviation (N,)."""
-    return np.asarray((DEGREES + 1.0) / (DEGREES + (mean**2 + sd**2) / fit.noise**2))
+    label, size = fit.columns.tails
+    squares = np.bincount(label, (mean**2 + sd**2) / fit.noise**2)
+    return np.asarray(((DEGREES + size) / (DEGREES + squares))[label])
 
 
 def evaluated(columns: Columns, parts: Sequence[Part], t: Floats, weights: Floats) -> Fit:
@@ -205,7 +216,7 @@ def _evaluate(
     solved = cho_solve((root, True), r, check_finite=False)
     m = len(r)
     likelihood = -0.5 * float(r @ solved) - float(np.log(np.diag(root)).sum()) - 0.5 * m * np.log(2 * np.pi)
-    likelihood += _bound(weights)
+    likelihood += _bound(columns, weights)
     along = np.zeros((m, len(t)), order="F")
     along[:, 0] = variance[0] * (columns.free.T @ ((columns.free @ solved) / weights))
     for k, p in on.items():
@@ -276,17 +287,19 @@ def _root(v: Floats) -> Floats:
             v = v + more * np.eye(len(v))
 
 
-def _bound(w: Floats) -> float:
+def _bound(columns: Columns, weights: Floats) -> float:
     """What the bound of heavy tails adds to a Gaussian of variances κ²/w; 0 where all weights are 1."""
-    if np.all(w == 1.0):
+    if np.all(weights == 1.0):
         return 0.0
-    n = DEGREES
+    label, d = columns.tails
+    n, w = DEGREES, weights[np.unique(label, return_index=True)[1]]
     constant = (
-        gammaln((n + 1.0) / 2.0) - gammaln(n / 2.0) - 0.5 * np.log(n * np.pi) + 0.5 * np.log(2.0 * np.pi)
+        gammaln((n + d) / 2.0)
+        - gammaln(n / 2.0)
+        - 0.5 * d * np.log(n * np.pi)
+        + 0.5 * d * np.log(2.0 * np.pi)
     )
-    each = (
-        constant - 0.5 * np.log(w) - 0.5 * (n + 1.0) * np.log((n + 1.0) / (w * n)) + 0.5 * (n + 1.0 - n * w)
-    )
+    each = constant - 0.5 * d * np.log(w) - 0.5 * (n + d) * np.log((n + d) / (w * n)) + 0.5 * (n + d - n * w)
     return float(each.sum())
 
 

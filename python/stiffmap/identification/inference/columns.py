@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.experiment import Experiment, Floats, Integers
 from stiffmap.experiment.noise.nuisance import nuisance_columns
-from stiffmap.experiment.noise.outliers import GROSS, MANY
+from stiffmap.experiment.noise.outliers import GROSS, LEAST_MANY, MANY
 from stiffmap.experiment.noise.robust import fitted
 from stiffmap.experiment.noise.whitening import basis, readings_of
 from stiffmap.experiment.prediction.predict import Predictor
@@ -68,6 +68,8 @@ class Columns:
     standard deviation in m or rad."""
     repeats: tuple[float, float] = (0.0, 0.0)
     """Sum of squares within repeats that were averaged, in noise, and its degrees of freedom."""
+    tied: bool = False
+    """Whether the readings of a row share one weight of heavy tails, as where an instrument slips; else each has its own."""
 
     @property
     def free(self) -> Floats:
@@ -101,14 +103,22 @@ class Columns:
         return len(self.residual)
 
     @cached_property
+    def tails(self) -> tuple[Integers, Integers]:
+        """(N,) number of the weight of heavy tails of each reading, and how many readings have each weight."""
+        label = np.unique(self.rows, return_inverse=True)[1] if self.tied else np.arange(len(self.rows))
+        return label.reshape(-1), np.bincount(label.reshape(-1))
+
+    @cached_property
     def alone(self) -> NDArray[np.bool_]:
-        """(N,) readings far from what frames and declared numbers, robustly fitted, make of all others; none where there are many:
-        they are structure."""
+        """(N,) readings far from what frames and declared numbers, robustly fitted, make of all others, with those that share their
+        weight; none where there are many: they are structure."""
         values, p, q = self.free @ self.residual, self.numbers.shape[1], self.frames.shape[1]
         prior = np.hstack([np.zeros((p, q)), np.eye(p)])
         whole = np.vstack([np.hstack([self.frames, self.free @ self.numbers]), prior])
-        far = np.asarray(fitted(whole, np.append(values, np.zeros(p)))[1][: len(values)] > GROSS)
-        return far if far.mean() <= MANY else np.zeros(len(values), bool)
+        far = fitted(whole, np.append(values, np.zeros(p)))[1][: len(values)] > GROSS
+        label, size = self.tails
+        out = np.bincount(label, far) > 0.0
+        return np.asarray(out[label] & (out.sum() <= max(LEAST_MANY, MANY * len(size))))
 
     @property
     def groups(self) -> dict[str, Integers]:

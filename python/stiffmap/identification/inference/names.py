@@ -6,7 +6,7 @@ their uncertainties, in "groups" each group by its own. All are searched alike a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 
@@ -15,7 +15,7 @@ from scipy.optimize import least_squares
 
 from stiffmap.experiment.experiment import Floats
 from stiffmap.identification.candidates.candidates import clash
-from stiffmap.identification.inference.amplitudes import Fit, evaluated, fitted, refitted
+from stiffmap.identification.inference.amplitudes import QUIET, Fit, evaluated, fitted, refitted
 from stiffmap.identification.inference.candidates import evidence, of_pairs
 from stiffmap.identification.inference.chosen import Chosen, all_moved
 from stiffmap.identification.inference.columns import Columns
@@ -25,8 +25,6 @@ from stiffmap.identification.inference.places import Place
 from stiffmap.identification.inference.sizes import gains, log_mean, spectrum
 
 EXACT = "exact"
-QUIET = -6.0
-"""ln variance with which gaps begin in a fit that goes on from one without gaps."""
 SETTLED = 0.3
 """Noise: a correction that changes less is none."""
 PROGRESS = 0.1
@@ -87,14 +85,13 @@ def searched(
     travel: bool = False,
 ) -> Search:
     """The best set of effects over all worlds; no step begins once time is `over`. `travel`: whether drives may err along their
-    travel in any smooth way."""
-    parts = Parts(columns)
-    gaps = (*parts.gaps, *parts.travel) if travel else parts.gaps
-    worlds: dict[str, tuple[Part, ...]] = {EXACT: ()}
-    if columns.unknowns and not over():
-        worlds |= {"together": parts.together, "groups": parts.numbers}
-    optima: dict[tuple[tuple[int, int], ...], Floats] = {}
-    searches = [_World(columns, gaps, name, own, predict, over, optima) for name, own in worlds.items()]
+    travel in any smooth way. Heavy tails are those of readings, or of rows where these are likelier."""
+    searches = list(_worlds(columns, predict, over, travel))
+    tied = replace(columns, tied=True)
+    if len(tied.tails[1]) < len(columns.rows):
+        of_rows = list(_worlds(tied, predict, over, travel))
+        if of_rows[:2][-1].null.score > searches[:2][-1].null.score + PROGRESS:
+            searches = of_rows
     searches.sort(key=lambda w: -w.null.score)
     found: dict[str, Search] = {}
     for w in searches:
@@ -109,6 +106,19 @@ def searched(
         exact=found[EXACT].null.score,
         calibrated=max(off, key=lambda f: f.score, default=None),
     )
+
+
+def _worlds(
+    columns: Columns, predict: Predict | None, over: Callable[[], bool], travel: bool
+) -> Iterator[_World]:
+    parts = Parts(columns)
+    gaps = (*parts.gaps, *parts.travel) if travel else parts.gaps
+    worlds: dict[str, tuple[Part, ...]] = {EXACT: ()}
+    if columns.unknowns and not over():
+        worlds |= {"together": parts.together, "groups": parts.numbers}
+    optima: dict[tuple[tuple[int, int], ...], Floats] = {}
+    for name, own in worlds.items():
+        yield _World(columns, gaps, name, own, predict, over, optima)
 
 
 def _with_rivals(model: Model, searches: Sequence[_World], found: Mapping[str, Search]) -> Search:

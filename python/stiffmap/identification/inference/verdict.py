@@ -29,6 +29,7 @@ from stiffmap.identification.numbers.unknowns import Unknown
 DETERMINED = 0.5
 """Posterior standard deviation, in standard uncertainties, of a number that the readings determine."""
 TOLERABLE = "declared numbers within their tolerances show the same"
+ONE_POSE = "it rests on the readings of one pose"
 CLEARLY = 1.15
 """Noise over what is stated, or under it, from which it is said."""
 LEAST_SCALE = 0.01
@@ -120,7 +121,9 @@ def judged(columns: Columns, search: Search) -> Verdict:
     as_effects = tuple(b.unknown for b in beyond if called[id(b)] is not None)
     beyond = tuple(b for b in beyond if called[id(b)] is None)
     rest, time = left(model.fit)
-    unexplained = [why for _, why in refused if why != TOLERABLE]
+    slips = bool(np.any(model.fit.weights != 1.0))  # then those of one pose may be others
+    explained = {TOLERABLE, ONE_POSE} if slips else {TOLERABLE}
+    unexplained = [why for _, why in refused if why not in explained]
     rest = rest or (unexplained[0] if unexplained else "")
     named.sort(key=lambda n: -n.share)
     return Verdict(tuple(named), tuple(refused), beyond, rest, time, as_effects)
@@ -150,7 +153,7 @@ def refusal(columns: Columns, fit: Fit, c: Chosen) -> tuple[float, str]:
         return 0.0, "smaller than what nobody can name"
     rest = fit.without([c.part.name])
     if without_a_pose(columns, rest, c) < np.log(ODDS):
-        return 0.0, "it rests on the readings of one pose"
+        return 0.0, ONE_POSE
     scatter, worst = unevenness(columns, rest, c.lines(columns) @ c.values / columns.sigma)
     return scatter, f"its strength differs along {worst}" if worst else ""
 

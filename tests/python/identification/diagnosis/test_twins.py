@@ -61,3 +61,12 @@ def test_a_twin_is_diagnosed_right_and_one_without_a_fault_quietly(
     t = twin(number, kind="gaussian", faults=faults, poses=8, strength=3.0, spread=0.0)
     assert len(t.faults) == faults
     assert judged(t, of_diagnosis(sm.diagnose(t.machine, t.experiment))).word == word
+
+
+@pytest.mark.parametrize(("number", "spread"), [(52000, 0.3), (62010, 0.0), (62038, 0.3)])
+def test_rows_that_slip_are_no_cause(number: int, spread: float) -> None:
+    """Two of ten rows are off by 10 to 30 standard deviations in all of their readings, next to small numbers that are off."""
+    t = twin(number, kind="outliers", faults=0, poses=10, strength=0.0, spread=spread)
+    d = sm.diagnose(t.machine, t.experiment)
+    assert d.verdict == "none"
+    assert any("far from the others" in line for line in d.limitations)

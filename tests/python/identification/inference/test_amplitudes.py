@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.stats import multivariate_normal, norm, t
+from scipy.stats import multivariate_normal, multivariate_t, norm
 from tests.python.identification.inference.synthetic import READINGS, columns, parts
 
 from stiffmap.identification.inference import amplitudes
@@ -24,11 +24,15 @@ def dense(c, some, ln_variance, weights):
 
 
 @pytest.mark.parametrize("seed", range(4))
-@pytest.mark.parametrize("heavy", [False, True])
+@pytest.mark.parametrize("heavy", ["", "own", "tied"])
 def test_the_likelihood_is_that_of_the_covariance_and_its_gradient_that_of_differences(seed, heavy):
     rng = np.random.default_rng(seed)
     c, some = columns(rng), parts(rng)
-    w = rng.uniform(0.2, 1.2, READINGS) if heavy else np.ones(READINGS)
+    if heavy == "tied":
+        c = replace(c, rows=np.arange(READINGS) // 3, tied=True)
+    label, size = c.tails
+    each = rng.uniform(0.2, 1.2, len(size)) if heavy else np.ones(len(size))
+    w = each[label]
     at = rng.uniform(-1.5, 1.0, 4)
     noise = c.free.T @ (c.free / w[:, None])
 
@@ -40,7 +44,8 @@ def test_the_likelihood_is_that_of_the_covariance_and_its_gradient_that_of_diffe
     gradient = amplitudes._gradient(fit, along, inverse, c.spared.at_readings(inverse))
     information = amplitudes._information(fit, along)
     expected = multivariate_normal(cov=dense(c, some, at, w)).logpdf(c.residual)
-    bound = sum(float(ln_bound(0.0, x)) - norm.logpdf(0.0, scale=x**-0.5) for x in w) if heavy else 0.0
+    gaussian = sum(norm.logpdf(0.0, scale=w**-0.5))
+    bound = sum(map(ln_bound, np.zeros(len(size)), each, size)) - gaussian if heavy else 0.0
     assert fit.likelihood == pytest.approx(expected + bound, abs=1e-8)
     errors = []
     for h in (1e-2, 5e-3):
@@ -52,25 +57,29 @@ def test_the_likelihood_is_that_of_the_covariance_and_its_gradient_that_of_diffe
     assert np.linalg.eigvalsh(information).min() > 0.0
 
 
-def ln_bound(e, w):
-    """Tangent of ln t at the deviation whose weight is w, as a Gaussian of variance 1/w."""
-    n = DEGREES
-    x0 = (n + 1) / w - n
-    tangent = t.logpdf(0.0, n) - (n + 1) / 2 * np.log1p(x0 / n) - w / 2 * (e**2 - x0)
-    return tangent
+def ln_t(e, d):
+    """ln of Student's t of d readings whose squares sum to e**2."""
+    at = np.asarray(e)[..., None] * np.eye(d)[0]
+    return multivariate_t.logpdf(at, loc=np.zeros(d), shape=np.eye(d), df=DEGREES)
 
 
-def test_the_bound_of_heavy_tails_lies_below_them_and_touches_them():
+def ln_bound(e, w, d):
+    """Tangent of ln t of d readings at the deviation whose weight is w, as a Gaussian of variances 1/w."""
+    x0 = (DEGREES + d) / w - DEGREES
+    return ln_t(0.0, d) - (DEGREES + d) / 2 * np.log1p(x0 / DEGREES) - w / 2 * (e**2 - x0)
+
+
+@pytest.mark.parametrize("d", [1, 3])
+def test_the_bound_of_heavy_tails_lies_below_them_and_touches_them(d):
     e = np.linspace(-8, 8, 161)
+    c = replace(columns(np.random.default_rng(0)), rows=np.arange(2 * d) // d, tied=True)
     for w in (0.1, 0.4, 1.0, 1.2):
-        ours = (
-            norm.logpdf(e, scale=w**-0.5) + amplitudes._bound(np.array([w, w])) / 2
-            if w != 1.0
-            else ln_bound(e, w)
-        )
-        assert np.all(ours <= t.logpdf(e, DEGREES) + 1e-9)
-        touched = np.sqrt(max((DEGREES + 1) / w - DEGREES, 0.0))
-        assert ln_bound(touched, w) == pytest.approx(t.logpdf(touched, DEGREES), abs=1e-9)
+        gaussian = norm.logpdf(e, scale=w**-0.5) + (d - 1) * norm.logpdf(0.0, scale=w**-0.5)
+        ours = gaussian + amplitudes._bound(c, np.full(2 * d, w)) / 2 if w != 1.0 else ln_bound(e, w, d)
+        assert np.all(ours <= ln_t(e, d) + 1e-9)
+        touched = np.sqrt(max((DEGREES + d) / w - DEGREES, 0.0))
+        assert ln_bound(touched, w, d) == pytest.approx(ln_t(touched, d), abs=1e-9)
+        assert ours == pytest.approx(ln_bound(e, w, d), abs=1e-9)
 
 
 def test_priors_are_those_of_the_table():
