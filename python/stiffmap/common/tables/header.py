@@ -14,8 +14,6 @@ from stiffmap.common.units import TIMES, name_and_unit, unit_of
 Line = tuple[int, list[str]]
 MOST_LINES = 4
 """Lines above the data that may be of the header."""
-COUNTED = {*TIMES, "Hz", "kHz", "rpm", "tooth", "rev"}
-"""Parts of units that no column of an experiment has."""
 BEHIND = [
     re.compile(pattern)
     for pattern in (
@@ -122,7 +120,8 @@ def _bare(cell: str) -> str:
 def _is_unit(text: str) -> bool:
     """Whether it is a unit, also one of several, such as g/N, m/s^2/N or mm/min."""
     parts = [re.sub(r"\^?[23²³]$", "", p) for p in re.split("[/*·]", text)]
-    return unit_of(text) is not None or all(unit_of(p) is not None or p in COUNTED for p in parts)
+    more = (*TIMES, "Hz", "kHz", "rpm", "tooth", "rev")
+    return unit_of(text) is not None or all(unit_of(p) is not None or p in more for p in parts)
 
 
 def _units(cells: Sequence[str]) -> bool:

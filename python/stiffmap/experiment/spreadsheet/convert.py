@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from array import array
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -100,8 +99,8 @@ def _is_mean(sheet: Table, columns: Sequence[Column]) -> bool:
         *_, cell = sheet.columns[c.index]
         *values, last = sheet.numbers(c.index)
         above = np.array(values)[np.isfinite(values)]
-        digits = re.search(r"[.,](\d+)$", cell.strip())
-        step = max(0.1 ** (len(digits[1]) if digits else 0), 1e-9 * np.max(np.abs(above), initial=0.0))
+        decimals = cell.strip().replace(",", ".").partition(".")[2]
+        step = max(0.1 ** len(decimals), 1e-9 * np.max(np.abs(above), initial=0.0))
         if len(above) < 3 or not abs(last - above.mean()) <= 0.501 * step:
             return False
         if (spread := np.ptp(above)) and c.meaning in READINGS:

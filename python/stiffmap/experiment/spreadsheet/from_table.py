@@ -19,9 +19,7 @@ from stiffmap.common.tables.sheet import Layout, read_sheet
 from stiffmap.common.tables.table import Table, column_letter
 from stiffmap.common.tables.workbook import WORKBOOKS, sheet_names
 from stiffmap.common.units import SPELLINGS, known, unit_of
-from stiffmap.experiment.channels import AXES
 from stiffmap.experiment.experiment import Experiment
-from stiffmap.experiment.files.fields import SEEN, SEEN_TURNED
 from stiffmap.experiment.files.load import load_experiment
 from stiffmap.experiment.noise.level import against_the_load, contradictions, no_difference, not_at_zero
 from stiffmap.experiment.spreadsheet.answers import Answers, Meant, Question
@@ -45,8 +43,6 @@ from stiffmap.solve.machine import Machine, load_machine
 
 CIRCULAR = ("deviation",)
 """What a ball bar reads, by the name that its mapping file has for it."""
-OF_PLACES = dict(zip((*SEEN, *SEEN_TURNED), AXES, strict=True))
-"""Columns of places -> the readings whose noise theirs is."""
 Understand = Callable[[str | None, Ask | None], tuple[Meant, ImportedSheet]]
 """What is meant by a sheet of that name, with answers to its questions."""
 
@@ -131,8 +127,10 @@ def experiment_from_table(
     if wrong:
         raise StiffmapError(f"record: expected one of {', '.join(sorted(RECORD))}; got '{wrong[0]}'")
     chosen = {k: v.split("|") for k, v in (columns or {}).items()}
-    given = Answers(chosen, dict(units or {}), dict(constants or {}), {})
-    given.noise.update((OF_PLACES.get(k, k), v) for k, v in (noise or {}).items())
+    sure = {
+        re.sub("^p(r?[xyz])$", r"d\1", k).replace("dr", "r"): v for k, v in (noise or {}).items()
+    }  # px is dx
+    given = Answers(chosen, dict(units or {}), dict(constants or {}), sure)
     rows = None if dh is None else read_dh(read_sheet(Path(dh)), given.units, dh_convention)
     drives = drives if rows is None else {f"{LEG}.{r.name}": r.slides for r in rows}
     numbered = any(h.strip("+-").isdigit() for many in chosen.values() for h in many)

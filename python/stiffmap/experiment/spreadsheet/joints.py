@@ -48,8 +48,7 @@ def commanded(m: Meant, drives: Mapping[str, bool]) -> None:
         return
     if lost:
         m.ask_column(
-            f"which column commands {lost[0]}? Say --map {lost[0]}='HEADER', or --set {lost[0]}=NUMBER where it is the same in every row",
-            lost[0],
+            f"which column commands {(n := lost[0])}? Say --map {n}='HEADER', or --set {n}=NUMBER", n
         )
     m.chosen = {k: v for k, v in m.chosen.items() if k not in drives and k not in short}
     for k, (name, slides) in enumerate(drives.items(), 1):

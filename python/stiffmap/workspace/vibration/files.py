@@ -80,9 +80,8 @@ def _table(path: Path) -> MeasuredResponse:
         parts = [complex_number(c) for c in words]
         if None in parts:
             t.fail("expected complex numbers, such as 0.1+0.2i", "response", parts.index(None))
-        values = np.array(parts, complex)
-        t.values |= {"real": values.real, "imag": values.imag}
-        t.units |= dict.fromkeys(("real", "imag"), t.units["response"])
+        for n in ("real", "imag"):
+            t.values[n], t.units[n] = getattr(np.array(parts, complex), n), t.units["response"]
     form = next((pair for pair in FORMS if {*pair, "frequency"} == {*t.values} - {"coherence"}), ("", ""))
     unit = t.units.get(form[0], "")
     known = response_unit(unit)
