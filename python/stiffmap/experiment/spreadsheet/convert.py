@@ -95,11 +95,10 @@ def _is_mean(sheet: Table, columns: Sequence[Column]) -> bool:
     """Whether the last row is the mean of three or more, to the digits that it has and by more than chance; not where a command that
     varies comes again in it: readings in proportion to loads up and down have their own mean."""
     chance = 1.0
-    for c in columns:
-        *_, cell = sheet.columns[c.index]
+    for c in columns if len(sheet) > 3 else ():
         *values, last = sheet.numbers(c.index)
         above = np.array(values)[np.isfinite(values)]
-        decimals = cell.strip().replace(",", ".").partition(".")[2]
+        decimals = [*sheet.columns[c.index]][-1].strip().replace(",", ".").partition(".")[2]
         step = max(0.1 ** len(decimals), 1e-9 * np.max(np.abs(above), initial=0.0))
         if len(above) < 3 or not abs(last - above.mean()) <= 0.501 * step:
             return False
