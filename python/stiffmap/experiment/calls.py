@@ -75,7 +75,7 @@ def residual(
         noise,
         out,
         summary(kept, noise.sigma, e.channels),
-        float(chi2.sf(float(white @ white), max(problem.freedom, 1))),
+        float(chi2.sf(float(white @ white), problem.freedom)) if problem.freedom > 0 else float("nan"),
         int(problem.nuisance.shape[1]),
         _groups_off(problem, white),
         checks(e, e.reading, noise.sigma, ~out),

@@ -199,3 +199,57 @@ def test_a_heading_between_rows_is_said_where_it_is_a_comment(mark: str, tmp_pat
     rows = f"{mark} loading\nx [mm],fx [N],dx [mm]\n0,50,0.1\n1,50,0.1\n{mark}\n{mark}----\n{mark} unloading\n0,50,0.2\n"
     (tmp_path / "t.csv").write_text(rows)
     assert read_sheet(tmp_path / "t.csv").aside == (f"row 7 is a remark: {mark} unloading",)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "| P | x [mm] | y [mm] |\n|---|--------|--------|\n| P 1 of A | 1.5 | 2 |\n| P 2 of A | 2.5 | 3 |\n",
+        "P | x [mm] | y [mm]\n--- | ---: | ---\nP 1 + 2 | 1.5 | 2\nP 3 + 4 | 2.5 | 3\n",
+        "|P|x [mm]|y [mm]|\n|:-:|:-:|:-:|\n|90 + 1 a|1.5|2|\n|90 - 2 a|2.5|3|\n",
+    ],
+)
+def test_bars_part_cells_that_have_blanks(text: str, tmp_path: Path) -> None:
+    (tmp_path / "t.md").write_text(text)
+    t = read_sheet(tmp_path / "t.md")
+    x, y = (t.numbers(t.header.index(f"{a} [mm]")) for a in "xy")
+    np.testing.assert_array_equal([x, y], [[1.5, 2.5], [2.0, 3.0]])
+
+
+@pytest.mark.parametrize(
+    ("units", "size"),
+    [
+        ("Hz;g/N;g/N", 9.80665),
+        ("Hz;m/s^2/N;m/s^2/N", 1.0),
+        ("kHz;(m/s²/N);(m/s²/N)", 1.0),
+        ("-;m/s2/N;m/s2/N", 0.0),
+    ],
+)
+def test_a_line_of_units_may_have_quotients(units: str, size: float, tmp_path: Path) -> None:
+    (tmp_path / "t.csv").write_text(f"Frequency;Real;Imag\n{units}\n10;1;0\n20;2;0\n")
+    if not size:  # no unit of the frequency
+        with pytest.raises(FileError, match="frequencies in Hz"):
+            read_responses(tmp_path / "t.csv")
+        return
+    found = read_responses(tmp_path / "t.csv")[0]
+    omega = 2 * np.pi * found.frequency
+    np.testing.assert_allclose(found.receptance, [size, 2 * size] / -(omega**2))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "frequency_Hz,FRF [m/N]\n10,0.1+0.2i\n20,-1.5e-3-2E-1i\n",
+        "Frequency;H\nHz;m/N\n10;(0.1+0.2j)\n20;(-1.5e-3-2E-1j)\n",
+        "frequency [Hz];H1 (m/N);coherence\n10;0.1 + j0.2;0.9\n20;-.0015 - j*2E-1;0.8\n",
+    ],
+)
+def test_responses_of_complex_numbers(text: str, tmp_path: Path) -> None:
+    (tmp_path / "t.csv").write_text(text)
+    found = read_responses(tmp_path / "t.csv")[0]
+    np.testing.assert_allclose(found.receptance, [0.1 + 0.2j, -1.5e-3 - 0.2j])
+    (tmp_path / "t.csv").write_text(
+        text.replace("20", "20", 1).rpartition("20")[0] + "20,fast\n".replace(",", text[12])
+    )
+    with pytest.raises(FileError):
+        read_responses(tmp_path / "t.csv")

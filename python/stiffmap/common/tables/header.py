@@ -117,10 +117,17 @@ def _bare(cell: str) -> str:
     return cell.strip().strip("[]()").strip()
 
 
+def _is_unit(text: str) -> bool:
+    """Whether it is a unit, also one of several, such as g/N, m/s^2/N or mm/min."""
+    parts = [re.sub(r"\^?[23²³]$", "", p) for p in re.split("[/*·]", text)]
+    more = (*TIMES, "Hz", "kHz", "rpm", "tooth", "rev")
+    return unit_of(text) is not None or all(unit_of(p) is not None or p in more for p in parts)
+
+
 def _units(cells: Sequence[str]) -> bool:
     """Whether a line holds nothing but units."""
     filled = [_bare(c) for c in cells if _bare(c) and _bare(c) not in ("-", "–", "—", "#", "1")]
-    named = [c for c in filled if unit_of(c) is not None]
+    named = [c for c in filled if _is_unit(c)]
     return bool(named) and len(named) >= 0.6 * len(filled)
 
 
@@ -131,8 +138,7 @@ def with_unit(name: str, unit: str) -> str:
 
 def _with_own_unit(name: str, unit: str) -> str:
     bare = _bare(unit)
-    no_unit = unit_of(bare) is None and bare not in TIMES
-    return name if no_unit or split_unit(name)[1] else with_unit(name, bare)
+    return name if not _is_unit(bare) or split_unit(name)[1] else with_unit(name, bare)
 
 
 def _needs_group(names: Sequence[str], group: Sequence[str], first: Sequence[str]) -> bool:

@@ -40,6 +40,8 @@ SAMPLE = 2_000
 NUMBER = re.compile(r"\s*[+-]?(\d+[.,]?\d*|[.,]\d+)([eEdD][+-]?\d+)?\s*")
 GROUPED = re.compile(r"[+-]?\d{1,3}(?:(['’ ])\d{3}(?:\1\d{3})*(?:\.\d+)?|(?:,\d{3})+\.\d+)")
 """``1'000``, ``1 000.5``, ``1,000.5``."""
+_PART = r"((?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)"
+COMPLEX = re.compile(rf"\(?([+-]?{_PART[1:-1]})([+-])(?:[ij]{_PART}|{_PART}[ij])\)?", re.IGNORECASE)
 FORTRAN = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)[dD][+-]?\d+")
 WITH_UNIT = re.compile(
     r"([+\-−–]?\d(?:[\d.,]|['’ ](?=\d))*(?:[eE][+-]?\d+)?)\s*((?:[^\W\d_]|[°\"']).{0,19})", re.DOTALL
@@ -208,10 +210,16 @@ def is_nothing(text: str) -> bool:
     return text.lower() in NOTHING or DASHES.fullmatch(text) is not None
 
 
+def complex_number(cell: str) -> complex | None:
+    """``0.1+0.2i``, ``(0.1-0.2j)`` or ``0.1 + j0.2``; None for what is none."""
+    match = COMPLEX.fullmatch(re.sub(r"[\s*]", "", cell))
+    return None if match is None else complex(float(match[1]), float(match[2] + (match[3] or match[4])))
+
+
 def is_finite(cell: str, spelling: Spelling) -> bool:
     """Whether a cell holds a number."""
     value = number(cell, spelling)
-    return value is not None and math.isfinite(value)
+    return complex_number(cell) is not None if value is None else math.isfinite(value)
 
 
 def is_data(cells: list[str], spelling: Spelling) -> bool:
@@ -246,7 +254,9 @@ def _numbers_between(separator: str, lines: Sequence[str]) -> tuple[int, int]:
         rows = map(_cut, lines) if separator == " " else csv.reader(lines, delimiter=separator)
         cells = list(chain.from_iterable(rows))
         numbers = sum(NUMBER.fullmatch(c) is not None or parted(c)[1] != "" for c in cells)
-        broken = sum('"' in c or any(c.count(a) != c.count(b) for a, b in ("[]", "{}")) for c in cells)
+        broken = sum(
+            '"' in c or c == "|" or any(c.count(a) != c.count(b) for a, b in ("[]", "{}")) for c in cells
+        )
         return -broken, numbers
     return -len(lines), 0
 

@@ -22,7 +22,7 @@ COLUMNS = {
     "feed": "m/s",
 }
 USUAL = {"m": "mm", "m/s": "mm/min", "rad": "deg"}
-KNOWN = Known(COLUMNS, {n: f"{n} [{USUAL.get(si, si)}]" for n, si in COLUMNS.items()}, {})
+KNOWN = Known(COLUMNS, {n: f"{n} [{USUAL.get(si, si)}]" for n, si in COLUMNS.items()}, {"time": "t"})
 
 
 class PoseTable(NamedTable):

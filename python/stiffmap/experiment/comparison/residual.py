@@ -40,7 +40,7 @@ class Residual:
     summary: Summary
     lack_of_fit: float
     """p-value of a residual this large if the machine were as its file says; nuisances and shared zeros
-    taken into account."""
+    taken into account. NaN where they are as many as the readings."""
     nuisances: int
     """How many unknown frames and zeros were fitted."""
     groups_off: int
@@ -155,6 +155,8 @@ def _pose(turn: Floats, shift: Floats) -> str:
 
 
 def _p_value(p: float) -> str:
+    if np.isnan(p):
+        return "unknown: as many unknowns as readings, so that nothing is left to contradict the machine"
     return f"{p:.2g}" if p > 1e-99 else "below 1e-99"
 
 

@@ -5,9 +5,11 @@ from __future__ import annotations
 from array import array
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import chain, repeat
+from itertools import chain, islice, repeat
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs import make_folder, only_job, write_rows, write_text
@@ -25,6 +27,9 @@ from stiffmap.experiment.spreadsheet.together import weight
 
 WORDS = ("id", "setup", "branch", "target")
 """Columns of words that a sheet may have."""
+Numbers = Mapping[str, float]
+RARE = 0.03
+"""How seldom readings are by chance as near to the mean of others as one that is computed."""
 ABSOLUTE = {"ll": "length"}
 """Readings that a sheet has in coordinates of their own -> their columns in data.csv."""
 
@@ -73,7 +78,8 @@ def understand(m: Meant, loaded: bool = False) -> ImportedSheet:
             "--map fz='-HEADER' where it pulls against the axis), or --set fx=NUMBER (N) where it is the same in every row",
             "load",
         )
-    said = []
+    mean = _is_mean(sheet, [c for c in used if c.meaning not in WORDS])
+    said = [f"left out: row {sheet.lines[-1]} is the mean of those above it in every number"] if mean else []
     for c in used:
         if c.meaning in WRENCH[:3]:
             sign, why = weight(sheet, c.index, c.name[:1] in ("+", "-"), c.meaning, found[c.meaning])
@@ -81,9 +87,26 @@ def understand(m: Meant, loaded: bool = False) -> ImportedSheet:
             said += [why] if why else []
     named = {m: u.name for m, u in found.items()}
     factors = {m: u.factor for m, u in found.items() if u.factor != 1.0}
-    return ImportedSheet(
-        columns, named, factors, Rows(sheet, used, m.constants, factors), dict(m.constants), said
-    )
+    rows = Rows(sheet, used, m.constants, factors, len(sheet) - mean)
+    return ImportedSheet(columns, named, factors, rows, dict(m.constants), said)
+
+
+def _is_mean(sheet: Table, columns: Sequence[Column]) -> bool:
+    """Whether the last row is the mean of three or more, to the digits that it has and by more than chance; not where a command that
+    varies comes again in it: readings in proportion to loads up and down have their own mean."""
+    chance = 1.0
+    for c in columns if len(sheet) > 3 else ():
+        *values, last = sheet.numbers(c.index)
+        above = np.array(values)[np.isfinite(values)]
+        decimals = [*sheet.columns[c.index]][-1].strip().replace(",", ".").partition(".")[2]
+        step = max(0.1 ** len(decimals), 1e-9 * np.max(np.abs(above), initial=0.0))
+        if len(above) < 3 or not abs(last - above.mean()) <= 0.501 * step:
+            return False
+        if (spread := np.ptp(above)) and c.meaning in READINGS:
+            chance *= min(1.0, step / spread)
+        elif spread and last in above:
+            return False
+    return bool(chance < RARE)
 
 
 def _refuse_loads(m: Meant, repeats: Sequence[Column]) -> None:
@@ -122,9 +145,9 @@ class Rows:
     """Rows of data.csv, made one by one whenever they are asked for: text, and numbers as floats."""
 
     def __init__(
-        self, sheet: Table, used: list[Column], constants: Mapping[str, float], factors: Mapping[str, float]
+        self, sheet: Table, used: list[Column], constants: Numbers, factors: Numbers, count: int
     ) -> None:
-        self._sheet = sheet
+        self._sheet, self._count = sheet, count
         self.repeats = max([c.repeat for c in used], default=0) or 1
         """Side by side in the sheet, which become rows one below the other."""
         common = [c for c in used if c.repeat == 0]
@@ -152,7 +175,7 @@ class Rows:
         self.lines = array("q")
         taken: set[str] = set()
         sides = zip(*map(self._side, range(self.repeats)), strict=True)
-        for line, rows in zip(self._sheet.lines, sides, strict=True):
+        for line, rows in islice(zip(self._sheet.lines, sides, strict=True), self._count):
             for row in rows:
                 if any(row[i] != "" for i in self._readings):
                     self.lines.append(line)

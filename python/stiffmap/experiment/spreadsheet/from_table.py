@@ -127,7 +127,10 @@ def experiment_from_table(
     if wrong:
         raise StiffmapError(f"record: expected one of {', '.join(sorted(RECORD))}; got '{wrong[0]}'")
     chosen = {k: v.split("|") for k, v in (columns or {}).items()}
-    given = Answers(chosen, dict(units or {}), dict(constants or {}), dict(noise or {}))
+    sure = {
+        re.sub("^p(r?[xyz])$", r"d\1", k).replace("dr", "r"): v for k, v in (noise or {}).items()
+    }  # px is dx
+    given = Answers(chosen, dict(units or {}), dict(constants or {}), sure)
     rows = None if dh is None else read_dh(read_sheet(Path(dh)), given.units, dh_convention)
     drives = drives if rows is None else {f"{LEG}.{r.name}": r.slides for r in rows}
     numbered = any(h.strip("+-").isdigit() for many in chosen.values() for h in many)

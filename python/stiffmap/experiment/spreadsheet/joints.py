@@ -47,7 +47,9 @@ def commanded(m: Meant, drives: Mapping[str, bool]) -> None:
     if len(lost) == len(at):
         return
     if lost:
-        m.ask_column(f"which column commands {lost[0]}? Say --map {lost[0]}='HEADER'", lost[0])
+        m.ask_column(
+            f"which column commands {(n := lost[0])}? Say --map {n}='HEADER', or --set {n}=NUMBER", n
+        )
     m.chosen = {k: v for k, v in m.chosen.items() if k not in drives and k not in short}
     for k, (name, slides) in enumerate(drives.items(), 1):
         index = at[name]
@@ -73,7 +75,7 @@ def _numbered(m: Meant, count: int, given: bool) -> list[str]:
     turns = quaternion(m.sheet)
     for whose in ("", "target[ _.-]?", "actual[ _.-]?"):
         names = [NUMBERED.format(whose, k) for k in range(count + 1)]
-        there = [m.sheet.find(n, turns) is not None for n in names]
+        there = [m.sheet.find(n, turns) is not None or bool(_set(m, n)) for n in names]
         if all(there) and not given:
             raise StiffmapError(
                 f"{m.sheet.file}: expected {count} joints, found those from 0 to {count}: say --map JOINT='HEADER' for each"
@@ -89,13 +91,24 @@ def _find(m: Meant, name: str, number: str, header: str | None) -> int | None:
     own = [re.escape(n) for n in (name, name.split(".")[-1]) if n.lower() not in ("x", "y", "z")]
     turns = quaternion(m.sheet)
     found = (m.sheet.find(pattern, turns) for pattern in (*own, number))
-    return next((i for i in found if i is not None), None)
+    index = next((i for i in found if i is not None), None)
+    if index is None and (same := _set(m, *own, number)):
+        index = len(m.sheet.header)
+        m.sheet = m.sheet.with_column(same[0], np.full(len(m.sheet), m.spend(same[0])))
+    return index
+
+
+def _set(m: Meant, *patterns: str) -> list[str]:
+    """What --set says to be the same in every row and is all of one of these regular expressions."""
+    return [k for p in patterns for k in m.constants if re.fullmatch(p, k, re.IGNORECASE)]
 
 
 def _unit(m: Meant, index: int, name: str, slides: bool) -> Unit:
     names = (name, name.split(".")[-1], m.sheet.names[index], "joints")
     quantity = "length" if slides else "angle"
     largest = float(np.nanmax(np.abs(m.sheet.numbers(index)), initial=0.0))
+    if m.sheet.names[index] in m.spent and (slides or not largest):  # mm by --set; zero in any unit
+        return Unit("mm" if slides else "deg")
     if not slides and largest > MOST_TURNS and not m.written_unit(index, *names, quantity=quantity):
         m.said.append(f"'{m.sheet.header[index]}' goes to {largest:.4g}: taken as degrees")
         return Unit("deg")

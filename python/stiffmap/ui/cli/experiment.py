@@ -13,12 +13,11 @@ import typer
 from rich.text import Text
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.number_text import number_in
 from stiffmap.common.outputs.option import written
 from stiffmap.experiment.noise.level import unknown
 from stiffmap.experiment.spreadsheet.from_table import FromTable, experiment_from_table
 from stiffmap.ui.cli import options
-from stiffmap.ui.cli.inputs import pairs, refuse_unused
+from stiffmap.ui.cli.inputs import numbers, pairs, refuse_unused
 from stiffmap.ui.cli.options import argument, flag, option
 from stiffmap.ui.cli.output import show
 from stiffmap.ui.cli.output import table as table_of
@@ -160,10 +159,4 @@ def _told(table: FromTable, words: Sequence[str]) -> Iterator[Any]:
 
 
 def _numbers(given: Sequence[str] | None, name: str) -> dict[str, float]:
-    out = {}
-    for key, text in pairs(given, name).items():
-        try:
-            out[key] = number_in(text)
-        except ValueError:
-            raise StiffmapError(f"--{name}: expected a number, such as {key}=0; got '{text}'") from None
-    return out
+    return {k: float(numbers(v, f"{name} {k}", 1)[0]) for k, v in pairs(given, name).items()}

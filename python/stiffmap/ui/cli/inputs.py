@@ -19,12 +19,12 @@ MM = 1e-3
 
 def numbers(text: str, name: str, count: int | None = None) -> Floats:
     """Finite numbers, separated by commas or blanks."""
-    expected = "numbers" if count is None else f"{count} numbers"
+    expected = {None: "numbers", 1: "a number"}.get(count, f"{count} numbers")
     try:
         out = np.array([number_in(part) for part in text.replace(",", " ").split()])
     except ValueError:
         raise StiffmapError(
-            f"--{name}: expected {expected} without units, such as 100,0,-50; got '{text}'"
+            f"--{name}: expected {expected} without units, such as {'100' if count == 1 else '100,0,-50'}; got '{text}'"
         ) from None
     if (count is not None and out.size != count) or not out.size:
         raise StiffmapError(f"--{name}: expected {expected} separated by commas, got '{text}'")

@@ -11,16 +11,17 @@ import numpy as np
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError, StiffmapError, needed, refuse_folder
-from stiffmap.common.tables.named import Known, read_named
+from stiffmap.common.tables.lines import complex_number
+from stiffmap.common.tables.named import WORD, Known, read_named
 from stiffmap.common.tables.workbook import TABLES
 from stiffmap.workspace.vibration.response import Complex
 from stiffmap.workspace.vibration.response_units import FREQUENCIES, ResponseUnit, response_unit
 
 COLUMNS = Known(
-    {**dict.fromkeys(("frequency", "real", "imag", "magnitude", "coherence"), ""), "phase": "rad"},
+    {**dict.fromkeys(("frequency", "real", "imag", "magnitude", "coherence"), ""), "phase": "rad", "response": WORD},
     {"frequency": "frequency_Hz", "phase": "phase_deg"},
     {
-        "freq": "frequency", "f": "frequency", "coh": "coherence", "phase_angle": "phase",
+        "freq": "frequency", "f": "frequency", "coh": "coherence", "phase_angle": "phase", "arg(h)": "phase", **dict.fromkeys(("h", "frf", "h1", "h2", "h(f)", "complex"), "response"),
         **dict.fromkeys(("re", "re(h)", "re(frf)", "real_part"), "real"),
         **dict.fromkeys(("im", "im(h)", "im(frf)", "imaginary", "imaginary_part", "imag_part"), "imag"),
         **dict.fromkeys(("mag", "amplitude", "|h|", "|frf|", "accelerance", "inertance", "mobility", "receptance"), "magnitude"),
@@ -75,6 +76,12 @@ def read_responses(path: str | PathLike[str]) -> list[MeasuredResponse]:
 
 def _table(path: Path) -> MeasuredResponse:
     t = read_named(path, COLUMNS)
+    if words := t.values.pop("response", None):
+        parts = [complex_number(c) for c in words]
+        if None in parts:
+            t.fail("expected complex numbers, such as 0.1+0.2i", "response", parts.index(None))
+        for n in ("real", "imag"):
+            t.values[n], t.units[n] = getattr(np.array(parts, complex), n), t.units["response"]
     form = next((pair for pair in FORMS if {*pair, "frequency"} == {*t.values} - {"coherence"}), ("", ""))
     unit = t.units.get(form[0], "")
     known = response_unit(unit)

@@ -31,3 +31,17 @@ def test_two_of_five_rows_in_unknown_frames_are_not_set_aside(wrong: tuple[int, 
     found = sm.residual(made.machine, made.experiment)
     assert not found.set_aside.any()
     assert found.lack_of_fit < 1e-6
+
+
+def test_as_many_unknowns_as_readings_leave_nothing_to_contradict(tmp_path: Path) -> None:
+    """9 readings, 9 unknowns of instrument and reflector: whatever was read fits, and no p-value says so."""
+    (tmp_path / "dh.csv").write_text(ARM)
+    cells = "0.1,0.2,0.3,500,20,400\n0.9,-0.4,0.5,300,520,100\n-0.7,0.8,-0.9,480,-390,620\n"
+    (tmp_path / "t.csv").write_text(f"q1,q2,q3,px,py,pz\n{cells}")
+    noise, units = dict.fromkeys(("px", "py", "pz"), 50.0), {"joints": "rad", "length": "mm"}
+    made = sm.experiment_from_table(
+        None, tmp_path / "t.csv", tmp_path / "o", dh=tmp_path / "dh.csv", units=units, noise=noise
+    )
+    found = sm.residual(made.machine, made.experiment)
+    assert np.isnan(found.lack_of_fit)
+    assert "nothing is left to contradict" in "\n".join(found.lines())

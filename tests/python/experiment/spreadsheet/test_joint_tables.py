@@ -360,3 +360,68 @@ def test_a_coordinate_that_is_not_simply_added_is_refused(cell: str, tmp_path: P
     (tmp_path / "dh.csv").write_text(f"i,a [mm],alpha [deg],d [mm],theta [deg]\n1,2,0,1,0\n2,1,0,0,{cell}\n")
     with pytest.raises(StiffmapError, match=r"column .theta.*expected a number"):
         read_dh(read_sheet(tmp_path / "dh.csv"), {}, "standard")
+
+
+SCARA = "joint,theta [deg],d [mm],a [mm],alpha [deg],type\njoint_1,0,0,400,0,R\njoint_2,0,0,350,0,R\nlift,0,0,0,0,P\n"
+
+
+@pytest.mark.parametrize(
+    ("columns", "same"),
+    [
+        ("q2,q3", {"joint_1": 0.0}),
+        ("q1,q3", {"J2": 0.0}),
+        ("joint_1,joint_2", {"lift": 12.5}),
+        ("q1,q2", {"q0": 0.0}),
+        ("q3", {"arm.joint_1": 0.0, "q2": 0.0}),
+    ],
+)
+def test_a_joint_may_be_the_same_in_every_row(columns: str, same: dict[str, float], tmp_path: Path) -> None:
+    """Angles of zero need no unit, lengths are mm; the noise of places goes by the names of their columns."""
+    rows = [f"{','.join(f'{k + 0.1 * j}' for j in range(columns.count(',') + 1))},{k},2,3" for k in range(3)]
+    (tmp_path / "t.csv").write_text("\n".join([f"{columns},px [mm],py [mm],pz [mm]", *rows]) + "\n")
+    write(tmp_path, "dh.csv", SCARA)
+    units = {c: "mm" if c == "q3" or (c, "q0") == ("q2", *same) else "deg" for c in columns.split(",")}
+    noise = {"px": 0.1, "py": 0.2, "pz": 0.3}
+    made = sm.experiment_from_table(
+        None,
+        tmp_path / "t.csv",
+        tmp_path / "o",
+        dh=tmp_path / "dh.csv",
+        units=units,
+        constants=same,
+        noise=noise,
+    )
+    np.testing.assert_allclose(made.experiment.sigma[:, :3], [[1e-4, 2e-4, 3e-4]] * 3)
+    command = made.experiment.command
+    assert command is not None
+    order = [c.joint for c in made.experiment.command_of]
+    for name, value in same.items():
+        joint = {"J2": "arm.joint_2", "q2": "arm.joint_2", "lift": "arm.lift"}.get(name, "arm.joint_1")
+        np.testing.assert_allclose(command[:, order.index(joint)], 1e-3 * value, atol=1e-15)
+
+
+def test_a_joint_that_is_set_next_to_its_column_is_refused(tmp_path: Path) -> None:
+    write(tmp_path, "dh.csv", SCARA)
+    write(tmp_path, "t.csv", "q1,q2,q3,px [mm]\n1,2,3,4\n2,3,4,5\n")
+    units, noise = {"q1": "deg", "q2": "deg", "q3": "mm"}, {"px": 0.1}
+    for same in ({"joint_1": 0.0}, {"q1": 0.0}, {"q7": 0.0}):
+        with pytest.raises(StiffmapError, match=next(iter(same))):
+            sm.experiment_from_table(
+                None, tmp_path / "t.csv", tmp_path / "o", dh=tmp_path / "dh.csv", units=units, constants=same, noise=noise
+            )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("text", "theta"),
+    [
+        ("| Joint | theta [deg] | d [mm] | a [mm] | alpha [deg] |\n|---|:---:|---|---|---|\n| 1 | 90 + q1 | 300 | 0 | 90 |\n| 2 | q2 | 0 | 400 | 0 |\n", 90.0),
+        ("# My arm\n\n| i | $\\theta_i$ [deg] | d_i [mm] | a_i [mm] | $\\alpha_i$ [deg] |\n|-|-|-|-|-|\n| 1 | \\theta_1 - 30 | 300 | 0 | 90 |\n| 2 | \\theta_2 | 0 | 400 | 0 |\n", -30.0),
+        ("| Link | θ [°] | d [mm] | a [mm] | α [°] |\n|--|--|--|--|--|\n| 1 | θ₁ + 15 | 300 | 0 | 90° |\n| 2 | θ₂ | 0 | 400 | 0° |\n", 15.0),
+        ("Link | theta (deg) | d (mm) | a (mm) | alpha (deg)\n--- | --- | --- | --- | ---\n1 | 45 + q1 | 300 | 0 | 90\n2 | q2 | 0 | 400 | 0\n", 45.0),
+    ],
+)  # fmt: skip
+def test_tables_of_markdown_are_imported(text: str, theta: float, tmp_path: Path) -> None:
+    assert main(["import", write(tmp_path, "arm.md", text), "-o", str(tmp_path / "arm.yaml")]) == 0
+    assert [r.theta for r in read_dh(read_sheet(tmp_path / "arm.md"), {}, "standard")] == pytest.approx(
+        [math.radians(theta), 0.0]
+    )

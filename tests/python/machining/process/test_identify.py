@@ -86,11 +86,12 @@ def made(noise: float = 0.0, signals: bool = False, runout: float = 0.0) -> dict
 def test_letters_of_data_sheets_name_columns() -> None:
     table = {k: v for k, v in MEASURED.items() if k not in ("feed_per_tooth_mm", "teeth")}
     feed = [c * 2 * 3000 for c in MEASURED["feed_per_tooth_mm"]]
-    other = {**table, "vf [mm/min]": feed, "n [rpm]": 3000, "flutes": 2, "D [mm]": 25}
     same = sm.identify_process(MEASURED).coefficients
-    assert {k: v[0] for k, v in sm.identify_process(other).coefficients.items()} == pytest.approx(
-        {k: v[0] for k, v in same.items()}
-    )
+    for speed in ("n [rpm]", "spindle_speed_rpm", "Spindle speed [1/min]"):
+        other = {**table, "vf [mm/min]": feed, speed: 3000, "flutes": 2, "D [mm]": 25}
+        assert {k: v[0] for k, v in sm.identify_process(other).coefficients.items()} == pytest.approx(
+            {k: v[0] for k, v in same.items()}
+        )
 
 
 def test_straight_forces_come_back() -> None:

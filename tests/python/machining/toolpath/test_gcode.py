@@ -13,6 +13,7 @@ from stiffmap.machining.toolpath import load_path
 from stiffmap.machining.toolpath.gcode.load import load_gcode
 from stiffmap.machining.toolpath.gcode.read import ProgramReader, read_moves
 from stiffmap.machining.toolpath.gcode.words import read_block
+from stiffmap.machining.toolpath.gcode.write import _lines
 from stiffmap.machining.toolpath.path import Kind, Toolpath
 
 HEAD = "G21 G90 G17 G94 S6000 M3 F600\n"
@@ -186,6 +187,10 @@ def test_refused(text: str, head: str, message: str) -> None:
         "G64 P0.02 Q0.01",
         "G64 P0.02",
         "G64 Q0",
+        "G187 P3 E0.01",
+        "G187 E0.002",
+        "G05.1 Q1",
+        "G5.1 Q0",
         "G17 G40 G49 G80 G98",
         "G97 S6000 M3",
         "M48",
@@ -418,3 +423,25 @@ def test_every_word_of_the_standard_is_read_or_refused_by_its_name(why: str, wor
         return
     with pytest.raises(FileError, match=why):
         read(f"{word}\nX1 Y1 Z1 F600\n")
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("G5.1 X1 Y1 I2 J0", "G5.1: splines are not read"),
+        ("G5.1 Q1 X1", "G5.1: splines are not read"),
+        ("G5.1", "G5.1: splines are not read"),
+        ("G64 E0.01", "unknown word: E0.01"),
+        ("G187 Q1", "unknown word: Q1"),
+        ("G5.1 Q1 P2", "unknown word: P2"),
+        ("G1 X1 E0.4", "unknown word: E0.4"),
+    ],
+)
+def test_words_of_tracking_go_with_its_modes_alone(line: str, words: str) -> None:
+    with pytest.raises(FileError, match=words):
+        read(f"{line}\nG0 X0 Y0 Z0\n")
+
+
+def test_tracking_next_to_a_motion_stays_in_the_written_program() -> None:
+    lines = _lines(["G187", "P3", "E0.01", "G1", "X10"], ["G1 X10.02", "G1 X10.05"], False)
+    assert lines == ["G187 P3 E0.01 G1 X10.02", "G1 X10.05"]

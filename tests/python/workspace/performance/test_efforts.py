@@ -45,9 +45,11 @@ def test_a_described_line_runs_as_fast_as_it_may(tmp_path):
     assert slow.time[-1] == 2.0
 
 
-def test_a_table_over_time_has_the_derivatives_of_its_motion(tmp_path):
+@pytest.mark.parametrize("name", ["t [s]", "time [s]", "Time (s)", "time_s"])
+def test_a_table_over_time_has_the_derivatives_of_its_motion(name, tmp_path):
     """A cubic in time is in the spline exactly."""
-    t = load_motion(write(tmp_path, ROWS, "rows.csv")).trajectory(sm.load_machine("orthoglide-revised"))
+    rows = write(tmp_path, ROWS.replace("t [s]", name), "rows.csv")
+    t = load_motion(rows).trajectory(sm.load_machine("orthoglide-revised"))
     i = t.time / 0.1
     np.testing.assert_allclose(t.position, np.stack([5e-3 * i, 1e-3 * i**2, 1e-4 * i**3], axis=1), atol=1e-15)
     np.testing.assert_allclose(

@@ -30,7 +30,7 @@ NEEDED = ("feed_per_tooth", "fx", "fy", "fz", "teeth", "axial")
 ALIASES = {
     "c": "feed_per_tooth", "chip": "feed_per_tooth", "depth": "axial", "ap": "axial", "ae": "radial", "width": "radial",
     "rpm": "spindle", "z": "teeth", "n_teeth": "teeth", "flutes": "teeth", "t": "time", "vf": "feed", "n": "spindle",
-    "d": "diameter",
+    "d": "diameter", "spindle_speed": "spindle",
 }  # fmt: skip
 PER_TOOTH = re.compile(r"(/|_per_|_)tooth$")
 PER_EDGE = ("feed_per_tooth", "c", "chip")

@@ -21,7 +21,9 @@ CENTRES = {2: "IJ", 1: "IK", 0: "JK"}
 """Words of an arc's centre by the axis that it turns about."""
 STARTS = {"distance": "G90", "feed mode": "G94", "plane": "G17", "centres": "G91.1", "offset": "G54"}
 """What is taken where a program says nothing; a controller may stand otherwise, so that a written program says it."""
-IGNORED_G = {40.0, 49.0, 61.0, 61.1, 64.0, 92.1, 92.2, 97.0, 98.0, 99.0}
+TRACKING = {"G64": "PQ", "G187": "PE", "G5.1": "Q"}
+"""Modes of how closely corners are tracked, and their words (LinuxCNC; Haas; Fanuc, where other words make it a spline)."""
+IGNORED_G = {5.1, 40.0, 49.0, 61.0, 61.1, 64.0, 187.0, 92.1, 92.2, 97.0, 98.0, 99.0}
 """Without meaning for the path: modes of tracking, cancelled compensation, offsets and cycles."""
 IGNORED_M = {7.0, 8.0, 9.0, 48.0, 49.0}
 BREAKS_M = {0.0, 1.0, 6.0, 60.0}
@@ -32,7 +34,7 @@ REFERENCES = {"G28", "G30"}
 GROUPS = {
     **dict.fromkeys(MOTIONS, "motion"), **dict.fromkeys(PLANES, "plane"), **dict.fromkeys(OFFSETS, "offset"),
     20.0: "unit", 21.0: "unit", 90.0: "distance", 91.0: "distance", 90.1: "centres", 91.1: "centres",
-    93.0: "feed mode", 94.0: "feed mode", 61.0: "tracking", 61.1: "tracking", 64.0: "tracking", 43.0: "length", 49.0: "length",
+    93.0: "feed mode", 94.0: "feed mode", 61.0: "tracking", 61.1: "tracking", 64.0: "tracking", 187.0: "tracking", 5.1: "tracking", 43.0: "length", 49.0: "length",
     40.0: "compensation", 97.0: "speed", 98.0: "return", 99.0: "return", 4.0: "one line", 28.0: "one line", 30.0: "one line", 53.0: "one line",
 }  # fmt: skip
 """Of two G words of one group in a line nobody knows which one holds."""
@@ -41,7 +43,7 @@ GROUPS_M = {
     **dict.fromkeys((7.0, 8.0, 9.0), "coolant"), **dict.fromkeys((48.0, 49.0), "override"), 6.0: "tool",
 }  # fmt: skip
 REFUSED_G = {
-    5.0: "splines", 5.1: "splines", 5.2: "NURBS", 10.0: "tables set by the program", 28.1: "reference points set by the program",
+    5.0: "splines", 5.2: "NURBS", 10.0: "tables set by the program", 28.1: "reference points set by the program",
     30.1: "reference points set by the program", 33.0: "threads", 38.2: "probing", 41.0: "cutter radius compensation (write the path of the centre, G40)",
     42.0: "cutter radius compensation (write the path of the centre, G40)", 92.0: "offsets set by the program",
     95.0: "feed per revolution (write G94)", 96.0: "constant surface speed",
@@ -96,7 +98,7 @@ class ModalState:
         return self.spindle * (self.speed or 0.0) * pi / 30 if self.spindle else 0.0
 
 
-LETTERS = frozenset("XYZCIJKRFSTHPQN")
+LETTERS = frozenset("XYZCIJKRFSTHPQEN")
 MOVING = "XYZCIJKR"
 STRAIGHT = ("G0", "G1")
 
@@ -183,8 +185,11 @@ class Codes:
             elif letter not in "AB" or value:  # a table that stays at zero turns no part
                 what = "rotary and secondary axes are not read" if letter in "ABUVW" else "unknown word"
                 self.fail(f"{what}: {letter}{value:g}")
-        if "Q" in values and groups.get("tracking") != "G64":
-            self.fail(f"unknown word: Q{values['Q']:g}")
+        tracking = groups.get("tracking", "")
+        if tracking == "G5.1" and ("Q" not in values or not values.keys().isdisjoint(MOVING)):
+            self.fail("G5.1: splines are not read")
+        for letter in [w for w in "QE" if w in values and w not in TRACKING.get(tracking, "")]:
+            self.fail(f"unknown word: {letter}{values[letter]:g}")
         if "unit" in groups and "F" in values:
             self.note("F in a line that changes the unit is taken in the new one; LinuxCNC takes the old one")
         self._numbers(values, own, motion or self.state.motion, groups)
@@ -219,7 +224,7 @@ class Codes:
             self.fail(
                 f"G{value:g}: {why or 'unknown word'}{' are not read' if why and '(' not in why else ''}",
             )
-        elif value in (61.0, 61.1, 64.0):
+        elif GROUPS.get(value) == "tracking":
             self.note(f"G{value:g}: how closely the controller tracks corners is not simulated")
         if (group := GROUPS.get(value)) in STARTS:
             s.said.add(group)
@@ -264,7 +269,7 @@ class Codes:
         elif "H" in values:
             self.fail("H goes with G43")
         arc = motion in ("G2", "G3") and not values.keys().isdisjoint(MOVING)
-        tracking = groups.get("tracking") == "G64"
+        tracking = "P" in TRACKING.get(groups.get("tracking", ""), "")
         if "P" in values and arc and tracking:
             self.fail("P is for G64 and for the arc: expected two lines")
         if "P" in values and not (arc or tracking or "G4" in own):

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiffmap.common.broadcasting import Floats
-from stiffmap.machining.toolpath.gcode.codes import AXES, CENTRES, INCH, STARTS, ModalState
+from stiffmap.machining.toolpath.gcode.codes import AXES, CENTRES, INCH, STARTS, TRACKING, ModalState
 from stiffmap.machining.toolpath.gcode.read import ProgramReader, read_moves
 from stiffmap.machining.toolpath.gcode.words import bare, decimal, plain, tokens_of
 from stiffmap.machining.toolpath.path import Kind, Toolpath
@@ -166,7 +166,7 @@ def _lines(tokens: list[str], pieces: list[str], feed: bool) -> list[str]:
     act before the motion, but what stops or ends the program comes after the last. A slash goes before each."""
     own: list[str] = []
     stops: list[str] = []
-    tracking = any(plain(t) == "G64" for t in tokens)
+    tracking = any("P" in TRACKING.get(plain(t), "") for t in tokens)
     placed = -1
     for token in tokens:
         word = plain(token)
