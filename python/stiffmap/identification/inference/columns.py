@@ -69,7 +69,8 @@ class Columns:
     repeats: tuple[float, float] = (0.0, 0.0)
     """Sum of squares within repeats that were averaged, in noise, and its degrees of freedom."""
     tied: bool = False
-    """Whether the readings of a row share one weight of heavy tails, as where an instrument slips; else each has its own."""
+    """Whether the lengths of a row share one weight of heavy tails, and the angles, as where an instrument slips; else each reading has
+    its own."""
 
     @property
     def free(self) -> Floats:
@@ -105,8 +106,11 @@ class Columns:
     @cached_property
     def tails(self) -> tuple[Integers, Integers]:
         """(N,) number of the weight of heavy tails of each reading, and how many readings have each weight."""
-        label = np.unique(self.rows, return_inverse=True)[1] if self.tied else np.arange(len(self.rows))
-        return label.reshape(-1), np.bincount(label.reshape(-1))
+        label = np.arange(len(self.rows))
+        if self.tied:
+            angle = np.array([c.unit == "rad" for c in self.experiment.channels])[self.channel]
+            label = np.unique(2 * self.rows + angle, return_inverse=True)[1].reshape(-1)
+        return label, np.bincount(label)
 
     @cached_property
     def alone(self) -> NDArray[np.bool_]:

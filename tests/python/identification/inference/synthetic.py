@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
+from stiffmap.experiment.channels import Channel
 from stiffmap.identification.inference.columns import Columns
 from stiffmap.identification.inference.free import Free
 from stiffmap.identification.inference.parts import Part
 
 READINGS, FREE = 40, 3
+CHANNELS = (Channel("dx", "m"), Channel("rx", "rad"))
 
 
 def columns(rng: np.random.Generator, residual: np.ndarray | None = None, repeats: float = 0.0) -> Columns:
@@ -18,9 +21,9 @@ def columns(rng: np.random.Generator, residual: np.ndarray | None = None, repeat
     taken = np.linalg.qr(rng.normal(size=(READINGS, READINGS)))[0][:, :FREE]
     m = READINGS - FREE
     zero = rng.normal(size=(m, 2))
-    none: Any = None
+    lengths: Any = SimpleNamespace(channels=CHANNELS)
     return Columns(
-        experiment=none,
+        experiment=lengths,
         rows=np.arange(READINGS),
         channel=np.zeros(READINGS, dtype=np.intp),
         sigma=np.ones(READINGS),

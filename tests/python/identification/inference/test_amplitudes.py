@@ -14,6 +14,12 @@ from stiffmap.identification.inference.constants import DEGREES, NOISE_SD, NUMBE
 from stiffmap.identification.inference.shares import shares
 
 
+def test_lengths_and_angles_of_a_row_slip_each_together():
+    c = replace(columns(np.random.default_rng(0)), rows=np.array([4, 4, 4, 7, 7]), tied=True)
+    label, size = replace(c, channel=np.array([0, 1, 0, 1, 1])).tails
+    assert list(label) == [0, 1, 0, 2, 2] and list(size) == [2, 1, 2]
+
+
 def dense(c, some, ln_variance, weights):
     """V by its definition."""
     noise = c.free.T @ np.diag(1.0 / weights) @ c.free
@@ -72,7 +78,8 @@ def ln_bound(e, w, d):
 @pytest.mark.parametrize("d", [1, 3])
 def test_the_bound_of_heavy_tails_lies_below_them_and_touches_them(d):
     e = np.linspace(-8, 8, 161)
-    c = replace(columns(np.random.default_rng(0)), rows=np.arange(2 * d) // d, tied=True)
+    c = replace(columns(np.random.default_rng(0)), rows=np.arange(2 * d) // d, channel=np.zeros(2 * d, int))
+    c = replace(c, tied=True)
     for w in (0.1, 0.4, 1.0, 1.2):
         gaussian = norm.logpdf(e, scale=w**-0.5) + (d - 1) * norm.logpdf(0.0, scale=w**-0.5)
         ours = gaussian + amplitudes._bound(c, np.full(2 * d, w)) / 2 if w != 1.0 else ln_bound(e, w, d)

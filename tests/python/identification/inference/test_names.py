@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.python.identification.inference.synthetic import READINGS, columns
+from tests.python.identification.inference.synthetic import CHANNELS, READINGS, columns
 
 import stiffmap as sm
 from stiffmap.experiment import load_experiment, random_plan, simulate
@@ -165,6 +165,7 @@ def test_what_numbers_within_their_tolerance_show_has_no_name(strengths, word):
 def one_place(n: int) -> Any:
     """An experiment of poses of four readings each, with nothing to cut it into parts by."""
     return SimpleNamespace(
+        channels=CHANNELS,
         position=np.zeros((n, 3)),
         wrench=np.zeros((n, 6)),
         command=None,
