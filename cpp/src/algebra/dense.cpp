@@ -33,12 +33,25 @@ Index rank_of(const MatX& A, double threshold) {
   return qr.rank();
 }
 
+MatX left_null_vectors(const MatX& A, double threshold) {
+  Eigen::ColPivHouseholderQR<MatX> qr;
+  qr.setThreshold(threshold);
+  qr.compute(A);
+  const MatX Q = qr.householderQ();
+  return Q.rightCols(A.rows() - qr.rank());
+}
+
 Singular6 singular_vectors(const Mat6& A) {
   const Eigen::JacobiSVD<Mat6> svd(A, Eigen::ComputeFullU | Eigen::ComputeFullV);
   return {svd.singularValues(), svd.matrixV()};
 }
 
 Mat6 inverse(const Mat6& A) { return A.partialPivLu().inverse(); }
+
+Eigen6 symmetric_eigen(const Mat6& A) {
+  const Eigen::SelfAdjointEigenSolver<Mat6> eigen(A);
+  return {eigen.eigenvalues(), eigen.eigenvectors()};
+}
 
 EigenX symmetric_eigen(const MatX& A) {
   const Eigen::SelfAdjointEigenSolver<MatX> eigen(A);

@@ -46,7 +46,7 @@ SpringMatrix spring_from_compliance(const Mat6& C, const std::string& name) {
   const Mat6 N = 0.5 * (s.asDiagonal() * (C + C.transpose()) * s.asDiagonal());
   SpringMatrix out;
   // Directions with a zero diagonal are rigid as they stand; the rest may hide a rank defect.
-  const EigenX eigen = symmetric_eigen(N);
+  const Eigen6 eigen = symmetric_eigen(N);
   int rank = 0, moving = 0;
   for (int i = 0; i < 6; ++i) {
     rank += eigen.values[i] > 1e-9;
@@ -64,7 +64,7 @@ SpringMatrix spring_from_compliance(const Mat6& C, const std::string& name) {
     out.stiffness = (0.5 * (out.stiffness + out.stiffness.transpose())).eval();
     return out;
   }
-  const EigenX plain = symmetric_eigen(MatX(0.5 * (C + C.transpose())));
+  const Eigen6 plain = symmetric_eigen(Mat6(0.5 * (C + C.transpose())));
   out.basis = plain.vectors;
   out.rotated = true;
   for (int i = 0; i < 6; ++i) {

@@ -130,7 +130,7 @@ class Compiler {
     }
     const Vec6 d = whole.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
     const bool deficient = s.matrix.rotated || s.matrix.rigid.any() ||
-                           symmetric_eigen(MatX(d.asDiagonal() * whole * d.asDiagonal())).values[0] < 1e-9;
+                           symmetric_eigen(Mat6(d.asDiagonal() * whole * d.asDiagonal())).values[0] < 1e-9;
     if (deficient || sticks) {
       if (s.stroke) found_.missing = "a link spring with rigid or free directions that varies with a joint";
       if (s.matrix.rotated || !Mat6(K.diagonal().asDiagonal()).isApprox(K, 1e-14))

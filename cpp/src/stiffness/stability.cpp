@@ -30,12 +30,10 @@ MatX allowed(const Mechanism& m, const Linearization& lin) {
 
 MatX closed_motions(const Mechanism& m, const Linearization& lin) {
   const MatX P = allowed(m, lin);
-  if (m.closures() == 0 || P.cols() == 0) return P;
+  if (m.closures() == 0) return P;
   MatX C = lin.J * P;
   scale_angles(m, C);
-  Orthogonal closures;
-  closures.compute(C, rank_threshold);
-  return P * closures.null_vectors();
+  return P * left_null_vectors(C.transpose(), rank_threshold);
 }
 
 MatX springs_only(const Mechanism& m, const Linearization& lin) {

@@ -49,6 +49,8 @@ struct Singular {
 };
 Singular singular_vectors(const MatX& A);
 Index rank_of(const MatX& A, double threshold);
+/// Orthonormal vectors x with A'x = 0, by pivoted QR of A.
+MatX left_null_vectors(const MatX& A, double threshold);
 
 /// The same of a 6x6, to full relative accuracy.
 struct Singular6 {
@@ -59,6 +61,11 @@ Singular6 singular_vectors(const Mat6& A);
 Mat6 inverse(const Mat6& A);
 
 /// Eigenvalues, rising, and eigenvectors of a symmetric matrix.
+struct Eigen6 {
+  Vec6 values;
+  Mat6 vectors;
+};
+Eigen6 symmetric_eigen(const Mat6& A);
 struct EigenX {
   VecX values;
   MatX vectors;
