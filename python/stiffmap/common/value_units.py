@@ -41,12 +41,12 @@ ATOMS = _atoms()
 
 def unit_factor(unit: str) -> tuple[Fraction | float, Dimension]:
     """SI factor and dimension of a product or quotient of units; StiffmapError for an unknown one."""
-    unit = unit.strip().replace("²", "2").replace("³", "3")
+    unit = unit.strip()
     if unit in STRESSES:  # a name for a quotient
         return STRESSES[unit], (("N", 1), ("m", -2))
     factor: Fraction | float = Fraction(1)
     powers: Counter[str] = Counter()
-    for name, power in _terms(unit):
+    for name, power in terms(unit):
         if name not in ATOMS:
             raise StiffmapError(
                 f"unknown unit {name!r} in {unit!r}; known: {', '.join(sorted([*ATOMS, *STRESSES]))}"
@@ -58,9 +58,10 @@ def unit_factor(unit: str) -> tuple[Fraction | float, Dimension]:
     return factor, tuple(sorted((d, p) for d, p in powers.items() if p))
 
 
-def _terms(unit: str) -> list[tuple[str, int]]:
-    """Atoms with their powers: ``rad/(N·m)`` is rad^1, N^-1, m^-1."""
+def terms(unit: str) -> list[tuple[str, int]]:
+    """Atoms with their powers: ``rad/(N·m)`` is rad^1, N^-1, m^-1. StiffmapError for what is none."""
     out = []
+    unit = unit.replace("²", "2").replace("³", "3")
     unit = f"1{unit}" if unit.startswith("/") else unit
     numerator, *denominators = re.split(r"/", unit.replace(" ", ""))
     for sign, part in [(1, numerator), *((-1, d) for d in denominators)]:

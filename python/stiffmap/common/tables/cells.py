@@ -38,6 +38,11 @@ class Cells:
     def __iter__(self) -> Iterator[str]:
         return chain.from_iterable(self.parts())
 
+    @property
+    def last(self) -> str:
+        """The last cell, nothing else unpacked."""
+        return self.blocks[-1].rpartition(BETWEEN)[2]
+
     def parts(self) -> Iterator[list[str]]:
         """Cells, block by block."""
         return (block.split(BETWEEN) for block in self.blocks)

@@ -5,11 +5,13 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from itertools import pairwise, zip_longest
 
-from stiffmap.common.errors import FileError
+from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.tables.lines import COMMENTS
 from stiffmap.common.units import TIMES, name_and_unit, unit_of
+from stiffmap.common.value_units import terms
 
 Line = tuple[int, list[str]]
 MOST_LINES = 4
@@ -119,9 +121,10 @@ def _bare(cell: str) -> str:
 
 def _is_unit(text: str) -> bool:
     """Whether it is a unit, also one of several, such as g/N, m/s^2/N or mm/min."""
-    parts = [re.sub(r"\^?[23²³]$", "", p) for p in re.split("[/*·]", text)]
     more = (*TIMES, "Hz", "kHz", "rpm", "tooth", "rev")
-    return unit_of(text) is not None or all(unit_of(p) is not None or p in more for p in parts)
+    with suppress(StiffmapError):
+        return unit_of(text) is not None or all(unit_of(n) is not None or n in more for n, _ in terms(text))
+    return False
 
 
 def _units(cells: Sequence[str]) -> bool:

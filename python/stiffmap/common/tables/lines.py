@@ -40,8 +40,8 @@ SAMPLE = 2_000
 NUMBER = re.compile(r"\s*[+-]?(\d+[.,]?\d*|[.,]\d+)([eEdD][+-]?\d+)?\s*")
 GROUPED = re.compile(r"[+-]?\d{1,3}(?:(['’ ])\d{3}(?:\1\d{3})*(?:\.\d+)?|(?:,\d{3})+\.\d+)")
 """``1'000``, ``1 000.5``, ``1,000.5``."""
-_PART = r"((?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)"
-COMPLEX = re.compile(rf"\(?([+-]?{_PART[1:-1]})([+-])(?:[ij]{_PART}|{_PART}[ij])\)?", re.IGNORECASE)
+_PART = r"(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?"
+COMPLEX = re.compile(rf"\(?([+-]?{_PART})([+-])(?:[ij]({_PART})|({_PART})[ij])\)?", re.IGNORECASE)
 FORTRAN = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)[dD][+-]?\d+")
 WITH_UNIT = re.compile(
     r"([+\-−–]?\d(?:[\d.,]|['’ ](?=\d))*(?:[eE][+-]?\d+)?)\s*((?:[^\W\d_]|[°\"']).{0,19})", re.DOTALL

@@ -11,6 +11,7 @@ DEFLECTION = (
     "spostamento|freccia|desplazamiento|deflexión|flecha"
 )
 COMMANDED = "target|cmd|nom|nominal|command|commanded|ref|desired|soll"
+MEASURED = "act|actual|meas|measured|achieved|attained|ist"
 PATTERNS: tuple[tuple[str, str], ...] = (
     ("id", r"#|id|nr\.?|no\.?|lfd\.? ?nr\.?|number|nummer|row|zeile|punkt|messpunkt|point|messpunkt nr\.?|point no\.?|punto"),
     ("temperature", r"t|temp|temperature|temperatur"),

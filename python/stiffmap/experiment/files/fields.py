@@ -25,6 +25,8 @@ COUNTED = ("repeat", "order", "hours", "temperature")
 POSE, POSE2 = ("x", "y", "z"), ("x2", "y2", "z2")
 APPROACH = ("approach_x", "approach_y", "approach_z")
 SEEN, SEEN_TURNED, SEEN_QUATERNION = ("px", "py", "pz"), ("prx", "pry", "prz"), ("pqx", "pqy", "pqz", "pqw")
+READ = dict(zip((*SEEN, *SEEN_TURNED), AXES, strict=True))
+"""Columns of places and turns that were seen -> their readings."""
 VECTOR = ("rotx", "roty", "rotz")
 QUATERNION = ("qw", "qx", "qy", "qz")
 EULER = ("euler1", "euler2", "euler3")

@@ -125,14 +125,17 @@ def whole_stays(experiment: Experiment, found: Mask) -> Mask:
 def without_suspects(experiment: Experiment, base: Floats) -> tuple[Noise, Mask]:
     """The noise floor of readings that do not stand alone before any effect is known, and (n,) those that do; `base` (n, c) is the
     declared prediction. One that is far off hides another one, so they are looked for until there is none."""
-    out = np.zeros(len(experiment), bool)
+    out, found = np.zeros(len(experiment), bool), None
     while True:
         noise = noise_of(experiment, ~out)
         problem = LinearProblem.of(experiment, noise.sigma, base, ~out)
+        if found is not None and problem.freedom < 1:
+            return found  # as many unknowns as readings fit anything
         bare = experiment.reading - base
         bare -= nuisance_part(problem, bare, robust=True)
         bare[out] = np.nan
         more = whole_stays(experiment, out | suspects(experiment, bare, noise.sigma))
-        if not (more & ~out).any() or LinearProblem.of(experiment, noise.sigma, base, ~more).freedom < 1:
-            return noise, out  # as many unknowns as readings fit anything
-        out |= more
+        found = noise, out
+        if not (more & ~out).any():
+            return found
+        out = out | more

@@ -96,9 +96,9 @@ def _is_mean(sheet: Table, columns: Sequence[Column]) -> bool:
     varies comes again in it: readings in proportion to loads up and down have their own mean."""
     chance = 1.0
     for c in columns if len(sheet) > 3 else ():
-        *values, last = sheet.numbers(c.index)
-        above = np.array(values)[np.isfinite(values)]
-        decimals = [*sheet.columns[c.index]][-1].strip().replace(",", ".").partition(".")[2]
+        values = sheet.numbers(c.index)
+        last, above = values[-1], values[:-1][np.isfinite(values[:-1])]
+        decimals = sheet.columns[c.index].last.replace(",", ".").partition(".")[2]
         step = max(0.1 ** len(decimals), 1e-9 * np.max(np.abs(above), initial=0.0))
         if len(above) < 3 or not abs(last - above.mean()) <= 0.501 * step:
             return False

@@ -17,7 +17,7 @@ from stiffmap.common.tables.table import Table, column_letter
 from stiffmap.common.units import known, unit_of
 from stiffmap.common.yaml_text import read, text_of
 from stiffmap.experiment.experiment import WRENCH
-from stiffmap.experiment.files.fields import SEEN, quantity_of
+from stiffmap.experiment.files.fields import READ, quantity_of
 from stiffmap.experiment.spreadsheet.answers import Answers, Meant, Question
 from stiffmap.experiment.spreadsheet.convert import ImportedSheet, understand
 from stiffmap.experiment.spreadsheet.guess import READINGS
@@ -91,7 +91,7 @@ def ask_all(m: Meant, ask: Ask | None, loaded: bool = False) -> ImportedSheet:
         return understand(m, loaded)
 
     found = asked(m, ask, understood)
-    read = dict.fromkeys(f"d{r[1]}" if r in SEEN else r for r in READINGS if r in found.units)
+    read = dict.fromkeys(READ.get(r, r) for r in READINGS if r in found.units)
     if ask is not None and found.rows.repeats < 2:
         _noise(m, [r for r in read if r not in m.noise], ask)
     return found

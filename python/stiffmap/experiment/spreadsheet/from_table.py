@@ -20,6 +20,7 @@ from stiffmap.common.tables.table import Table, column_letter
 from stiffmap.common.tables.workbook import WORKBOOKS, sheet_names
 from stiffmap.common.units import SPELLINGS, known, unit_of
 from stiffmap.experiment.experiment import Experiment
+from stiffmap.experiment.files.fields import READ
 from stiffmap.experiment.files.load import load_experiment
 from stiffmap.experiment.noise.level import against_the_load, contradictions, no_difference, not_at_zero
 from stiffmap.experiment.spreadsheet.answers import Answers, Meant, Question
@@ -127,9 +128,7 @@ def experiment_from_table(
     if wrong:
         raise StiffmapError(f"record: expected one of {', '.join(sorted(RECORD))}; got '{wrong[0]}'")
     chosen = {k: v.split("|") for k, v in (columns or {}).items()}
-    sure = {
-        re.sub("^p(r?[xyz])$", r"d\1", k).replace("dr", "r"): v for k, v in (noise or {}).items()
-    }  # px is dx
+    sure = {READ.get(k, k): v for k, v in (noise or {}).items()}
     given = Answers(chosen, dict(units or {}), dict(constants or {}), sure)
     rows = None if dh is None else read_dh(read_sheet(Path(dh)), given.units, dh_convention)
     drives = drives if rows is None else {f"{LEG}.{r.name}": r.slides for r in rows}

@@ -10,12 +10,15 @@ import numpy as np
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError, StiffmapError
+from stiffmap.common.tables.meaning import COMMANDED, MEASURED
 from stiffmap.common.yaml_text import read
-from stiffmap.experiment.files.fields import SEEN, quantity_of
+from stiffmap.experiment.files.fields import READ, SEEN, quantity_of
 from stiffmap.experiment.spreadsheet.answers import Meant
 
 FOLDER = Path(__file__).parent / "instruments"
 KEYS = {"title", "quantity", "columns", "measured", "circle", "units"}
+WORDS = {"{commanded}": COMMANDED, "{measured}": MEASURED}
+"""What stands for any word of that meaning in a mapping file."""
 CIRCLE = ("centre_x", "centre_y", "centre_z", "radius")
 
 
@@ -61,6 +64,8 @@ def load_instrument(name_or_path: str) -> Instrument:
                 raise FileError(
                     f"{key}.{meaning}: no regular expression: {problem}", file=str(path)
                 ) from None
+            for word, any_of in WORDS.items():
+                data[key][meaning] = data[key][meaning].replace(word, f"({any_of})")
     return Instrument(**data)
 
 
@@ -88,7 +93,7 @@ def as_readings(m: Meant, instrument: Instrument) -> None:
     said = m.guessed
     seen = any(c.meaning in SEEN for c in said)
     for c in said:
-        unit = instrument.units.get(c.meaning.replace("p", "d") if c.meaning in SEEN else c.meaning)
+        unit = instrument.units.get(READ.get(c.meaning, c.meaning))
         if unit and not c.unit and (seen or c.meaning in m.chosen):
             units[c.meaning] = unit
     for reading, pattern in ({} if seen else instrument.measured).items():

@@ -122,7 +122,8 @@ def fitted(
     weights: Floats | None = None,
 ) -> Fit:
     """The amplitudes of the best evidence; heavy tails where a reading stands out and the bound is better without doubt. A reading
-    that is far off may be all that a gap explains, so those that stand alone of a robust fit begin with no weight.
+    that is far off may be all that a gap explains, so those that stand alone of a robust fit begin with no weight, and
+    a fit from nothing begins with next to no gap as well.
 
     start
         ln variances to begin with, by the name of the part; others begin small.
@@ -135,29 +136,24 @@ def fitted(
     if weights is not None and np.any(weights != 1.0):
         heavy = _optimum(columns, tuple(parts), first, weights, heavy=True)
         return max(light, heavy, key=lambda f: f.score)
-    typical = min(light.noise, _typical(noise_part(light)[0]))
+    typical, slips = _standing_out(light)
     begun = np.array([2.0 * np.log(typical), *first[1:]])  # what sank may rise
-    starts = [(begun, _standing_out(light))]
+    starts = [(begun, slips)]
     if not given:  # what nobody can name may have taken what stands out
         quiet = np.where([False, *(p.kind in (*GAPS, "time") for p in parts)], QUIET, begun)
-        starts.append((quiet, _standing_out(evaluated(columns, parts, quiet, light.weights))))
+        starts.append((quiet, _standing_out(evaluated(columns, parts, quiet, light.weights))[1]))
     if columns.alone.any():
         starts.append((begun, np.where(columns.alone, NOTHING, 1.0)))
     found = [_optimum(columns, tuple(parts), t, w, heavy=True) for t, w in starts if w is not None]
     return max([light, *found], key=lambda f: f.score)
 
 
-def _typical(noise: Floats) -> float:
-    """Robust standard deviation."""
-    return 1.4826 * float(np.median(np.abs(noise)))
-
-
-def _standing_out(fit: Fit) -> Floats | None:
-    """(N,) weights of heavy tails at the posterior of the noise; None where no reading stands out of it."""
+def _standing_out(fit: Fit) -> tuple[float, Floats | None]:
+    """Robust standard deviation of the noise, at most the fit's, and (N,) weights of heavy tails at its posterior; None where no reading
+    stands out."""
     mean, sd = noise_part(fit)
-    if not np.any(np.abs(mean) > STANDS_OUT * min(fit.noise, _typical(mean))):
-        return None
-    return _heavy(fit, mean, sd)
+    typical = min(fit.noise, 1.4826 * float(np.median(np.abs(mean))))
+    return typical, _heavy(fit, mean, sd) if np.any(np.abs(mean) > STANDS_OUT * typical) else None
 
 
 def refitted(fit: Fit, residual: Floats) -> Fit:
@@ -168,7 +164,7 @@ def refitted(fit: Fit, residual: Floats) -> Fit:
 
 def _heavy(fit: Fit, mean: Floats, sd: Floats) -> Floats:
     """(N,) weights of heavy tails at the posterior of the noise, its mean and standard deviation (N,)."""
-    label, size = fit.columns.tails
+    label, size, _ = fit.columns.tails
     squares = np.bincount(label, (mean**2 + sd**2) / fit.noise**2)
     return np.asarray(((DEGREES + size) / (DEGREES + squares))[label])
 
@@ -291,8 +287,8 @@ def _bound(columns: Columns, weights: Floats) -> float:
     """What the bound of heavy tails adds to a Gaussian of variances κ²/w; 0 where all weights are 1."""
     if np.all(weights == 1.0):
         return 0.0
-    label, d = columns.tails
-    n, w = DEGREES, weights[np.unique(label, return_index=True)[1]]
+    _, d, first = columns.tails
+    n, w = DEGREES, weights[first]
     constant = (
         gammaln((n + d) / 2.0)
         - gammaln(n / 2.0)

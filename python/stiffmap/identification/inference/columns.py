@@ -104,13 +104,14 @@ class Columns:
         return len(self.residual)
 
     @cached_property
-    def tails(self) -> tuple[Integers, Integers]:
-        """(N,) number of the weight of heavy tails of each reading, and how many readings have each weight."""
-        label = np.arange(len(self.rows))
-        if self.tied:
-            angle = np.array([c.unit == "rad" for c in self.experiment.channels])[self.channel]
-            label = np.unique(2 * self.rows + angle, return_inverse=True)[1].reshape(-1)
-        return label, np.bincount(label)
+    def tails(self) -> tuple[Integers, Integers, Integers]:
+        """(N,) number of the weight of heavy tails of each reading; how many readings have each weight, and the first of them."""
+        own = np.arange(len(self.rows))
+        if not self.tied:
+            return own, np.ones_like(own), own
+        angle = np.array([c.unit == "rad" for c in self.experiment.channels])[self.channel]
+        _, first, label, size = np.unique(2 * self.rows + angle, True, True, True)
+        return label.reshape(-1), size, first
 
     @cached_property
     def alone(self) -> NDArray[np.bool_]:
@@ -120,7 +121,7 @@ class Columns:
         prior = np.hstack([np.zeros((p, q)), np.eye(p)])
         whole = np.vstack([np.hstack([self.frames, self.free @ self.numbers]), prior])
         far = fitted(whole, np.append(values, np.zeros(p)))[1][: len(values)] > GROSS
-        label, size = self.tails
+        label, size, _ = self.tails
         out = np.bincount(label, far) > 0.0
         return np.asarray(out[label] & (out.sum() <= max(LEAST_MANY, MANY * len(size))))
 

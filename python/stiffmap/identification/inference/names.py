@@ -6,7 +6,7 @@ their uncertainties, in "groups" each group by its own. All are searched alike a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 
@@ -86,11 +86,12 @@ def searched(
 ) -> Search:
     """The best set of effects over all worlds; no step begins once time is `over`. `travel`: whether drives may err along their
     travel in any smooth way. Heavy tails are those of readings, or of rows where these are likelier."""
-    searches = list(_worlds(columns, predict, over, travel))
+    searches = _worlds(columns, predict, over, travel)
     tied = replace(columns, tied=True)
     if len(tied.tails[1]) < len(columns.rows):
-        of_rows = list(_worlds(tied, predict, over, travel))
-        if of_rows[:2][-1].null.score > searches[:2][-1].null.score + PROGRESS:
+        of_rows = _worlds(tied, predict, over, travel)
+        middle = searches[:2][-1], of_rows[:2][-1]  # numbers off together, where there are any
+        if middle[1].null.score > middle[0].null.score + PROGRESS:
             searches = of_rows
     searches.sort(key=lambda w: -w.null.score)
     found: dict[str, Search] = {}
@@ -110,15 +111,15 @@ def searched(
 
 def _worlds(
     columns: Columns, predict: Predict | None, over: Callable[[], bool], travel: bool
-) -> Iterator[_World]:
+) -> list[_World]:
+    """Exact, together and groups, as far as there are numbers and time."""
     parts = Parts(columns)
     gaps = (*parts.gaps, *parts.travel) if travel else parts.gaps
     worlds: dict[str, tuple[Part, ...]] = {EXACT: ()}
     if columns.unknowns and not over():
         worlds |= {"together": parts.together, "groups": parts.numbers}
     optima: dict[tuple[tuple[int, int], ...], Floats] = {}
-    for name, own in worlds.items():
-        yield _World(columns, gaps, name, own, predict, over, optima)
+    return [_World(columns, gaps, name, own, predict, over, optima) for name, own in worlds.items()]
 
 
 def _with_rivals(model: Model, searches: Sequence[_World], found: Mapping[str, Search]) -> Search:

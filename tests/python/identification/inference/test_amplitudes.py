@@ -16,8 +16,8 @@ from stiffmap.identification.inference.shares import shares
 
 def test_lengths_and_angles_of_a_row_slip_each_together():
     c = replace(columns(np.random.default_rng(0)), rows=np.array([4, 4, 4, 7, 7]), tied=True)
-    label, size = replace(c, channel=np.array([0, 1, 0, 1, 1])).tails
-    assert list(label) == [0, 1, 0, 2, 2] and list(size) == [2, 1, 2]
+    label, size, first = replace(c, channel=np.array([0, 1, 0, 1, 1])).tails
+    assert list(label) == [0, 1, 0, 2, 2] and list(size) == [2, 1, 2] and list(first) == [0, 1, 3]
 
 
 def dense(c, some, ln_variance, weights):
@@ -36,7 +36,7 @@ def test_the_likelihood_is_that_of_the_covariance_and_its_gradient_that_of_diffe
     c, some = columns(rng), parts(rng)
     if heavy == "tied":
         c = replace(c, rows=np.arange(READINGS) // 3, tied=True)
-    label, size = c.tails
+    label, size, _ = c.tails
     each = rng.uniform(0.2, 1.2, len(size)) if heavy else np.ones(len(size))
     w = each[label]
     at = rng.uniform(-1.5, 1.0, 4)
