@@ -36,6 +36,7 @@ INNER = {
         "amplitudes",
         "candidates",
         "chosen",
+        "world",
         ("names", "shares"),
         ("verdict", "readings"),
         "term",

@@ -26,10 +26,10 @@ from stiffmap.identification.inference.constants import ODDS
 from stiffmap.identification.inference.corrected import Corrected, corrected
 from stiffmap.identification.inference.inference import Inferred, infer
 from stiffmap.identification.inference.machines import CALIBRATED, stands_out, vouched, written
-from stiffmap.identification.inference.names import EXACT
 from stiffmap.identification.inference.readings import readings
 from stiffmap.identification.inference.shares import of_numbers, shares, tolerance_word, too_wide
 from stiffmap.identification.inference.verdict import judged
+from stiffmap.identification.inference.world import EXACT
 from stiffmap.identification.numbers import GROUPS, Tolerances
 from stiffmap.identification.validity import covered
 from stiffmap.solve.machine import Machine, as_machine

@@ -7,56 +7,26 @@ their uncertainties, in "groups" each group by its own. All are searched alike a
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from itertools import combinations
+from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from stiffmap.experiment.experiment import Floats
-from stiffmap.identification.candidates.candidates import clash
-from stiffmap.identification.inference.amplitudes import QUIET, Fit, evaluated, fitted, refitted
-from stiffmap.identification.inference.candidates import evidence, of_pairs
-from stiffmap.identification.inference.chosen import Chosen, all_moved
+from stiffmap.identification.inference.amplitudes import Fit, evaluated, fitted
+from stiffmap.identification.inference.chosen import Chosen
 from stiffmap.identification.inference.columns import Columns
-from stiffmap.identification.inference.constants import MOST_EFFECTS, ODDS, REFITS, SIZES
-from stiffmap.identification.inference.parts import NOISE, Part, Parts
+from stiffmap.identification.inference.parts import Part, Parts
 from stiffmap.identification.inference.places import Place
-from stiffmap.identification.inference.sizes import gains, log_mean, spectrum
-
-EXACT = "exact"
-SETTLED = 0.3
-"""Noise: a correction that changes less is none."""
-PROGRESS = 0.1
-"""Gain of evidence, ln, below which one set is not better than another."""
-CORRECTIONS = 3
-"""Gauss-Newton corrections of the residual by whole predictions with the effects of a model."""
-SINGLES = 24
-"""Best single places of which pairs are tried; effort only."""
-SHORT = 10.0
-"""Evidence, ln, by which a bound may fall short of the fit: what is further below is not fitted; effort only."""
-RIVALS_FITTED = 4
-"""Places in an effect's stead that are fitted; effort only."""
-SAME_EVIDENCE = 2.0
-"""Evidence, ln, within which the coarsest part has the name."""
-AT_MOST, FAR = 25, 1e6
-"""Steps to the optimum of effects that bend; the misfit of a machine that fails."""
-Bound = tuple[float, Place, Fit]
-"""Evidence with a place, from below, and the amplitudes that give it."""
-Predict = Callable[[Sequence[Chosen]], Floats]
-"""(m,) what effects of given strengths add to the readings, by the machine itself; NaN where it fails."""
-
-
-@dataclass(frozen=True, eq=False)
-class Model:
-    """A set of effects in one world, at its best amplitudes."""
-
-    world: str
-    """``exact``, ``together`` or ``groups``."""
-    chosen: tuple[Chosen, ...]
-    fit: Fit
-    score: float
-    """Evidence of the set: that of the fit, mean over shapes."""
+from stiffmap.identification.inference.world import (
+    EXACT,
+    PROGRESS,
+    Model,
+    Predict,
+    World,
+    amplitudes,
+    best_shape,
+    largest_gain,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,24 +64,23 @@ def searched(
         if middle[1].null.score > middle[0].null.score + PROGRESS:
             searches = of_rows
     searches.sort(key=lambda w: -w.null.score)
-    found: dict[str, Search] = {}
+    found: dict[str, Model] = {}
     for w in searches:
-        found[w.name] = w.search(max((s.best for s in found.values()), key=lambda m: m.score, default=w.null))
-    best = _with_rivals(max((s.best for s in found.values()), key=lambda m: m.score), searches, found)
+        found[w.name] = w.search(max(found.values(), key=lambda m: m.score, default=w.null))
+    best = _with_rivals(max(found.values(), key=lambda m: m.score), searches, found)
     likelier = [m for m, odds in filter(None, best.instead) if odds < 0.0]
     if likelier:  # without an effect, which may be at any place, in another world
         best = _with_rivals(max(likelier, key=lambda m: m.score), searches, found)
-    off = [s.null.fit for name, s in found.items() if name != EXACT]
+    exact = next(w.null for w in searches if w.name == EXACT)
+    off = [w.null.fit for w in searches if w.name != EXACT]
     return replace(
         best,
-        exact=found[EXACT].null.score,
+        exact=exact.score,
         calibrated=max(off, key=lambda f: f.score, default=None),
     )
 
 
-def _worlds(
-    columns: Columns, predict: Predict | None, over: Callable[[], bool], travel: bool
-) -> list[_World]:
+def _worlds(columns: Columns, predict: Predict | None, over: Callable[[], bool], travel: bool) -> list[World]:
     """Exact, together and groups, as far as there are numbers and time."""
     parts = Parts(columns)
     gaps = (*parts.gaps, *parts.travel) if travel else parts.gaps
@@ -119,10 +88,10 @@ def _worlds(
     if columns.unknowns and not over():
         worlds |= {"together": parts.together, "groups": parts.numbers}
     optima: dict[tuple[tuple[int, int], ...], Floats] = {}
-    return [_World(columns, gaps, name, own, predict, over, optima) for name, own in worlds.items()]
+    return [World(columns, gaps, name, own, predict, over, optima) for name, own in worlds.items()]
 
 
-def _with_rivals(model: Model, searches: Sequence[_World], found: Mapping[str, Search]) -> Search:
+def _with_rivals(model: Model, searches: Sequence[World], found: Mapping[str, Model]) -> Search:
     """A model with what would do in the stead of each of its effects, in its own world and in others."""
     own = next(w for w in searches if w.name == model.world)
     others = [w for w in searches if w is not own]
@@ -147,8 +116,8 @@ def with_travel(fit: Fit) -> Fit:
 def put_instead(fit: Fit, c: Chosen, place: Place) -> Chosen:
     """Another place in the stead of an effect of a fit, nothing else fitted anew."""
     anchor = fit.without([c.part.name])
-    bare = Chosen.at(place, _best_shape(anchor, place))
-    t = np.append(anchor.t, _size(anchor, bare.part))
+    bare = Chosen.at(place, best_shape(anchor, place))
+    t = np.append(anchor.t, largest_gain(anchor, bare.part))
     found = evaluated(anchor.columns, (*anchor.parts, bare.part), t, anchor.weights)
     return bare.by_posterior(found)
 
@@ -158,330 +127,16 @@ def _without(
     near: Sequence[tuple[Place, float]],
     model: Model,
     price: float,
-    others: Sequence[_World],
-    found: Mapping[str, Search],
+    others: Sequence[World],
+    found: Mapping[str, Model],
 ) -> tuple[Model, float] | None:
     """The best model of another world in which an effect, and what would do in its stead, is not; and the ln odds against that of the
     effect and of what would do in its stead, each effect more at the `price` of its places."""
     same = {id(c.place), *(id(p) for p, _ in near)}
-    models = [m for w in others for m in (w.less(model, c), found[w.name].null, found[w.name].best)]
+    models = [m for w in others for m in (w.less(model, c), w.null, found[w.name])]
     allowed = (m for m in models if not same & {id(o.place) for o in m.chosen})
     other = max(allowed, key=lambda m: m.score - price * len(m.chosen), default=None)
     if other is None:
         return None
     together = model.score + float(np.logaddexp.reduce([0.0, *(s for _, s in near)]))
     return other, together - other.score - price * (len(model.chosen) - len(other.chosen))
-
-
-@dataclass(eq=False)
-class _World:
-    """The search in one world."""
-
-    columns: Columns
-    gaps: tuple[Part, ...]
-    name: str
-    numbers: tuple[Part, ...]
-    predict: Predict | None
-    over: Callable[[], bool]
-    optima: dict[tuple[tuple[int, int], ...], Floats]
-    known: dict[frozenset[tuple[int, int]], Model] = field(default_factory=dict)
-    anchors: dict[int, tuple[Model, list[Fit]]] = field(default_factory=dict)
-
-    @property
-    def price(self) -> float:
-        """ln of the places that an effect may be at."""
-        return float(np.log(max(1, len(self.columns.places))))
-
-    @property
-    def null(self) -> Model:
-        """No effect at all."""
-        return self._fit((), None)
-
-    def search(self, begin: Model) -> Search:
-        """Forward steps with elimination and exchange after each, from the effects of the best model of other worlds; it ends where
-        it would fall short of that even if each effect that may follow, and their exchanges, gained as much as the last one."""
-        model = null = self.null
-        if begin.chosen:
-            same = self._fit(begin.chosen, amplitudes(begin.fit), begin.fit.weights)
-            model = max(null, self._settled(same), key=lambda m: m.score)
-        limit = float(np.log(ODDS)) + self.price
-        while len(model.chosen) < MOST_EFFECTS and not self.over():
-            trials = self._trials(model)
-            if not trials:
-                break
-            best, all_gains = trials
-            total = float(np.logaddexp.reduce(all_gains))
-            if total <= limit:
-                break  # the odds of all places together
-            to_come = 1 + MOST_EFFECTS - len(best.chosen)
-            if begin.world != self.name and best.score + to_come * (best.score - model.score) < begin.score:
-                break
-            better = self._settled(best)
-            if len(better.chosen) <= len(model.chosen) and better.score <= model.score + PROGRESS:
-                break
-            model = better
-        return Search(self._refined(model), null, (), ())
-
-    def _trials(self, model: Model, beat: float = -np.inf) -> tuple[Model, Floats] | None:
-        """The model with the best further effect, and the gain of each place; None where none comes near the evidence to `beat`."""
-        found = self._bounds(model) if np.isfinite(model.score) else []
-        if not found:
-            return None
-        order = sorted(found, key=lambda b: -b[0])
-        likely = [b for b in order[:REFITS] if b[0] >= beat - SHORT]
-        if not likely:
-            return None
-        refits = [self._with(model, [place], anchor) for _, place, anchor in likely]
-        scores = {id(p): s for s, p, _ in order}
-        for m, (_, place, _) in zip(refits, likely, strict=True):
-            key = id(place)
-            scores[key] = max(scores[key], m.score) if np.isfinite(m.score) else -np.inf
-        best = max(refits, key=lambda m: m.score)
-        return (best, np.array(list(scores.values())) - model.score) if np.isfinite(best.score) else None
-
-    def _bounds(self, model: Model, more: tuple[Fit, ...] = ()) -> list[Bound]:
-        """Per place a lower bound of the evidence with it, and the anchor that gives it; `more` anchors than its own."""
-        taken = {id(c.place) for c in model.chosen}
-        others = [c.place.candidate for c in model.chosen]
-        free = tuple(p for p in self.columns.places if id(p) not in taken and not clash(p.candidate, others))
-        if not free:
-            return []
-        extra, anchors = model.score - model.fit.score, (*self._anchors(model), *more)
-        found = [[log_mean(g) + a.score + extra for g in evidence(a, free)] for a in anchors]
-        out = []
-        for k, place in enumerate(free):
-            which = int(np.argmax([f[k] for f in found]))
-            out.append((float(found[which][k]), place, anchors[which]))
-        return out
-
-    def _anchors(self, model: Model) -> list[Fit]:
-        """Amplitudes at which candidates are judged: as fitted; without gaps; the same at the declared noise."""
-        fit = model.fit
-        if id(model) in self.anchors:
-            return self.anchors[id(model)][1]
-        gaps = [g.name for g in self.gaps]
-        if any(p.name in gaps for p, _ in fit.on):
-            effects = tuple(c.part for c in model.chosen)
-            bare = fitted(fit.columns, (*self.numbers, *effects), amplitudes(fit), fit.weights)
-        else:
-            bare = fit.without(gaps)
-        at_rest = np.array([0.0, *bare.t[1:]])
-        found = [fit, bare, evaluated(fit.columns, bare.parts, at_rest, bare.weights)]
-        self.anchors[id(model)] = model, found
-        return found
-
-    def _with(self, model: Model, places: Sequence[Place], anchor: Fit) -> Model:
-        """The model with further effects, fitted from the anchor."""
-        chosen = list(model.chosen)
-        start = {**{g.name: QUIET for g in self.gaps}, **amplitudes(anchor)}
-        for place in places:
-            chosen.append(Chosen.at(place, _best_shape(anchor, place)))
-            start[chosen[-1].part.name] = _size(anchor, chosen[-1].part)
-        return self._fit(tuple(chosen), start, anchor.weights)
-
-    def _fit(
-        self, chosen: tuple[Chosen, ...], start: dict[str, float] | None, weights: Floats | None = None
-    ) -> Model:
-        """A set at its best amplitudes, on a residual that is corrected for what the effects' columns miss; fitted once."""
-        key = frozenset((id(c.place), c.shape) for c in chosen)
-        if key not in self.known:
-            bare = tuple(replace(c, values=np.zeros(0), refined=()) for c in chosen)
-            self.known[key] = self._made(bare, start, weights)
-        return self.known[key]
-
-    def _made(
-        self, chosen: tuple[Chosen, ...], start: dict[str, float] | None, weights: Floats | None
-    ) -> Model:
-        columns = self.columns
-        parts = (*self.numbers, *self.gaps, *(c.part for c in chosen))
-        fit = fitted(columns, parts, start, weights)
-        if self.predict and chosen:
-            fit, chosen = self._corrected(fit, chosen)
-        chosen = tuple(c if len(c.values) else c.by_posterior(fit) for c in chosen)
-        shapes = 0.0
-        for c in chosen:
-            if len(c.place.shapes) > 1:
-                each = evidence(fit.without([c.part.name]), (c.place,))[0]
-                shapes += float(log_mean(each) - each[c.shape])
-        possible = all(c.is_possible for c in chosen)
-        return Model(self.name, chosen, fit, fit.score + shapes if possible else -np.inf)
-
-    def _corrected(self, fit: Fit, chosen: tuple[Chosen, ...]) -> tuple[Fit, tuple[Chosen, ...]]:
-        """The fit on a residual less what straight lines miss of the effects; where that does not settle, at their own optimum,
-        with their values there."""
-        assert self.predict
-        now, shown = fit, None
-        for _ in range(CORRECTIONS + 1):
-            at = tuple(c.by_posterior(now) for c in chosen)
-            line = np.sum([c.rotated(self.columns) @ c.values for c in at], axis=0)
-            if shown is not None and _near(line, shown):
-                return now, chosen
-            missed = self.predict(at) - line
-            if not np.isfinite(missed).all():
-                break
-            if shown is None and _gain(fit, missed) < PROGRESS:
-                return fit, chosen
-            shown = line
-            now = self._less(missed, now)
-        found = self._at_optimum(fit, chosen)
-        return found if found and all(len(c.strengths) for c in found[1]) else (fit, chosen)
-
-    def _at_optimum(self, fit: Fit, chosen: tuple[Chosen, ...]) -> tuple[Fit, tuple[Chosen, ...]] | None:
-        """The fit on a residual less what the effects' columns miss at their own optimum, and the effects there; None where the
-        machine fails."""
-        assert self.predict
-        at = self._optimum(fit, chosen)
-        shown = self.predict(at)
-        if not np.isfinite(shown).all():
-            return None
-        lines = np.hstack([c.rotated(self.columns) for c in at])
-        return self._less(shown - lines @ np.linalg.lstsq(lines, shown, rcond=1e-9)[0], fit), at
-
-    def _refined(self, model: Model) -> Model:
-        """The set with its shapes (periods, knees) where they fit best, between those of the grid; the same where that is no better."""
-        if not self.predict or not any(c.shaped for c in model.chosen) or self.over():
-            return model
-        found = self._at_optimum(model.fit, model.chosen)
-        if not found:
-            return model
-        fit, at = found
-        gain = fit.score - model.fit.score
-        if gain <= PROGRESS or not all(c.is_possible for c in at):
-            return model
-        return replace(model, chosen=at, fit=fit, score=model.score + gain)
-
-    def _less(self, missed: Floats, fit: Fit) -> Fit:
-        """The fit on a residual less something."""
-        return refitted(fit, self.columns.residual - missed)
-
-    def _optimum(self, fit: Fit, chosen: tuple[Chosen, ...]) -> tuple[Chosen, ...]:
-        """The effects at the least squares of whole predictions, all else of the fit as it is; found once for each set."""
-        assert self.predict
-        predict, key = self.predict, tuple((id(c.place), c.shape) for c in chosen)
-        if key not in self.optima:
-            rest = fit.without([c.part.name for c in chosen])
-            begin = np.concatenate([c.by_posterior(fit).whole for c in chosen])
-            low, high = (np.concatenate([c.limits[k] for c in chosen]) for k in (0, 1))
-            inside = 1e-6 * np.minimum(np.nan_to_num(high - low, posinf=1.0), 1.0)
-
-            def residual(x: Floats) -> Floats:
-                left = rest.white(self.columns.residual - predict(all_moved(chosen, x)))
-                return np.where(np.isfinite(left), left, FAR)
-
-            begin = np.clip(begin, low + inside, high - inside)
-            self.optima[key] = least_squares(
-                residual, begin, "2-point", (low, high), x_scale="jac", diff_step=1e-3, max_nfev=AT_MOST
-            ).x
-        return all_moved(chosen, self.optima[key])
-
-    def _settled(self, model: Model) -> Model:
-        """The model after exchanges, one by one and by pairs."""
-        return self._exchanged(self._by_pairs(self._exchanged(model)))
-
-    def _exchanged(self, model: Model) -> Model:
-        """Each effect in turn left out where that costs less than odds, or given up for a better one."""
-        for _ in range(2):
-            before = model
-            for c in model.chosen if len(model.chosen) > 1 else ():
-                fewer = self.less(model, c)
-                if model.score - fewer.score < float(np.log(ODDS)):
-                    model = fewer
-                    break
-                found = self._trials(fewer, model.score)
-                if found and found[0].score > model.score + PROGRESS:
-                    model = found[0]
-                    break
-            if model is before:
-                return model
-        return model
-
-    def _by_pairs(self, model: Model) -> Model:
-        """Two effects at once given up for two others: one after the other they may never change."""
-        for first, second in combinations(model.chosen, 2):
-            fewer = self.less(self.less(model, first), second)
-            bounds = sorted(self._bounds(fewer), key=lambda b: -b[0])[:SINGLES]
-            if len(bounds) < 2:
-                continue
-            for anchor in self._anchors(fewer):
-                shapes = [p.shapes[_best_shape(anchor, p)] for _, p, _ in bounds]
-                gain = np.tril(of_pairs(anchor, shapes), -1)
-                for k in np.argsort(gain, axis=None)[::-1][:REFITS]:
-                    places = [bounds[int(i)][1] for i in np.unravel_index(int(k), gain.shape)]
-                    if clash(places[0].candidate, [places[1].candidate]):
-                        continue
-                    pair = self._with(fewer, places, anchor)
-                    if pair.score > model.score + PROGRESS:
-                        return pair
-        return model
-
-    def less(self, model: Model, c: Chosen) -> Model:
-        """The effects of a model but one, in this world."""
-        kept = tuple(o for o in model.chosen if o.part.name != c.part.name)
-        return self._fit(kept, amplitudes(model.fit), model.fit.weights)
-
-    def coarsest(self, model: Model) -> Model:
-        """The set with the coarsest part in each effect's place, of those whose evidence is the same."""
-        order = {id(p): k for k, p in enumerate(self.columns.places)}
-        for c in model.chosen:
-            fitted = self._fitted(model, c, self._steads(model, c))
-            found = [(order[id(p)], m) for p, m in fitted if m.score > model.score - SAME_EVIDENCE]
-            first = min(found, key=lambda f: f[0], default=None)
-            if first is not None and first[0] < order[id(c.place)]:
-                model = first[1]
-        return model
-
-    def _steads(self, model: Model, c: Chosen) -> list[tuple[float, Place, Fit]]:
-        """Bounds of all places in an effect's stead, the likeliest first."""
-        at_best = model.fit.without([c.part.name])
-        return sorted(self._bounds(self.less(model, c), (at_best,)), key=lambda b: -b[0])
-
-    def _fitted(
-        self, model: Model, c: Chosen, steads: list[tuple[float, Place, Fit]]
-    ) -> list[tuple[Place, Model]]:
-        """The likeliest places in an effect's stead, fitted."""
-        less = self.less(model, c)
-        likely = [b for b in steads if b[1] is not c.place and b[0] > model.score - SHORT]
-        return [(p, self._with(less, [p], anchor)) for _, p, anchor in likely[:RIVALS_FITTED]]
-
-    def rivals(self, model: Model) -> tuple[tuple[float, tuple[tuple[Place, float], ...]], ...]:
-        """Per effect its ln odds, all places that would do together, and those places; the likeliest are fitted."""
-        out = []
-        for c in model.chosen:
-            less, steads = self.less(model, c), self._steads(model, c)
-            scores = {id(p): (s - model.score, p) for s, p, _ in steads}
-            for p, m in self._fitted(model, c, steads):
-                scores[id(p)] = (max(scores[id(p)][0], m.score - model.score), p)
-            scores[id(c.place)] = (0.0, c.place)
-            together = float(np.logaddexp.reduce([s for s, _ in scores.values()]))
-            odds = model.score + together - less.score - self.price
-            near = [(p, s) for s, p in scores.values() if p is not c.place and s > -np.log(ODDS)]
-            out.append((odds, tuple(sorted(near, key=lambda n: -n[1]))))
-        return tuple(out)
-
-
-def _gain(fit: Fit, missed: Floats) -> float:
-    """Change of the evidence, at most, where the residual is less by something (m,), all amplitudes as they are."""
-    white = fit.white(missed)
-    return abs(float(missed @ fit.solved)) + 0.5 * float(white @ white)
-
-
-def _near(one: Floats, other: Floats) -> bool:
-    """Whether two changes of the readings are the same within a tenth, or within the noise."""
-    return float(np.linalg.norm(one - other)) < max(SETTLED, 0.1 * float(np.linalg.norm(one)))
-
-
-def amplitudes(fit: Fit) -> dict[str, float]:
-    """ln variances of a fit, by the names of its parts."""
-    return {NOISE: float(fit.t[0]), **{p.name: float(t) for p, t in zip(fit.parts, fit.t[1:], strict=True)}}
-
-
-def _best_shape(anchor: Fit, place: Place) -> int:
-    """Number of the shape that gains most at the anchor's amplitudes."""
-    return int(np.argmax(evidence(anchor, (place,))[0]))
-
-
-def _size(anchor: Fit, part: Part) -> float:
-    """ln variance of an effect that gains most at the anchor's amplitudes."""
-    assert part.factor is not None
-    best = int(np.argmax(gains(*spectrum(anchor.root, anchor.solved, part.factor))))
-    return float(2.0 * np.log(SIZES[best]))

@@ -20,10 +20,11 @@ from stiffmap.identification.inference.constants import (
     RARE,
     TOLERANCES,
 )
-from stiffmap.identification.inference.names import EXACT, Model, Search
+from stiffmap.identification.inference.names import Search
 from stiffmap.identification.inference.parts import GAPS, Part
 from stiffmap.identification.inference.places import Place
 from stiffmap.identification.inference.shares import of_numbers
+from stiffmap.identification.inference.world import EXACT, Model
 from stiffmap.identification.numbers.unknowns import Unknown
 
 DETERMINED = 0.5

@@ -18,10 +18,11 @@ from stiffmap.identification.inference.amplitudes import fitted
 from stiffmap.identification.inference.chosen import Chosen
 from stiffmap.identification.inference.constants import ODDS
 from stiffmap.identification.inference.inference import inferred, terms
-from stiffmap.identification.inference.names import Model, _World, searched
+from stiffmap.identification.inference.names import searched
 from stiffmap.identification.inference.parts import Parts
 from stiffmap.identification.inference.places import Place, Shape
 from stiffmap.identification.inference.verdict import TOLERABLE, Beyond, effect_of, judged
+from stiffmap.identification.inference.world import Model, World
 from stiffmap.identification.numbers.unknowns import Unknown
 from stiffmap.model import effects
 from stiffmap.model.description import AppliedEffect
@@ -275,9 +276,9 @@ def test_a_world_that_others_leave_far_behind_is_given_up_early(monkeypatch):
         c, numbers=10.0 * d, unknowns=unknowns, residual=residual, experiment=one_place(len(c.rows))
     )
     made: list[tuple[str, int]] = []
-    inner = _World._made
+    inner = World._made
     monkeypatch.setattr(
-        _World,
+        World,
         "_made",
         lambda w, chosen, *given: [made.append((w.name, len(chosen))), inner(w, chosen, *given)][1],
     )
@@ -294,9 +295,9 @@ def test_a_search_in_another_world_begins_with_what_was_found(monkeypatch):
     unknowns = tuple(Unknown(f"number {k}", "link lengths", "m", 1e-4) for k in range(3))
     c = replace(c, numbers=d, unknowns=unknowns, experiment=one_place(len(c.rows)))
     begun: list[tuple[str, set[str]]] = []
-    inner = _World.search
+    inner = World.search
     monkeypatch.setattr(
-        _World,
+        World,
         "search",
         lambda w, m: [begun.append((w.name, {x.place.candidate.element for x in m.chosen})), inner(w, m)][1],
     )
