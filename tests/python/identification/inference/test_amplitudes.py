@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -87,6 +88,19 @@ def test_the_bound_of_heavy_tails_lies_below_them_and_touches_them(d):
         touched = np.sqrt(max((DEGREES + d) / w - DEGREES, 0.0))
         assert ln_bound(touched, w, d) == pytest.approx(ln_t(touched, d), abs=1e-9)
         assert ours == pytest.approx(ln_bound(e, w, d), abs=1e-9)
+
+
+@pytest.mark.parametrize("tied", [False, True])
+def test_the_bound_touches_heavy_tails_at_the_weights_of_the_noise(tied):
+    rng = np.random.default_rng(3)
+    c = replace(columns(rng), rows=np.arange(READINGS) // 3, tied=tied)
+    fit, noise = SimpleNamespace(columns=c, noise=1.5), 4.0 * rng.standard_t(2, READINGS)
+    w = amplitudes._heavy(fit, noise, np.zeros(READINGS))
+    label, size, _ = c.tails
+    lengths = np.sqrt(np.bincount(label, noise**2)) / 1.5
+    expected = sum(map(ln_t, lengths, size)) - READINGS * np.log(1.5)
+    gaussian = norm.logpdf(noise, scale=1.5 * w**-0.5).sum()
+    assert gaussian + amplitudes._bound(c, w) == pytest.approx(expected, abs=1e-9)
 
 
 def test_priors_are_those_of_the_table():

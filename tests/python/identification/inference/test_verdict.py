@@ -15,8 +15,10 @@ from stiffmap.experiment.channels import Channel
 from stiffmap.identification.inference import amplitudes, verdict
 from stiffmap.identification.inference.chosen import Chosen
 from stiffmap.identification.inference.free import Free
+from stiffmap.identification.inference.names import Search
 from stiffmap.identification.inference.parts import Part, Parts
 from stiffmap.identification.inference.places import Place, Shape
+from stiffmap.identification.inference.world import Model
 from stiffmap.identification.numbers.unknowns import Unknown
 
 FLAT = np.ones(READINGS)
@@ -73,6 +75,16 @@ def test_an_effect_that_one_pose_alone_shows_has_no_name():
     c, fit, chosen = flat(1, alone)
     assert verdict.without_a_pose(c, fit.without(["effect"]), chosen) < np.log(20)
     assert verdict.refusal(c, fit, chosen)[1] == "it rests on the readings of one pose"
+
+
+@pytest.mark.parametrize(("slips", "rest"), [(False, verdict.ONE_POSE), (True, "")])
+def test_what_one_pose_shows_is_unexplained_unless_readings_slip(slips, rest):
+    c, fit, chosen = flat(1, np.where(np.arange(READINGS) < 5, 30.0, 0.0))
+    weights = np.where(np.arange(READINGS) == 7, 0.1 if slips else 1.0, 1.0)
+    model = Model("exact", (chosen,), replace(fit, weights=weights), 0.0)
+    found = verdict.judged(c, Search(model, model, (50.0,), ((),), (None,)))
+    assert not found.named and [why for _, why in found.refused] == [verdict.ONE_POSE]
+    assert found.rest == rest and found.word == ("none" if slips else "unattributed")
 
 
 def test_thirds_keep_equal_values_together():
