@@ -136,7 +136,8 @@ def _constants(sheet: Table, at: Mapping[str, int], types: list[str]) -> tuple[T
     """The table without the joints' coordinates, and the types: a joint whose type nobody says slides where its d is the coordinate."""
     columns = list(sheet.columns)
     for name, symbol, sliding in (("theta", "theta|θ", False), ("d", "d", True)):
-        cells = [unicodedata.normalize("NFKC", c).strip() for c in columns[at[name]]]  # θ₁ is θ1
+        plain = (unicodedata.normalize("NFKC", c) for c in columns[at[name]])  # θ₁ is θ1
+        cells = [c.replace("$", "").strip() for c in plain]
         for i, cell in enumerate(cells):
             left = re.sub(VARIABLE.format(symbol), "", cell, count=1).strip()
             of_it = not types[i] or sliding == (re.fullmatch(SLIDES, types[i]) is not None)

@@ -415,7 +415,7 @@ def test_a_joint_that_is_set_next_to_its_column_is_refused(tmp_path: Path) -> No
     ("text", "theta"),
     [
         ("| Joint | theta [deg] | d [mm] | a [mm] | alpha [deg] |\n|---|:---:|---|---|---|\n| 1 | 90 + q1 | 300 | 0 | 90 |\n| 2 | q2 | 0 | 400 | 0 |\n", 90.0),
-        ("# My arm\n\n| i | $\\theta_i$ [deg] | d_i [mm] | a_i [mm] | $\\alpha_i$ [deg] |\n|-|-|-|-|-|\n| 1 | \\theta_1 - 30 | 300 | 0 | 90 |\n| 2 | \\theta_2 | 0 | 400 | 0 |\n", -30.0),
+        ("# My arm\n\n| i | $\\theta_i$ [deg] | d_i [mm] | a_i [mm] | $\\alpha_i$ [deg] |\n|-|-|-|-|-|\n| 1 | \\theta_1 - 30 | 300 | 0 | 90 |\n| 2 | $\\theta_2$ | 0 | 400 | 0 |\n", -30.0),
         ("| Link | θ [°] | d [mm] | a [mm] | α [°] |\n|--|--|--|--|--|\n| 1 | θ₁ + 15 | 300 | 0 | 90° |\n| 2 | θ₂ | 0 | 400 | 0° |\n", 15.0),
         ("Link | theta (deg) | d (mm) | a (mm) | alpha (deg)\n--- | --- | --- | --- | ---\n1 | 45 + q1 | 300 | 0 | 90\n2 | q2 | 0 | 400 | 0\n", 45.0),
     ],
