@@ -34,7 +34,7 @@ from stiffmap.identification.inference.machines import (
     vouched,
     written,
 )
-from stiffmap.identification.inference.names import put_instead, searched, with_travel
+from stiffmap.identification.inference.names import put_instead, with_travel
 from stiffmap.identification.inference.parts import GAPS
 from stiffmap.identification.inference.readings import Readings, readings
 from stiffmap.identification.inference.shares import gap_of, shares, tolerance_word, too_wide
@@ -131,9 +131,9 @@ def _models(
     out: dict[str, Corrected] = {}
     plain = found.search.calibrated
     if v.named and plain is not None:
-        if found.columns.travel:  # as a calibration has it
-            plain = searched(replace(found.columns, places=()), travel=True).calibrated or plain
-        own = readings(predictor, found.uncertain, found.columns, plain, found.noise.sigma, found.suspects)
+        own = readings(
+            predictor, found.uncertain, found.columns, with_travel(plain), found.noise.sigma, found.suspects
+        )
         if len(own.spread):
             out[CALIBRATED] = corrected(own, ())
     while v.named or len(given.spread):

@@ -17,7 +17,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.linalg import LinAlgError
 from scipy.linalg import cho_solve, cholesky, solve_triangular
-from scipy.linalg.blas import dsyrk
+from scipy.linalg.blas import daxpy, dsyrk
 from scipy.linalg.lapack import dpotri
 from scipy.special import gammaln
 
@@ -37,11 +37,11 @@ from stiffmap.identification.inference.sizes import of_size
 STEPS, LARGEST_STEP, ENOUGH = 30, 2.0, 0.01
 """Newton steps, their length in ln variance, and the gain of evidence that ends them."""
 WEIGHINGS = 40
-"""Of heavy tails, at most, each followed by a few Newton steps."""
+"""Of heavy tails, at most, each with a Newton step."""
 NOTHING = 1e-6
 """Weight of a reading that stands alone, to begin with."""
-WEIGHED = 0.1
-"""Gain of evidence that ends the weighings."""
+WEIGHED, REACH = 0.1, 10.0
+"""Gain of evidence that ends the weighings; how often what one gains may be to come, effort only."""
 OFF, SINKS = -14.0, -8.0
 """ln variance of a part that the readings do not ask for, and below which one on its way down is taken out."""
 ROUND_OFF = 1e-13
@@ -134,7 +134,7 @@ def fitted(
     first = np.array([given.get(NOISE, 0.0), *(given.get(p.name, BEGIN) for p in parts)])
     light = _optimum(columns, tuple(parts), first, np.ones(len(columns.rows)))
     if weights is not None and np.any(weights != 1.0):
-        heavy = _optimum(columns, tuple(parts), first, weights, heavy=True)
+        heavy = _optimum(columns, tuple(parts), first, weights, heavy=True, beat=light.score)
         return max(light, heavy, key=lambda f: f.score)
     typical, slips = _standing_out(light)
     begun = np.array([2.0 * np.log(typical), *first[1:]])  # what sank may rise
@@ -144,8 +144,12 @@ def fitted(
         starts.append((quiet, _standing_out(evaluated(columns, parts, quiet, light.weights))[1]))
     if columns.alone.any():
         starts.append((begun, np.where(columns.alone, NOTHING, 1.0)))
-    found = [_optimum(columns, tuple(parts), t, w, heavy=True) for t, w in starts if w is not None]
-    return max([light, *found], key=lambda f: f.score)
+    best = light
+    for t, w in starts:
+        if w is not None:
+            heavy = _optimum(columns, tuple(parts), t, w, heavy=True, beat=best.score)
+            best = max(best, heavy, key=lambda f: f.score)
+    return best
 
 
 def _standing_out(fit: Fit) -> tuple[float, Floats | None]:
@@ -200,10 +204,12 @@ def _evaluate(
     nothing."""
     variance = np.exp(t)
     on = _on(parts, t)
-    v = variance[0] * noise + columns.zero.T  # symmetric all: as the lower half lies
-    for k, p in on.items():
-        if p.full is not None:
-            v += variance[k] * p.full.T
+    v = np.asfortranarray(variance[0] * noise)
+    for a, full in [
+        (1.0, columns.zero),
+        *((variance[k], p.full) for k, p in on.items() if p.full is not None),
+    ]:
+        daxpy(full.reshape(-1), v.T.reshape(-1), a=a)  # symmetric all, in place: as the lower half lies
     short = [np.sqrt(variance[k]) * p.factor for k, p in on.items() if p.factor is not None]
     if short:  # the lower half only
         v = dsyrk(1.0, np.hstack(short), beta=1.0, c=v, lower=1, overwrite_c=1)
@@ -300,24 +306,27 @@ def _bound(columns: Columns, weights: Floats) -> float:
 
 
 def _optimum(
-    columns: Columns, parts: tuple[Part, ...], t: Floats, weights: Floats, *, heavy: bool = False
+    columns: Columns,
+    parts: tuple[Part, ...],
+    t: Floats,
+    weights: Floats,
+    *,
+    heavy: bool = False,
+    beat: float = -np.inf,
 ) -> Fit:
-    """Damped Newton steps on ln variances; `heavy`: then further ones, each together with the weights of heavy tails at the posterior
-    before it, which by itself never makes the bound less."""
-    if heavy:
-        begun = _optimum(columns, parts, t, weights)
-        t, weights = begun.t, _heavy(begun, *noise_part(begun))
-    damping, noise = SHRINK, columns.spared.of_noise(1.0 / weights)
+    """Damped Newton steps on ln variances; `heavy`: once they gain little, further ones, each together with the weights of heavy tails at
+    the posterior before it, which by itself never makes the bound less, as long as the evidence to `beat` is within their reach."""
+    damping, noise, weighing = SHRINK, columns.spared.of_noise(1.0 / weights), False
     most = np.array([np.inf, *(p.most for p in parts)])
     t = np.minimum(t, most)
     fit, along = _evaluate(columns, parts, t, weights, noise)
     gradient, information = None, _information(fit, along)
-    for _ in range(WEIGHINGS if heavy else STEPS):
+    for _ in range(STEPS + heavy * WEIGHINGS):
         if gradient is None:
             inverse = fit.inverse()
             at_readings = columns.spared.at_readings(inverse)
             gradient = _gradient(fit, along, inverse, at_readings)
-            if heavy:
+            if weighing:
                 weights = _heavy(fit, *noise_part(fit, at_readings))
                 noise = columns.spared.of_noise(1.0 / weights)
         scale = np.maximum(np.diag(information), 1e-2)
@@ -332,12 +341,16 @@ def _optimum(
         gain = moved.score - fit.score
         if gain < -1e-9:
             damping *= 8.0
-            if damping > 1e6:
-                break
-            continue
-        fit, along, gradient = moved, along_there, None
-        information = _information(fit, along)
-        damping = max(damping / 4.0, 1e-3)
-        if gain < (WEIGHED if heavy else ENOUGH):
+            if damping <= 1e6:
+                continue
+        else:
+            fit, along, gradient = moved, along_there, None
+            information = _information(fit, along)
+            damping = max(damping / 4.0, 1e-3)
+        if weighing and fit.score + REACH * gain < beat:
             break
+        if gain < (WEIGHED if heavy else ENOUGH):
+            if weighing == heavy:
+                break
+            weighing, gradient, damping = True, None, SHRINK
     return _priced(fit, information)

@@ -7,7 +7,7 @@ integrated out with a flat prior is gone from everything that follows.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -112,6 +112,12 @@ class Columns:
         angle = np.array([c.unit == "rad" for c in self.experiment.channels])[self.channel]
         _, first, label, size = np.unique(2 * self.rows + angle, True, True, True)
         return label.reshape(-1), size, first
+
+    @property
+    def of_rows(self) -> Columns | None:
+        """The same, `tied`; None where that is what it is, or where no row has two readings of a unit."""
+        tied = replace(self, tied=True)
+        return None if self.tied or len(tied.tails[1]) == len(self.rows) else tied
 
     @cached_property
     def alone(self) -> NDArray[np.bool_]:

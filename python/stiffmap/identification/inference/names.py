@@ -23,7 +23,6 @@ from stiffmap.identification.inference.world import (
     Model,
     Predict,
     World,
-    amplitudes,
     best_shape,
     largest_gain,
 )
@@ -57,8 +56,7 @@ def searched(
     """The best set of effects over all worlds; no step begins once time is `over`. `travel`: whether drives may err along their
     travel in any smooth way. Heavy tails are those of readings, or of rows where these are likelier."""
     searches = _worlds(columns, predict, over, travel)
-    tied = replace(columns, tied=True)
-    if len(tied.tails[1]) < len(columns.rows):
+    if tied := columns.of_rows:
         of_rows = _worlds(tied, predict, over, travel)
         middle = searches[:2][-1], of_rows[:2][-1]  # numbers off together, where there are any
         if middle[1].null.score > middle[0].null.score + PROGRESS:
@@ -108,9 +106,10 @@ def with_travel(fit: Fit) -> Fit:
     more = Parts(fit.columns).travel
     if not more:
         return fit
-    return max(
-        fit, fitted(fit.columns, (*fit.parts, *more), amplitudes(fit), fit.weights), key=lambda f: f.score
-    )
+    same, tied = fit.columns, fit.columns.of_rows
+    # from nothing: what took the place of travel in the fit would keep it
+    found = [fitted(c, (*fit.parts, *more)) for c in (same, tied) if c]
+    return max([fit, *found], key=lambda f: f.score)
 
 
 def put_instead(fit: Fit, c: Chosen, place: Place) -> Chosen:
