@@ -22,7 +22,7 @@ from stiffmap.common.units import unit_of
 Lines = Callable[[], Iterable[tuple[int, list[str]]]]
 """Number and cells of each line, from the first one whenever it is called."""
 COMMENTS = ("#", "%", "//")
-SEPARATORS = ";\t|, "
+SEPARATORS = ";\t|,& "
 BLANKS = re.compile(r"[ \t]+(?![\[(])")
 """Between cells, but not before a unit in brackets."""
 MARKED = re.compile(r"^(#|%|//)\s+")
@@ -42,6 +42,10 @@ GROUPED = re.compile(r"[+-]?\d{1,3}(?:(['’ ])\d{3}(?:\1\d{3})*(?:\.\d+)?|(?:,\
 """``1'000``, ``1 000.5``, ``1,000.5``."""
 _PART = r"(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?"
 COMPLEX = re.compile(rf"\(?([+-]?{_PART})([+-])(?:[ij]({_PART})|({_PART})[ij])\)?", re.IGNORECASE)
+ANGLE = re.compile(
+    r"([+-]? *)((?:\d+(?:[.,]\d+)?)?) *[*·]? *(?:(?:np|math)\.)?(°|π|pi)(?: */ *(\d+))?", re.IGNORECASE
+)
+"""``-π/2``, ``3*pi/4``, ``90°``: sign, number, unit and denominator."""
 FORTRAN = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)[dD][+-]?\d+")
 WITH_UNIT = re.compile(
     r"([+\-−–]?\d(?:[\d.,]|['’ ](?=\d))*(?:[eE][+-]?\d+)?)\s*((?:[^\W\d_]|[°\"']).{0,19})", re.DOTALL
@@ -219,7 +223,10 @@ def complex_number(cell: str) -> complex | None:
 def is_finite(cell: str, spelling: Spelling) -> bool:
     """Whether a cell holds a number."""
     value = number(cell, spelling)
-    return complex_number(cell) is not None if value is None else math.isfinite(value)
+    if value is None:
+        angle = ANGLE.fullmatch(plain(cell.strip()))
+        return complex_number(cell) is not None or (angle is not None and angle[3] != "°")
+    return math.isfinite(value)
 
 
 def is_data(cells: list[str], spelling: Spelling) -> bool:
@@ -230,6 +237,12 @@ def is_data(cells: list[str], spelling: Spelling) -> bool:
 
 def _text(path: Path) -> tuple[str, Lines, str]:
     text = text_of(path)
+    if "\\begin{" in text:  # rows of LaTeX end in two strokes, with a rule before or behind
+        text = re.sub(
+            r"(?m)^[ \t]*\\(?:hline|\w+rule)\b|\\\\(?:\[.*?\])?[ \t]*(?:\\\w+[ \t]*)?$|^.*\\(?:begin|end)\{.*$",
+            "",
+            text,
+        )
     lines_ = (line for line in io.StringIO(text) if line.strip() and not line.strip().startswith(COMMENTS))
     sample = list(islice(lines_, SAMPLE))
     best = max(SEPARATORS, key=lambda s: _numbers_between(s, sample))  # the first of equals
