@@ -465,3 +465,44 @@ def test_rows_that_are_no_joints_one_behind_the_other_are_refused(
     file = write(tmp_path, "dh.csv", f"joint,theta [deg],d [mm],a [mm],alpha [deg]\n{lines}\n")
     with pytest.raises(StiffmapError, match=words):
         read_dh(read_sheet(Path(file)), {}, "standard")
+
+
+@pytest.mark.parametrize(
+    "form",
+    [
+        "/joint_states/joint_{}/position", "field.position{}", "joint_states.position.joint_{}", ".position[{}]",
+        "joint[{}]", "θ{}", "/states/position[joint_{}]",
+    ],
+)  # fmt: skip
+def test_joints_have_the_names_that_logs_give_them(form: str, tmp_path: Path) -> None:
+    first = int("osition" in form and "joint_" not in form) ^ 1  # an array begins at 0
+    rows = [f"{k},{0.1 * k + 0.05},{-0.2 * k},{0.01 * k},{k},2,3,9" for k in range(3)]
+    names = [form.format(k + first) for k in range(3)]
+    head = ",".join(
+        [
+            "t",
+            *names,
+            "px [mm]",
+            "py [mm]",
+            "pz [mm]",
+            form.format(1).replace("position", "velocity") if "position" in form else "more",
+        ]
+    )
+    (tmp_path / "t.csv").write_text("\n".join([head, *rows]) + "\n", encoding="utf-8")
+    write(tmp_path, "dh.csv", SCARA)
+    made = sm.experiment_from_table(
+        None, tmp_path / "t.csv", tmp_path / "o", dh=tmp_path / "dh.csv", units={"angle": "rad", "length": "m"}, noise={"px": 0.1, "py": 0.1, "pz": 0.1}
+    )  # fmt: skip
+    expected = [[0.1 * k + 0.05, -0.2 * k, 0.01 * k] for k in range(3)]
+    np.testing.assert_allclose(made.experiment.command, expected, atol=1e-12)
+
+
+def test_two_logs_of_one_joint_are_asked_for(tmp_path: Path) -> None:
+    write(tmp_path, "dh.csv", SCARA)
+    head = ",".join(f"/{who}/joint_{k}/position" for who in ("target", "state") for k in (1, 2, 3))
+    (tmp_path / "t.csv").write_text(f"{head},px [mm]\n1,2,3,1,2,3,4\n2,3,4,1,2,3,5\n")
+    units, noise = {"angle": "rad", "length": "m"}, {"px": 0.1}
+    with pytest.raises(StiffmapError, match=r"which of two columns commands arm\.joint_1\?"):
+        sm.experiment_from_table(
+            None, tmp_path / "t.csv", tmp_path / "o", dh=tmp_path / "dh.csv", units=units, noise=noise
+        )
