@@ -42,10 +42,9 @@ GROUPED = re.compile(r"[+-]?\d{1,3}(?:(['’ ])\d{3}(?:\1\d{3})*(?:\.\d+)?|(?:,\
 """``1'000``, ``1 000.5``, ``1,000.5``."""
 _PART = r"(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?"
 COMPLEX = re.compile(rf"\(?([+-]?{_PART})([+-])(?:[ij]({_PART})|({_PART})[ij])\)?", re.IGNORECASE)
-ANGLE = re.compile(
-    r"([+-]? *)((?:\d+(?:[.,]\d+)?)?) *[*·]? *(?:(?:np|math)\.)?(°|π|pi)(?: */ *(\d+))?", re.IGNORECASE
-)
-"""``-π/2``, ``3*pi/4``, ``90°``: sign, number, unit and denominator."""
+IN_PI = re.compile(r"(?i)([+−–-]? *)((?:\d+(?:\.\d+)?)?) *[*·]? *(?:(?:np|math)\.)?(?:π|pi)(?: */ *(\d+))?")
+LATEX = re.compile(r"(?m)^ *\\(?:hline|\w+rule)\b|\\\\(?:\[.*?\])? *(?:\\\w+)? *$|^.*\\(?:begin|end)\{.*$")
+"""What a row of LaTeX has beside its cells: rules before it or behind, the strokes at its end."""
 FORTRAN = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)[dD][+-]?\d+")
 WITH_UNIT = re.compile(
     r"([+\-−–]?\d(?:[\d.,]|['’ ](?=\d))*(?:[eE][+-]?\d+)?)\s*((?:[^\W\d_]|[°\"']).{0,19})", re.DOTALL
@@ -220,12 +219,19 @@ def complex_number(cell: str) -> complex | None:
     return None if match is None else complex(float(match[1]), float(match[2] + (match[3] or match[4])))
 
 
+def radians(cell: str) -> float | None:
+    """The angle in a cell such as ``-π/2`` or ``90°``; None for what is none of them."""
+    if match := IN_PI.fullmatch(cell):
+        return math.pi * float(plain(f"{match[1].strip()}{match[2] or 1}")) / float(match[3] or 1)
+    degrees = number(cell[:-1].replace(" ", ""), Spelling("," in cell)) if cell.endswith("°") else None
+    return None if degrees is None else math.radians(degrees)
+
+
 def is_finite(cell: str, spelling: Spelling) -> bool:
     """Whether a cell holds a number."""
     value = number(cell, spelling)
     if value is None:
-        angle = ANGLE.fullmatch(plain(cell.strip()))
-        return complex_number(cell) is not None or (angle is not None and angle[3] != "°")
+        return complex_number(cell) is not None or IN_PI.fullmatch(cell.strip()) is not None
     return math.isfinite(value)
 
 
@@ -237,12 +243,7 @@ def is_data(cells: list[str], spelling: Spelling) -> bool:
 
 def _text(path: Path) -> tuple[str, Lines, str]:
     text = text_of(path)
-    if "\\begin{" in text:  # rows of LaTeX end in two strokes, with a rule before or behind
-        text = re.sub(
-            r"(?m)^[ \t]*\\(?:hline|\w+rule)\b|\\\\(?:\[.*?\])?[ \t]*(?:\\\w+[ \t]*)?$|^.*\\(?:begin|end)\{.*$",
-            "",
-            text,
-        )
+    text = LATEX.sub("", text) if "\\begin{" in text else text
     lines_ = (line for line in io.StringIO(text) if line.strip() and not line.strip().startswith(COMMENTS))
     sample = list(islice(lines_, SAMPLE))
     best = max(SEPARATORS, key=lambda s: _numbers_between(s, sample))  # the first of equals

@@ -13,7 +13,6 @@ import re
 import unicodedata
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -22,7 +21,7 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.tables.cells import Cells
 from stiffmap.common.tables.header import split_unit, with_unit
-from stiffmap.common.tables.lines import ANGLE, plain
+from stiffmap.common.tables.lines import radians
 from stiffmap.common.tables.table import Table
 from stiffmap.common.units import unit_of
 from stiffmap.experiment.spreadsheet.answers import Meant
@@ -115,16 +114,12 @@ def read_dh(given: Table, units: Mapping[str, str], convention: str) -> list[DHR
     more = sheet.find(MORE)
     if more is not None and not {*sheet.columns[more]} <= NOTHING_MORE:
         sheet.fail(f"'{given.header[more]}' says more than theta, d, a and alpha, which are all that is read")
-    types = [*sheet.columns[at["type"]]] if "type" in at else [""] * len(sheet.lines)
-    sheet, types = _constants(sheet, at, [w.strip().lower() for w in types])
-    for name in ("theta", "alpha"):
-        sheet = _angles(sheet, at[name], units.get(name) or units.get("angle", ""))
+    sheet, types = _constants(sheet, at, units)
     m = Meant(units=dict(units), sheet=sheet)
     units_of = {n: m.unit(at[n], n, quantity=q).size for n, q in QUANTITIES.items()}
     numbers = {n: np.nan_to_num(_in_si(sheet, at[n], units_of[n], q)) for n, q in QUANTITIES.items()}
     if "type" not in at and any(types) and "" in types:
-        what = "no joint's coordinate, which the other rows have: leave out a frame that is fixed to the one before it"
-        sheet.fail(what, types.index(""))
+        sheet.fail("no joint's coordinate, which others have: leave a fixed frame out", types.index(""))
     count = len(sheet.lines)
     slides = [re.fullmatch(SLIDES, w) is not None for w in types]
     for i, w in enumerate(types):
@@ -143,9 +138,10 @@ def read_dh(given: Table, units: Mapping[str, str], convention: str) -> list[DHR
     return out
 
 
-def _constants(sheet: Table, at: Mapping[str, int], types: list[str]) -> tuple[Table, list[str]]:
-    """The table without the joints' coordinates, and the types: a joint whose type nobody says slides where its d is the coordinate."""
-    columns = list(sheet.columns)
+def _constants(sheet: Table, at: Mapping[str, int], units: Mapping[str, str]) -> tuple[Table, list[str]]:
+    """The table of numbers without the joints' coordinates, and the types: a joint whose type nobody says slides where its d is one."""
+    columns, header = list(sheet.columns), list(sheet.header)
+    types = [w.lower() for w in columns[at["type"]]] if "type" in at else [""] * len(sheet.lines)
     for name, symbol, sliding in (("theta", "theta|θ", False), ("d", "d", True)):
         cells = [*columns[at[name]]]
         for i, cell in enumerate(cells):
@@ -155,11 +151,18 @@ def _constants(sheet: Table, at: Mapping[str, int], types: list[str]) -> tuple[T
                 cells[i] = re.sub(r"^([+−–-]) +", r"\1", left) or "0"
                 types[i] = types[i] or ("p" if sliding else "r")
         columns[at[name]] = Cells.of(cells)
-    names = sheet.columns[at["name"]] if "name" in at else ()
-    first = [(i, int(found[0])) for i, w in enumerate(names) if (found := re.search(r"\d+", w))]
-    if falls := [i for (_, a), (i, b) in pairwise(first) if b < a]:
-        sheet.fail("expected joints in their order from the base to the tool", falls[0])
-    return replace(sheet, columns=tuple(columns)), types
+    first = [re.search(r"\d{1,9}", w) for w in sheet.columns[at["name"]]] if "name" in at else []
+    falls = np.diff([int(f[0]) if f else math.nan for f in first], prepend=math.nan) < 0
+    sheet.check(~falls, lambda i: "expected joints in their order from the base to the tool")
+    for name in ("theta", "alpha"):
+        cells = [*columns[at[name]]]
+        plain, own = split_unit(header[at[name]])
+        said = units.get(name) or own or units.get("angle", "rad")
+        angles = [radians(c) for c in cells]
+        if (unit := unit_of(said, "angle")) and angles.count(None) < len(angles):
+            cells = [c if a is None else repr(a / unit.size) for a, c in zip(angles, cells, strict=True)]
+            header[at[name]], columns[at[name]] = with_unit(plain, said), Cells.of(cells)
+    return replace(sheet, header=tuple(header), columns=tuple(columns)), types
 
 
 def _plain(cell: str) -> str:
@@ -167,24 +170,6 @@ def _plain(cell: str) -> str:
     text = unicodedata.normalize("NFKC", re.sub(r"</?su[bp]>|\*\*|[$`]", "", html.unescape(cell)))
     text = re.sub(r"\\d?frac *\{([^{}]*)\} *\{([^{}]*)\}", r"\1/\2", text)
     return re.sub(r"\\pi\b", "π", re.sub(r"\^ *\{? *\\circ *\}?", "°", text)).strip()
-
-
-def _angles(sheet: Table, column: int, unit: str) -> Table:
-    """The table with angles such as ``-π/2`` or ``90°`` as numbers, in the unit of the column or else in their own."""
-    cells = [*sheet.columns[column]]
-    found = [ANGLE.fullmatch(plain(c)) for c in cells]
-    name, own = split_unit(sheet.header[column])
-    said = unit or own or ("rad" if any(m and m[3] != "°" for m in found) else "deg")
-    size = unit_of(said, "angle")
-    if size is None or not any(found):
-        return sheet
-    for i, m in enumerate(found):
-        if m:
-            turn = math.pi / (180 if m[3] == "°" else 1) / float(m[4] or 1) / size.size
-            cells[i] = repr(turn * float(f"{m[1].strip()}{m[2] or 1}".replace(",", ".")))
-    columns, header = [*sheet.columns], [*sheet.header]
-    columns[column], header[column] = Cells.of(cells), with_unit(name, said)
-    return replace(sheet, header=tuple(header), columns=tuple(columns))
 
 
 def _limit(m: Meant, column: int | None, row: int, size: float, quantity: str) -> float:

@@ -16,8 +16,6 @@ from stiffmap.experiment.files.fields import READ, SEEN, quantity_of
 from stiffmap.experiment.spreadsheet.answers import Meant
 
 FOLDER = Path(__file__).parent / "instruments"
-NEAR = 0.1
-"""Share of the circle's radius by which radii of a trace may differ from it; deviations from it are far smaller."""
 KEYS = {"title", "quantity", "columns", "measured", "circle", "units"}
 WORDS = {"{commanded}": COMMANDED, "{measured}": MEASURED}
 """What stands for any word of that meaning in a mapping file."""
@@ -132,13 +130,11 @@ def _of_circle(m: Meant, instrument: Instrument) -> None:
         at[key] = found
     angles, deviation = (_si(m, i, key, instrument) for key, i in at.items())
     *centre, radius = (m.constants.pop(c) for c in CIRCLE)
-    head, raw = m.sheet.header[at["deviation"]], m.sheet.numbers(at["deviation"])
-    whole, plain = (abs(np.nanmedian(v) / radius - 1) < NEAR for v in (deviation, raw))
-    if plain and not whole and not m.written_unit(at["deviation"], "deviation"):
-        raise StiffmapError(f"{m.sheet.file}: '{head}' holds radii; say their unit: --unit deviation=mm")
-    if whole:
-        m.said.append(f"'{head}' holds radii: the deviation is what they have more than {radius:g} mm")
-        deviation = deviation - radius
+    i = at["deviation"]
+    radii = deviation if m.written_unit(i, "deviation") else m.sheet.numbers(i)  # in mm, as --set has it
+    if abs(np.nanmedian(radii) / radius - 1) < 0.1:  # deviations are far smaller
+        deviation = radii - radius
+        m.said.append(f"'{m.sheet.header[i]}' holds radii: the deviation is what is above {radius:g} mm")
     plane = instrument.circle["plane"]
     waves = {plane[0]: np.cos(angles), plane[1]: np.sin(angles)}
     made = {}

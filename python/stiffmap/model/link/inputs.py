@@ -120,8 +120,7 @@ def read_cases(path: str | Path) -> Floats:
     at = table.find(r"(load[ _-]?)?case|lc|id|nr\.?|no\.?|name|number")
     if at is not None and table.is_numeric(at):
         falls = np.diff(table.numbers(at), prepend=-np.inf) <= 0
-        wrong = f"'{table.header[at]}': expected cases in the order in which the field has them"
-        table.check(~falls, lambda i: wrong)
+        table.check(~falls, lambda i: f"'{table.header[at]}': expected cases in the order of the field")
     return np.stack([found[c][0] for c in WRENCH], axis=-1)
 
 

@@ -23,7 +23,7 @@ from stiffmap.ui.cli.output import show
 
 def command(
     context: typer.Context,
-    urdf: Path = argument("URDF file, or a table of Denavit and Hartenberg (.csv, .txt, .md, .tex, .xlsx, .ods)."),
+    urdf: Path = argument("URDF file, or a table of Denavit and Hartenberg (text, .md, .tex, .xlsx, .ods)."),
     sidecar: Path | None = option("YAML with what a URDF lacks: loops, motors, compliances."),
     output: Path | None = written("Machine file to write. [default: NAME.yaml]"),
     dh_convention: options.DhConvention = "standard",

@@ -77,7 +77,12 @@ def test_a_ball_bar_is_a_distance_from_its_centre(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("header", "size", "unit"),
-    [("angle [deg],Radius [mm]", 1.0, ""), ("Angle (deg),R (in)", 25.4, ""), ("phi,R", 10.0, "deviation=cm")],
+    [
+        ("angle [deg],Radius [mm]", 1.0, ""),
+        ("Angle (deg),R (in)", 25.4, ""),
+        ("phi,R", 10.0, "deviation=cm"),
+        ("Winkel,R", 1.0, ""),
+    ],
 )
 def test_radii_of_a_circle_are_no_deviations(header: str, size: float, unit: str, tmp_path: Path) -> None:
     circle = [f"--set={k}" for k in ("centre_x=0", "centre_y=420", "centre_z=0", "radius=50")]
@@ -86,14 +91,6 @@ def test_radii_of_a_circle_are_no_deviations(header: str, size: float, unit: str
     said = ["--unit", unit] if unit else []
     e = made(tmp_path, "ball-bar", text, *circle, *said, "--noise", "dd=0.0005")
     np.testing.assert_allclose(e.reading[:, -1], [1.5e-6, -2e-6, 0.25e-6], atol=1e-12)
-
-
-def test_radii_without_a_unit_are_no_micrometres(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "t.csv").write_text("angle,R\n0,50.001\n90,49.998\n", encoding="utf-8")
-    circle = [f"--set={k}" for k in ("centre_x=0", "centre_y=420", "centre_z=0", "radius=50")]
-    call = ["experiment", "new", str(tmp_path / "t.csv"), "--machine", "five-bar", "-o", str(tmp_path / "o")]
-    assert main([*call, "--instrument", "ball-bar", *circle]) == 2
-    assert "--unit deviation=mm" in capsys.readouterr().err
 
 
 def test_cycles_of_iso_9283_are_repeats(tmp_path: Path) -> None:

@@ -543,7 +543,7 @@ def test_cases_stand_in_the_order_of_the_field(tmp_path, name):
     rows = [f"{k}," + ",".join("1" if i == k else "0" for i in range(1, 7)) for k in range(1, 7)]
     assert read_cases(write(tmp_path, "c.csv", head + "\n".join(rows) + "\n")) == pytest.approx(np.eye(6))
     rows[2:4] = rows[3], rows[2]
-    with pytest.raises(StiffmapError, match=r"line 5.*order in which the field has them"):
+    with pytest.raises(StiffmapError, match=r"line 5.*in the order of the field"):
         read_cases(write(tmp_path, "c.csv", head + "\n".join(rows) + "\n"))
 
 
