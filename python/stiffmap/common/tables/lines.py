@@ -44,7 +44,7 @@ _PART = r"(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?"
 COMPLEX = re.compile(rf"\(?([+-]?{_PART})([+-])(?:[ij]({_PART})|({_PART})[ij])\)?", re.IGNORECASE)
 IN_PI = re.compile(r"(?i)([+−–-]? *)((?:\d+(?:\.\d+)?)?) *[*·]? *(?:(?:np|math)\.)?(?:π|pi)(?: */ *(\d+))?")
 LATEX = re.compile(r"(?m)^ *\\(?:hline|\w+rule)\b|\\\\(?:\[.*?\])? *(?:\\\w+)? *$|^.*\\(?:begin|end)\{.*$")
-"""What a row of LaTeX has beside its cells: rules before it or behind, the strokes at its end."""
+"""Rules before a row or behind it, and the strokes at its end."""
 FORTRAN = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)[dD][+-]?\d+")
 WITH_UNIT = re.compile(
     r"([+\-−–]?\d(?:[\d.,]|['’ ](?=\d))*(?:[eE][+-]?\d+)?)\s*((?:[^\W\d_]|[°\"']).{0,19})", re.DOTALL
