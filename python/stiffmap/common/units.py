@@ -112,8 +112,8 @@ def known(quantity: str | None = None) -> str:
 
 
 def name_and_unit(header: str) -> tuple[str, str]:
-    """``x [mm]`` is x in mm; an empty unit where none stands in brackets."""
-    match = re.fullmatch(r"\s*(.*?)\s*(?:[\[(]\s*([^\])]*?)\s*[\])])?\s*", header, re.DOTALL)
+    """``x [mm]`` is x in mm; an empty unit where none stands in brackets, as in joint[1]."""
+    match = re.fullmatch(r"(?s)\s*(.*?)\s*(?:(?!\b\[(?:\w+_)?\d+\])[\[(]\s*([^])]*?)\s*[])])?\s*", header)
     assert match is not None  # any text is a name
     return match[1], match[2] or ""
 

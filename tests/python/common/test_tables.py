@@ -145,6 +145,13 @@ def test_a_row_whose_cells_may_be_those_of_other_columns(text: str, words: str, 
         read_sheet(tmp_path / "t.txt")
 
 
+@pytest.mark.parametrize("head", ["Force x Force y", "dx mean   dy mean", "X cmd\tY cmd"])
+def test_names_with_blanks_between_blanks_are_said(head: str, tmp_path: Path) -> None:
+    (tmp_path / "t.txt").write_text(f"{head}\n1.5 2.5\n3.5 4.5\n")
+    with pytest.raises(FileError, match=r"occurs twice \(names with blanks"):
+        read_sheet(tmp_path / "t.txt")
+
+
 @pytest.mark.parametrize("text", [ROWS, ROWS.replace(",", " "), ROWS.replace(",", ";")])
 def test_words_behind_a_row_are_said(text: str, tmp_path: Path) -> None:
     between = next(s for s in " ;," if s in text.splitlines()[1])

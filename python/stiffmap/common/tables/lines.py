@@ -22,7 +22,7 @@ from stiffmap.common.units import unit_of
 Lines = Callable[[], Iterable[tuple[int, list[str]]]]
 """Number and cells of each line, from the first one whenever it is called."""
 COMMENTS = ("#", "%", "//")
-SEPARATORS = ";\t|, "
+SEPARATORS = ";\t|,& "
 BLANKS = re.compile(r"[ \t]+(?![\[(])")
 """Between cells, but not before a unit in brackets."""
 MARKED = re.compile(r"^(#|%|//)\s+")
@@ -42,6 +42,9 @@ GROUPED = re.compile(r"[+-]?\d{1,3}(?:(['’ ])\d{3}(?:\1\d{3})*(?:\.\d+)?|(?:,\
 """``1'000``, ``1 000.5``, ``1,000.5``."""
 _PART = r"(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?"
 COMPLEX = re.compile(rf"\(?([+-]?{_PART})([+-])(?:[ij]({_PART})|({_PART})[ij])\)?", re.IGNORECASE)
+IN_PI = re.compile(r"(?i)([+−–-]? *)((?:\d+(?:\.\d+)?)?) *[*·]? *(?:(?:np|math)\.)?(?:π|pi)(?: */ *(\d+))?")
+LATEX = re.compile(r"(?m)^ *\\(?:hline|\w+rule)\b|\\\\(?:\[.*?\])? *(?:\\\w+)? *$|^.*\\(?:begin|end)\{.*$")
+"""Rules before a row or behind it, and the strokes at its end."""
 FORTRAN = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)[dD][+-]?\d+")
 WITH_UNIT = re.compile(
     r"([+\-−–]?\d(?:[\d.,]|['’ ](?=\d))*(?:[eE][+-]?\d+)?)\s*((?:[^\W\d_]|[°\"']).{0,19})", re.DOTALL
@@ -216,10 +219,20 @@ def complex_number(cell: str) -> complex | None:
     return None if match is None else complex(float(match[1]), float(match[2] + (match[3] or match[4])))
 
 
+def radians(cell: str) -> float | None:
+    """The angle in a cell such as ``-π/2`` or ``90°``; None for what is none of them."""
+    if match := IN_PI.fullmatch(cell):
+        return math.pi * float(plain(f"{match[1].strip()}{match[2] or 1}")) / float(match[3] or 1)
+    degrees = number(cell[:-1].replace(" ", ""), Spelling("," in cell)) if cell.endswith("°") else None
+    return None if degrees is None else math.radians(degrees)
+
+
 def is_finite(cell: str, spelling: Spelling) -> bool:
     """Whether a cell holds a number."""
     value = number(cell, spelling)
-    return complex_number(cell) is not None if value is None else math.isfinite(value)
+    if value is None:
+        return complex_number(cell) is not None or IN_PI.fullmatch(cell.strip()) is not None
+    return math.isfinite(value)
 
 
 def is_data(cells: list[str], spelling: Spelling) -> bool:
@@ -230,6 +243,7 @@ def is_data(cells: list[str], spelling: Spelling) -> bool:
 
 def _text(path: Path) -> tuple[str, Lines, str]:
     text = text_of(path)
+    text = LATEX.sub("", text) if "\\begin{" in text else text
     lines_ = (line for line in io.StringIO(text) if line.strip() and not line.strip().startswith(COMMENTS))
     sample = list(islice(lines_, SAMPLE))
     best = max(SEPARATORS, key=lambda s: _numbers_between(s, sample))  # the first of equals

@@ -108,7 +108,8 @@ def read_sheet(path: Path, sheet: str | None = None, layout: Layout = PLAIN) -> 
     number_, header = found
     names = _checked(header, str(path), number_)
     if not layout.repeated:
-        refuse_twice(names, str(path), number_, "" if layout.strict else f"; name the columns: {WAY}")
+        way = " (names with blanks in them?)" if separator == " " else ""
+        refuse_twice(names, str(path), number_, way + ("" if layout.strict else f"; name the columns: {WAY}"))
     width = len(names)
     said = [*header, *(c.strip() for _, cells in above for c in cells)]
     aside = [f"row {n}, of numbers above the header" for n, _ in begun[:-1]]

@@ -7,6 +7,7 @@ to the joint's coordinate, or d for a joint that slides.
 
 from __future__ import annotations
 
+import html
 import math
 import re
 import unicodedata
@@ -19,7 +20,10 @@ from scipy.spatial.transform import Rotation
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.tables.cells import Cells
+from stiffmap.common.tables.header import split_unit, with_unit
+from stiffmap.common.tables.lines import radians
 from stiffmap.common.tables.table import Table
+from stiffmap.common.units import unit_of
 from stiffmap.experiment.spreadsheet.answers import Meant
 from stiffmap.experiment.spreadsheet.joints import MOST_TURNS
 from stiffmap.model.description import Drive, Element, Joint, Leg, MachineDescription, Offset, Pose
@@ -81,11 +85,12 @@ def read_dh(given: Table, units: Mapping[str, str], convention: str) -> list[DHR
 
     Raises StiffmapError that names the column which is missing or has no unit, or the columns of another convention.
     """
-    header = [re.sub(r"[\\$]", "", unicodedata.normalize("NFKC", h)) for h in given.header]
-    sheet = replace(given, header=tuple(INDEX.sub(r"\1", h) for h in header))
+    header = [_plain(h).replace("\\", "") for h in given.header]
+    cells = tuple(Cells.of(map(_plain, c)) for c in given.columns)
+    sheet = replace(given, header=tuple(INDEX.sub(r"\1", h) for h in header), columns=cells)
     columns = {n: sheet.find(pattern) for n, pattern in (NUMBERS | WORDS).items()}
     at = {n: i for n, i in columns.items() if i is not None}
-    before = [i for i, h in enumerate(header) if h[0] in "aAαΑ" and (found := INDEX.match(h)) and found[2]]
+    before = [i for i, h in enumerate(header) if h[:1] in "aAαΑ" and (found := INDEX.match(h)) and found[2]]
     if "a" not in at and (r := sheet.find("r")) is not None and len({*NUMBERS} & {*at}) == 3:
         before += _with_r(at, r, sheet)
     marks = [given.header[i] for i in before] or [w for w in given.above if MODIFIED.search(w)]
@@ -109,11 +114,12 @@ def read_dh(given: Table, units: Mapping[str, str], convention: str) -> list[DHR
     more = sheet.find(MORE)
     if more is not None and not {*sheet.columns[more]} <= NOTHING_MORE:
         sheet.fail(f"'{given.header[more]}' says more than theta, d, a and alpha, which are all that is read")
-    types = [*sheet.columns[at["type"]]] if "type" in at else [""] * len(sheet.lines)
-    sheet, types = _constants(sheet, at, [w.strip().lower() for w in types])
+    sheet, types = _constants(sheet, at, units)
     m = Meant(units=dict(units), sheet=sheet)
     units_of = {n: m.unit(at[n], n, quantity=q).size for n, q in QUANTITIES.items()}
     numbers = {n: np.nan_to_num(_in_si(sheet, at[n], units_of[n], q)) for n, q in QUANTITIES.items()}
+    if "type" not in at and any(types) and "" in types:
+        sheet.fail("no joint's coordinate, which others have: leave a fixed frame out", types.index(""))
     count = len(sheet.lines)
     slides = [re.fullmatch(SLIDES, w) is not None for w in types]
     for i, w in enumerate(types):
@@ -132,12 +138,12 @@ def read_dh(given: Table, units: Mapping[str, str], convention: str) -> list[DHR
     return out
 
 
-def _constants(sheet: Table, at: Mapping[str, int], types: list[str]) -> tuple[Table, list[str]]:
-    """The table without the joints' coordinates, and the types: a joint whose type nobody says slides where its d is the coordinate."""
-    columns = list(sheet.columns)
+def _constants(sheet: Table, at: Mapping[str, int], units: Mapping[str, str]) -> tuple[Table, list[str]]:
+    """The table of numbers without the joints' coordinates, and the types: a joint whose type nobody says slides where its d is one."""
+    columns, header = list(sheet.columns), list(sheet.header)
+    types = [w.lower() for w in columns[at["type"]]] if "type" in at else [""] * len(sheet.lines)
     for name, symbol, sliding in (("theta", "theta|θ", False), ("d", "d", True)):
-        plain = (unicodedata.normalize("NFKC", c) for c in columns[at[name]])  # θ₁ is θ1
-        cells = [c.replace("$", "").strip() for c in plain]
+        cells = [*columns[at[name]]]
         for i, cell in enumerate(cells):
             left = re.sub(VARIABLE.format(symbol), "", cell, count=1).strip()
             of_it = not types[i] or sliding == (re.fullmatch(SLIDES, types[i]) is not None)
@@ -145,7 +151,25 @@ def _constants(sheet: Table, at: Mapping[str, int], types: list[str]) -> tuple[T
                 cells[i] = re.sub(r"^([+−–-]) +", r"\1", left) or "0"
                 types[i] = types[i] or ("p" if sliding else "r")
         columns[at[name]] = Cells.of(cells)
-    return replace(sheet, columns=tuple(columns)), types
+    first = [re.search(r"\d{1,9}", w) for w in sheet.columns[at["name"]]] if "name" in at else []
+    falls = np.diff([int(f[0]) if f else math.nan for f in first], prepend=math.nan) < 0
+    sheet.check(~falls, lambda i: "expected joints in their order from the base to the tool")
+    for name in ("theta", "alpha"):
+        cells = [*columns[at[name]]]
+        plain, own = split_unit(header[at[name]])
+        said = units.get(name) or own or units.get("angle", "rad")
+        angles = [radians(c) for c in cells]
+        if (unit := unit_of(said, "angle")) and angles.count(None) < len(angles):
+            cells = [c if a is None else repr(a / unit.size) for a, c in zip(angles, cells, strict=True)]
+            header[at[name]], columns[at[name]] = with_unit(plain, said), Cells.of(cells)
+    return replace(sheet, header=tuple(header), columns=tuple(columns)), types
+
+
+def _plain(cell: str) -> str:
+    """Without the marks of Markdown, HTML and LaTeX: ``&theta;<sub>1</sub>`` and ``$\\theta_1$`` are the angle of a joint."""
+    text = unicodedata.normalize("NFKC", re.sub(r"</?su[bp]>|\*\*|[$`]", "", html.unescape(cell)))
+    text = re.sub(r"\\d?frac *\{([^{}]*)\} *\{([^{}]*)\}", r"\1/\2", text)
+    return re.sub(r"\\pi\b", "π", re.sub(r"\^ *\{? *\\circ *\}?", "°", text)).strip()
 
 
 def _limit(m: Meant, column: int | None, row: int, size: float, quantity: str) -> float:

@@ -130,6 +130,11 @@ def _of_circle(m: Meant, instrument: Instrument) -> None:
         at[key] = found
     angles, deviation = (_si(m, i, key, instrument) for key, i in at.items())
     *centre, radius = (m.constants.pop(c) for c in CIRCLE)
+    i = at["deviation"]
+    radii = deviation if m.written_unit(i, "deviation") else m.sheet.numbers(i)  # in mm, as --set has it
+    if abs(np.nanmedian(radii) / radius - 1) < 0.1:  # deviations are far smaller
+        deviation = radii - radius
+        m.said.append(f"'{m.sheet.header[i]}' holds radii: the deviation is what is above {radius:g} mm")
     plane = instrument.circle["plane"]
     waves = {plane[0]: np.cos(angles), plane[1]: np.sin(angles)}
     made = {}

@@ -18,7 +18,8 @@ from stiffmap.experiment.spreadsheet.guess import READINGS, Column
 from stiffmap.experiment.spreadsheet.together import quaternion
 from stiffmap.solve.machine import Machine
 
-NUMBERED = r"{}(joint|axis|achse|gelenk|theta|q|j|a)[ _.-]?{}"
+NUMBERED = r"(?!.*(?:veloc|accel|effort|torque|current))(?:(?:.*[/.\[])?{}(?:joint|axis|achse|gelenk|theta|θ|关节|q|j|a)|.*[/.]position)[ _.-]?\[?{}\]?(?:[/._](?:position|pos))?"
+"""Also as logs have them: ``/joint_states/joint_1/position``, ``field.position0``, ``position[0]`` of a message."""
 MEASURED = r"([xyz])[ _.-]?meas(?:ured|\.)?"
 """A header of a measured position, next to joints."""
 MOST_TURNS = 4.0 * math.pi
@@ -92,6 +93,8 @@ def _find(m: Meant, name: str, number: str, header: str | None) -> int | None:
     turns = quaternion(m.sheet)
     found = (m.sheet.find(pattern, turns) for pattern in (*own, number))
     index = next((i for i in found if i is not None), None)
+    if index is not None and m.sheet.find(number, (*turns, index)) is not None:
+        m.ask_column(f"which of two columns commands {name}? Say --map {name}='HEADER'", name)
     if index is None and (same := _set(m, *own, number)):
         index = len(m.sheet.header)
         m.sheet = m.sheet.with_column(same[0], np.full(len(m.sheet), m.spend(same[0])))

@@ -17,6 +17,7 @@ from stiffmap.common.tables.named import Known, read_named
 from stiffmap.common.tables.workbook import TABLES
 from stiffmap.common.texts import lines_of
 from stiffmap.machining.toolpath.gcode.load import load_gcode
+from stiffmap.machining.toolpath.gcode.words import OWN_LANGUAGE
 from stiffmap.machining.toolpath.outlines import outline, outline_names
 from stiffmap.machining.toolpath.path import Toolpath, path_of
 
@@ -62,7 +63,7 @@ def load_path(
     if suffix in TABLES:
         return read_points(path)
     known = ", ".join((*GCODE, *CL, *TABLES))
-    raise FileError(f"unknown kind of path {suffix!r}; known: {known}", file=str(path))
+    raise FileError(f"unknown kind of path {suffix!r}; known: {known}; {OWN_LANGUAGE}", file=str(path))
 
 
 COLUMNS = {

@@ -117,6 +117,10 @@ def read_cases(path: str | Path) -> Floats:
             file=table.file,
             line=table.top,
         )
+    at = table.find(r"(load[^a-z]?)?case|lc|id|nr\.?|no\.?|name|number")
+    if at is not None and table.is_numeric(at):
+        falls = np.diff(table.numbers(at), prepend=-np.inf) <= 0
+        table.check(~falls, lambda i: f"'{table.header[at]}': expected cases in the order of the field")
     return np.stack([found[c][0] for c in WRENCH], axis=-1)
 
 

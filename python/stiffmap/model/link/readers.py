@@ -65,6 +65,8 @@ def known_columns(
         raise FileError("no such file", file=str(path))
     layout = Layout(lambda name: name.lower() in units, strict=True, repeated=True)
     sheet = read_sheet(Path(path), None, layout)
+    header = (re.sub(r"(?i)^(u[xyz])[ _]?\d+\b", r"\1", h) for h in sheet.header)  # ux1
+    sheet = replace(sheet, header=tuple(header))
     found: dict[str, list[Floats]] = {name: [] for name in units}
     for head, cells, name in zip(sheet.header, sheet.columns, map(str.lower, sheet.names), strict=True):
         if name in units:

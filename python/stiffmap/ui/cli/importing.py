@@ -23,7 +23,7 @@ from stiffmap.ui.cli.output import show
 
 def command(
     context: typer.Context,
-    urdf: Path = argument("URDF file, or a table of Denavit and Hartenberg (.csv, .txt, .md, .xlsx, .ods)."),
+    urdf: Path = argument("URDF file, or a table of Denavit and Hartenberg (text, .md, .tex, .xlsx, .ods)."),
     sidecar: Path | None = option("YAML with what a URDF lacks: loops, motors, compliances."),
     output: Path | None = written("Machine file to write. [default: NAME.yaml]"),
     dh_convention: options.DhConvention = "standard",
@@ -49,7 +49,7 @@ def command(
 
       [cyan]stiffmap import arm.urdf --tip tool -o tool.yaml[/cyan]
     """
-    table = urdf.suffix.lower() in (*TABLES, ".txt", ".md")
+    table = urdf.suffix.lower() in (*TABLES, ".txt", ".md", ".tex")
     expected, found, others = (
         ("URDF", "table", "sidecar tip") if table else ("table", "URDF", "unit dh_convention")
     )

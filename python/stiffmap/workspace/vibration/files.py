@@ -84,6 +84,10 @@ def _table(path: Path) -> MeasuredResponse:
             t.values[n], t.units[n] = getattr(np.array(parts, complex), n), t.units["response"]
     form = next((pair for pair in FORMS if {*pair, "frequency"} == {*t.values} - {"coherence"}), ("", ""))
     unit = t.units.get(form[0], "")
+    if form == FORMS[1] and (level := re.fullmatch(r"(?i)db(?: re:?)? ?(?:1 ?)?(.*)", unit)):
+        unit = level[1] or t.fail("expected what 0 dB is, as in [dB re 1 m/N]", "magnitude")
+        t.values["magnitude"] = 10 ** (t.values["magnitude"] / 20)
+    t.check("magnitude", lambda v: v >= 0, "a size of zero or more ([dB re 1 m/N] where it is in decibels)")
     known = response_unit(unit)
     kind = None if known is None else _derivatives(known)
     if known is None or kind is None or t.units.get("imag", unit) != unit:

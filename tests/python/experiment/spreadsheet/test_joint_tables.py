@@ -425,3 +425,84 @@ def test_tables_of_markdown_are_imported(text: str, theta: float, tmp_path: Path
     assert [r.theta for r in read_dh(read_sheet(tmp_path / "arm.md"), {}, "standard")] == pytest.approx(
         [math.radians(theta), 0.0]
     )
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("dh.csv", "joint,theta,d [mm],a [mm],alpha\n1,0,300,0,pi/2\n2,-π/2,0,400,0\n3,30°,0,0,-90°\n"),
+        ("dh.csv", "joint;theta [deg];d [mm];a [mm];alpha [rad]\n1;0;300;0;1,5707963268\n2;-np.pi/2;0;400;0\n3;30;0;0;-2*pi/4\n"),
+        ("dh.md", "| Link | &theta;<sub>i</sub> | d<sub>i</sub> (mm) | a<sub>i</sub> (mm) | α<sub>i</sub> |\n|-|-|-|-|-|\n"
+         "| 1 | θ<sub>1</sub> | 300 | 0 | π/2 |\n| 2 | θ<sub>2</sub> − π/2 | 0 | 400 | 0 |\n| 3 | **θ₃ + π/6** | 0 | 0 | −π/2 |\n"),
+        ("dh.tex", "\\begin{tabular}{|c|c|c|c|c|}\n\\hline\n$i$ & $\\theta_i$ & $d_i$ [mm] & $a_i$ [mm] & $\\alpha_i$ \\\\ \\hline\n"
+         "1 & $\\theta_1$ & 300 & 0 & $\\frac{\\pi}{2}$ \\\\\n2 & $\\theta_2-\\pi/2$ & 0 & 400 & 0 \\\\[2pt]\n\\midrule 3 & $\\theta_3 + 30^\\circ$ & 0 & 0 & $-90^{\\circ}$ \\\\ \\hline\n\\end{tabular}\n"),
+    ],
+)  # fmt: skip
+def test_angles_of_parts_of_pi_and_marks_of_texts(name: str, text: str, tmp_path: Path) -> None:
+    file = write(tmp_path, name, text)
+    assert main(["import", file, "-o", str(tmp_path / "arm.yaml")]) == 0
+    rows = read_dh(read_sheet(Path(file)), {}, "standard")
+    assert [math.degrees(r.theta) for r in rows] == pytest.approx([0, -90, 30])
+    assert [math.degrees(r.alpha) for r in rows] == pytest.approx([90, 0, -90])
+    assert [(r.d, r.a) for r in rows] == [(0.3, 0), (0, 0.4), (0, 0)]
+
+
+@pytest.mark.parametrize(
+    ("rows", "words"),
+    [
+        ("1,0,0\n3,0,0\n2,0,0", "line 4: expected joints in their order"),
+        ("joint_2,0,0\njoint_1,0,0", "line 3: expected joints in their order"),
+        ("1->2,0,0\n0->1,0,0", "line 3: expected joints in their order"),
+        ("1,q1,0\n2,q2 + 90,0\ntool,0,100", "line 4: no joint's coordinate"),
+        ("1,0,d1\n2,θ2,0\nEE,90,100", "line 4: no joint's coordinate"),
+        ("base,0,200\n1,q1,0", "line 2: no joint's coordinate"),
+    ],
+)
+def test_rows_that_are_no_joints_one_behind_the_other_are_refused(
+    rows: str, words: str, tmp_path: Path
+) -> None:
+    lines = "\n".join(f"{r},10,0" for r in rows.split("\n"))
+    file = write(tmp_path, "dh.csv", f"joint,theta [deg],d [mm],a [mm],alpha [deg]\n{lines}\n")
+    with pytest.raises(StiffmapError, match=words):
+        read_dh(read_sheet(Path(file)), {}, "standard")
+
+
+@pytest.mark.parametrize(
+    "form",
+    [
+        "/joint_states/joint_{}/position", "field.position{}", "joint_states.position.joint_{}", ".position[{}]",
+        "joint[{}]", "θ{}", "/states/position[joint_{}]",
+    ],
+)  # fmt: skip
+def test_joints_have_the_names_that_logs_give_them(form: str, tmp_path: Path) -> None:
+    first = int("osition" in form and "joint_" not in form) ^ 1  # an array begins at 0
+    rows = [f"{k},{0.1 * k + 0.05},{-0.2 * k},{0.01 * k},{k},2,3,9" for k in range(3)]
+    names = [form.format(k + first) for k in range(3)]
+    head = ",".join(
+        [
+            "t",
+            *names,
+            "px [mm]",
+            "py [mm]",
+            "pz [mm]",
+            form.format(1).replace("position", "velocity") if "position" in form else "more",
+        ]
+    )
+    (tmp_path / "t.csv").write_text("\n".join([head, *rows]) + "\n", encoding="utf-8")
+    write(tmp_path, "dh.csv", SCARA)
+    made = sm.experiment_from_table(
+        None, tmp_path / "t.csv", tmp_path / "o", dh=tmp_path / "dh.csv", units={"angle": "rad", "length": "m"}, noise={"px": 0.1, "py": 0.1, "pz": 0.1}
+    )  # fmt: skip
+    expected = [[0.1 * k + 0.05, -0.2 * k, 0.01 * k] for k in range(3)]
+    np.testing.assert_allclose(made.experiment.command, expected, atol=1e-12)
+
+
+def test_two_logs_of_one_joint_are_asked_for(tmp_path: Path) -> None:
+    write(tmp_path, "dh.csv", SCARA)
+    head = ",".join(f"/{who}/joint_{k}/position" for who in ("target", "state") for k in (1, 2, 3))
+    (tmp_path / "t.csv").write_text(f"{head},px [mm]\n1,2,3,1,2,3,4\n2,3,4,1,2,3,5\n")
+    units, noise = {"angle": "rad", "length": "m"}, {"px": 0.1}
+    with pytest.raises(StiffmapError, match=r"which of two columns commands arm\.joint_1\?"):
+        sm.experiment_from_table(
+            None, tmp_path / "t.csv", tmp_path / "o", dh=tmp_path / "dh.csv", units=units, noise=noise
+        )

@@ -192,3 +192,21 @@ def test_across_a_curve_that_dives_is_its_own_side(downwards: bool, tmp_path: Pa
     np.testing.assert_allclose(
         np.abs(points.normal[on_arc]), np.tile([0.0, 1.0, 0.0], (on_arc.sum(), 1)), atol=1e-9
     )
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("p.h", "BEGIN PGM ONE MM\n"),
+        ("p.nc", "%\n12 L X+5 Y-2 R0 FMAX M3\n"),
+        ("p.mpf", "N10 G90 G54\nN20 G21 G1 X=IC(5) F500\n"),
+        ("p.src", "DEF part( )\nPTP {A1 0, A2 -90}\n"),
+        ("p.nc", "MODULE Part\n  MoveL p1, v100, fine, tool0;\n"),
+    ],
+)
+def test_programs_in_a_language_of_a_controller_are_to_be_exported(
+    name: str, text: str, tmp_path: Path
+) -> None:
+    (tmp_path / name).write_text(text)
+    with pytest.raises(FileError, match=r"of Heidenhain, KRL, RAPID.*, export G-code \(ISO\), APT or points"):
+        load_path(tmp_path / name)

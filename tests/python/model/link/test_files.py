@@ -535,3 +535,23 @@ def test_short_rows_of_an_frd(tmp_path):
     binary = re.sub(r"(2C +10)\n", rf"\1{' ' * 37}2\n", frd_text())
     with pytest.raises(StiffmapError, match=r"a\.frd: expected ASCII, found a binary \.frd"):
         read_frd(write(tmp_path, "a.frd", binary))
+
+
+@pytest.mark.parametrize("name", ["case", "Load case", "No."])
+def test_cases_stand_in_the_order_of_the_field(tmp_path, name):
+    head = f"{name},fx [N],fy [N],fz [N],mx [N*m],my [N*m],mz [N*m]\n"
+    rows = [f"{k}," + ",".join("1" if i == k else "0" for i in range(1, 7)) for k in range(1, 7)]
+    assert read_cases(write(tmp_path, "c.csv", head + "\n".join(rows) + "\n")) == pytest.approx(np.eye(6))
+    rows[2:4] = rows[3], rows[2]
+    with pytest.raises(StiffmapError, match=r"line 5.*in the order of the field"):
+        read_cases(write(tmp_path, "c.csv", head + "\n".join(rows) + "\n"))
+
+
+@pytest.mark.parametrize("between", ["", "_", " "])
+def test_displacements_may_be_numbered_by_their_case(tmp_path, between):
+    text = csv_text()
+    for a in "xyz":
+        for k in range(1, 7):
+            text = text.replace(f",u{a} [", f",u{a}{between}{k} [", 1)
+    points, fields = read_field(write(tmp_path, "f.csv", text))
+    assert points == pytest.approx(POINTS) and fields == pytest.approx(U)

@@ -17,6 +17,7 @@ _REFUSED = (
     ("#", "parameters (#) are not read: expand them in the program that wrote the file"),
     ("[", "expressions in brackets are not read: write numbers"),
 )
+OWN_LANGUAGE = "of Heidenhain, KRL, RAPID, Siemens's words (X=IC(5)) and the like, export G-code (ISO), APT or points (.csv)"
 LARGEST = 1e9
 LONGEST = 10_000
 """Characters of a line."""
@@ -84,7 +85,8 @@ def read_block(text: str, file: str, number: int) -> ProgramBlock:
     parts = _WORD.split(line)
     if any(parts[::3]):
         wrong = next(k for k, between in enumerate(parts[::3]) if between)
-        fail(file, number, f"expected words such as X12.5, found {''.join(parts[3 * wrong :])[:30]!r}")
+        found = "".join(parts[3 * wrong :])[:30]
+        fail(file, number, f"expected words such as X12.5, found {found!r}; {OWN_LANGUAGE}")
     words = tuple(zip(parts[1::3], map(float, parts[2::3]), strict=True))
     if "N" in line[1:] or line.startswith("N-"):
         fail(file, number, f"N: expected the line's number at its beginning, found {line[:40]!r}")
