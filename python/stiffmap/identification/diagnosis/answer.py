@@ -60,7 +60,7 @@ def answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, cross
 
     models, v, notes = _models(predictor, found, v, given(fit))
     best = models.get(CORRECTED)
-    if best and (more := with_travel(fit)) is not fit:
+    if best and (more := with_travel(fit, anew=False)) is not fit:
         models[CORRECTED] = along_travel(best, given(more))
     listed = stands_out(columns, fit, found.suspects, models.values())
     clock.say("readings that no fit saw")
@@ -131,9 +131,8 @@ def _models(
     out: dict[str, Corrected] = {}
     plain = found.search.calibrated
     if v.named and plain is not None:
-        own = readings(
-            predictor, found.uncertain, found.columns, with_travel(plain), found.noise.sigma, found.suspects
-        )
+        plain = with_travel(plain, anew=True)  # as a calibration has it
+        own = readings(predictor, found.uncertain, found.columns, plain, found.noise.sigma, found.suspects)
         if len(own.spread):
             out[CALIBRATED] = corrected(own, ())
     while v.named or len(given.spread):

@@ -37,7 +37,9 @@ from stiffmap.identification.inference.sizes import of_size
 STEPS, LARGEST_STEP, ENOUGH = 30, 2.0, 0.01
 """Newton steps, their length in ln variance, and the gain of evidence that ends them."""
 WEIGHINGS = 40
-"""Of heavy tails, at most, each with a Newton step."""
+"""Of heavy tails, at most, each followed by a few Newton steps."""
+CATCHES_UP = 10.0
+"""Evidence, ln, that heavy tails may gain over none by an effect more; effort only."""
 NOTHING = 1e-6
 """Weight of a reading that stands alone, to begin with."""
 WEIGHED, REACH = 0.1, 10.0
@@ -68,6 +70,8 @@ class Fit:
     """ln N(r | 0, V), with the bound of heavy tails."""
     score: float
     """Evidence: likelihood, priors, and the price of the amplitudes (Laplace)."""
+    lighter: float = 0.0
+    """How much likelier than with heavy tails, ln; 0 where none were tried."""
     gain: dict[int, Floats] = field(default_factory=dict)
     """What places would add to the evidence, as far as it was asked for: by the place's `id`, (shapes,)."""
 
@@ -120,6 +124,7 @@ def fitted(
     parts: Sequence[Part],
     start: Mapping[str, float] | None = None,
     weights: Floats | None = None,
+    lighter: float = 0.0,
 ) -> Fit:
     """The amplitudes of the best evidence; heavy tails where a reading stands out and the bound is better without doubt. A reading
     that is far off may be all that a gap explains, so those that stand alone of a robust fit begin with no weight, and
@@ -129,6 +134,8 @@ def fitted(
         ln variances to begin with, by the name of the part; others begin small.
     weights
         (N,) of heavy tails of a fit that this one goes on from: no others are tried.
+    lighter
+        How much likelier that fit was than with heavy tails, ln; none are tried where one effect more can hardly change that.
     """
     given = start or {}
     first = np.array([given.get(NOISE, 0.0), *(given.get(p.name, BEGIN) for p in parts)])
@@ -136,6 +143,8 @@ def fitted(
     if weights is not None and np.any(weights != 1.0):
         heavy = _optimum(columns, tuple(parts), first, weights, heavy=True, beat=light.score)
         return max(light, heavy, key=lambda f: f.score)
+    if lighter > CATCHES_UP:
+        return replace(light, lighter=lighter - CATCHES_UP)
     typical, slips = _standing_out(light)
     begun = np.array([2.0 * np.log(typical), *first[1:]])  # what sank may rise
     starts = [(begun, slips)]
@@ -144,12 +153,12 @@ def fitted(
         starts.append((quiet, _standing_out(evaluated(columns, parts, quiet, light.weights))[1]))
     if columns.alone.any():
         starts.append((begun, np.where(columns.alone, NOTHING, 1.0)))
-    best = light
+    best, likeliest = light, -np.inf
     for t, w in starts:
         if w is not None:
             heavy = _optimum(columns, tuple(parts), t, w, heavy=True, beat=best.score)
-            best = max(best, heavy, key=lambda f: f.score)
-    return best
+            best, likeliest = max(best, heavy, key=lambda f: f.score), max(likeliest, heavy.score)
+    return replace(best, lighter=best.score - likeliest) if np.isfinite(likeliest) else best
 
 
 def _standing_out(fit: Fit) -> tuple[float, Floats | None]:
@@ -163,7 +172,8 @@ def _standing_out(fit: Fit) -> tuple[float, Floats | None]:
 def refitted(fit: Fit, residual: Floats) -> Fit:
     """The same parts for another residual (m,): from the amplitudes of a fit, with heavy tails where it has them."""
     columns = replace(fit.columns, residual=residual)
-    return _optimum(columns, fit.parts, fit.t, fit.weights, heavy=bool(np.any(fit.weights != 1.0)))
+    found = _optimum(columns, fit.parts, fit.t, fit.weights, heavy=bool(np.any(fit.weights != 1.0)))
+    return replace(found, lighter=fit.lighter)
 
 
 def _heavy(fit: Fit, mean: Floats, sd: Floats) -> Floats:
@@ -314,19 +324,22 @@ def _optimum(
     heavy: bool = False,
     beat: float = -np.inf,
 ) -> Fit:
-    """Damped Newton steps on ln variances; `heavy`: once they gain little, further ones, each together with the weights of heavy tails at
-    the posterior before it, which by itself never makes the bound less, as long as the evidence to `beat` is within their reach."""
-    damping, noise, weighing = SHRINK, columns.spared.of_noise(1.0 / weights), False
+    """Damped Newton steps on ln variances; `heavy`: then further ones, each together with the weights of heavy tails at the posterior
+    before it, which by itself never makes the bound less, as long as the evidence to `beat` is within their reach."""
+    if heavy:
+        begun = _optimum(columns, parts, t, weights)
+        t, weights = begun.t, _heavy(begun, *noise_part(begun))
+    damping, noise = SHRINK, columns.spared.of_noise(1.0 / weights)
     most = np.array([np.inf, *(p.most for p in parts)])
     t = np.minimum(t, most)
     fit, along = _evaluate(columns, parts, t, weights, noise)
     gradient, information = None, _information(fit, along)
-    for _ in range(STEPS + heavy * WEIGHINGS):
+    for _ in range(WEIGHINGS if heavy else STEPS):
         if gradient is None:
             inverse = fit.inverse()
             at_readings = columns.spared.at_readings(inverse)
             gradient = _gradient(fit, along, inverse, at_readings)
-            if weighing:
+            if heavy:
                 weights = _heavy(fit, *noise_part(fit, at_readings))
                 noise = columns.spared.of_noise(1.0 / weights)
         scale = np.maximum(np.diag(information), 1e-2)
@@ -341,16 +354,12 @@ def _optimum(
         gain = moved.score - fit.score
         if gain < -1e-9:
             damping *= 8.0
-            if damping <= 1e6:
-                continue
-        else:
-            fit, along, gradient = moved, along_there, None
-            information = _information(fit, along)
-            damping = max(damping / 4.0, 1e-3)
-        if weighing and fit.score + REACH * gain < beat:
-            break
-        if gain < (WEIGHED if heavy else ENOUGH):
-            if weighing == heavy:
+            if damping > 1e6:
                 break
-            weighing, gradient, damping = True, None, SHRINK
+            continue
+        fit, along, gradient = moved, along_there, None
+        information = _information(fit, along)
+        damping = max(damping / 4.0, 1e-3)
+        if gain < (WEIGHED if heavy else ENOUGH) or fit.score + REACH * gain < beat:
+            break
     return _priced(fit, information)

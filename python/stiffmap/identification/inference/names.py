@@ -23,6 +23,7 @@ from stiffmap.identification.inference.world import (
     Model,
     Predict,
     World,
+    amplitudes,
     best_shape,
     largest_gain,
 )
@@ -101,14 +102,15 @@ def _with_rivals(model: Model, searches: Sequence[World], found: Mapping[str, Mo
     return Search(model, own.null, tuple(odds for odds, _ in rivals), near, instead)
 
 
-def with_travel(fit: Fit) -> Fit:
-    """The fit where drives may also err along their travel in any smooth way; the same fit if that is no likelier."""
-    more = Parts(fit.columns).travel
+def with_travel(fit: Fit, *, anew: bool) -> Fit:
+    """The fit where drives may also err along their travel in any smooth way; the same fit if that is no likelier. `anew`: not from its
+    amplitudes, since what took the place of travel there may keep it; heavy tails as in `searched`."""
+    parts = (*fit.parts, *(more := Parts(fit.columns).travel))
     if not more:
         return fit
-    same, tied = fit.columns, fit.columns.of_rows
-    # from nothing: what took the place of travel in the fit would keep it
-    found = [fitted(c, (*fit.parts, *more)) for c in (same, tied) if c]
+    if not anew:
+        return max(fit, fitted(fit.columns, parts, amplitudes(fit), fit.weights), key=lambda f: f.score)
+    found = [fitted(c, parts) for c in (fit.columns, fit.columns.of_rows) if c]
     return max([fit, *found], key=lambda f: f.score)
 
 

@@ -159,24 +159,32 @@ class World:
         for place in places:
             chosen.append(Chosen.at(place, best_shape(anchor, place)))
             start[chosen[-1].part.name] = largest_gain(anchor, chosen[-1].part)
-        return self._fit(tuple(chosen), start, anchor.weights)
+        return self._fit(tuple(chosen), start, anchor.weights, model.fit.lighter)
 
     def _fit(
-        self, chosen: tuple[Chosen, ...], start: dict[str, float] | None, weights: Floats | None = None
+        self,
+        chosen: tuple[Chosen, ...],
+        start: dict[str, float] | None,
+        weights: Floats | None = None,
+        lighter: float = 0.0,
     ) -> Model:
         """A set at its best amplitudes, on a residual that is corrected for what the effects' columns miss; fitted once."""
         key = frozenset((id(c.place), c.shape) for c in chosen)
         if key not in self.known:
             bare = tuple(replace(c, values=np.zeros(0), refined=()) for c in chosen)
-            self.known[key] = self._made(bare, start, weights)
+            self.known[key] = self._made(bare, start, weights, lighter)
         return self.known[key]
 
     def _made(
-        self, chosen: tuple[Chosen, ...], start: dict[str, float] | None, weights: Floats | None
+        self,
+        chosen: tuple[Chosen, ...],
+        start: dict[str, float] | None,
+        weights: Floats | None,
+        lighter: float,
     ) -> Model:
         columns = self.columns
         parts = (*self.numbers, *self.gaps, *(c.part for c in chosen))
-        fit = fitted(columns, parts, start, weights)
+        fit = fitted(columns, parts, start, weights, lighter)
         if self.predict and chosen:
             fit, chosen = self._corrected(fit, chosen)
         chosen = tuple(c if len(c.values) else c.by_posterior(fit) for c in chosen)
@@ -299,7 +307,7 @@ class World:
     def less(self, model: Model, c: Chosen) -> Model:
         """The effects of a model but one, in this world."""
         kept = tuple(o for o in model.chosen if o.part.name != c.part.name)
-        return self._fit(kept, amplitudes(model.fit), model.fit.weights)
+        return self._fit(kept, amplitudes(model.fit), model.fit.weights, model.fit.lighter)
 
     def coarsest(self, model: Model) -> Model:
         """The set with the coarsest part in each effect's place, of those whose evidence is the same."""

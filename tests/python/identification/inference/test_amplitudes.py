@@ -157,6 +157,24 @@ def test_one_wild_reading_moves_nothing_under_heavy_tails():
     assert loud.noise < 1.4
 
 
+def test_heavy_tails_that_fell_far_short_are_not_tried_with_one_effect_more(monkeypatch):
+    rng = np.random.default_rng(5)
+    c, some = columns(rng), parts(rng)
+    wild = np.where(np.arange(READINGS) == 7, 25.0, 0.0)
+    slipped = replace(c, residual=rng.normal(size=len(c)) + c.free.T @ wild)
+    tried = amplitudes.fitted(slipped, some)
+    spared = amplitudes.fitted(slipped, some, lighter=2.5 * amplitudes.CATCHES_UP)
+    assert np.all(spared.weights == 1.0) and spared.lighter == 1.5 * amplitudes.CATCHES_UP
+    assert tried.weights[7] < 0.05 and tried.score > spared.score
+    near = amplitudes.fitted(slipped, some, lighter=0.5 * amplitudes.CATCHES_UP)
+    assert np.array_equal(near.weights, tried.weights)
+    plain = replace(c, residual=np.resize([1.0, -1.0], len(c)))
+    monkeypatch.setattr(amplitudes, "STANDS_OUT", 0.5)  # tried without need, they fall short
+    light = amplitudes.fitted(plain, some[:1])
+    assert np.all(light.weights == 1.0) and light.lighter > 0.0
+    assert amplitudes.refitted(light, plain.residual).lighter == light.lighter
+
+
 def test_a_part_far_larger_than_the_noise_is_factorised_all_the_same():
     smooth = np.exp(-0.5 * (np.arange(40.0)[:, None] - np.arange(40.0)) ** 2 / 400.0)
     v = np.eye(40) + 1e17 * smooth
