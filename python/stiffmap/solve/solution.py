@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiffmap.common.broadcasting import Floats
+from stiffmap.common.json_text import plain
 from stiffmap.solve.closing import Kinematics
 from stiffmap.solve.compiled import Answer, Flag, Names, Status, counted
 from stiffmap.solve.labels import OverPoses, solution_dataset
@@ -242,10 +243,10 @@ class Solution(OverPoses):
         return solution_dataset(self, dims, coords)
 
     def as_plain(self) -> dict[str, Any]:
-        """Data of JSON of one pose, SI."""
-        return {
+        """Data of JSON of one pose, SI; StiffmapError for several."""
+        data = {
             "point": self.point,
-            "status": Status(int(self.status)).name,
+            "status": self._status_of_one(),
             "flags": [f.name for f in Flag(int(self.flags))],
             "displacement": self.displacement,
             "stiffness": self.stiffness,
@@ -256,6 +257,7 @@ class Solution(OverPoses):
             "spring_deflection": self.spring_deflection,
             "indeterminate": list(self.indeterminate),
         }
+        return dict(plain(data))
 
     def count(self) -> dict[str, int]:
         """Number of poses per status."""
