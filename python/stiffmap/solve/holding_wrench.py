@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from stiffmap.common.broadcasting import Floats, batch, one_of, rows, thread_count, trailing
+from stiffmap.common.broadcasting import Floats, batch, one_of, real_number, rows, thread_count, trailing
 from stiffmap.common.json_text import plain
 from stiffmap.common.short import short_repr
 from stiffmap.solve.closing import commanded
@@ -58,7 +58,7 @@ class HoldingWrench(OverPoses):
         """Data of JSON of one pose, SI; StiffmapError for several."""
         data = {
             "point": self.point,
-            "status": self._status_of_one(),
+            "status": Status(int(real_number(self.status, "status", "that of one pose"))).name,
             "status_without_clamp": Status(int(self.force_status)).name,
             "flags": [f.name for f in Flag(int(self.flags))],
             "wrench": self.wrench,

@@ -103,15 +103,14 @@ def solution_dataset(s: Any, dims: Sequence[str] | None, coords: Mapping[str, An
     return xr.Dataset(data, coords={**labels, **more}, attrs={"point": s.point})
 
 
-XYZ, TWISTS, WRENCHES, NUMBERED = ("axis", ("x", "y", "z")), ("component", COMPONENTS), ("wrench_component", WRENCH), ("", ())  # fmt: skip
+XYZ, TWISTS, WRENCHES, LEGS = ("axis", ("x", "y", "z")), ("component", COMPONENTS), ("wrench_component", WRENCH), ("leg", ())  # fmt: skip
 AXES: dict[str, tuple[tuple[str, tuple[str, ...]], ...]] = {
-    "position": (XYZ,), "rotation": (XYZ, XYZ), "displacement": (TWISTS,), "components": (TWISTS,), "jacobian": (TWISTS,),
-    "wrench": (WRENCHES,), "springs": (WRENCHES,), "legs": (WRENCHES,), "leg_wrench": (NUMBERED, WRENCHES),
-    "stiffness": (WRENCHES, TWISTS), "leg_stiffness": (NUMBERED, WRENCHES, TWISTS),
+    "position": (XYZ,), "rotation": (XYZ, ("axis_1", XYZ[1])), "displacement": (TWISTS,), "components": (TWISTS,), "jacobian": (TWISTS,),
+    "wrench": (WRENCHES,), "springs": (WRENCHES,), "legs": (WRENCHES,), "leg_wrench": (LEGS, WRENCHES),
+    "stiffness": (WRENCHES, TWISTS), "leg_stiffness": (LEGS, WRENCHES, TWISTS),
 }  # fmt: skip
 """Field -> its own axes, as far as they have names; all others are numbered, since three drives or modes are no x, y, z."""
-OF_THE_MACHINE = ("length", "limits", "errors")
-"""Fields that are the same at all poses, however many these are."""
+OF_THE_MACHINE = ("length", "limits", "errors")  # the same at all poses, however many these are
 ENDINGS = (".json", ".csv", ".nc")
 
 
@@ -121,17 +120,8 @@ class OverPoses:
     __slots__ = ()
     status: Any
 
-    def _status_of_one(self) -> str:
-        """Name of the status of one pose; StiffmapError for several."""
-        if np.ndim(self.status):
-            raise StiffmapError(f"expected the result of one pose, got {np.size(self.status)}; see to_json")
-        return Status(int(self.status)).name
-
     def to_xarray(self) -> xr.Dataset:
-        """Every array as a variable: dimension ``pose``, or ``pose_0``, ``pose_1`` … for several batch axes, then its own.
-
-        What is the machine's has its own alone.
-        """
+        """Every array as a variable: dimension ``pose``, or ``pose_0``, ``pose_1`` … for several batch axes (none for what is the machine's), then its own."""
         import xarray as xr
 
         batch = batch_dims(np.ndim(self.status))
@@ -141,9 +131,7 @@ class OverPoses:
             dims = [] if name in OF_THE_MACHINE else list(batch)
             named = AXES.get(name.partition(".")[0], ())
             for i in range(value.ndim - len(dims)):
-                dim, labels = named[i] if i < len(named) else NUMBERED
-                dim = dim or f"{name}_{i}"
-                dim = dim if dim not in dims else f"{dim}_{i}"
+                dim, labels = named[i] if i < len(named) else (f"{name}_{i}", ())
                 dims.append(dim)
                 if labels:
                     coordinates[dim] = list(labels)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffmap.common.broadcasting import Floats
+from stiffmap.common.broadcasting import Floats, real_number
 from stiffmap.common.json_text import plain
 from stiffmap.solve.closing import Kinematics
 from stiffmap.solve.compiled import Answer, Flag, Names, Status, counted
@@ -246,7 +246,7 @@ class Solution(OverPoses):
         """Data of JSON of one pose, SI; StiffmapError for several."""
         data = {
             "point": self.point,
-            "status": self._status_of_one(),
+            "status": Status(int(real_number(self.status, "status", "that of one pose"))).name,
             "flags": [f.name for f in Flag(int(self.flags))],
             "displacement": self.displacement,
             "stiffness": self.stiffness,

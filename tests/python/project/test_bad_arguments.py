@@ -344,3 +344,19 @@ def test_one_name_may_stand_by_itself() -> None:
     assert sm.map_statistics(machine, wrench=W, percentiles=95, **FEW).percentile.size == 1
     circle = [sm.mill(**CIRCLE, at=(0.05, 0.05, 0), step=0.02, size=size) for size in (0.06, [0.06])]
     assert np.array_equal(circle[0].error, circle[1].error)
+
+
+def test_arguments_that_contradict_each_other_are_refused() -> None:
+    machine = sm.load_machine("orthoglide-revised")
+    few: dict[str, Any] = {"x": 0.0, "y": 0.0, "z": 0.0}
+    for words, call in (
+        ("no cases= beside a mapping", lambda: sm.error_map(machine, **few, wrench={"a": W}, cases=["b"])),
+        ("resume: nothing is kept without out=", lambda: sm.error_map(machine, **few, wrench=W, resume=True)),
+        (
+            "place: not together with at",
+            lambda: sm.mill(machine, "circle", "trimming", place=2, at=(0, 0, 0)),
+        ),
+        ("place: not together with at", lambda: sm.mill(machine, "circle", "trimming", place=2, turn=0.1)),
+    ):
+        with pytest.raises(sm.StiffmapError, match=words):
+            call()

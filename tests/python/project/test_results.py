@@ -101,7 +101,7 @@ def test_plain_data_is_data_of_json() -> None:
         json.dumps(result.as_plain(), allow_nan=False)
     assert failed.as_plain()["displacement"] == [None] * 6
     for several in (RESULTS["Solution"], RESULTS["HoldingWrench"], OTHERS[1]["Solution"]):
-        with pytest.raises(sm.StiffmapError, match="result of one pose"):
+        with pytest.raises(sm.StiffmapError, match="status: expected that of one pose"):
             several.as_plain()
 
 

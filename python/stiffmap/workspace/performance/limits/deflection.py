@@ -182,9 +182,8 @@ def _result(
     good = (status == Status.CONVERGED) & np.isfinite(value)
     value, unit = np.where(good, value, np.nan), np.where(good[:, None], unit, np.nan)
     i = int(np.argmax(value) if good.all() else np.argmin(good))
-    return WorstDeflection(
-        float(value[i]), p[i], unit[i], value, p, unit, status, ask.force, plane, ask.linear
-    )
+    worst = float(value[i])
+    return WorstDeflection(worst, p[i], unit[i], value, p, unit, status, ask.force, plane, ask.linear)
 
 
 def _refined(ask: _Ask, out: WorstDeflection, low: Floats, high: Floats, nodes: int) -> WorstDeflection:
