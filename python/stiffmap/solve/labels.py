@@ -133,8 +133,7 @@ class OverPoses:
             for i in range(value.ndim - len(dims)):
                 dim, labels = named[i] if i < len(named) else (f"{name}_{i}", ())
                 dims.append(dim)
-                if labels:
-                    coordinates[dim] = list(labels)
+                coordinates |= {dim: list(labels)} if labels else {}
             variables[name] = (dims, value)
         return xr.Dataset(variables, coords=coordinates)
 
@@ -146,10 +145,9 @@ class OverPoses:
         data = self.to_xarray()
         batch, shape = data["status"].dims, data["status"].shape
         for name, variable in data.data_vars.items():
-            own = [d for d in variable.dims if d not in batch]
-            sizes = [data.sizes[d] for d in own]
-            flat = np.broadcast_to(variable.to_numpy(), (*shape, *sizes)).reshape(prod(shape), prod(sizes))
-            labels = [data[d].to_numpy() if d in data.coords else range(data.sizes[d]) for d in own]
+            own = {d: n for d, n in variable.sizes.items() if d not in batch}
+            flat = np.broadcast_to(variable, (*shape, *own.values())).reshape(prod(shape), prod(own.values()))
+            labels = [data[d].to_numpy() if d in data.coords else range(n) for d, n in own.items()]
             first = [] if name == "displacement" and "component" in own else [str(name)]
             for i, parts in enumerate(product(*labels)):
                 table["_".join([*first, *map(str, parts)])] = flat[:, i]

@@ -24,6 +24,7 @@ from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.readings.library.distance import READING
 from stiffmap.solve.kinematics import forward_kinematics, inverse_kinematics
 from stiffmap.solve.machine import Machine, as_machine
+from stiffmap.workspace.maps.inputs import magnitude
 
 MICRO = {"deflection": 3e-6, "position": 8e-6}
 """m: default noise of a reading."""
@@ -80,14 +81,14 @@ def plan_of_poses(
         One standard deviation of a reading, m and rad; None: 3 µm for deflections, 8 µm for positions.
     """
     one_of(quantity, MICRO, "quantity")
-    for axis in instance_of(axes, Sequence, "axes", "names of axes"):
+    for axis in instance_of(axes, Sequence, "axes", "names of axes") or ("",):
         one_of(axis, AXES, "axes")
     poses = trailing(poses, (3,), "poses", "positions (m)").reshape(-1, 3)
     own = [np.zeros((1, 6))] * len(poses) if quantity == "position" else _each(loads, len(poses))
     position = np.repeat(poses, [len(w) for w in own], axis=0)
     wrench = np.vstack(own)
     n = len(position) * whole_number(repeats, "repeats", 1)
-    given = None if noise is None else real_number(noise, "noise")
+    given = None if noise is None else magnitude(noise, "noise", "m")
     turn = real_number(angle_noise, "angle_noise")
     plan = Experiment(
         name="plan",

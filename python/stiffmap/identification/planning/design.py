@@ -156,6 +156,8 @@ def plan(
     at = None if position is None else trailing(position, (3,), "position", "positions (m)").reshape(-1, 3)
     load = None if wrench is None else wrench_array(wrench)
     one_of(aim, AIMS, "aim")
+    if aim != "map" and not (at is None and load is None):
+        raise StiffmapError(f"position and wrench: only with aim 'map', got {aim!r}; see candidates")
     if aim == "separate" and not others:
         raise StiffmapError("rival: separating two explanations needs the other one")
     whole_number(rows, "rows", 1)

@@ -84,9 +84,8 @@ class Commands:
         """
         scale = np.where(self.prismatic, MM, 180.0 / np.pi)
         units = ["mm" if p else "deg" for p in self.prismatic]
-        ok = self.ok[:, None]
-        turn = Rotation.from_matrix(np.where(ok[:, None], self.rotation, np.eye(3))).as_rotvec()
-        turn = np.where(ok, np.degrees(turn), np.nan)
+        turn = Rotation.from_matrix(np.where(self.ok[:, None, None], self.rotation, np.eye(3))).as_rotvec()
+        turn = np.where(self.ok[:, None], np.degrees(turn), np.nan)
         columns = {f"wanted_{a}_mm": self.wanted[:, i] * MM for i, a in enumerate("xyz")}
         for word, values in (("declared", self.declared), ("command", self.actuators)):
             columns |= {

@@ -77,7 +77,7 @@ def wrench_cases(
         if not wrench or cases is not None:
             found = f"cases {list(cases)}" if cases is not None else "an empty mapping"
             raise StiffmapError(
-                f"wrench: expected at least one case, and no cases= beside a mapping, got {found}"
+                f"wrench: expected at least one case, and no cases= with a mapping, got {found}"
             )
         out = np.stack([wrench_array(w, f"wrench[{n!r}]") for n, w in wrench.items()])
         return out, tuple(map(str, wrench))

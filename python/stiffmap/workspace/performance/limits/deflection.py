@@ -195,8 +195,7 @@ def _refined(ask: _Ask, out: WorstDeflection, low: Floats, high: Floats, nodes: 
     for _ in range(REFINEMENTS):
         h = h / 2
         p = np.unique(np.clip(at + around * h, low, high), axis=0)
-        value, way, status = ask.at(p)
-        tried = _result(ask, p, value, way, status, out.plane)
+        tried = _result(ask, p, *ask.at(p), out.plane)
         if not tried.value <= best:
             best, at, unit = tried.value, tried.position, tried.direction
         if not np.isfinite(best):  # a pose of the box has no equilibrium
