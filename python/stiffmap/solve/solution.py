@@ -265,7 +265,7 @@ class Solution(OverPoses):
 
     def _repr_html_(self) -> str:
         rows = "".join(f"<tr><td>{n}</td><td>{c}</td></tr>" for n, c in self.count().items())
-        worst = np.linalg.norm(self.displacement[..., :3], axis=-1)
+        worst = np.where(self.ok, np.linalg.norm(self.displacement[..., :3], axis=-1), np.nan)
         top = f"{1e3 * np.nanmax(worst):.4f} mm" if np.isfinite(worst).any() else "none"
         return (
             f"<b>stiffmap solution</b>: {self.status.size} poses at point {self.point}, "

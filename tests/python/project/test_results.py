@@ -111,3 +111,13 @@ def test_the_largest_internal_force_where_poses_failed() -> None:
     assert RESULTS["InternalWrenches"].largest()[1] >= 0
     with pytest.raises(sm.StiffmapError, match="no link springs"):
         sm.assembly_wrenches(sm.load_machine("ur10"), [-0.775, -0.05, 0.3]).largest()
+
+
+def test_the_largest_displacement_is_that_of_a_pose_with_an_answer() -> None:
+    """An unstable equilibrium keeps its displacement, but is no answer; nor has one a batch of failed poses alone."""
+    short = sm.load_machine("orthoglide-revised").with_number("x.bar/length", 0.01)
+    unstable = short.solve(POSES[0], [100, 0, 0, 0, 0, 0])
+    assert unstable.status == sm.Status.UNSTABLE and np.isfinite(unstable.displacement).all()
+    assert "largest displacement none" in unstable._repr_html_()
+    assert "largest displacement none" in OTHERS[1]["Solution"]._repr_html_()
+    assert "largest displacement 0.0" in RESULTS["Solution"]._repr_html_()

@@ -81,7 +81,7 @@ def plan_of_poses(
         One standard deviation of a reading, m and rad; None: 3 µm for deflections, 8 µm for positions.
     """
     one_of(quantity, MICRO, "quantity")
-    for axis in instance_of(axes, Sequence, "axes", "names of axes") or ("",):
+    for axis in instance_of(axes, Sequence, "axes", "names of axes"):
         one_of(axis, AXES, "axes")
     poses = trailing(poses, (3,), "poses", "positions (m)").reshape(-1, 3)
     own = [np.zeros((1, 6))] * len(poses) if quantity == "position" else _each(loads, len(poses))

@@ -165,7 +165,7 @@ def plan(
     one_of(tool, UNKNOWN, "tool")
     if pool is None:
         where, loads = random_poses(machine, poses, seed), load_set("axes", [magnitude(force, "force", "N")])
-        pool = plan_of_poses(machine, quantity, where, loads, axes=axes, noise=noise)
+        pool = plan_of_poses(machine, quantity, where, loads, axes=axes if len(axes) else ("",), noise=noise)
     both, old = replace(in_limits(machine, pool), frame=frame, tool=tool), 0
     if measured is not None:
         old = len(measured)
