@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import cache, wraps
 from inspect import signature, unwrap
@@ -80,7 +80,10 @@ def _tests(hint: Any) -> Iterator[Test]:
             yield from _tests(part)
     elif origin is Literal:
         yield lambda v: isinstance(v, str) and v in inner, " or ".join(map(repr, inner))
-    elif getattr(origin, "__module__", "").partition(".")[0] in ("stiffmap", "xarray"):
+    elif getattr(origin, "__module__", "").partition(".")[0] in ("stiffmap", "xarray", "matplotlib"):
         yield lambda v: isinstance(v, origin), f"a{'n' * (origin.__name__[0] in 'AEIOU')} {origin.__name__}"
+    elif origin is Sequence and hint not in (Sequence[float], Sequence[str]):  # arrays are numbers too
+        of = [test for test, _ in _tests(*inner)]
+        yield lambda v: isinstance(v, Collection) and all(any(_fits(t, e) for t in of) for e in v), "several"
     else:
         yield PLAIN.get(hint) or PLAIN[origin]

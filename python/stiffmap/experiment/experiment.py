@@ -263,6 +263,8 @@ def _pick(values: Any, index: Integers) -> Any:
 def numbered(parts: Sequence[Any]) -> Integers:
     """(n,) number of each different row of the parts, numbers (n, ...) or words (n,); None and no words are left out."""
     given = [p for p in parts if p is not None and len(p)]
+    if not given:
+        raise StiffmapError("experiment: expected at least one row, got none")
     columns = [np.unique(p, return_inverse=True)[1] if isinstance(p, tuple) else p for p in given]
     key = np.concatenate([np.asarray(c, dtype=float).reshape(len(c), -1).T for c in columns])
     np.nan_to_num(np.round(key, 9, out=key), copy=False, nan=np.inf)

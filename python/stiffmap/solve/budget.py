@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from stiffmap.common.broadcasting import Floats, real_array
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.html import table, titled
+from stiffmap.common.json_text import plain
 from stiffmap.common.number_text import percents
 from stiffmap.common.short import short_repr
 from stiffmap.model.description import Cable
@@ -89,7 +90,8 @@ class DeflectionBudget:
     def as_plain(self) -> dict[str, Any]:
         """Data of JSON, SI."""
         shares = {n: {"share": s, "displacement": c} for n, c, s in self.ranked()}
-        return {"displacement": self.displacement, "elements": shares, "second_order": self.rest_share}
+        whole = {"displacement": self.displacement, "elements": shares, "second_order": self.rest_share}
+        return dict(plain(whole))
 
     def to_dataframe(self) -> pd.DataFrame:
         """Rows by element, µm and %, the largest share first."""

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from stiffmap.common.broadcasting import Floats, batch, one_of, rows, thread_count, trailing
+from stiffmap.common.broadcasting import Floats, batch, one_of, real_number, rows, thread_count, trailing
+from stiffmap.common.json_text import plain
 from stiffmap.common.short import short_repr
 from stiffmap.solve.closing import commanded
 from stiffmap.solve.compiled import CompiledMachine, Flag, Status
@@ -54,10 +55,10 @@ class HoldingWrench(OverPoses):
         return np.asarray(self.status == Status.CONVERGED)
 
     def as_plain(self) -> dict[str, Any]:
-        """Data of JSON of one pose, SI."""
-        return {
+        """Data of JSON of one pose, SI; StiffmapError for several."""
+        data = {
             "point": self.point,
-            "status": Status(int(self.status)).name,
+            "status": Status(int(real_number(self.status, "status", "that of one pose"))).name,
             "status_without_clamp": Status(int(self.force_status)).name,
             "flags": [f.name for f in Flag(int(self.flags))],
             "wrench": self.wrench,
@@ -66,6 +67,7 @@ class HoldingWrench(OverPoses):
             "leg_stiffness": dict(zip(self.legs, self.leg_stiffness, strict=True)),
             "actuator_effort": dict(zip(self.actuators, self.actuator_effort, strict=True)),
         }
+        return dict(plain(data))
 
 
 def holding_wrench(

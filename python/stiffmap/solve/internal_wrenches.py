@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from stiffmap.common.broadcasting import Floats, thread_count
+from stiffmap.common.errors import StiffmapError
 from stiffmap.common.short import short_repr
 from stiffmap.model.description.tree import joint_of, joints
 from stiffmap.solve.closing import loaded_poses
@@ -34,9 +35,12 @@ class InternalWrenches(OverPoses):
     point: str
 
     def largest(self) -> tuple[str, float]:
-        """The spring with the largest force, and that force (N)."""
-        sizes = {n: float(np.nanmax(np.linalg.norm(w[..., :3], axis=-1))) for n, w in self.springs.items()}
-        name = max(sizes, key=lambda n: sizes[n])
+        """The spring with the largest force, and that force (N), NaN where every pose failed; StiffmapError without springs."""
+        if not self.springs:
+            raise StiffmapError("largest: the machine has no link springs")
+        forces = {n: np.linalg.norm(w[..., :3], axis=-1) for n, w in self.springs.items()}
+        sizes = {n: float(np.fmax.reduce(f, axis=None, initial=np.nan)) for n, f in forces.items()}
+        name = max(sizes, key=lambda n: (sizes[n] >= 0, sizes[n]))
         return name, sizes[name]
 
 

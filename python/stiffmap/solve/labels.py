@@ -6,6 +6,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from itertools import product
+from math import prod
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
@@ -102,7 +103,14 @@ def solution_dataset(s: Any, dims: Sequence[str] | None, coords: Mapping[str, An
     return xr.Dataset(data, coords={**labels, **more}, attrs={"point": s.point})
 
 
-AXES = {3: ("axis", ("x", "y", "z"))}
+XYZ, TWISTS, WRENCHES, LEGS = ("axis", ("x", "y", "z")), ("component", COMPONENTS), ("wrench_component", WRENCH), ("leg", ())  # fmt: skip
+AXES: dict[str, tuple[tuple[str, tuple[str, ...]], ...]] = {
+    "position": (XYZ,), "rotation": (XYZ, ("axis_1", XYZ[1])), "displacement": (TWISTS,), "components": (TWISTS,), "jacobian": (TWISTS,),
+    "wrench": (WRENCHES,), "springs": (WRENCHES,), "legs": (WRENCHES,), "leg_wrench": (LEGS, WRENCHES),
+    "stiffness": (WRENCHES, TWISTS), "leg_stiffness": (LEGS, WRENCHES, TWISTS),
+}  # fmt: skip
+"""Field -> its own axes, as far as they have names; all others are numbered, since three drives or modes are no x, y, z."""
+OF_THE_MACHINE = ("length", "limits", "errors")  # the same at all poses, however many these are
 ENDINGS = (".json", ".csv", ".nc")
 
 
@@ -113,23 +121,19 @@ class OverPoses:
     status: Any
 
     def to_xarray(self) -> xr.Dataset:
-        """Every array as a variable: dimension ``pose``, or ``pose_0``, ``pose_1`` … for several batch axes, then its own."""
+        """Every array as a variable: dimension ``pose``, or ``pose_0``, ``pose_1`` … for several batch axes (none for what is the machine's), then its own."""
         import xarray as xr
 
-        shape = np.shape(self.status)
+        batch = batch_dims(np.ndim(self.status))
         variables: dict[str, Any] = {}
         coordinates: dict[str, Any] = {}
         for name, value in _arrays(self):
-            own = value.shape[len(shape) :]
-            if value.shape[: len(shape)] != shape:
-                continue
-            dims = list(batch_dims(len(shape)))
-            for i, size in enumerate(own):
-                dim, labels = AXES.get(size, (f"{name}_{i}", ()))
-                dim = dim if dim not in dims else f"{dim}_{i}"
+            dims = [] if name in OF_THE_MACHINE else list(batch)
+            named = AXES.get(name.partition(".")[0], ())
+            for i in range(value.ndim - len(dims)):
+                dim, labels = named[i] if i < len(named) else (f"{name}_{i}", ())
                 dims.append(dim)
-                if labels:
-                    coordinates[dim] = list(labels)
+                coordinates |= {dim: list(labels)} if labels else {}
             variables[name] = (dims, value)
         return xr.Dataset(variables, coords=coordinates)
 
@@ -139,12 +143,11 @@ class OverPoses:
 
         table: dict[str, Any] = {}
         data = self.to_xarray()
-        count = data["status"].ndim
+        batch, shape = data["status"].dims, data["status"].shape
         for name, variable in data.data_vars.items():
-            shape = variable.shape[:count]
-            flat = variable.to_numpy().reshape(int(np.prod(shape)), -1)
-            own = variable.dims[count:]
-            labels = [data[d].to_numpy() if d in data.coords else range(data.sizes[d]) for d in own]
+            own = {d: n for d, n in variable.sizes.items() if d not in batch}
+            flat = np.broadcast_to(variable, (*shape, *own.values())).reshape(prod(shape), prod(own.values()))
+            labels = [data[d].to_numpy() if d in data.coords else range(n) for d, n in own.items()]
             first = [] if name == "displacement" and "component" in own else [str(name)]
             for i, parts in enumerate(product(*labels)):
                 table["_".join([*first, *map(str, parts)])] = flat[:, i]

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffmap.common.broadcasting import Floats
+from stiffmap.common.broadcasting import Floats, real_number
+from stiffmap.common.json_text import plain
 from stiffmap.solve.closing import Kinematics
 from stiffmap.solve.compiled import Answer, Flag, Names, Status, counted
 from stiffmap.solve.labels import OverPoses, solution_dataset
@@ -242,10 +243,10 @@ class Solution(OverPoses):
         return solution_dataset(self, dims, coords)
 
     def as_plain(self) -> dict[str, Any]:
-        """Data of JSON of one pose, SI."""
-        return {
+        """Data of JSON of one pose, SI; StiffmapError for several."""
+        data = {
             "point": self.point,
-            "status": Status(int(self.status)).name,
+            "status": Status(int(real_number(self.status, "status", "that of one pose"))).name,
             "flags": [f.name for f in Flag(int(self.flags))],
             "displacement": self.displacement,
             "stiffness": self.stiffness,
@@ -256,6 +257,7 @@ class Solution(OverPoses):
             "spring_deflection": self.spring_deflection,
             "indeterminate": list(self.indeterminate),
         }
+        return dict(plain(data))
 
     def count(self) -> dict[str, int]:
         """Number of poses per status."""
@@ -263,7 +265,7 @@ class Solution(OverPoses):
 
     def _repr_html_(self) -> str:
         rows = "".join(f"<tr><td>{n}</td><td>{c}</td></tr>" for n, c in self.count().items())
-        worst = np.linalg.norm(self.displacement[..., :3], axis=-1)
+        worst = np.where(self.ok, np.linalg.norm(self.displacement[..., :3], axis=-1), np.nan)
         top = f"{1e3 * np.nanmax(worst):.4f} mm" if np.isfinite(worst).any() else "none"
         return (
             f"<b>stiffmap solution</b>: {self.status.size} poses at point {self.point}, "

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import stiffmap as sm
-from stiffmap.experiment.virtual.plans import plan_of_poses
+from stiffmap.experiment.virtual.plans import plan_of_poses, random_plan
 from stiffmap.workspace.performance.motion.trajectory import Trajectory
 
 P, W = [0.0, 0.416, 0.0], [10.0, 0, 0, 0, 0, 0]
@@ -344,3 +344,43 @@ def test_one_name_may_stand_by_itself() -> None:
     assert sm.map_statistics(machine, wrench=W, percentiles=95, **FEW).percentile.size == 1
     circle = [sm.mill(**CIRCLE, at=(0.05, 0.05, 0), step=0.02, size=size) for size in (0.06, [0.06])]
     assert np.array_equal(circle[0].error, circle[1].error)
+
+
+def test_arguments_that_contradict_each_other_are_refused() -> None:
+    machine = sm.load_machine("orthoglide-revised")
+    few: dict[str, Any] = {"x": 0.0, "y": 0.0, "z": 0.0}
+    for words, call in (
+        ("no cases= with a mapping", lambda: sm.error_map(machine, **few, wrench={"a": W}, cases=["b"])),
+        ("resume: nothing is kept without out=", lambda: sm.error_map(machine, **few, wrench=W, resume=True)),
+        (
+            "place: not together with at",
+            lambda: sm.mill(machine, "circle", "trimming", place=2, at=(0, 0, 0)),
+        ),
+        ("place: not together with at", lambda: sm.mill(machine, "circle", "trimming", place=2, turn=0.1)),
+    ):
+        with pytest.raises(sm.StiffmapError, match=words):
+            call()
+
+
+def test_plans_take_no_argument_that_means_nothing() -> None:
+    """A pose of the workpiece without its map, readings without an axis or with an impossible spread."""
+    machine, found = sm.load_machine("orthoglide-revised"), "dead_zone actuator y half_width=10um"
+    given: dict[str, Any]
+    for words, given in (
+        ("only with aim 'map'", {"position": [[0, 0, 0]]}),
+        ("only with aim 'map'", {"wrench": W}),
+        ("axes: expected one of dx", {"axes": ()}),
+        ("noise: expected a positive number", {"noise": 0.0}),
+        ("noise: expected a positive number", {"noise": -1e-6}),
+    ):
+        with pytest.raises(sm.StiffmapError, match=words):
+            sm.plan(machine, found, rows=2, poses=4, **given)
+
+
+def test_an_experiment_without_rows_is_refused() -> None:
+    machine = sm.load_machine("orthoglide-revised")
+    none = random_plan(machine, poses=2).rows([])
+    calls: tuple[Callable[..., Any], ...] = (sm.residual, sm.simulate, sm.calibrate, sm.diagnose)
+    for call in calls:
+        with pytest.raises(sm.StiffmapError, match="at least one row"):
+            call(machine, none)

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from stiffmap.common.broadcasting import whole_number
+from stiffmap.common.json_text import plain
 from stiffmap.common.outputs import number_cells, write_rows
 from stiffmap.common.short import short_repr
 from stiffmap.experiment.comparison.summary import Summary
@@ -101,7 +102,7 @@ class Residual:
     def as_plain(self, rows: int = 10) -> dict[str, Any]:
         """Data of JSON, SI, with the worst `rows`."""
         e = self.experiment
-        return {
+        data = {
             "experiment": e.name,
             "quantity": e.quantity,
             "units": "SI (m, rad), base axes",
@@ -117,6 +118,7 @@ class Residual:
             "worst": [{"id": i, "channel": c, "residual": v} for i, c, v in self.worst(rows)],
             "checks": [vars(c) for c in self.checks],
         }
+        return dict(plain(data))
 
     def lines(self, rows: int = 10) -> list[str]:
         """The residual in words, with the worst `rows`."""

@@ -24,6 +24,7 @@ from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.readings.library.distance import READING
 from stiffmap.solve.kinematics import forward_kinematics, inverse_kinematics
 from stiffmap.solve.machine import Machine, as_machine
+from stiffmap.workspace.maps.inputs import magnitude
 
 MICRO = {"deflection": 3e-6, "position": 8e-6}
 """m: default noise of a reading."""
@@ -87,7 +88,7 @@ def plan_of_poses(
     position = np.repeat(poses, [len(w) for w in own], axis=0)
     wrench = np.vstack(own)
     n = len(position) * whole_number(repeats, "repeats", 1)
-    given = None if noise is None else real_number(noise, "noise")
+    given = None if noise is None else magnitude(noise, "noise", "m")
     turn = real_number(angle_noise, "angle_noise")
     plan = Experiment(
         name="plan",

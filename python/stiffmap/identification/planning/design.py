@@ -156,6 +156,8 @@ def plan(
     at = None if position is None else trailing(position, (3,), "position", "positions (m)").reshape(-1, 3)
     load = None if wrench is None else wrench_array(wrench)
     one_of(aim, AIMS, "aim")
+    if aim != "map" and not (at is None and load is None):
+        raise StiffmapError(f"position and wrench: only with aim 'map', got {aim!r}; see candidates")
     if aim == "separate" and not others:
         raise StiffmapError("rival: separating two explanations needs the other one")
     whole_number(rows, "rows", 1)
@@ -163,7 +165,7 @@ def plan(
     one_of(tool, UNKNOWN, "tool")
     if pool is None:
         where, loads = random_poses(machine, poses, seed), load_set("axes", [magnitude(force, "force", "N")])
-        pool = plan_of_poses(machine, quantity, where, loads, axes=axes, noise=noise)
+        pool = plan_of_poses(machine, quantity, where, loads, axes=axes if len(axes) else ("",), noise=noise)
     both, old = replace(in_limits(machine, pool), frame=frame, tool=tool), 0
     if measured is not None:
         old = len(measured)

@@ -73,9 +73,9 @@ class Commands:
         return np.asarray(np.isfinite(self.actuators).all(axis=1))
 
     def rms(self, errors: Floats) -> float:
-        """Root mean square distance (m) of the tool from where it is wanted, over the rows of errors (n, 6) with an answer."""
+        """Root mean square distance (m) of the tool from where it is wanted, over the rows of errors (n, 6) with an answer; NaN without."""
         e = trailing(errors, (len(self.ok), 6), "errors", "errors (m, rad)")[self.ok, :3]
-        return float(np.sqrt(np.mean(np.sum(e**2, axis=1))))
+        return float(np.sqrt(np.mean(np.sum(e**2, axis=1)))) if len(e) else float("nan")
 
     def write(self, path: str | PathLike[str]) -> None:
         """CSV in mm and deg: wanted pose, commands (declared and compensated), pose to command, errors.
@@ -84,9 +84,8 @@ class Commands:
         """
         scale = np.where(self.prismatic, MM, 180.0 / np.pi)
         units = ["mm" if p else "deg" for p in self.prismatic]
-        turn = np.degrees(
-            Rotation.from_matrix(np.where(self.ok[:, None, None], self.rotation, np.eye(3))).as_rotvec()
-        )
+        turn = Rotation.from_matrix(np.where(self.ok[:, None, None], self.rotation, np.eye(3))).as_rotvec()
+        turn = np.where(self.ok[:, None], np.degrees(turn), np.nan)
         columns = {f"wanted_{a}_mm": self.wanted[:, i] * MM for i, a in enumerate("xyz")}
         for word, values in (("declared", self.declared), ("command", self.actuators)):
             columns |= {
@@ -168,6 +167,7 @@ def compensate(
         after = _error(machine, plan, at, threads)
         before = after if step == 0 else before
         move = -np.einsum("nac,nc->na", inverse, _rows(after[:, :, None], plan.rotation, chosen)[:, :, 0])
+        u = u + 0 * move  # where there is no equilibrium, there is no command
         if not np.nanmax(np.abs(move), initial=0.0) > DONE:
             break
         u = u + move

@@ -102,6 +102,8 @@ def choices(
     block = None if stock is None else box(stock)
     tried = None
     if place is not None:
+        if at is not None or turn:
+            raise StiffmapError("place: not together with at or turn, which it finds")
         tried = placements(machine, p, cut, count=place, threads=threads, scheduler=scheduler)
         at, turn = tried.best.at, tried.best.turn
     origin = machine.description.home.p if at is None else at

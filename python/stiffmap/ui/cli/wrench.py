@@ -39,7 +39,7 @@ def command(
     held = m.wrench(place, displacement, point=point, **how)
     data: dict[str, Any] = {"machine": m.name, "point": point, "displacement": displacement} | held.as_plain()
     told = [f"status {data['status'].lower()}; without the clamp: {data['status_without_clamp'].lower()}"]
-    parts = {f"leg {n} on platform": w for n, w in data["leg_wrench"].items()}
+    parts = {f"leg {n} on platform": w for n, w in zip(held.legs, held.leg_wrench, strict=True)}
     for name, w in {"whole machine": held.wrench, **parts}.items():
         force, moment = (", ".join(f"{v:.4f}" for v in part) for part in (w[:3], w[3:]))
         told.append(f"{name}: force ({force}) N, moment about {point} ({moment}) N m")

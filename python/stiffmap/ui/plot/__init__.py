@@ -4,6 +4,7 @@ Lengths in mm, angles in deg; colours that a colour-blind reader can distinguish
 never shown as a value. No display is needed.
 """
 
+from stiffmap.common.arguments import checked
 from stiffmap.ui.plot.efforts import stress_figure
 from stiffmap.ui.plot.error_maps import map_figure
 from stiffmap.ui.plot.forces import ellipse_figure, polar_figure, sweep_figure
@@ -23,3 +24,6 @@ __all__ = [
     "stress_figure",
     "sweep_figure",
 ]
+
+for _name in __all__:
+    globals()[_name] = checked(globals()[_name])

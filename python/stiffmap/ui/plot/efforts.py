@@ -9,8 +9,9 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from stiffmap.common.errors import StiffmapError
+from stiffmap.common.broadcasting import real_number
 from stiffmap.solve.internal_wrenches import InternalWrenches
+from stiffmap.solve.status import Status
 from stiffmap.ui.plot.style import BLUE, CYCLE, VERMILLION, headline, line_look, paper
 
 PANELS = (("effort", "effort", "effort_margin", "peak_effort"), ("rate", "speed", "speed_margin", "peak_speed"),
@@ -55,12 +56,12 @@ def _unit(turns: list[int], effort: bool) -> str:
 
 def stress_figure(stress: InternalWrenches, title: str = "") -> Figure:
     """Forces (N, left) and moments (N·m, right) of every link spring at one pose, in the spring's axes."""
-    if stress.status.shape != ():
-        raise StiffmapError(f"stress: expected one pose, got {stress.status.shape}")
+    status = Status(int(real_number(stress.status, "stress", "one pose")))
+    told = "" if status == Status.CONVERGED else f": none, {status.name.lower()}"
     names = list(stress.springs)
     values = np.array([stress.springs[n] for n in names]).reshape(len(names), 6)
     rows = np.arange(len(names))
-    with paper(6.4, 1.2 + 0.24 * len(names), title or "internal wrenches, spring axes") as figure:
+    with paper(6.4, 1.2 + 0.24 * len(names), (title or "internal wrenches, spring axes") + told) as figure:
         axes: Any = figure.subplots(1, 2, sharey=True)
         for ax, first, unit in zip(axes, (0, 3), ("force, N", "moment, N m"), strict=True):
             for k in range(3):

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.projections.polar import PolarAxes
 from numpy.typing import NDArray
 
+from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import place_text
 from stiffmap.solve.status import Status
 from stiffmap.ui.plot.style import (
@@ -37,8 +38,9 @@ def polar_figure(
     """One diagram per Dataset of `polar`: radius = deflection (mm), angle = direction of the force."""
     many = [diagrams] if isinstance(diagrams, xr.Dataset) else list(diagrams)
     with paper(max(2.6 * len(many) + 0.4, 4.0), 3.3) as figure:
+        axes = _panels(figure, many, "angle", variable, projection="polar")
         unit, factor = length_unit(max(float(np.nanmax(p[variable].values, initial=0.0)) for p in many))
-        for ax, pol in zip(_panels(figure, many, projection="polar"), many, strict=True):
+        for ax, pol in zip(axes, many, strict=True):
             draw_polar(ax, pol, variable, tolerance, factor)
         headline(figure, f"{many[0].attrs['machine']}: deflection, {unit}, under {force_text(many[0])}")
     return figure
@@ -69,7 +71,7 @@ def ellipse_figure(
     """Displacement of the TCP in the plane (mm) as the force turns; one panel per Dataset of `polar`."""
     many = [diagrams] if isinstance(diagrams, xr.Dataset) else list(diagrams)
     with paper(max(2.5 * len(many) + 0.4, 4.0), 3.2) as figure:
-        for ax, pol in zip(_panels(figure, many), many, strict=True):
+        for ax, pol in zip(_panels(figure, many, "angle"), many, strict=True):
             draw_ellipse(ax, pol, plane, tolerance)
         headline(figure, f"{many[0].attrs['machine']}: displacement under {force_text(many[0])}")
     return figure
@@ -107,7 +109,7 @@ def sweep_figure(
     many = [given] if isinstance(given, Mapping) else list(given)
     with paper(max(2.3 * len(many) + 0.6, 4.0), 3.1) as figure:
         first = [next(iter(lines.values())) for lines in many]
-        axes = _panels(figure, first)
+        axes = _panels(figure, first, "deflection_along", variable)
         for ax, lines in zip(axes, many, strict=True):
             draw_sweeps(ax, lines, variable, tolerance)
         axes[0].set_ylabel(f"{in_words(variable)}, mm")
@@ -137,8 +139,10 @@ def draw_sweeps(ax: Axes, lines: Mapping[str, xr.Dataset], variable: str, tolera
     ax.margins(x=0)
 
 
-def _panels(figure: Figure, many: Sequence[xr.Dataset], projection: str | None = None) -> NDArray[np.object_]:
-    """Axes side by side, each titled by where its Dataset is."""
+def _panels(figure: Figure, many: Sequence[xr.Dataset], *needed: str, projection: str | None = None) -> Any:
+    """Axes side by side, each titled by where its Dataset is, which holds what is drawn."""
+    if not many or not all(set(needed) <= set(ds.variables) for ds in many):
+        raise StiffmapError(f"expected Datasets of polar or sweep that hold {' and '.join(needed)}")
     axes: NDArray[np.object_] = figure.subplots(
         1, len(many), squeeze=False, subplot_kw={"projection": projection}
     )[0]

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
-from stiffmap.common.broadcasting import Floats, real_array
+from stiffmap.common.broadcasting import Floats, real_array, real_number
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import length_text, length_unit, percents, place_text, vector_text
 from stiffmap.solve.budget import DeflectionBudget, deflection_budget
@@ -18,6 +18,7 @@ from stiffmap.solve.machine import Machine, takes_machine
 from stiffmap.ui.plot.scene import draw_box, draw_force, draw_skeleton, finish, on, scene_axes
 from stiffmap.ui.plot.skeleton import Skeleton, skeleton, standing
 from stiffmap.ui.plot.style import BLUE, ORANGE, headline, leg_colours, paper
+from stiffmap.workspace.maps.inputs import place
 
 SHOWN = 0.08
 """Of the machine's extent, how far the tool moves in the picture."""
@@ -38,7 +39,7 @@ def machine_figure(
     `view`: elevation and azimuth in deg; None: from above where everything lies in a plane of constant z,
     else (22, 35). Raises StiffmapError where the pose cannot be reached.
     """
-    p = machine.description.home.p if position is None else real_array(position, "position")
+    p = machine.description.home.p if position is None else place(position)
     shape = standing(machine, p, rotation)
     with paper(5.6, 5.2, most=4) as figure:
         ax = scene_axes(figure, shape, view)
@@ -74,11 +75,11 @@ def loaded_shape(
 
     Raises StiffmapError where one of them is no stable equilibrium.
     """
-    p = machine.description.home.p if position is None else real_array(position, "position")
+    p = machine.description.home.p if position is None else place(position)
     load = real_array(wrench, "wrench")
     free = machine.solve(p, np.zeros(6), rotation=rotation, gravity=np.zeros(3))
     under = machine.solve(p, load, rotation=rotation, gravity=gravity)
-    status = max(int(free.status), int(under.status))
+    status = int(real_number(np.maximum(free.status, under.status), "wrench", "one wrench"))
     if status != Status.CONVERGED:
         raise StiffmapError(
             f"{machine.name} cannot be drawn under load at {place_text(p)}: {Status(status).name.lower()}"

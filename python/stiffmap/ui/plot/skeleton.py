@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from stiffmap.common.broadcasting import Floats, real_array
+from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import place_text
 from stiffmap.model.description import Joint
@@ -16,6 +16,7 @@ from stiffmap.model.description.tree import joints
 from stiffmap.solve.compiled import CompiledMachine, Role, Status
 from stiffmap.solve.kinematics import inverse_kinematics
 from stiffmap.solve.machine import Machine
+from stiffmap.workspace.maps.inputs import place
 
 COINCIDENT = 1e-9
 FLAT = 1e-6  # m
@@ -81,7 +82,7 @@ def standing(
     start: ArrayLike | None = None,
 ) -> Skeleton:
     """The machine at a commanded TCP pose (m, base axes; None: home), springs at rest; StiffmapError out of its reach."""
-    p = machine.description.home.p if position is None else real_array(position, "position")
+    p = machine.description.home.p if position is None else place(position)
     k = inverse_kinematics(machine, p, rotation, start=start, threads=1)
     if int(k.status) != Status.CONVERGED:
         raise StiffmapError(

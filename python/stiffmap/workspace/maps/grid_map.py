@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from stiffmap.common.errors import FileError
+from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.outputs import bytes_text, needs_space, only_job
 from stiffmap.model.files.load import Source
 from stiffmap.solve.compiled import Status
@@ -102,6 +102,8 @@ def error_map(
     plan = map_plan(machine, **call)
     work = work_of(chunk, scheduler)
     if out is None:
+        if resume:
+            raise StiffmapError("resume: nothing is kept without out=, next to which an interrupted run lies")
         store = memory_store(plan)
         _fill(plan, store, work, progress)
         ds = plan.dataset(store.arrays)

@@ -74,11 +74,13 @@ def wrench_cases(
 ) -> tuple[Floats, tuple[str, ...] | None]:
     """Wrenches (cases, 6) and their names; the names are None for a single, unnamed wrench."""
     if isinstance(wrench, Mapping):
-        if not wrench:
-            raise StiffmapError("wrench: expected at least one case, got an empty mapping")
-        return np.stack([wrench_array(w, f"wrench[{n!r}]") for n, w in wrench.items()]), tuple(
-            map(str, wrench)
-        )
+        if not wrench or cases is not None:
+            found = f"cases {list(cases)}" if cases is not None else "an empty mapping"
+            raise StiffmapError(
+                f"wrench: expected at least one case, and no cases= with a mapping, got {found}"
+            )
+        out = np.stack([wrench_array(w, f"wrench[{n!r}]") for n, w in wrench.items()])
+        return out, tuple(map(str, wrench))
     out = wrench_array(wrench)
     if out.ndim == 1:
         if cases is not None and len(cases) != 1:

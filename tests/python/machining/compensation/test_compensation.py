@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -58,6 +59,25 @@ def test_the_loaded_machine_stands_where_it_is_wanted(name: str) -> None:
     wanted = sm.forward_kinematics(machine, found.declared).position
     np.testing.assert_allclose(at[:, rows], wanted[:, rows], atol=1e-9)
     assert np.abs(found.before[:, rows]).max() > 1e-5
+
+
+@pytest.mark.parametrize("also", [False, True])
+def test_a_pose_without_an_equilibrium_has_no_command(also: bool, tmp_path: Path) -> None:
+    """Alone as among others: out of reach, and under a load that it does not bear."""
+    machine = sm.load_machine("orthoglide-revised")
+    fine, heavy = [0.05, 0.05, 0.05], [1e7, 0, 0, 0, 0, 0]
+    for bad, load in (([9.0, 0, 0], LOAD), (fine, heavy), ([np.nan, 0, 0], LOAD)):
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", "1 of . positions are not finite", UserWarning)
+            found = compensate(machine, [bad, fine][: 1 + also], wrench=[load, LOAD][: 1 + also])
+        assert found.ok.tolist() == [False, True][: 1 + also]
+        for values in (found.actuators, found.position, found.after):
+            assert np.isnan(values[0]).all()
+        found.write(tmp_path / "commands.csv")
+        rows = [line.split(",") for line in (tmp_path / "commands.csv").read_text().splitlines()]
+        answers = [i for i, name in enumerate(rows[0]) if name.startswith(("command_", "pose_", "after_"))]
+        assert len(answers) == 12 and {rows[1][i] for i in answers} == {""}
+        assert np.isfinite(found.rms(found.after)) == also
 
 
 def test_a_redundant_configuration_stays_in_its_branch() -> None:

@@ -176,3 +176,22 @@ def test_what_no_pose_keeps_is_named_with_its_bound():
         row = table[name].found
         assert row.worst == 0 and "transmission above 2" in row.note and "no pose" in row.note
     assert sm.largest_box("orthoglide-revised", region=[[5, 5, 5], [6, 6, 6]]).limited_by == ("reach",)
+
+
+def test_a_failed_pose_has_no_direction_of_the_worst_force():
+    """In the answer's position and direction too, which belong together; found between the nodes of a box as well."""
+    machine = sm.load_machine("orthoglide-revised")
+    d = worst_deflection(machine, [[0, 0, 0], [9, 0, 0], [0.2, 0.3, -0.1]], force=300.0)
+    assert list(np.isnan(d.directions[:, 0])) == [False, True, False] == list(np.isnan(d.values))
+    assert np.isnan(d.value) and list(d.position) == [9, 0, 0] and np.isnan(d.direction).all()
+    whole = worst_deflection(machine, d.positions[[0, 2]], force=300.0)
+    assert whole.value == d.values[2] and list(whole.direction) == list(d.directions[2])
+    arm = sm.load_machine("ur10")
+    around = np.array([[-0.5, -0.5, 0.3], [0.5, 0.5, 0.4]])  # the arm does not reach its own axis
+    nodes = worst_deflection(arm, box=around, force=10.0, nodes=2, refine=False)
+    assert np.isfinite(nodes.values).all()
+    refined = worst_deflection(arm, box=around, force=10.0, nodes=2)
+    assert np.isnan(refined.value) and np.isnan(refined.direction).all()
+    assert np.abs(refined.position[:2]).max() < 0.2
+    with pytest.raises(sm.StiffmapError, match="position: expected at least one"):
+        worst_deflection(machine, np.zeros((0, 3)), force=1.0)

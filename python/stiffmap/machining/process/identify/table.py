@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffmap.common.broadcasting import Floats, given_path, instance_of
+from stiffmap.common.broadcasting import Floats, given_path
 from stiffmap.common.errors import FileError
 from stiffmap.common.tables.cells import Cells
 from stiffmap.common.tables.named import WORD, Known, NamedTable, named, read_named
@@ -214,7 +214,6 @@ def _slot_signs(table: ForceTable) -> ForceTable:
 
 
 def _defaults(process: Process) -> dict[str, object]:
-    instance_of(process, Process, "process", "a Process, as load_process gives it")
     c, t = process.cut, process.tool
     return {
         "teeth": t.teeth, "axial": c.axial, "diameter": t.diameter, "radial": c.radial, "side": c.side,

@@ -31,13 +31,13 @@ class WorstDeflection:
     position: Floats
     """(3,) m, where."""
     direction: Floats
-    """(3,) unit vector of the force, base axes."""
+    """(3,) unit vector of the force, base axes; NaN with `value`, as `position` is then a pose that failed."""
     values: Floats
     """(n,) m at each pose."""
     positions: Floats
     """(n, 3) m."""
     directions: Floats
-    """(n, 3)."""
+    """(n, 3), NaN where the pose failed."""
     status: NDArray[np.uint8]
     """(n,) highest status among the directions of a pose."""
     force: float
@@ -99,6 +99,8 @@ def worst_deflection(
         if box is not None:
             raise StiffmapError("worst_deflection: expected position or box, got both")
         p = trailing(position, (3,), "position", "positions (m)").reshape(-1, 3)
+        if not len(p):
+            raise StiffmapError("position: expected at least one, got none")
         return _result(ask, p, *ask.at(p), plane)
     low, high = read_box(machine, box)
     p = box_nodes(low, high, nodes)
@@ -178,11 +180,10 @@ def _result(
     ask: _Ask, p: Floats, value: Floats, unit: Floats, status: NDArray[np.uint8], plane: str | None
 ) -> WorstDeflection:
     good = (status == Status.CONVERGED) & np.isfinite(value)
-    value = np.where(good, value, np.nan)
-    i = int(np.nanargmax(value)) if good.any() else 0
-    worst = float(value[i]) if good.all() else float("nan")
-    where = p[i] if good.all() else p[int(np.argmin(good))]
-    return WorstDeflection(worst, where, unit[i], value, p, unit, status, ask.force, plane, ask.linear)
+    value, unit = np.where(good, value, np.nan), np.where(good[:, None], unit, np.nan)
+    i = int(np.argmax(value) if good.all() else np.argmin(good))
+    worst = float(value[i])
+    return WorstDeflection(worst, p[i], unit[i], value, p, unit, status, ask.force, plane, ask.linear)
 
 
 def _refined(ask: _Ask, out: WorstDeflection, low: Floats, high: Floats, nodes: int) -> WorstDeflection:
@@ -194,9 +195,9 @@ def _refined(ask: _Ask, out: WorstDeflection, low: Floats, high: Floats, nodes: 
     for _ in range(REFINEMENTS):
         h = h / 2
         p = np.unique(np.clip(at + around * h, low, high), axis=0)
-        value, way, status = ask.at(p)
-        value = np.where(status == Status.CONVERGED, value, -np.inf)
-        i = int(np.argmax(value))
-        if value[i] > best:
-            best, at, unit = float(value[i]), p[i], way[i]
+        tried = _result(ask, p, *ask.at(p), out.plane)
+        if not tried.value <= best:
+            best, at, unit = tried.value, tried.position, tried.direction
+        if not np.isfinite(best):  # a pose of the box has no equilibrium
+            break
     return replace(out, value=best, position=at, direction=unit)

@@ -195,7 +195,7 @@ def natural_frequencies(
     w0 = 1 / np.sqrt(out["square"])
     found = {k: out[k].reshape(shape + out[k].shape[1:]) for k in ("coordinates", "status", "flags")}
     return NaturalFrequencies(
-        frequency=(w0 / (2 * np.pi)).reshape(*shape, -1),
+        frequency=(w0 / (2 * np.pi)).reshape(*shape, *w0.shape[1:]),
         shape=(w0[..., None] * out["shape"]).reshape(*shape, *out["shape"].shape[1:]),
         **found,
     )
