@@ -25,6 +25,8 @@ from stiffmap.workspace.maps.progress import track
 from stiffmap.workspace.maps.store import Store, folder_store, memory_store
 from stiffmap.workspace.maps.zarr_map import open_zarr_map
 
+OTHER_FORMATS = (".csv", ".json", ".ods", ".parquet", ".txt", ".xlsx", ".yaml")
+
 
 @keywords_of(map_plan)
 def error_map(
@@ -110,6 +112,10 @@ def error_map(
         hint_metres(machine, np.r_[plan.x, plan.y, plan.z], bool((ds.status == Status.UNREACHABLE).all()))
         return ds
     target = Path(out)
+    if target.suffix in OTHER_FORMATS:
+        raise StiffmapError(
+            f"out: expected a name that ends in .nc or .zarr, found {target.name!r}; tables: stiffmap map --format csv"
+        )
     write = _to_zarr if is_zarr(target) else _to_netcdf
     with only_job(target):
         write(plan, target, resume, work, progress)

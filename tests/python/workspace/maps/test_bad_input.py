@@ -40,6 +40,15 @@ def test_error_map(machine: sm.Machine, change: dict[str, Any], message: str) ->
         sm.error_map(machine, **{**GOOD, **change})
 
 
+@pytest.mark.parametrize("name", ["m.csv", "m.xlsx", "m.json"])
+def test_a_map_is_no_table(machine: sm.Machine, tmp_path: Path, name: str) -> None:
+    with pytest.raises(
+        sm.StiffmapError, match=rf"out: expected a name that ends in \.nc or \.zarr, found '{name}'"
+    ):
+        sm.error_map(machine, **GOOD, out=tmp_path / name)
+    assert not list(tmp_path.iterdir())
+
+
 def test_unwritable_output(machine: sm.Machine, tmp_path: Path) -> None:
     with pytest.raises(sm.StiffmapError, match=r"m\.nc: cannot be written"):
         sm.error_map(machine, **GOOD, out=tmp_path / "nowhere" / "m.nc")
