@@ -34,9 +34,10 @@ def likelihood(c, v, effects):
     return multivariate_normal(cov=v).logpdf(c.residual)
 
 
-@pytest.mark.parametrize("rank", [1, 2, 5])
-def test_one_effect_is_worth_the_mean_over_its_sizes(rank):
-    c, fit, shapes, v = setting(rank, (rank, rank, rank))
+@pytest.mark.parametrize(("rank", "count"), [(1, 3), (2, 3), (5, 3), (5, READINGS // 4)])
+def test_one_effect_is_worth_the_mean_over_its_sizes(rank, count):
+    """Few by their solutions, more directions than readings by the inverse of the factor."""
+    c, fit, shapes, v = setting(rank, (rank,) * count)
     found = candidates.evidence(fit, (Place(None, shapes[:1]), Place(None, shapes[1:])))  # type: ignore[arg-type]
     each = np.concatenate(found)
     for s, gain in zip(shapes, each, strict=True):

@@ -18,7 +18,7 @@ from stiffmap.identification.inference.amplitudes import fitted
 from stiffmap.identification.inference.chosen import Chosen
 from stiffmap.identification.inference.constants import ODDS
 from stiffmap.identification.inference.inference import inferred, terms
-from stiffmap.identification.inference.names import searched
+from stiffmap.identification.inference.names import searched, with_travel
 from stiffmap.identification.inference.parts import Parts
 from stiffmap.identification.inference.places import Place, Shape
 from stiffmap.identification.inference.verdict import TOLERABLE, Beyond, effect_of, judged
@@ -230,6 +230,23 @@ def test_declared_numbers_out_of_tolerance_in_the_stead_of_a_name_do_not_take_it
         assert len(v.named) == named
         assert [b.unknown.name for n in v.named for b in n.numbers] == numbers * named
         assert v.word == (("ambiguous" if numbers else "effects") if named else "none")
+
+
+def test_errors_along_the_travel_are_found_next_to_rows_that_slipped():
+    rng = np.random.default_rng(2)
+    bare = replace(columns(rng), rows=np.arange(READINGS) // 4)
+    along = np.linalg.qr(rng.normal(size=(len(bare), 3)))[0] * np.sqrt(len(bare) / 3)
+    slipped = np.where(bare.rows < 2, 25.0 * rng.normal(size=READINGS), 0.0)
+    residual = along @ (6.0, -4.0, 5.0) + rng.normal(size=len(bare)) + bare.free.T @ slipped
+    c = replace(bare, residual=residual, travel=(("a along its travel", along, 1.0),))
+    plain = fitted(c, ())
+    same, anew = (with_travel(plain, anew=a) for a in (False, True))
+    assert not same.columns.tied and anew.columns.tied  # the lengths of a row share a weight
+    assert anew.score > same.score > plain.score
+    assert anew.amplitude("a along its travel") == pytest.approx(5.0, rel=0.5)
+    assert np.all(anew.weights[:8] < 0.1) and np.all(anew.weights[8:] > 0.1)
+    none = replace(plain, columns=bare)
+    assert with_travel(none, anew=True) is none
 
 
 def test_a_number_is_no_effect_that_contains_a_named_one():
