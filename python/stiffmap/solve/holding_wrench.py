@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from stiffmap.common.broadcasting import Floats, batch, one_of, real_number, rows, thread_count, trailing
+from stiffmap.common.broadcasting import Floats, batch, one_of, rows, thread_count, trailing
 from stiffmap.common.json_text import plain
 from stiffmap.common.short import short_repr
 from stiffmap.solve.closing import commanded
 from stiffmap.solve.compiled import CompiledMachine, Flag, Status
 from stiffmap.solve.labels import OverPoses
+from stiffmap.solve.status import status_of_one
 
 
 @short_repr
@@ -58,7 +59,7 @@ class HoldingWrench(OverPoses):
         """Data of JSON of one pose, SI; StiffmapError for several."""
         data = {
             "point": self.point,
-            "status": Status(int(real_number(self.status, "status", "that of one pose"))).name,
+            "status": status_of_one(self.status).name,
             "status_without_clamp": Status(int(self.force_status)).name,
             "flags": [f.name for f in Flag(int(self.flags))],
             "wrench": self.wrench,

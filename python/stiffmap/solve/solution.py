@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffmap.common.broadcasting import Floats, real_number
+from stiffmap.common.broadcasting import Floats
 from stiffmap.common.json_text import plain
 from stiffmap.solve.closing import Kinematics
 from stiffmap.solve.compiled import Answer, Flag, Names, Status, counted
 from stiffmap.solve.labels import OverPoses, solution_dataset
+from stiffmap.solve.status import status_of_one
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -246,7 +247,7 @@ class Solution(OverPoses):
         """Data of JSON of one pose, SI; StiffmapError for several."""
         data = {
             "point": self.point,
-            "status": Status(int(real_number(self.status, "status", "that of one pose"))).name,
+            "status": status_of_one(self.status).name,
             "flags": [f.name for f in Flag(int(self.flags))],
             "displacement": self.displacement,
             "stiffness": self.stiffness,

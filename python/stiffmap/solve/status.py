@@ -7,6 +7,8 @@ from enum import IntEnum, IntFlag
 import numpy as np
 from numpy.typing import NDArray
 
+from stiffmap.common.broadcasting import real_number
+
 
 class Status(IntEnum):
     """Status of one pose; failed poses hold NaN as well."""
@@ -42,3 +44,8 @@ class Flag(IntFlag):
 def counted(status: NDArray[np.uint8]) -> dict[str, int]:
     """Number of poses per status, for those that there are."""
     return {s.name: int((status == s).sum()) for s in Status if (status == s).any()}
+
+
+def status_of_one(status: NDArray[np.uint8], name: str = "status", what: str = "that of one pose") -> Status:
+    """The status of a result of one pose; StiffmapError, which begins with `name`, for one of several."""
+    return Status(int(real_number(status, name, what)))

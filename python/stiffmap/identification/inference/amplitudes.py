@@ -153,12 +153,13 @@ def fitted(
         starts.append((quiet, _standing_out(evaluated(columns, parts, quiet, light.weights))[1]))
     if columns.alone.any():
         starts.append((begun, np.where(columns.alone, NOTHING, 1.0)))
-    best, likeliest = light, -np.inf
+    scores, best = [], light
     for t, w in starts:
         if w is not None:
             heavy = _optimum(columns, tuple(parts), t, w, heavy=True, beat=best.score)
-            best, likeliest = max(best, heavy, key=lambda f: f.score), max(likeliest, heavy.score)
-    return replace(best, lighter=best.score - likeliest) if np.isfinite(likeliest) else best
+            scores.append(heavy.score)
+            best = max(best, heavy, key=lambda f: f.score)
+    return replace(best, lighter=best.score - max(scores)) if scores else best
 
 
 def _standing_out(fit: Fit) -> tuple[float, Floats | None]:

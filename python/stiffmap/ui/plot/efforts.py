@@ -9,9 +9,8 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from stiffmap.common.broadcasting import real_number
 from stiffmap.solve.internal_wrenches import InternalWrenches
-from stiffmap.solve.status import Status
+from stiffmap.solve.status import Status, status_of_one
 from stiffmap.ui.plot.style import BLUE, CYCLE, VERMILLION, headline, line_look, paper
 
 PANELS = (("effort", "effort", "effort_margin", "peak_effort"), ("rate", "speed", "speed_margin", "peak_speed"),
@@ -56,7 +55,7 @@ def _unit(turns: list[int], effort: bool) -> str:
 
 def stress_figure(stress: InternalWrenches, title: str = "") -> Figure:
     """Forces (N, left) and moments (N·m, right) of every link spring at one pose, in the spring's axes."""
-    status = Status(int(real_number(stress.status, "stress", "one pose")))
+    status = status_of_one(stress.status, "stress", "one pose")
     told = "" if status == Status.CONVERGED else f": none, {status.name.lower()}"
     names = list(stress.springs)
     values = np.array([stress.springs[n] for n in names]).reshape(len(names), 6)

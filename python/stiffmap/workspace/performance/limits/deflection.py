@@ -181,7 +181,7 @@ def _result(
 ) -> WorstDeflection:
     good = (status == Status.CONVERGED) & np.isfinite(value)
     value, unit = np.where(good, value, np.nan), np.where(good[:, None], unit, np.nan)
-    i = int(np.argmax(value) if good.all() else np.argmin(good))
+    i = int(np.argmax(value))  # the first that failed, if any did: NaN comes before all numbers
     worst = float(value[i])
     return WorstDeflection(worst, p[i], unit[i], value, p, unit, status, ask.force, plane, ask.linear)
 
