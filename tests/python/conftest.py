@@ -4,14 +4,18 @@
 wherever it runs may carry `@pytest.mark.slow` itself. No file may be slow as a whole: its feature would then go
 untested in the fast lane.
 
+A worker that crashes says how it ended, and where, in the summary.
+
 Where a run has all that tests need (`.ci/run`), `--skips-listed` makes it fail if a test skips that `skips.txt` does
 not list.
 """
 
 from __future__ import annotations
 
+import faulthandler
 from collections import defaultdict
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -26,12 +30,40 @@ def listed(name: str) -> set[str]:
 
 SLOW = listed("slow.txt")
 SKIPPED: set[str] = set()
+ENDS: list[str] = []
+"""How workers ended that crashed, and what they were doing."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption(
         "--skips-listed", action="store_true", help="fail where a test skips that skips.txt lacks"
     )
+
+
+def faults(root: Path, worker: str) -> Path:
+    """Where a worker of pytest-xdist writes what it was doing when it crashed."""
+    return root / "build" / f"crash-{worker}.txt"
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_configure(config: pytest.Config) -> None:
+    if worker := getattr(config, "workerinput", None):
+        path = faults(config.rootpath, worker["workerid"])
+        path.parent.mkdir(exist_ok=True)
+        faulthandler.enable(path.open("w", encoding="utf-8"))
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_testnodedown(node: Any, error: object) -> None:
+    if error is not None:
+        code = node.gateway._io.popen.wait(10)
+        lines = faults(node.config.rootpath, node.gateway.id).read_text(encoding="utf-8").splitlines()
+        ENDS.append("\n".join([f"{node.gateway.id} ended with {code}", *lines[:40]]))
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    for end in ENDS:
+        terminalreporter.write_line(end)
 
 
 def pytest_runtest_logreport(report: pytest.TestReport) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from collections.abc import Callable
 from typing import Any
@@ -25,6 +26,50 @@ def opened(browser: Any, view: View, width: int = 1100, height: int = 700) -> An
     page.goto(view.url)
     page.get_by_role("tab", name="Tool and load").wait_for()
     return page
+
+
+CAMERA = {
+    "type": "ViewerCameraMessage", "wxyz": (1.0, 0.0, 0.0, 0.0), "position": (0.6, -0.8, 0.9), "look_at": (0.0, 0.0, 0.0),
+    "up_direction": (0.0, 0.0, 1.0), "fov": 0.8, "near": 0.01, "far": 100.0, "image_height": 700, "image_width": 1100,
+}  # fmt: skip
+"""What a page says first."""
+
+
+class Tab:
+    """What a page receives, without a browser that draws it."""
+
+    def __init__(self, view: View) -> None:
+        import msgspec
+        import viser
+        from websockets.sync.client import connect
+        from websockets.typing import Subprotocol
+
+        names = [Subprotocol(f"viser-v{viser.__version__}")]
+        self._socket = connect(
+            f"ws://127.0.0.1:{view._server.get_port()}",
+            subprotocols=names,
+            max_size=None,
+            max_queue=None,
+            proxy=None,
+        )
+        self._socket.send(msgspec.msgpack.encode(CAMERA))
+
+    def shows(self, text: str, seconds: float = 60.0) -> bool:
+        """Whether a message with this text arrives: messages are compressed but for their arrays."""
+        import zstandard
+
+        end = time.monotonic() + seconds
+        with contextlib.suppress(TimeoutError):
+            while True:
+                message = self._socket.recv(end - time.monotonic())
+                assert isinstance(message, bytes)
+                packed = message[16 : 16 + int.from_bytes(message[8:16], "little")]
+                if text.encode() in zstandard.decompress(packed):
+                    return True
+        return False
+
+    def close(self) -> None:
+        self._socket.close()
 
 
 def client_of(view: View) -> Any:

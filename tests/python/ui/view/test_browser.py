@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import time
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -155,24 +154,6 @@ def test_every_field_of_a_number_has_decimals() -> None:
         fields = [h for h in found if hasattr(h, "precision") and h is not controls.mode]  # whole
         assert len(fields) >= 12
         assert {h.precision for h in fields} == {DECIMALS}
-
-
-def test_several_pages_show_the_same_and_a_closed_one_costs_nothing(browser: Any) -> None:
-    machine = sm.load_machine("five-bar")
-    with View(model_of(machine, force=(10.0, 0.0, 0.0))) as view:
-        one, two = opened(browser, view), opened(browser, view)
-        assert until(lambda: len(view._server.get_clients()) == 2)
-        for k in range(100):
-            view._viewer.drag(
-                np.array([0.05 * np.sin(k), 0.42, 0.0]), np.array(view._viewer.scene.gizmo.wxyz)
-            )
-            time.sleep(0.02)
-            if k == 50:
-                two.close()
-        assert view._viewer.worker.idle(60)
-        d = 1e6 * np.linalg.norm(machine.solve(view.state.position, view.state.wrench).displacement[:3])
-        one.get_by_text(f"{d:.1f} µm").first.wait_for()
-        assert until(lambda: len(view._server.get_clients()) == 1)
 
 
 def test_the_page_holds_everything_and_asks_for_nothing(tmp_path: Path) -> None:

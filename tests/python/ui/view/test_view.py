@@ -12,12 +12,13 @@ import threading
 import time
 import urllib.error
 import urllib.request
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from tests.python.ui.view.pages import Tab, until
 
 import stiffmap as sm
 from stiffmap.common.errors import FileError, MissingPartError, StiffmapError
@@ -43,13 +44,6 @@ def view(machine: sm.Machine) -> Iterator[View]:
     with View(model_of(machine)) as v:
         assert v._viewer.worker.idle()
         yield v
-
-
-def until(true: Callable[[], bool], seconds: float = 20.0) -> bool:
-    end = time.monotonic() + seconds
-    while not true() and time.monotonic() < end:
-        time.sleep(0.05)
-    return true()
 
 
 def test_a_drag_is_drawn_as_solved(view: View, machine: sm.Machine) -> None:
@@ -240,6 +234,26 @@ def test_the_command_serves_until_it_is_interrupted() -> None:
         finally:
             running.kill()
         assert running.stderr.read() == ""
+
+
+def test_several_pages_show_the_same_and_a_closed_one_costs_nothing() -> None:
+    machine = sm.load_machine("five-bar")
+    with View(model_of(machine, force=(10.0, 0.0, 0.0))) as view:
+        tabs = [Tab(view) for _ in range(3)]
+        assert until(lambda: len(view._server.get_clients()) == 3)
+        for k in range(100):
+            view._viewer.drag(
+                np.array([0.05 * np.sin(k), 0.42, 0.0]), np.array(view._viewer.scene.gizmo.wxyz)
+            )
+            time.sleep(0.01)
+            if k == 50:
+                tabs.pop().close()
+        assert view._viewer.worker.idle(60)
+        d = 1e6 * np.linalg.norm(machine.solve(view.state.position, view.state.wrench).displacement[:3])
+        assert all(tab.shows(f"{d:.1f} µm") for tab in tabs)
+        assert until(lambda: len(view._server.get_clients()) == 2)
+        for tab in tabs:
+            tab.close()
 
 
 def test_rows_and_paths_are_drawn() -> None:
