@@ -21,7 +21,7 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.tables.cells import Cells
 from stiffmap.common.tables.header import split_unit, with_unit
-from stiffmap.common.tables.lines import radians
+from stiffmap.common.tables.lines import IN_PI, radians, sum_in
 from stiffmap.common.tables.table import Table
 from stiffmap.common.units import unit_of
 from stiffmap.experiment.spreadsheet.answers import Meant
@@ -29,6 +29,7 @@ from stiffmap.experiment.spreadsheet.joints import MOST_TURNS
 from stiffmap.model.description import Drive, Element, Joint, Leg, MachineDescription, Offset, Pose
 
 CONVENTIONS = ("standard", "modified")
+ASSUMED = "the table does not say which convention it has, and standard was taken; --dh-convention modified takes the other"
 NUMBERS = {
     "theta": r"theta|θ|offset|theta[ _-]?(offset|0|\(offset\))|q[ _-]?offset",
     "d": "d",
@@ -42,6 +43,8 @@ INDEX = re.compile(
 """``theta_i``, ``d(i)``, ``aᵢ₋₁``: the symbol, and whether it is of the link before."""
 VARIABLE = r"(?i)(?:\+ *)?\\?(?:{}|q)[ _]?\{{?(?:\d+|i)\}}?\*?(?= *(?:[+−–-]|$))|\*$"
 """The joint's coordinate in a cell, as in ``q2``, ``θ2 - 90``, ``90 + \\theta_2``, ``0*``; what is left is added to it."""
+RANGE = re.compile(r"(?i)±|(?:[\d.)π°]|pi) *(?:[-−–<~→…]|\\?to|bis|\.{2,}) *[-−–+]?\.?(?:[\d(π]|pi)")
+"""``0 \\to 1``, ``-170...170``, ``0 - 1``."""
 WORDS = {
     "name": r"name|joint|axis|achse|gelenk|id|link",
     "type": r"type|kind|art|sigma|σ",
@@ -154,21 +157,30 @@ def _constants(sheet: Table, at: Mapping[str, int], units: Mapping[str, str]) ->
     first = [re.search(r"\d{1,9}", w) for w in sheet.columns[at["name"]]] if "name" in at else []
     falls = np.diff([int(f[0]) if f else math.nan for f in first], prepend=math.nan) < 0
     sheet.check(~falls, lambda i: "expected joints in their order from the base to the tool")
-    for name in ("theta", "alpha"):
+    point = (lambda v: repr(v).replace(".", ",")) if sheet.decimal_comma else repr
+    for name, quantity in QUANTITIES.items():
         cells = [*columns[at[name]]]
+        found = f"'{header[at[name]]}': expected one number; found"
+        limits = "a range or a difference; limits of a joint stand in columns low and high"
+        sheet.check([not RANGE.search(c) for c in cells], lambda i: f"{found} '{cells[i]}', {limits}")  # noqa: B023
+        sums = (None if IN_PI.search(c) else sum_in(c, sheet.decimal_comma) for c in cells)
+        cells = [c if v is None else point(v) for v, c in zip(sums, cells, strict=True)]
         plain, own = split_unit(header[at[name]])
         said = units.get(name) or own or units.get("angle", "rad")
-        angles = [radians(c) for c in cells]
-        if (unit := unit_of(said, "angle")) and angles.count(None) < len(angles):
-            cells = [c if a is None else repr(a / unit.size) for a, c in zip(angles, cells, strict=True)]
-            header[at[name]], columns[at[name]] = with_unit(plain, said), Cells.of(cells)
+        angles = [radians(c, sheet.decimal_comma) for c in cells]
+        if quantity == "angle" and (unit := unit_of(said, "angle")) and angles.count(None) < len(angles):
+            cells = [c if a is None else point(a / unit.size) for a, c in zip(angles, cells, strict=True)]
+            header[at[name]] = with_unit(plain, said)
+        columns[at[name]] = Cells.of(cells)
     return replace(sheet, header=tuple(header), columns=tuple(columns)), types
 
 
 def _plain(cell: str) -> str:
     """Without the marks of Markdown, HTML and LaTeX: ``&theta;<sub>1</sub>`` and ``$\\theta_1$`` are the angle of a joint."""
-    text = unicodedata.normalize("NFKC", re.sub(r"</?su[bp]>|\*\*|[$`]", "", html.unescape(cell)))
-    text = re.sub(r"\\d?frac *\{([^{}]*)\} *\{([^{}]*)\}", r"\1/\2", text)
+    bare = re.sub(r"(?<!\w)\*\*([^*]+)\*\*(?!\w)", r"\1", html.unescape(cell))
+    text = unicodedata.normalize("NFKC", re.sub(r"</?su[bp]>|[$`]", "", bare))
+    text = re.sub(r"\\d?frac *\{([^{}]*)\} *\{([^{}]*)\}", r"(\1)/(\2)", text)
+    text = re.sub(r"\\(?:cdot|times)\b", "*", text)
     return re.sub(r"\\pi\b", "π", re.sub(r"\^ *\{? *\\circ *\}?", "°", text)).strip()
 
 

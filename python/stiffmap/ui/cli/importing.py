@@ -63,11 +63,16 @@ def command(
     data = {"file": file, "name": machine.name, "legs": machine.legs, "actuators": machine.actuators, "tip": read.tip,
             "left_out": read.left_out, "rigid": read.rigid}  # fmt: skip
     lines = [f"wrote {file}: legs {', '.join(machine.legs)}; {len(machine.actuators)} actuators"]
-    show(as_json, data, [*lines, *_remarks(read)])
+    assumed = table and "dh_convention" not in options_given(context)
+    show(as_json, data, [*lines, *_remarks(read, assumed)])
 
 
-def _remarks(found: Imported) -> Iterator[Text]:
-    """What was chosen, left out or taken as rigid."""
+def _remarks(found: Imported, assumed: bool) -> Iterator[Text]:
+    """What was chosen, left out, taken as rigid, or `assumed` of a table."""
+    if assumed:
+        from stiffmap.experiment.spreadsheet.dh import ASSUMED
+
+        yield Text.assemble(("convention", "yellow"), f": {ASSUMED}")
     for head, text, there in (
         ("tip", f" {found.tip}, {found.choice}; --tip LINK takes another", found.choice),
         ("left out", f" (not on the way to the tip; masses stay on what carries them): {', '.join(found.left_out)}", found.left_out),

@@ -447,6 +447,59 @@ def test_angles_of_parts_of_pi_and_marks_of_texts(name: str, text: str, tmp_path
     assert [(r.d, r.a) for r in rows] == [(0.3, 0), (0, 0.4), (0, 0)]
 
 
+def _cells(folder: Path, theta: str, d: str) -> list[str]:
+    rows = f"1,0,{d},0,pi/2\n2,{theta},0.1,0.43,0\n"
+    return ["import", write(folder, "dh.csv", f"joint,theta [rad],d [m],a [m],alpha\n{rows}"), "--overwrite"]
+
+
+@pytest.mark.parametrize(
+    ("theta", "d", "turn", "shift"),
+    [
+        ("1/2*pi", "0.33 + 0.42", 0.5, 0.75),
+        ("pi/2 + pi", "2*0.15", 1.5, 0.3),
+        ("90° + 45°", "2 \\cdot 0.15", 0.75, 0.3),
+        ("-\\frac{1}{2}\\pi", "(0.1+0.2)*2", -0.5, 0.6),
+        ("2π/4", "1e-1+1e-2", 0.5, 0.11),
+    ],
+)
+def test_cells_that_are_sums_and_products(
+    theta: str, d: str, turn: float, shift: float, tmp_path: Path
+) -> None:
+    rows = read_dh(read_sheet(Path(_cells(tmp_path, theta, d)[1])), {}, "standard")
+    assert (rows[1].theta / math.pi, rows[0].d) == pytest.approx((turn, shift))
+
+
+def test_sums_with_decimal_commas(tmp_path: Path) -> None:
+    text = "joint;theta [deg];d [m];a [m];alpha\n1;90 + 1,125;0,33 + 0,42;0;0\n2;1,125°;0,5;0;-π/2\n"
+    rows = read_dh(read_sheet(Path(write(tmp_path, "dh.csv", text))), {}, "standard")
+    assert [math.degrees(r.theta) for r in rows] == pytest.approx([91.125, 1.125])
+    assert [r.d for r in rows] == pytest.approx([0.75, 0.5])
+
+
+@pytest.mark.parametrize(
+    ("theta", "d", "words"),
+    [
+        ("0 \\to 1", "0", "line 3: 'theta.*expected one number; found '0 .*to 1', a range"),
+        ("−170–170", "0", "line 3: 'theta.*expected one number.*a range or a difference"),
+        ("0", "0...1", "line 2: 'd .*expected one number.*limits of a joint stand in columns low and high"),
+        ("0", "2**3", "line 2: column 'd .*expected a number"),
+        ("0", "1/0*2", "line 2: column 'd .*expected a number"),
+        ("0", "90°", "line 2: column 'd .*expected a number"),
+    ],
+)
+def test_cells_that_are_no_one_number_are_refused(theta: str, d: str, words: str, tmp_path: Path) -> None:
+    with pytest.raises(StiffmapError, match=words):
+        read_dh(read_sheet(Path(_cells(tmp_path, theta, d)[1])), {}, "standard")
+
+
+def test_a_convention_that_nobody_says_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    given = _cells(tmp_path, "0", "0.1")
+    assert main(given) == 0
+    assert "standard was taken; --dh-convention modified takes the other" in capsys.readouterr().out
+    assert main([*given, "--dh-convention", "standard"]) == 0
+    assert "was taken" not in capsys.readouterr().out
+
+
 @pytest.mark.parametrize(
     ("rows", "words"),
     [
