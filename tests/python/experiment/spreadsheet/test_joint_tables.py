@@ -492,6 +492,23 @@ def test_cells_that_are_no_one_number_are_refused(theta: str, d: str, words: str
         read_dh(read_sheet(Path(_cells(tmp_path, theta, d)[1])), {}, "standard")
 
 
+@pytest.mark.parametrize("first", [True, False])
+def test_joints_in_small_letters_next_to_quaternions_in_capitals(first: bool, tmp_path: Path) -> None:
+    turns, joints = [f"Q{i}" for i in range(4)], [f"q{i} [deg]" for i in range(1, 7)]
+    names = [*joints, *turns] if first else [*turns, *joints]
+    rows = [
+        {**dict(zip(joints, (10.0 * k + i for i in range(6)), strict=True)), **dict(zip(turns, (0.6, 0, 0.8, 0), strict=True))}
+        for k in range(4)
+    ]  # fmt: skip
+    lines = [",".join(str(r[n]) for n in names) + f",{k},2,3" for k, r in enumerate(rows)]
+    text = "\n".join([",".join([*names, "px [mm]", "py [mm]", "pz [mm]"]), *lines])
+    dh = write(tmp_path, "dh.csv", table())
+    noise = {"px": 1.0, "py": 1.0, "pz": 1.0}
+    sm.experiment_from_table(None, write(tmp_path, "t.csv", text), tmp_path / "o", dh=dh, noise=noise)
+    command = sm.load_experiment(tmp_path / "o").command
+    assert np.degrees(command[3]) == pytest.approx([30, 31, 32, 33, 34, 35])
+
+
 def test_a_convention_that_nobody_says_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     given = _cells(tmp_path, "0", "0.1")
     assert main(given) == 0
