@@ -509,6 +509,31 @@ def test_joints_in_small_letters_next_to_quaternions_in_capitals(first: bool, tm
     assert np.degrees(command[3]) == pytest.approx([30, 31, 32, 33, 34, 35])
 
 
+def test_names_in_words_and_limits_of_coordinates(tmp_path: Path) -> None:
+    head = "Link,Link length a (mm),Link twist α (deg),Link offset d (mm),Joint angle θ (deg),qmin,q_max"
+    file = write(tmp_path, "dh.csv", f"{head}\n1,30,90,400,q1,-170,170\n2,500,-,,q2 + 90,-90,120\n")
+    rows = read_dh(read_sheet(Path(file)), {}, "standard")
+    assert [v for r in rows for v in (r.a, math.degrees(r.alpha), r.d)] == pytest.approx(
+        [0.03, 90, 0.4, 0.5, 0, 0]
+    )
+    assert [math.degrees(r.theta) for r in rows] == pytest.approx([0, 90])
+    assert [float(np.degrees(v)) for r in rows for v in r.range or ()] == pytest.approx([-170, 170, -90, 120])
+
+
+def test_columns_that_nothing_is_made_of_are_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = table().replace("alpha [deg]\n", "alpha [deg],Mass [kg]\n").replace("90.0\n", "90.0,7.1\n")
+    assert main(["import", write(tmp_path, "dh.csv", text), "-o", str(tmp_path / "arm.yaml")]) == 0
+    assert "left out: column 'Mass [kg]'" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("cell", ["#REF!", "?", "n/a", "missing"])
+def test_a_cell_that_lacks_its_number_is_no_zero(cell: str, tmp_path: Path) -> None:
+    rows = f"1,0,400,0,{cell}\n2,0,0,500,0\n"
+    file = write(tmp_path, "dh.csv", f"joint,theta [deg],d [mm],a [mm],alpha [deg]\n{rows}")
+    with pytest.raises(StiffmapError, match=r"line 2: 'alpha .deg.': expected one number; found"):
+        read_dh(read_sheet(Path(file)), {}, "standard")
+
+
 def test_a_convention_that_nobody_says_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     given = _cells(tmp_path, "0", "0.1")
     assert main(given) == 0
@@ -526,6 +551,7 @@ def test_a_convention_that_nobody_says_is_said(tmp_path: Path, capsys: pytest.Ca
         ("1,q1,0\n2,q2 + 90,0\ntool,0,100", "line 4: no joint's coordinate"),
         ("1,0,d1\n2,θ2,0\nEE,90,100", "line 4: no joint's coordinate"),
         ("base,0,200\n1,q1,0", "line 2: no joint's coordinate"),
+        ("1,0,0\n2,0,0\nTool flange,0,100", "line 4: a name that no joint has: leave a fixed frame out"),
     ],
 )
 def test_rows_that_are_no_joints_one_behind_the_other_are_refused(
