@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from threading import current_thread, main_thread
 from types import FrameType
 
-from stiffmap.common.broadcasting import real_number
+from stiffmap.common.broadcasting import real_number, refused
 
 Progress = Callable[[str], None]
 
@@ -33,6 +33,8 @@ class Clock:
     def of(budget: float | None, progress: Progress | None = None) -> Clock:
         """A clock that starts now; `budget` in seconds, None: no end."""
         most = float("inf") if budget is None else real_number(budget, "time_limit", "seconds")
+        if not most >= 0:
+            raise refused("time_limit", "seconds, 0 or more", f"{most:g}")
         return Clock(time.monotonic() + most, progress)
 
     def leave_out(self, what: str) -> None:

@@ -24,7 +24,7 @@ from stiffmap.model.effects import add_effect
 from stiffmap.model.files import load_description, save_description
 from stiffmap.model.files.load import Source
 from stiffmap.solve.compiled import CompiledMachine, Status
-from stiffmap.solve.derivatives import Prepared, Request, differentiate, prepare, read_requests
+from stiffmap.solve.derivatives import DISPLACEMENT, Prepared, Request, differentiate, prepare, read_requests
 from stiffmap.solve.holding_wrench import HoldingWrench, holding_wrench
 from stiffmap.solve.options import SolveKeywords, SolveOptions, options_of, spelled_out
 from stiffmap.solve.redesign import redesigned
@@ -117,7 +117,7 @@ class Machine:
         wrench: ArrayLike | None = None,
         *,
         derivatives: Sequence[Request] = (),
-        derivatives_of: Sequence[str] = ("displacement",),
+        derivatives_of: Sequence[str] = DISPLACEMENT,
         **given: Unpack[SolveKeywords],
     ) -> Solution:
         """Equilibrium, stiffness and compliance at commanded poses under external wrenches.
@@ -172,6 +172,8 @@ class Machine:
         """
         if not isinstance(derivatives, tuple | list):
             derivatives = tuple(instance_of(derivatives, Iterable, "derivatives", "effects or inputs"))
+        if not derivatives and derivatives_of is not DISPLACEMENT:
+            read_requests(derivatives, derivatives_of)
         threads = given.get("threads", 0) if len(given) == 1 else 0
         if not derivatives and (not given or threads is None or (type(threads) is int and threads == 1)):
             one = self._compiled.solve_one(position, wrench)

@@ -38,7 +38,8 @@ FIELDS = (
 class Solution(OverPoses):
     """Equilibria of a batch of poses; SI, base axes, linear part first, leading batch axes (...).
 
-    Failed poses hold NaN and their status. Arrays are made when they are first asked for.
+    Poses that failed hold NaN and their status; UNSTABLE ones keep the numbers of their equilibrium, which is no minimum of the
+    energy. Arrays are made when they are first asked for.
     """
 
     __slots__ = ("_answer", "_made", "_names", "_order", "_shape", "_slopes", "point", "unloaded")

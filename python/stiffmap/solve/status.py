@@ -11,7 +11,7 @@ from stiffmap.common.broadcasting import real_number
 
 
 class Status(IntEnum):
-    """Status of one pose; failed poses hold NaN as well."""
+    """Status of one pose; failed poses hold NaN as well, UNSTABLE ones the numbers of an equilibrium that gives way (NaN in maps)."""
 
     CONVERGED = 0
     UNREACHABLE = 1

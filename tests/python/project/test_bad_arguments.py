@@ -318,6 +318,10 @@ def test_what_is_no_argument_of_long_calls_is_one_error(
 
 def test_more_is_refused_by_name() -> None:
     machine = sm.load_machine("five-bar")
+    for call in (sm.diagnose, sm.calibrate):
+        for less in (-1, float("nan")):
+            with pytest.raises(sm.StiffmapError, match=r"time_limit: expected .*got (-1|nan)"):
+                call("orthoglide-revised", A_SERVO, time_limit=less)
     with pytest.raises(sm.StiffmapError, match="wrench: expected one row or 2"):
         sm.compensate(machine, MANY, wrench=[W, W, W])
     with pytest.raises(sm.StiffmapError, match="outlier_share: expected a share from 0 to 1, got 5"):

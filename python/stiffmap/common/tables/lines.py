@@ -12,6 +12,7 @@ from itertools import chain, islice
 from pathlib import Path
 from typing import NamedTuple
 
+from stiffmap.common.arithmetic import sum_of_numbers
 from stiffmap.common.errors import FileError
 from stiffmap.common.number_text import number_in
 from stiffmap.common.tables.cells import BETWEEN, Cells, blocks, filled
@@ -42,7 +43,19 @@ GROUPED = re.compile(r"[+-]?\d{1,3}(?:(['’ ])\d{3}(?:\1\d{3})*(?:\.\d+)?|(?:,\
 """``1'000``, ``1 000.5``, ``1,000.5``."""
 _PART = r"(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?"
 COMPLEX = re.compile(rf"\(?([+-]?{_PART})([+-])(?:[ij]({_PART})|({_PART})[ij])\)?", re.IGNORECASE)
-IN_PI = re.compile(r"(?i)([+−–-]? *)((?:\d+(?:\.\d+)?)?) *[*·]? *(?:(?:np|math)\.)?(?:π|pi)(?: */ *(\d+))?")
+IN_PI = re.compile(r"(?i)°|π|pi(?!\w)")
+SIGNS = tuple(
+    (re.compile(pattern), sign)
+    for pattern, sign in (
+        (r"^\+ *", ""),
+        (r"[·×]", "*"),
+        (r"°", f"({math.radians(1.0)!r})"),
+        (r"(?i)(?:(?:np|math)\.)?(?:π|pi(?!\w))", f"({math.pi!r})"),
+        (r"(?<=[\d.)]) *(?=\()", "*"),
+    )
+)
+"""Of sums and products, as Python writes them."""
+LONGEST_SUM = 80
 LATEX = re.compile(r"(?m)^ *\\(?:hline|\w+rule)\b|\\\\(?:\[.*?\])? *(?:\\\w+)? *$|^.*\\(?:begin|end)\{.*$")
 """Rules before a row or behind it, and the strokes at its end."""
 FORTRAN = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)[dD][+-]?\d+")
@@ -219,19 +232,35 @@ def complex_number(cell: str) -> complex | None:
     return None if match is None else complex(float(match[1]), float(match[2] + (match[3] or match[4])))
 
 
-def radians(cell: str) -> float | None:
-    """The angle in a cell such as ``-π/2`` or ``90°``; None for what is none of them."""
-    if match := IN_PI.fullmatch(cell):
-        return math.pi * float(plain(f"{match[1].strip()}{match[2] or 1}")) / float(match[3] or 1)
-    degrees = number(cell[:-1].replace(" ", ""), Spelling("," in cell)) if cell.endswith("°") else None
-    return None if degrees is None else math.radians(degrees)
+def sum_in(cell: str, comma: bool = False) -> float | None:
+    """The value of sums and products with numbers, π and degrees (in rad): ``0.33 + 0.42``, ``2*0.15``, ``-π/2``, ``90°``.
+
+    None for anything else: ``0 - 1`` may be a range, ``1/2`` a date.
+    """
+    text = plain(cell.strip())
+    if comma or "°" in text:
+        text = text.replace(",", ".")
+    for pattern, sign in SIGNS:
+        text = pattern.sub(sign, text)
+    summed = re.fullmatch(r"[-+*/().\de ]*[+*(][-+*/().\de ]*", text) and len(cell) <= LONGEST_SUM
+    if not summed or re.search(r"[\d.)] *-", text):
+        return None
+    with suppress(SyntaxError, TypeError, ArithmeticError):
+        value = sum_of_numbers(text)
+        return value if math.isfinite(value) else None
+    return None
+
+
+def radians(cell: str, comma: bool = False) -> float | None:
+    """The angle in a cell such as ``-π/2`` or ``90°``, whatever its column's unit; None for what is none of them."""
+    return sum_in(cell, comma) if IN_PI.search(cell) else None
 
 
 def is_finite(cell: str, spelling: Spelling) -> bool:
     """Whether a cell holds a number."""
     value = number(cell, spelling)
     if value is None:
-        return complex_number(cell) is not None or IN_PI.fullmatch(cell.strip()) is not None
+        return complex_number(cell) is not None or ("°" not in cell and sum_in(cell) is not None)
     return math.isfinite(value)
 
 

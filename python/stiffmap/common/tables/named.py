@@ -91,7 +91,8 @@ class NamedTable:
 
 def read_named(path: Path, known: Known, sheet: str | None = None) -> NamedTable:
     """A text or a workbook. Raises FileError naming file, line and column, what was expected and what was found."""
-    return named(read_sheet(path, sheet, Layout(known.has, strict=True)), known)
+    names = ", ".join(known.usual.get(n, n) for n in known.units)
+    return named(read_sheet(path, sheet, Layout(known.has, strict=True, names=names)), known)
 
 
 def named(sheet: Table, known: Known) -> NamedTable:

@@ -71,6 +71,8 @@ class Layout:
     """Whether all below the header are rows of numbers, with a cell for each column, in a command without --header and --table."""
     repeated: bool = False
     """Whether names may come again, as those of displacements do once per load case."""
+    names: str = ""
+    """Those that a header may have, for the message where there is none."""
 
 
 PLAIN = Layout()
@@ -100,9 +102,10 @@ def read_sheet(path: Path, sheet: str | None = None, layout: Layout = PLAIN) -> 
         found = first[0], _names(first[1], layout.header, str(path), first[0])
     if first is None or found is None:
         way = f"; if the table has none, name its columns: {WAY}, or by their numbers, as in --map x=2"
+        begin = f"; expected its names of columns, such as {layout.names}" if layout.names else ""
         rule = "; a row of numbers has two or more, each alone in its cell, in half of its cells or more"
         raise FileError(
-            f"no header line with rows of numbers below it was found{'' if layout.strict else way if first else rule}",
+            f"no header line with rows of numbers below it was found{begin if layout.strict else way if first else rule}",
             file=str(path),
         )
     number_, header = found

@@ -21,7 +21,7 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.tables.cells import Cells
 from stiffmap.common.tables.header import split_unit, with_unit
-from stiffmap.common.tables.lines import radians
+from stiffmap.common.tables.lines import DASHES, IN_PI, is_nothing, radians, sum_in
 from stiffmap.common.tables.table import Table
 from stiffmap.common.units import unit_of
 from stiffmap.experiment.spreadsheet.answers import Meant
@@ -29,11 +29,14 @@ from stiffmap.experiment.spreadsheet.joints import MOST_TURNS
 from stiffmap.model.description import Drive, Element, Joint, Leg, MachineDescription, Offset, Pose
 
 CONVENTIONS = ("standard", "modified")
+ASSUMED = "the table does not say which convention it has, and standard was taken; --dh-convention modified takes the other"
+LONG = r"((link|joint) )?((length|twist|offset|angle),? )?"
+"""Before a symbol, as in ``Link length a``."""
 NUMBERS = {
-    "theta": r"theta|θ|offset|theta[ _-]?(offset|0|\(offset\))|q[ _-]?offset",
-    "d": "d",
-    "a": "a",
-    "alpha": "alpha|α",
+    "theta": rf"{LONG}(theta|θ)|offset|theta[ _-]?(offset|0|\(offset\))|q[ _-]?offset",
+    "d": f"{LONG}d",
+    "a": f"{LONG}a",
+    "alpha": f"{LONG}(alpha|α)",
 }
 INDEX = re.compile(
     r"^((?:theta|θ|q)[ _-]?offset|theta|θ|alpha|α|sigma|σ|[adr])[ _-]*[({\[]?[ijkn]( ?[-−–_] ?1)?[)}\]]?(?![^\W_])",
@@ -42,12 +45,16 @@ INDEX = re.compile(
 """``theta_i``, ``d(i)``, ``aᵢ₋₁``: the symbol, and whether it is of the link before."""
 VARIABLE = r"(?i)(?:\+ *)?\\?(?:{}|q)[ _]?\{{?(?:\d+|i)\}}?\*?(?= *(?:[+−–-]|$))|\*$"
 """The joint's coordinate in a cell, as in ``q2``, ``θ2 - 90``, ``90 + \\theta_2``, ``0*``; what is left is added to it."""
+RANGE = re.compile(r"(?i)±|(?:[\d.)π°]|pi) *(?:[-−–<~→…]|\\?to|bis|\.{2,}) *[-−–+]?\.?(?:[\d(π]|pi)")
+"""``0 \\to 1``, ``-170...170``, ``0 - 1``."""
 WORDS = {
     "name": r"name|joint|axis|achse|gelenk|id|link",
     "type": r"type|kind|art|sigma|σ",
-    "low": r"low|min|lower",
-    "high": r"high|max|upper",
+    "low": r"((q|theta|θ)[ _]?)?(low|min|lower)([ _]limit)?",
+    "high": r"((q|theta|θ)[ _]?)?(high|max|upper)([ _]limit)?",
 }
+FIXED = re.compile(r"(?i)tool|tcp|(tool )?flange|flansch|werkzeug|eef?|end[ _-]?effector|gripper|greifer")
+"""Names of a row that is no joint."""
 MODIFIED = re.compile(
     r"(?i)modified[ -]?(dh|denavit)|(dh|denavit|convention)\W+modified\b|\b(mdh|craig|khalil)\b"
 )
@@ -118,14 +125,20 @@ def read_dh(given: Table, units: Mapping[str, str], convention: str) -> list[DHR
     m = Meant(units=dict(units), sheet=sheet)
     units_of = {n: m.unit(at[n], n, quantity=q).size for n, q in QUANTITIES.items()}
     numbers = {n: np.nan_to_num(_in_si(sheet, at[n], units_of[n], q)) for n, q in QUANTITIES.items()}
-    if "type" not in at and any(types) and "" in types:
-        sheet.fail("no joint's coordinate, which others have: leave a fixed frame out", types.index(""))
     count = len(sheet.lines)
+    said = [*sheet.columns[at["name"]]] if "name" in at else [""] * count
+    if "type" not in at:
+        whole = [
+            w != "" or not (any(types) or FIXED.fullmatch(n.strip()))
+            for w, n in zip(types, said, strict=True)
+        ]
+        why = "no joint's coordinate, which others have" if any(types) else "a name that no joint has"
+        sheet.check(whole, lambda _: f"{why}: leave a fixed frame out, or say R or P in a column 'type'")
     slides = [re.fullmatch(SLIDES, w) is not None for w in types]
     for i, w in enumerate(types):
         if not slides[i] and not re.fullmatch(TURNS, w):
             sheet.fail(f"joint: expected R or P, one that turns or slides; found '{w}'", i)
-    names = [_named(w, i) for i, w in enumerate(sheet.columns[at["name"]] if "name" in at else [""] * count)]
+    names = [_named(w, i) for i, w in enumerate(said)]
     if len(set(names)) < count:
         raise StiffmapError(f"{sheet.file}: joints of the same name: {', '.join(names)}")
     out = []
@@ -136,6 +149,14 @@ def read_dh(given: Table, units: Mapping[str, str], convention: str) -> list[DHR
         theta, d, a, alpha = (float(numbers[n][i]) for n in NUMBERS)
         out.append(DHRow(names[i], theta, d, a, alpha, slides[i], (low, high) if known else None))
     return out
+
+
+def unused(given: Table) -> list[str]:
+    """Names of the columns that `read_dh` makes nothing of."""
+    known = "|".join(f"({p})" for p in (*NUMBERS.values(), *WORDS.values(), MORE, "r", "i|#|no|nr"))
+    plain = (split_unit(INDEX.sub(r"\1", _plain(h).replace("\\", "")))[0] for h in given.header)
+    each = zip(given.header, plain, given.columns, strict=True)
+    return [h for h, n, cells in each if any(cells) and not re.fullmatch(known, n, re.IGNORECASE)]
 
 
 def _constants(sheet: Table, at: Mapping[str, int], units: Mapping[str, str]) -> tuple[Table, list[str]]:
@@ -154,21 +175,32 @@ def _constants(sheet: Table, at: Mapping[str, int], units: Mapping[str, str]) ->
     first = [re.search(r"\d{1,9}", w) for w in sheet.columns[at["name"]]] if "name" in at else []
     falls = np.diff([int(f[0]) if f else math.nan for f in first], prepend=math.nan) < 0
     sheet.check(~falls, lambda i: "expected joints in their order from the base to the tool")
-    for name in ("theta", "alpha"):
+    point = (lambda v: repr(v).replace(".", ",")) if sheet.decimal_comma else repr
+    for name, quantity in QUANTITIES.items():
         cells = [*columns[at[name]]]
+        found = f"'{header[at[name]]}': expected one number; found"
+        limits = "a range or a difference; limits of a joint stand in columns low and high"
+        read = [not is_nothing(c) or DASHES.fullmatch(c) or not c for c in cells]
+        sheet.check(read, lambda i: f"{found} '{cells[i]}'")  # noqa: B023
+        sheet.check([not RANGE.search(c) for c in cells], lambda i: f"{found} '{cells[i]}', {limits}")  # noqa: B023
+        sums = (None if IN_PI.search(c) else sum_in(c, sheet.decimal_comma) for c in cells)
+        cells = [c if v is None else point(v) for v, c in zip(sums, cells, strict=True)]
         plain, own = split_unit(header[at[name]])
         said = units.get(name) or own or units.get("angle", "rad")
-        angles = [radians(c) for c in cells]
-        if (unit := unit_of(said, "angle")) and angles.count(None) < len(angles):
-            cells = [c if a is None else repr(a / unit.size) for a, c in zip(angles, cells, strict=True)]
-            header[at[name]], columns[at[name]] = with_unit(plain, said), Cells.of(cells)
+        angles = [radians(c, sheet.decimal_comma) for c in cells]
+        if quantity == "angle" and (unit := unit_of(said, "angle")) and angles.count(None) < len(angles):
+            cells = [c if a is None else point(a / unit.size) for a, c in zip(angles, cells, strict=True)]
+            header[at[name]] = with_unit(plain, said)
+        columns[at[name]] = Cells.of(cells)
     return replace(sheet, header=tuple(header), columns=tuple(columns)), types
 
 
 def _plain(cell: str) -> str:
     """Without the marks of Markdown, HTML and LaTeX: ``&theta;<sub>1</sub>`` and ``$\\theta_1$`` are the angle of a joint."""
-    text = unicodedata.normalize("NFKC", re.sub(r"</?su[bp]>|\*\*|[$`]", "", html.unescape(cell)))
-    text = re.sub(r"\\d?frac *\{([^{}]*)\} *\{([^{}]*)\}", r"\1/\2", text)
+    bare = re.sub(r"(?<!\w)\*\*([^*]+)\*\*(?!\w)", r"\1", html.unescape(cell))
+    text = unicodedata.normalize("NFKC", re.sub(r"</?su[bp]>|[$`]", "", bare))
+    text = re.sub(r"\\d?frac *\{([^{}]*)\} *\{([^{}]*)\}", r"(\1)/(\2)", text)
+    text = re.sub(r"\\(?:cdot|times)\b", "*", text)
     return re.sub(r"\\pi\b", "π", re.sub(r"\^ *\{? *\\circ *\}?", "°", text)).strip()
 
 

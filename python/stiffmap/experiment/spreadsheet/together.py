@@ -220,7 +220,10 @@ def _hung(m: Meant) -> None:
 
 def quaternion(sheet: Table) -> list[int]:
     """Columns w x y z of quaternions, by their names (Motive: Rotation W, ROS: pose.orientation.w) and length of one, or none."""
-    for names in (WXYZ, ("q1", "q2", "q3", "q4"), ("q0", "q1", "q2", "q3"), ("q0", *WXYZ[1:])):
+    numbered = (
+        [f"(?-i:{q}{k + i})" for i in range(4)] for k in (1, 0) for q in "qQ"
+    )  # q1 is a joint next to Q0 to Q3
+    for names in (WXYZ, *numbered, ("q0", *WXYZ[1:])):
         at = [i for i in map(sheet.find, names) if i is not None and sheet.is_numeric(i)]
         if len(at) == 4:
             size = np.linalg.norm([sheet.numbers(i) for i in at], axis=0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -31,7 +32,7 @@ class Information:
         predictor = Predictor(machine, plan)
         self.plan, self.base = predictor.experiment, predictor()
         if len(self.plan) != len(plan):
-            raise StiffmapError(f"plan: {self.plan.out_of_reach[0]}")
+            raise StiffmapError(f"{self.plan.name}: {self.plan.out_of_reach[0]}")
         known = rival or terms
         parameters = fitted(machine.description, known)
         if not parameters:
@@ -79,12 +80,15 @@ def map_weight(
     machine: Machine, terms: Terms, at: Floats | None, load: Floats | None, force: float
 ) -> Floats:
     """(k, k) mean over the map of the squared change of the tool's position per parameter (typical sizes)."""
+    name = "position"
     if at is None:
+        name = "position (not given: corners of the workspace)"
         low, high = machine.workspace
         inside = np.stack([low + 0.02 * (high - low), high - 0.02 * (high - low)])
         at = np.array(np.meshgrid(*inside.T, indexing="ij")).reshape(3, -1).T
     wrench = np.array([force, 0, 0, 0, 0, 0]) if load is None else load
-    there = Information(machine, plan_of_poses(machine, "deflection", at, wrench[None]), terms)
+    poses = replace(plan_of_poses(machine, "deflection", at, wrench[None]), name=name)
+    there = Information(machine, poses, terms)
     columns = there.columns[:, :3]
     return np.asarray(np.einsum("nak,nal->kl", columns, columns) / len(columns))
 

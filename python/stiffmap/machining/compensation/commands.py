@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
-from stiffmap.common.broadcasting import Floats, names_of, one_of, trailing, wrench_array
+from stiffmap.common.broadcasting import Floats, names_of, one_of, refused, trailing, wrench_array
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs import number_cells, write_rows
 from stiffmap.common.short import short_repr
@@ -148,6 +148,11 @@ def compensate(
         For bad input.
     """
     ids = None
+    if approach is not None:
+        approach = trailing(approach, (3,), "approach", "directions")
+        lost = approach[~(np.linalg.norm(approach, axis=-1) > 0)]
+        if lost.size:
+            raise refused("approach", "directions with a length", str(lost[0].tolist()))
     if isinstance(position, (str, PathLike)):
         read = against_base(load_plan(Path(position), machine, "position"), machine.description.home.r)
         position, rotation, approach, ids = read.position, read.rotation, read.approach, read.ids

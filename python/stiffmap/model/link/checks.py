@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import real_array
 from stiffmap.common.errors import StiffmapError
+from stiffmap.common.number_text import SMALLEST
 from stiffmap.model.link.arrays import Bools, Floats
 
 AXES = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
@@ -37,6 +38,10 @@ def checked_field(
     check_points(p)
     w = _finite("wrenches", wrenches, (None, 6), "(cases, 6) in N and N·m")
     u = _finite("displacements", displacements, (len(w), len(p), 3), "(cases, n, 3) in m")
+    if np.abs(u).max(initial=0.0) < SMALLEST:
+        raise StiffmapError(
+            "displacements: expected a field that moves, got 0 m at every point of every case"
+        )
     r = _finite("reference", reference, (3,), "(3,) in m")
     return DisplacementField(p, u, w, r)
 

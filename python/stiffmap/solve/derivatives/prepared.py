@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from stiffmap.common.broadcasting import Floats, one_of
+from stiffmap.common.broadcasting import Floats, names_of, one_of, refused
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.description import AppliedEffect, MachineDescription
 from stiffmap.model.effects import add_effect, apply_records, get
@@ -23,6 +23,7 @@ INPUTS = {
     "rotation": ("rx", "ry", "rz"),
     "wrench": ("fx", "fy", "fz", "mx", "my", "mz"),
 }
+DISPLACEMENT = ("displacement",)
 QUANTITIES = ("displacement", "stiffness", "compliance")
 
 
@@ -37,7 +38,7 @@ class Requests:
     @property
     def whole(self) -> bool:
         """Stiffness or compliance is wanted, so that varied machines are solved in full."""
-        return self.of != ("displacement",)
+        return self.of != DISPLACEMENT
 
     @property
     def key(self) -> str:
@@ -47,10 +48,11 @@ class Requests:
 
 def read_requests(given: Sequence[Request], of: Sequence[str]) -> Requests:
     """Checked requests; StiffmapError for one of another form."""
-    if isinstance(of, str):
-        of = (of,)
+    of = names_of(of, "derivatives_of")
     for name in of:
         one_of(name, QUANTITIES, "derivatives_of")
+    if not given and of != DISPLACEMENT:
+        raise refused("derivatives_of", "derivatives as well, by which these are", "none")
     effects, inputs = [], []
     for request in given:
         if isinstance(request, str):

@@ -15,9 +15,10 @@ from rich.text import Text
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs.option import written
 from stiffmap.experiment.noise.level import unknown
+from stiffmap.experiment.spreadsheet.dh import ASSUMED
 from stiffmap.experiment.spreadsheet.from_table import FromTable, experiment_from_table
 from stiffmap.ui.cli import options
-from stiffmap.ui.cli.inputs import numbers, pairs, refuse_unused
+from stiffmap.ui.cli.inputs import numbers, options_given, pairs, refuse_unused
 from stiffmap.ui.cli.options import argument, flag, option
 from stiffmap.ui.cli.output import show
 from stiffmap.ui.cli.output import table as table_of
@@ -98,7 +99,8 @@ def command(
             "columns": {names[c.index]: c.meaning for c in found.columns}, "units": found.units,
             "warnings": made.warnings}  # fmt: skip
     warnings = [Text(f"WARNING: {line}", "bold red") for line in made.warnings]
-    show(as_json, data, [*warnings, *made.remarks, *_told(made, context.obj)])
+    assumed = [ASSUMED] if dh is not None and "dh_convention" not in options_given(context) else []
+    show(as_json, data, [*warnings, *assumed, *made.remarks, *_told(made, context.obj)])
 
 
 def _prompt(text: str) -> str:

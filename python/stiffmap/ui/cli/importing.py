@@ -20,6 +20,8 @@ from stiffmap.ui.cli.inputs import flags_of, options_given, pairs
 from stiffmap.ui.cli.options import argument, option
 from stiffmap.ui.cli.output import show
 
+AWAY = " (not on the way to the tip; masses stay on what carries them)"
+
 
 def command(
     context: typer.Context,
@@ -63,14 +65,19 @@ def command(
     data = {"file": file, "name": machine.name, "legs": machine.legs, "actuators": machine.actuators, "tip": read.tip,
             "left_out": read.left_out, "rigid": read.rigid}  # fmt: skip
     lines = [f"wrote {file}: legs {', '.join(machine.legs)}; {len(machine.actuators)} actuators"]
-    show(as_json, data, [*lines, *_remarks(read)])
+    assumed = table and "dh_convention" not in options_given(context)
+    show(as_json, data, [*lines, *_remarks(read, assumed)])
 
 
-def _remarks(found: Imported) -> Iterator[Text]:
-    """What was chosen, left out or taken as rigid."""
+def _remarks(found: Imported, assumed: bool) -> Iterator[Text]:
+    """What was chosen, left out, taken as rigid, or `assumed` of a table."""
+    if assumed:
+        from stiffmap.experiment.spreadsheet.dh import ASSUMED
+
+        yield Text.assemble(("convention", "yellow"), f": {ASSUMED}")
     for head, text, there in (
         ("tip", f" {found.tip}, {found.choice}; --tip LINK takes another", found.choice),
-        ("left out", f" (not on the way to the tip; masses stay on what carries them): {', '.join(found.left_out)}", found.left_out),
+        ("left out", f"{AWAY if found.tip else ''}: {', '.join(found.left_out)}", found.left_out),
         ("rigid", f" (no compliance in the sidecar): {', '.join(found.rigid)}", found.rigid),
     ):  # fmt: skip
         if there:
@@ -80,12 +87,14 @@ def _remarks(found: Imported) -> Iterator[Text]:
 def _of_table(file: Path, convention: str, unit: list[str] | None) -> Imported:
     """The arm of a table of Denavit and Hartenberg."""
     from stiffmap.common.tables.sheet import read_sheet
-    from stiffmap.experiment.spreadsheet.dh import QUANTITIES, arm, read_dh
+    from stiffmap.experiment.spreadsheet.dh import QUANTITIES, arm, read_dh, unused
 
     name = re.sub(r"[^A-Za-z0-9_\-]+", "-", file.stem)
     units = pairs(unit, "unit")
     if wrong := [n for n in units if n not in {*QUANTITIES, *QUANTITIES.values()}]:
         raise StiffmapError(f"--unit {wrong[0]}: expected one of {', '.join(QUANTITIES)}")
-    rows = read_dh(read_sheet(file), units, convention)
+    sheet = read_sheet(file)
+    rows = read_dh(sheet, units, convention)
     description = arm(rows, convention, name, f"from {file.name}")
-    return Imported(description, (), tuple(r.name for r in rows))
+    aside = (*(f"column '{h}'" for h in unused(sheet)), *sheet.aside)
+    return Imported(description, aside, tuple(r.name for r in rows))

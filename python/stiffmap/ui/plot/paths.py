@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from stiffmap.common.broadcasting import Floats
+from stiffmap.common.broadcasting import Floats, refused, whole_number
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import place_text
 from stiffmap.solve.machine import Machine
@@ -25,8 +25,7 @@ SHARE = 0.25  # of the machine's length, of the largest motion of a drawn mode
 def path_figure(path: xr.Dataset) -> Figure:
     """Force (N) against displacement along it (mm) of a `sweep` with a limit; unstable parts dashed, a
     crossing branch in another colour."""
-    if not path.attrs.get("end"):
-        raise StiffmapError("path: expected a sweep with a limit, got one of single forces")
+    _check(path)
     with paper(4.6, 3.4, most=2) as figure:
         ax = figure.subplots()
         for number, colour, name in ((0, BLUE, ""), (1, GREEN, "crossing branch, ")):
@@ -40,6 +39,11 @@ def path_figure(path: xr.Dataset) -> Figure:
         ax.set(xlabel="displacement along the force, mm", ylabel="force, N")
         ax.set_title(f"{path.attrs['machine']}, {place_text(path.position.values)}")
     return figure
+
+
+def _check(path: xr.Dataset) -> None:
+    if not path.attrs.get("end"):
+        raise refused("path", "the Dataset of a sweep with a limit", "another one, such as of single forces")
 
 
 def _draw_branch(ax: Axes, branch: xr.Dataset, colour: str, name: str) -> None:
@@ -65,9 +69,13 @@ def mode_figure(
     machine: Machine, path: xr.Dataset, index: int = 0, *, view: tuple[float, float] | None = None
 ) -> Figure:
     """A critical point of a path: the machine there (grey) and moved along the mode, largely enlarged."""
+    _check(path)
     count = path.sizes.get("critical", 0)
-    if not 0 <= index < count:
-        raise StiffmapError(f"index: the path has {count} critical points, got {index}")
+    if not count:
+        raise StiffmapError(
+            "path: expected a sweep with a critical point, which a mode belongs to; found none"
+        )
+    index = whole_number(index, "index", 0, count - 1, f"a critical point of the path, 0 to {count - 1}")
     at = path.critical_coordinates.values[index]
     moved = at + SHARE * machine.compiled.length * path.mode.values[index]
     leg, joint = str(path.mode_leg.values[index]), str(path.mode_joint.values[index])

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from stiffmap.common.broadcasting import Floats, trailing
+from stiffmap.common.broadcasting import Floats, real_array, trailing
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.addresses import known_values
 from stiffmap.solve.compiled import Status
@@ -99,6 +99,11 @@ def design_sweep(
             "deflection": np.linalg.norm(s.displacement[..., :3], axis=-1),
             **_evaluated(evaluate, made),
         }
+        same = [{n: a.shape for n, a in c.items()} for c in (cells[index], next(iter(cells.values())))]
+        if same[0] != same[1]:
+            raise StiffmapError(
+                f"evaluate: expected results of the same names and shapes for every machine, got {same[0]} after {same[1]}"
+            )
     if not cells:
         raise StiffmapError(
             f"numbers: no machine can be made of them; the first: {next(iter(problems.values()))}"
@@ -115,7 +120,10 @@ def _evaluated(evaluate: Evaluate | None, machine: Machine) -> dict[str, np.ndar
     more = dict(found) if isinstance(found, Mapping) else {"value": found}
     if taken := sorted(set(more) & {*KEPT, "problem"}):
         raise StiffmapError(f"evaluate: the name '{taken[0]}' is taken; name the result otherwise")
-    return {name: np.asarray(value, dtype=float) for name, value in more.items()}
+    return {
+        name: real_array(1.0 * value if isinstance(value, bool) else value, f"evaluate: {name}", "a number")
+        for name, value in more.items()
+    }
 
 
 def _dataset(

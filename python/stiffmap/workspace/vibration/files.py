@@ -19,7 +19,7 @@ from stiffmap.workspace.vibration.response_units import FREQUENCIES, ResponseUni
 
 COLUMNS = Known(
     {**dict.fromkeys(("frequency", "real", "imag", "magnitude", "coherence"), ""), "phase": "rad", "response": WORD},
-    {"frequency": "frequency_Hz", "phase": "phase_deg"},
+    {"frequency": "frequency_Hz", **{n: f"{n}_m/N" for n in ("real", "imag", "magnitude")}, "phase": "phase_deg"},
     {
         "freq": "frequency", "f": "frequency", "coh": "coherence", "phase_angle": "phase", "arg(h)": "phase", **dict.fromkeys(("h", "frf", "h1", "h2", "h(f)", "complex"), "response"),
         **dict.fromkeys(("re", "re(h)", "re(frf)", "real_part"), "real"),

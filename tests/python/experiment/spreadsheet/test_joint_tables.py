@@ -447,6 +447,101 @@ def test_angles_of_parts_of_pi_and_marks_of_texts(name: str, text: str, tmp_path
     assert [(r.d, r.a) for r in rows] == [(0.3, 0), (0, 0.4), (0, 0)]
 
 
+def _cells(folder: Path, theta: str, d: str) -> list[str]:
+    rows = f"1,0,{d},0,pi/2\n2,{theta},0.1,0.43,0\n"
+    return ["import", write(folder, "dh.csv", f"joint,theta [rad],d [m],a [m],alpha\n{rows}"), "--overwrite"]
+
+
+@pytest.mark.parametrize(
+    ("theta", "d", "turn", "shift"),
+    [
+        ("1/2*pi", "0.33 + 0.42", 0.5, 0.75),
+        ("pi/2 + pi", "2*0.15", 1.5, 0.3),
+        ("90° + 45°", "2 \\cdot 0.15", 0.75, 0.3),
+        ("-\\frac{1}{2}\\pi", "(0.1+0.2)*2", -0.5, 0.6),
+        ("2π/4", "1e-1+1e-2", 0.5, 0.11),
+    ],
+)
+def test_cells_that_are_sums_and_products(
+    theta: str, d: str, turn: float, shift: float, tmp_path: Path
+) -> None:
+    rows = read_dh(read_sheet(Path(_cells(tmp_path, theta, d)[1])), {}, "standard")
+    assert (rows[1].theta / math.pi, rows[0].d) == pytest.approx((turn, shift))
+
+
+def test_sums_with_decimal_commas(tmp_path: Path) -> None:
+    text = "joint;theta [deg];d [m];a [m];alpha\n1;90 + 1,125;0,33 + 0,42;0;0\n2;1,125°;0,5;0;-π/2\n"
+    rows = read_dh(read_sheet(Path(write(tmp_path, "dh.csv", text))), {}, "standard")
+    assert [math.degrees(r.theta) for r in rows] == pytest.approx([91.125, 1.125])
+    assert [r.d for r in rows] == pytest.approx([0.75, 0.5])
+
+
+@pytest.mark.parametrize(
+    ("theta", "d", "words"),
+    [
+        ("0 \\to 1", "0", "line 3: 'theta.*expected one number; found '0 .*to 1', a range"),
+        ("−170–170", "0", "line 3: 'theta.*expected one number.*a range or a difference"),
+        ("0", "0...1", "line 2: 'd .*expected one number.*limits of a joint stand in columns low and high"),
+        ("0", "2**3", "line 2: column 'd .*expected a number"),
+        ("0", "1/0*2", "line 2: column 'd .*expected a number"),
+        ("0", "90°", "line 2: column 'd .*expected a number"),
+    ],
+)
+def test_cells_that_are_no_one_number_are_refused(theta: str, d: str, words: str, tmp_path: Path) -> None:
+    with pytest.raises(StiffmapError, match=words):
+        read_dh(read_sheet(Path(_cells(tmp_path, theta, d)[1])), {}, "standard")
+
+
+@pytest.mark.parametrize("first", [True, False])
+def test_joints_in_small_letters_next_to_quaternions_in_capitals(first: bool, tmp_path: Path) -> None:
+    turns, joints = [f"Q{i}" for i in range(4)], [f"q{i} [deg]" for i in range(1, 7)]
+    names = [*joints, *turns] if first else [*turns, *joints]
+    rows = [
+        {**dict(zip(joints, (10.0 * k + i for i in range(6)), strict=True)), **dict(zip(turns, (0.6, 0, 0.8, 0), strict=True))}
+        for k in range(4)
+    ]  # fmt: skip
+    lines = [",".join(str(r[n]) for n in names) + f",{k},2,3" for k, r in enumerate(rows)]
+    text = "\n".join([",".join([*names, "px [mm]", "py [mm]", "pz [mm]"]), *lines])
+    dh = write(tmp_path, "dh.csv", table())
+    noise = {"px": 1.0, "py": 1.0, "pz": 1.0}
+    sm.experiment_from_table(None, write(tmp_path, "t.csv", text), tmp_path / "o", dh=dh, noise=noise)
+    command = sm.load_experiment(tmp_path / "o").command
+    assert np.degrees(command[3]) == pytest.approx([30, 31, 32, 33, 34, 35])
+
+
+def test_names_in_words_and_limits_of_coordinates(tmp_path: Path) -> None:
+    head = "Link,Link length a (mm),Link twist α (deg),Link offset d (mm),Joint angle θ (deg),qmin,q_max"
+    file = write(tmp_path, "dh.csv", f"{head}\n1,30,90,400,q1,-170,170\n2,500,-,,q2 + 90,-90,120\n")
+    rows = read_dh(read_sheet(Path(file)), {}, "standard")
+    assert [v for r in rows for v in (r.a, math.degrees(r.alpha), r.d)] == pytest.approx(
+        [0.03, 90, 0.4, 0.5, 0, 0]
+    )
+    assert [math.degrees(r.theta) for r in rows] == pytest.approx([0, 90])
+    assert [float(np.degrees(v)) for r in rows for v in r.range or ()] == pytest.approx([-170, 170, -90, 120])
+
+
+def test_columns_that_nothing_is_made_of_are_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = table().replace("alpha [deg]\n", "alpha [deg],Mass [kg]\n").replace("90.0\n", "90.0,7.1\n")
+    assert main(["import", write(tmp_path, "dh.csv", text), "-o", str(tmp_path / "arm.yaml")]) == 0
+    assert "left out: column 'Mass [kg]'" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("cell", ["#REF!", "?", "n/a", "missing"])
+def test_a_cell_that_lacks_its_number_is_no_zero(cell: str, tmp_path: Path) -> None:
+    rows = f"1,0,400,0,{cell}\n2,0,0,500,0\n"
+    file = write(tmp_path, "dh.csv", f"joint,theta [deg],d [mm],a [mm],alpha [deg]\n{rows}")
+    with pytest.raises(StiffmapError, match=r"line 2: 'alpha .deg.': expected one number; found"):
+        read_dh(read_sheet(Path(file)), {}, "standard")
+
+
+def test_a_convention_that_nobody_says_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    given = _cells(tmp_path, "0", "0.1")
+    assert main(given) == 0
+    assert "standard was taken; --dh-convention modified takes the other" in capsys.readouterr().out
+    assert main([*given, "--dh-convention", "standard"]) == 0
+    assert "was taken" not in capsys.readouterr().out
+
+
 @pytest.mark.parametrize(
     ("rows", "words"),
     [
@@ -456,6 +551,7 @@ def test_angles_of_parts_of_pi_and_marks_of_texts(name: str, text: str, tmp_path
         ("1,q1,0\n2,q2 + 90,0\ntool,0,100", "line 4: no joint's coordinate"),
         ("1,0,d1\n2,θ2,0\nEE,90,100", "line 4: no joint's coordinate"),
         ("base,0,200\n1,q1,0", "line 2: no joint's coordinate"),
+        ("1,0,0\n2,0,0\nTool flange,0,100", "line 4: a name that no joint has: leave a fixed frame out"),
     ],
 )
 def test_rows_that_are_no_joints_one_behind_the_other_are_refused(

@@ -90,6 +90,12 @@ def test_the_map_is_made_certain(orthoglide: sm.Machine) -> None:
     terms = [placed(orthoglide, f"compliance actuator {leg} scale=1") for leg in "xyz"]
     plan = design(orthoglide, terms, rows=5, poses=12, aim="map", position=np.array([[0.1, 0.1, 0.0]]))
     assert plan.value < plan.random_value
+    with pytest.raises(
+        sm.StiffmapError, match=r"^position: .* at 1 row \(id 2; first at \(9000.0, 0.0, 0.0\) mm"
+    ):
+        design(
+            orthoglide, terms, rows=5, poses=12, aim="map", position=np.array([[0.1, 0.1, 0.0], [9, 0, 0]])
+        )
 
 
 def test_limits_and_unknown_frames() -> None:

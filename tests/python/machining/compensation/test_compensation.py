@@ -88,6 +88,12 @@ def test_a_redundant_configuration_stays_in_its_branch() -> None:
     np.testing.assert_allclose(found.actuators[0, 0] - elbow_down[0, 0], -1e-3, atol=1e-9)
 
 
+@pytest.mark.parametrize("approach", [[0, 0, 0], [[1, 0, 0], [0, 0, 0]], [0, np.nan, 1]])
+def test_an_approach_has_a_direction(approach: list[float]) -> None:
+    with pytest.raises(sm.StiffmapError, match=r"approach: expected directions with a length, got .0.0"):
+        compensate(sm.load_machine("orthoglide-revised"), np.zeros((2, 3)), approach=approach)
+
+
 def test_play_is_taken_up_on_the_side_of_the_approach() -> None:
     machine = sm.load_machine("orthoglide-revised").with_effect(
         "dead_zone", element="actuator", legs=["x"], half_width=2e-5

@@ -205,6 +205,19 @@ def test_design_sweep_is_the_machines_one_by_one() -> None:
     assert ds["forearm.length"].attrs == {"address": "forearm/length", "units": "m"}
 
 
+def test_design_sweep_refuses_results_that_are_no_numbers() -> None:
+    results = iter(({"a": 1.0}, {"a": [1.0, 2.0]}))
+    for evaluate, words in (
+        (lambda m: "3.5", "evaluate: value: expected a number, got text"),
+        (lambda m: {"a": None}, "evaluate: a: expected a number, got NoneType"),
+        (lambda m: next(results), "evaluate: expected results of the same names and shapes"),
+    ):
+        with pytest.raises(StiffmapError, match=words):
+            sm.design_sweep("five-bar", {"arm/length": [0.3, 0.31]}, evaluate=evaluate, progress=False)
+    flags = sm.design_sweep("five-bar", {"arm/length": [0.3]}, evaluate=lambda m: True, progress=False)
+    assert flags["value"].item() == 1.0
+
+
 def test_design_sweep_can_be_saved(tmp_path: Path) -> None:
     ds = sm.design_sweep(
         "ur10", {"elbow/stiffness": [1e4, 2e4]}, position=[[-0.9, -0.16, 0.28]], wrench=FORCE

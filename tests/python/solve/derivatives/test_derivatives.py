@@ -247,6 +247,8 @@ def test_the_machines_are_kept() -> None:
         (["pose"], ("displacement",), "expected an effect or one of position, rotation, wrench"),
         ([("length",)], ("displacement",), "expected \\(kind"),
         ([3], ("displacement",), "expected \\(kind"),
+        ([], ("stiffness",), "derivatives_of: expected derivatives as well"),
+        ([], ("energy",), "derivatives_of: expected one of displacement, stiffness"),
         (["wrench"], ("energy",), "derivatives_of: expected one of displacement, stiffness"),
         ([("length", {"element": "bra", "error": 0.0})], ("stiffness",), "did you mean 'bar'"),
     ],

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import stiffmap as sm
 
@@ -46,6 +47,14 @@ def test_only_the_results_that_a_picture_shows_are_taken(
             figure(drawn[kind])
     with pytest.raises(sm.StiffmapError, match="expected"):
         figure([])
+
+
+def test_a_mode_is_of_a_path(drawn: dict[str, Any]) -> None:
+    for found in (*drawn.values(), xr.Dataset()):
+        with pytest.raises(sm.StiffmapError, match=r"^path: expected (a|the) Dataset"):
+            sm.plot.mode_figure(drawn["machine"], found)
+        with pytest.raises(sm.StiffmapError, match=r"^path: expected (a|the) Dataset"):
+            sm.plot.path_figure(found)
 
 
 def test_one_pose_is_drawn_under_one_wrench(drawn: dict[str, Any]) -> None:

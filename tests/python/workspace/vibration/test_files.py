@@ -58,6 +58,10 @@ def test_tables_as_analysers_write_them(tmp_path, head, columns):
             "frequency: expected frequencies in Hz, kHz, rad/s or rpm",
         ),
         ("f_Hz,magnitude_m/N,phase\n1,1,0\n2,1,0\n", "phase: the unit is missing: write phase_deg"),
+        (
+            "10,1e-6,-1e-8\n20,2e-6,-2e-8\n",
+            "no header line .*expected its names of columns, such as frequency_Hz, real_m/N, imag_m/N",
+        ),
         ("f_Hz,magnitude_dB,phase_deg\n1,1,0\n2,1,0\n", "expected what 0 dB is"),
         ("f_Hz,magnitude_m/N,phase_deg\n1,-100,0\n2,-101,0\n", "expected a size of zero or more"),
         ("f_Hz,magnitude_m/N,imag_m/N\n1,1,0\n2,1,0\n", "expected the columns"),
