@@ -218,8 +218,8 @@ def _optimum(
             lambda x, q=q: jacobian(x, q),
             (low, high),
             x_scale="jac",
-            ftol=1e-6,
-            xtol=1e-6,
+            ftol=1e-4,
+            xtol=1e-4,
             max_nfev=steps,
         ).x
         left, before = raw(x), q

@@ -19,6 +19,8 @@ VISIBLE = 3.0
 """Noise: a candidate whose largest plausible size shows less is left out."""
 LARGEST = 20.0
 """Noise, rms: two places are one where even an effect of this size would differ by less than `VISIBLE`."""
+AT_ONCE = 256
+"""Variants whose columns are taken together."""
 NULL = 1e-9
 """Share of the longest column below which a direction is no direction."""
 
@@ -55,10 +57,14 @@ def places(
 ) -> tuple[Place, ...]:
     """Candidates with their directions; those that show alike under one name, that of the coarsest part."""
     by: dict[int, list[Shape]] = {}
-    for v in plan.variants:
-        found = shape_of(v, free.T @ (v.lines(use) / noise).T)
-        if found is not None:
-            by.setdefault(id(v.candidate), []).append(found)
+    for begin in range(0, len(plan.variants), AT_ONCE):
+        some = plan.variants[begin : begin + AT_ONCE]
+        lines = [v.lines(use) / noise for v in some]
+        ends = np.cumsum([len(k) for k in lines])[:-1]
+        for v, white in zip(some, np.split(free.T @ np.concatenate(lines).T, ends, axis=1), strict=True):
+            found = shape_of(v, white)
+            if found is not None:
+                by.setdefault(id(v.candidate), []).append(found)
     tolerance = VISIBLE / (LARGEST * np.sqrt(free.shape[1]))
 
     def order(shapes: list[Shape]) -> tuple[object, ...]:

@@ -294,10 +294,13 @@ class World:
                 continue
             for anchor in self._anchors(fewer):
                 shapes = [p.shapes[best_shape(anchor, p)] for _, p, _ in bounds]
-                gain = np.tril(of_pairs(anchor, shapes), -1)
-                for k in np.argsort(gain, axis=None)[::-1][:REFITS]:
+                gain = of_pairs(anchor, shapes)
+                bound = anchor.score + fewer.score - fewer.fit.score + gain
+                for k in np.argsort(np.tril(gain, -1), axis=None)[::-1][:REFITS]:
                     places = [bounds[int(i)][1] for i in np.unravel_index(int(k), gain.shape)]
-                    if clash(places[0].candidate, [places[1].candidate]):
+                    if bound.flat[k] < model.score - SHORT or clash(
+                        places[0].candidate, [places[1].candidate]
+                    ):
                         continue
                     pair = self._with(fewer, places, anchor)
                     if pair.score > model.score + PROGRESS:
