@@ -15,6 +15,8 @@ DENSEST, SMALLEST = 2000.0, 0.7
 """kg/m³ and m: as much of all that moves in a cube of the machine's length; known robots have a fiftieth of it."""
 WIDEST = 50.0
 """Of the machine's length: a radius of gyration beyond it; in kg mm² it is a thousandfold, in g mm² the 31 623-fold."""
+ROUNDED = 0.01
+"""Of the largest principal moment, which is no larger than the other two together: by as much numbers that were rounded are off."""
 LIMITS = 4 * math.pi, 720.0, 0.5
 """Of a joint in degrees: more than as many rad, at most as much, and a multiple."""
 
@@ -48,6 +50,14 @@ def doubts(model: UrdfModel) -> Iterator[str]:
             f"link {link}: inertia: found a radius of gyration of {radius:.4g} m in a machine of {size:.3g} m; expected kg m^2, "
             f"{radius / 1e3:.3g} m if these are kg mm^2, {radius / math.sqrt(1e9):.3g} m if g mm^2"
         )
+    for link, body in bodies:
+        a, b, c = np.linalg.eigvalsh(np.array(body.inertia))
+        if (1 - ROUNDED) * c > a + b > 0:
+            yield (
+                f"link {link}: inertia: found principal moments of {a:.3g}, {b:.3g} and {c:.3g} kg m^2, which no body has; expected the "
+                f"largest to be at most the sum of the others, {a + b:.3g}; those of other links may be wrong as well"
+            )
+            break
     for joint in model.moving:
         low, high = joint.limits or (0.0, 0.0)
         whole = low % LIMITS[2] == high % LIMITS[2] == 0

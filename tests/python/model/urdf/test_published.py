@@ -312,6 +312,9 @@ DOUBTS = {
                                                  "expected kg m^2, 0.04 m if these are kg mm^2"),
     "g mm²": (tensors(machine_of(0.4, 5), 8e6), "link a: inertia: found a radius of gyration of 1265 m in a machine of 0.8 m; "
                                                 "expected kg m^2, 1.26 m if these are kg mm^2, 0.04 m if g mm^2"),
+    "a shape of no body": (machine_of(0.4, 5).replace('izz="0.008', 'izz="0.018'),
+                           "link a: inertia: found principal moments of 0.008, 0.008 and 0.018 kg m^2, which no body has; expected "
+                           "the largest to be at most the sum of the others, 0.016"),
 }  # fmt: skip
 
 
@@ -332,10 +335,11 @@ def test_numbers_that_no_machine_has_are_warned_of(name: str, tmp_path: Path) ->
         machine_of(30.0, 9e4), machine_of(1.3, 1600), machine_of(0.02, 0.1), tensors(machine_of(0.4, 1e-3), 1.0),
         machine_of(0.4, 5, '<limit lower="-12.56" upper="12.56"/>'), machine_of(0.4, 5, '<limit lower="-1e16" upper="1e16"/>'),
         machine_of(0.01, 1500, '<limit lower="0" upper="0.6"/>', "prismatic"),
+        machine_of(0.4, 5).replace('izz="0.008', 'izz="0.01605'),
         robot(arm()).replace('<link name="base"/>', '<link name="map"/><link name="base"/><joint name="m" type="fixed"><parent '
                              'link="map"/><child link="base"/><origin xyz="691000 5334000 0"/></joint>'),
     ],
-    ids=["crane", "heavy arm", "finger", "moments of one", "four turns", "no limit", "machine tool", "place on a map"],
+    ids=["crane", "heavy arm", "finger", "moments of one", "four turns", "no limit", "machine tool", "flat plate, rounded", "place on a map"],
 )  # fmt: skip
 def test_real_machines_are_not_doubted(text: str, tmp_path: Path) -> None:
     with warnings.catch_warnings():
