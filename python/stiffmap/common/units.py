@@ -61,7 +61,8 @@ def _table(*rows: tuple[str, str, Fraction | float]) -> dict[str, Unit]:
 
 SPELLINGS = {
     "length": _table(
-        *((n, n, 1) for n in ("m", "cm", "mm")),
+        ("m|metres|meters", "m", 1), ("cm", "cm", 1),
+        ("mm|millimetres|millimeters|millimetre|millimeter|millimètres|milímetros", "mm", 1),
         ("um|µm|μm|micron|microns|1/1000mm|0.001mm|mm/1000", "um", 1),
         ("in|inch|inches|zoll|\"|''", "in", 1),
         ("mil|mils|thou|in/1000|1/1000in|0.001in|thousandths", "in", 1e-3),

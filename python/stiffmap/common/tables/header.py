@@ -100,6 +100,27 @@ def record_of(above: Sequence[Line]) -> tuple[tuple[str, str], ...]:
     return tuple(out.items())
 
 
+STATED = re.compile(
+    r"(?i)\W*(?:(?P<length>length|linear|distance|coordinate|längen|maß)|(?P<angle>angular|angle|winkel)|(?P<force>force|load|kraft))?"
+    r"[ -]?(?:units?|einheit(?:en)?|unités?|unidad(?:es)?|unità)\s*(?:[:=]\s*(?P<text>.*))?"
+)
+
+
+def stated_unit(above: Sequence[str], quantity: str) -> str:
+    """``Units: mm, deg`` or ``Length unit;inches`` in the cells above a table: what it says of a quantity, of lengths also a unit
+    that nobody knows; nothing where it says nothing."""
+    for cell, following in zip_longest(above, above[1:], fillvalue=""):
+        match = STATED.fullmatch(cell.strip())
+        of = match and next((q for q in ("length", "angle", "force") if match[q]), "")
+        text = (match["text"] or following).strip() if match and of in ("", quantity) else ""
+        words = [text, *re.split(r"[\s,;/&|]+", text)]
+        if found := next((w for w in words if unit_of(w, quantity)), ""):
+            return found
+        if text and quantity == "length" and not any(map(unit_of, words)):
+            return text
+    return ""
+
+
 def _plain(cell: str) -> str:
     text = re.sub(r"\s+", " ", cell.strip())
     bare = text.lstrip("#%").strip() if text.startswith(("#", "%")) else text

@@ -52,7 +52,7 @@ MEAN = re.compile(
 )
 """All of the last cell of such a row, where the first row is a reading."""
 WAY = "--header id,x,y,z,dx,dy,dz (nothing between two commas for a column that is not used)"
-LONGEST_HEADER, MOST_COLUMNS = 300, 1000
+LONGEST_HEADER, MOST_COLUMNS, MOST_ABOVE = 300, 1000, 50
 
 
 @dataclass(frozen=True)
@@ -225,7 +225,7 @@ def _above(rows: Iterator[Line], spelling: Spelling, above: list[Line]) -> Itera
             yield n, cells
         elif not data:
             above.append((n, cells))
-            del above[:-8]
+            del above[:-MOST_ABOVE]
 
 
 def _begun(

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.tables.header import with_unit
+from stiffmap.common.tables.header import stated_unit, with_unit
 from stiffmap.common.tables.table import Table, column_letter
 from stiffmap.common.units import Unit, known, unit_of
 from stiffmap.experiment.files.fields import quantity_of
@@ -110,11 +110,14 @@ class Meant(Answers):
         return find_column(header, self.sheet.header)
 
     def written_unit(self, column: int, *names: str, quantity: str = "") -> str:
-        """What --unit says of one of these names, else the header, else the column next to it, else --unit of the quantity."""
+        """What --unit says of one of these names, else the header, else the column next to it, else --unit of the quantity, else a
+        line above the table."""
         own = next((self.units[n] for n in names if self.units.get(n)), "") or self.sheet.unit(column)
-        return (
-            own or self._next_to(column) or self.units.get(quantity or quantity_of(names[0]) or "length", "")
-        )
+        return own or self._next_to(column) or self.usual_unit(quantity or quantity_of(names[0]) or "length")
+
+    def usual_unit(self, quantity: str) -> str:
+        """Of columns that have none: what --unit says of the quantity, else a line above the table."""
+        return self.units.get(quantity) or stated_unit(self.sheet.above, quantity)
 
     def unit(self, column: int, *names: str, quantity: str = "") -> Unit:
         """Of a column, by its names for --unit: the first one is shown, by the last one it is to be said. Raises Question."""

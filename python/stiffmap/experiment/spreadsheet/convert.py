@@ -80,6 +80,11 @@ def understand(m: Meant, loaded: bool = False) -> ImportedSheet:
         )
     mean = _is_mean(sheet, [c for c in used if c.meaning not in WORDS])
     said = [f"left out: row {sheet.lines[-1]} is the mean of those above it in every number"] if mean else []
+    for quantity in sorted({quantity_of(c.meaning) or "" for c in used if not c.unit} - {"", *m.units}):
+        if text := m.usual_unit(quantity):
+            said.append(
+                f"{quantity} is in '{text}', as a line above the table says, where a column names no unit"
+            )
     for c in used:
         if c.meaning in WRENCH[:3]:
             sign, why = weight(sheet, c.index, c.name[:1] in ("+", "-"), c.meaning, found[c.meaning])
@@ -236,7 +241,7 @@ def write_folder(
         factors = {n.replace("p", "d"): f for n, f in found.factors.items()}
         own = {absolute: n for n, absolute in ABSOLUTE.items()}
         if set(AXES[3:]) & set(m.noise) - set(found.units):
-            head["units"].setdefault("angle", m.units.get("angle", "deg"))
+            head["units"].setdefault("angle", m.usual_unit("angle") or "deg")
         head["noise"] = {own.get(n, n): v * factors.get(own.get(n, n), 1.0) for n, v in m.noise.items()}
     if m.columns:
         head["command"] = {k: {"actuator": a, "unit": u} for k, (a, u) in m.columns.items()}

@@ -9,11 +9,13 @@ from dataclasses import dataclass, replace
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.tables.header import split_unit
 from stiffmap.common.tables.meaning import meaning_of
-from stiffmap.common.units import TIMES
+from stiffmap.common.units import TIMES, unit_of
 from stiffmap.experiment.channels import AXES
 from stiffmap.experiment.files.fields import SEEN
 
 REPEATED = re.compile(r"^(.*?)[ _.-]*(?:#|run|messung|wdh|rep|repeat)?[ _.-]*(\d+)$", re.IGNORECASE)
+TORQUE = re.compile(r"^[tT](?=[ _]?[xyzXYZ]$)")
+"""Tx, Ty, Tz of a load cell, where the unit is one of moments."""
 READINGS = (*AXES, "dd", "ll", *SEEN)
 
 
@@ -51,7 +53,9 @@ def guess(headers: Sequence[str], chosen: Mapping[str, Sequence[str]]) -> list[C
             out.append(Column(index, name, unit, meaning, repeat if len(chosen[meaning]) > 1 else 0))
         else:
             time = unit in (*TIMES, "ms", "h") or (name == "t" and not unit)  # T is a temperature
-            meaning, repeat = ("note", 0) if time else _meaning(name)
+            meaning, repeat = (
+                ("note", 0) if time else _meaning(TORQUE.sub("m", name) if unit_of(unit, "moment") else name)
+            )
             out.append(Column(index, name, unit, "note" if meaning in chosen else meaning, repeat))
     if "ll" not in chosen and any(c.meaning in READINGS and c.meaning != "ll" for c in out):
         # a length of something else

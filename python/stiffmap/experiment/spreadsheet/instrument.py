@@ -77,8 +77,10 @@ def as_readings(m: Meant, instrument: Instrument) -> None:
     Raises StiffmapError where the sheet lacks a column that the instrument needs.
     """
     of = {k: quantity_of(k) or {"angle": "angle"}.get(k, "length") for k in instrument.units}
-    usual = {k: u for k, u in instrument.units.items() if of[k] not in m.units}
-    instrument = replace(instrument, units=usual)  # --unit length=m speaks of every length without one
+    usual = {k: u for k, u in instrument.units.items() if not m.usual_unit(of[k])}
+    instrument = replace(
+        instrument, units=usual
+    )  # --unit length=m and a line above speak of every length without one
     if instrument.circle:
         _of_circle(m, instrument)
         return

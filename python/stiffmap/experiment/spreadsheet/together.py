@@ -259,7 +259,7 @@ def _turns(m: Meant, taken: set[int]) -> None:
         m.chosen[meaning] = [header]
         taken.add(i)
         if of_pose is EULER and not m.sheet.unit(i):
-            m.units.setdefault(meaning, m.units.get("angle", "deg"))
+            m.units.setdefault(meaning, m.usual_unit("angle") or "deg")
     if seen:
         m.head |= {"target_orientation": turns} if turns else {}
     else:

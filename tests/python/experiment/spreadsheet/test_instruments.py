@@ -56,6 +56,47 @@ def test_a_tracker_lists_points(tmp_path: Path) -> None:
     assert e.ids == ("A1", "A2")
 
 
+INCHES = """Name,X nominal,Y nominal,Z nominal,X actual,Y actual,Z actual
+P1,0,15,0,0.001,15.002,0
+P2,2,15,0,2.001,15.001,0
+"""
+
+
+@pytest.mark.parametrize(
+    "head",
+    [
+        "Units: Inches\nDate: 2024-01-01\n",
+        "# Length units = inches\n# Frame: World\n",
+        "Length Unit,Inches,Angle Unit,Degrees\nDate: 2024,,,\n",
+        "Units: in/deg\n" + "".join(f"Remark {k}: none\n" for k in range(9)),
+    ],
+)
+def test_a_line_above_the_table_says_the_unit_of_all_lengths(
+    head: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    sure = ["--noise", "dx=0.01", "--noise", "dy=0.01", "--noise", "dz=0.01"]
+    e = made(tmp_path, "tracker", head + INCHES, *sure)
+    np.testing.assert_allclose(e.position, [[0, 0.381, 0], [0.0508, 0.381, 0]])
+    np.testing.assert_allclose(e.reading[:, 0], 25.4e-6, rtol=1e-9)
+    assert "as a line above the table says" in capsys.readouterr().out
+
+
+def test_a_unit_above_the_table_that_nobody_knows(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "file.csv").write_text("Units: Feet\nDate: 2024-01-01\n" + INCHES)
+    call = ["experiment", "new", str(tmp_path / "file.csv"), "--machine", "five-bar", "--instrument"]
+    assert main([*call, "tracker", "-o", str(tmp_path / "out")]) == 2
+    assert "the unit 'Feet' is not known" in capsys.readouterr().err
+
+
+def test_moments_of_a_load_cell(tmp_path: Path) -> None:
+    rows = "x [mm],y [mm],Fx/N,Fy/N,Tx/Nm,Ty/Nm,Tz/Nm,dx/µm\n0,400,110,0,1,2,3,12\n50,400,110,0,1,2,3,14\n"
+    (tmp_path / "cell.csv").write_text(rows, encoding="utf-8")
+    found = sm.experiment_from_table(
+        "five-bar", tmp_path / "cell.csv", tmp_path / "out", constants={"z": 0.0}, noise={"dx": 1.0}
+    )
+    np.testing.assert_allclose(found.experiment.wrench, [[110, 0, 0, 1, 2, 3]] * 2)
+
+
 def test_dial_gauges(tmp_path: Path) -> None:
     e = made(tmp_path, "dial-gauges", GAUGES, "--noise", "dx=2", "--noise", "dy=0.002")
     assert e.quantity == "deflection"
