@@ -38,7 +38,7 @@ def save_link(link: LinkFile, path: str | Path) -> None:
     """Write the file; numbers keep all their digits, so it loads back equal.
 
     Raises:
-        StiffmapError: the path cannot be written.
+        StiffmapError: the path cannot be written; a compliance that `load_link` would refuse.
     """
     data = {
         "kind": "stiffmap-link",
@@ -49,6 +49,7 @@ def save_link(link: LinkFile, path: str | Path) -> None:
         "covariance": link.covariance.tolist(),
         "provenance": link.provenance,
     }
+    _check_spring(path, _array(path, data, "compliance", (6, 6)))
     text = yaml.safe_dump(data, sort_keys=False, default_flow_style=None, width=10_000, allow_unicode=True)
     write_text(path, text)
 

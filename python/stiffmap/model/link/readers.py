@@ -65,8 +65,11 @@ def known_columns(
         raise FileError("no such file", file=str(path))
     layout = Layout(lambda name: name.lower() in units, strict=True, repeated=True)
     sheet = read_sheet(Path(path), None, layout)
-    header = (re.sub(r"(?i)^(u[xyz])[ _]?\d+\b", r"\1", h) for h in sheet.header)  # ux1
-    sheet = replace(sheet, header=tuple(header))
+    cases = [re.match(r"(?i)(u[xyz])[ _]?(\d+)\b", h) for h in sheet.header]  # ux1
+    names = [m[1] + h[m.end() :] if m else h for m, h in zip(cases, sheet.header, strict=True)]
+    order = sorted(range(len(names)), key=lambda i: int(m[2]) if (m := cases[i]) else 0)
+    header, columns = (tuple(given[i] for i in order) for given in (names, sheet.columns))
+    sheet = replace(sheet, header=header, columns=columns)
     found: dict[str, list[Floats]] = {name: [] for name in units}
     for head, cells, name in zip(sheet.header, sheet.columns, map(str.lower, sheet.names), strict=True):
         if name in units:

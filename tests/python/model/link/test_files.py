@@ -555,3 +555,17 @@ def test_displacements_may_be_numbered_by_their_case(tmp_path, between):
             text = text.replace(f",u{a} [", f",u{a}{between}{k} [", 1)
     points, fields = read_field(write(tmp_path, "f.csv", text))
     assert points == pytest.approx(POINTS) and fields == pytest.approx(U)
+    names, *rows = [line.split(",") for line in text.splitlines()[1:]]
+    turned = [*range(4), *range(7, 10), *range(4, 7), *range(10, 22)]  # the second case before the first
+    again = "\n".join(",".join(row[i] for i in turned) for row in (names, *rows))
+    assert read_field(write(tmp_path, "g.csv", again))[1] == pytest.approx(U)
+
+
+def test_no_link_file_is_written_that_cannot_be_read(tmp_path):
+    C = bar_compliance()
+    C[1, 1] *= -1
+    with pytest.raises(
+        StiffmapError, match=r"link\.yaml: compliance: expected a diagonal that is not negative"
+    ):
+        save_link(LinkFile(C, np.zeros((36, 36)), np.zeros(3), {}), tmp_path / "link.yaml")
+    assert not (tmp_path / "link.yaml").exists()
