@@ -197,7 +197,19 @@ def _of_group(over: str) -> tuple[str, str]:
 
 
 def _under(group: Sequence[str], names: Sequence[str]) -> Iterator[tuple[str, str]]:
-    """Each name with the group over it, which reaches to the next one or to a column without a name."""
+    """Each name with the group over it, which reaches to the next one or to a column without a name; over names that begin anew, as
+    x y z x y z do, it may stand in the middle of them."""
+    sets: list[dict[str, int]] = [{}]
+    for i, name in enumerate(names):
+        if name in sets[-1]:
+            sets.append({})
+        if name:
+            sets[-1][name] = i
+    over = [[g for g in (group[i] for i in s.values() if i < len(group)) if g] for s in sets]
+    begins = (min(s.values(), default=0) for s in sets[1:])
+    if all(len(g) == 1 for g in over) and not all(i < len(group) and group[i] for i in begins):
+        titles = {i: g for s, (g,) in zip(sets, over, strict=True) for i in s.values()}
+        group = [titles.get(i, g) for i, g in enumerate([*group, *[""] * (len(names) - len(group))])]
     current = ""
     for above, name in zip_longest(group, names, fillvalue=""):
         current = above or (current if name else "")

@@ -56,6 +56,17 @@ def test_a_tracker_lists_points(tmp_path: Path) -> None:
     assert e.ids == ("A1", "A2")
 
 
+def test_titles_in_the_middle_of_what_they_mean(tmp_path: Path) -> None:
+    text = (
+        "Name,,Nominal,,,Actual,,,Deviation,\n,X,Y,Z,X,Y,Z,X,Y,Z\n,mm,mm,mm,mm,mm,mm,mm,mm,mm\n"
+        "P1,0,400,0,0.1,400.02,0,0.1,0.02,0\nP2,50,400,0,50.12,400.01,0,0.12,0.01,0\n"
+    )
+    e = made(tmp_path, "tracker", text, "--noise", "dx=0.01", "--noise", "dy=0.01", "--noise", "dz=0.01")
+    np.testing.assert_allclose(e.position, [[0, 0.4, 0], [0.05, 0.4, 0]])
+    np.testing.assert_allclose(e.reading[:, :3], 1e-6 * np.array([[100, 20, 0], [120, 10, 0]]), atol=1e-12)
+    assert e.ids == ("P1", "P2")
+
+
 INCHES = """Name,X nominal,Y nominal,Z nominal,X actual,Y actual,Z actual
 P1,0,15,0,0.001,15.002,0
 P2,2,15,0,2.001,15.001,0
