@@ -55,6 +55,11 @@ CASES: dict[str, tuple[Change, Change, tuple[str, ...]]] = {
     "twice the same id": (same, swap("3,90", "1,90"), ("data.csv, line 4", "'1' occurs twice", "line 2")),
     "text for a number": (same, swap("-0.049", "oops"), ("data.csv, line 3", "'dx'", "'oops'")),
     "empty force": (same, swap("-100,0,0", ",0,0"), ("data.csv, line 3", "'fx'", "an empty cell")),
+    "no reading at all": (
+        same,
+        lambda t: re.sub(r"(?m),-?0\.049,0$", ",nan,", t),
+        ("data.csv", "expected a reading in one row or more of dx, dy; found none"),
+    ),
     "infinite": (same, swap("90,0", "inf,0"), ("data.csv, line 4", "'x'", "finite")),
     "poses in µm": (swap("length: mm", "length: um"), same, ("poses x, y, z would be in µm", "dx: um")),
     "noise zero": (swap("dx: 0.003", "dx: 0"), same, ("noise of dx is zero or unknown", "declare it")),

@@ -106,6 +106,10 @@ def _readings(
     _above_zero(table, of_kinds)
     _promise(reading, channels, table, seen, seen_rotation, of_kinds)
     if not np.isfinite(reading).any():
+        if empty := [c for c in (*read(), *absolute()) if c in table]:
+            raise FileError(
+                f"expected a reading in one row or more of {', '.join(empty)}; found none", file=table.file
+            )
         raise MissingColumnError(
             f"missing column: no reading ({', '.join((*read(), *absolute()))}, joints)",
             file=table.file,

@@ -78,13 +78,20 @@ class Comparison:
         """Whether one set of numbers serves both: a property of the type rather than of a specimen."""
         return self.p >= ALPHA
 
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """Rows that the machine does not reach, in words."""
+        return tuple(text for one in (self.first, self.second) for text in one.experiment.out_of_reach)
+
     def as_plain(self) -> dict[str, Any]:
         """Data of JSON, SI."""
-        return {"common": self.common, "p": self.p, "changes": [vars(c) for c in self.changes]}
+        changes = [vars(c) for c in self.changes]
+        return {"common": self.common, "p": self.p, "changes": changes, "left_out": list(self.left_out)}
 
     def __str__(self) -> str:
         word = "one set of numbers serves both" if self.common else "the two differ"
-        return "\n".join([f"{word} (p = {self.p:.2g})", *map(str, self.changes)])
+        left = [f"left out: {text}" for text in self.left_out]
+        return "\n".join([f"{word} (p = {self.p:.2g})", *map(str, self.changes), *left])
 
 
 def monitor(

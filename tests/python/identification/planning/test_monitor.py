@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -40,6 +41,16 @@ def test_a_change_is_seen_and_none_is_invented(orthoglide: sm.Machine, plan: sm.
     assert moved.changes[0].after - moved.changes[0].before == pytest.approx(0.2, abs=4 * moved.changes[0].u)
     p_values = [compare(orthoglide, first, twin(orthoglide, plan, 1.3, s), term).p for s in range(2, 14)]
     assert min(p_values) > 1e-4
+
+
+def test_rows_out_of_reach_are_said(orthoglide: sm.Machine, plan: sm.Experiment) -> None:
+    first = twin(orthoglide, plan, 1.3, 0)
+    position = first.position.copy()
+    position[-1, 0] = 5.0
+    far = replace(first, position=position)
+    found = compare(orthoglide, first, far, [placed(orthoglide, "compliance actuator x scale=1")])
+    (text,) = found.as_plain()["left_out"]
+    assert "no equilibrium at 1 row" in text and f"left out: {text}" in str(found)
 
 
 def test_the_command_line(
