@@ -68,8 +68,8 @@ def known_columns(
     cases = [re.match(r"(?i)(u[xyz])[ _]?(\d+)\b", h) for h in sheet.header]  # ux1
     names = [m[1] + h[m.end() :] if m else h for m, h in zip(cases, sheet.header, strict=True)]
     order = sorted(range(len(names)), key=lambda i: int(m[2]) if (m := cases[i]) else 0)
-    header, columns = (tuple(given[i] for i in order) for given in (names, sheet.columns))
-    sheet = replace(sheet, header=header, columns=columns)
+    header = tuple(names[i] for i in order)
+    sheet = replace(sheet, header=header, columns=tuple(sheet.columns[i] for i in order))
     found: dict[str, list[Floats]] = {name: [] for name in units}
     for head, cells, name in zip(sheet.header, sheet.columns, map(str.lower, sheet.names), strict=True):
         if name in units:
