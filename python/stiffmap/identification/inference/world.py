@@ -294,14 +294,14 @@ class World:
                 continue
             for anchor in self._anchors(fewer):
                 shapes = [p.shapes[best_shape(anchor, p)] for _, p, _ in bounds]
-                gain = of_pairs(anchor, shapes)
-                bound = anchor.score + fewer.score - fewer.fit.score + gain
-                for k in np.argsort(np.tril(gain, -1), axis=None)[::-1][:REFITS]:
+                gain = np.tril(of_pairs(anchor, shapes), -1)
+                short = model.fit.score - anchor.score - gain
+                for k in np.argsort(gain, axis=None)[::-1][:REFITS]:
                     places = [bounds[int(i)][1] for i in np.unravel_index(int(k), gain.shape)]
-                    if bound.flat[k] < model.score - SHORT or clash(
-                        places[0].candidate, [places[1].candidate]
-                    ):
+                    if clash(places[0].candidate, [places[1].candidate]):
                         continue
+                    if self.name != EXACT and short.flat[k] > 2.0 * SHORT:
+                        continue  # in "exact" nothing takes up what a set lacks, and bounds lie far too low
                     pair = self._with(fewer, places, anchor)
                     if pair.score > model.score + PROGRESS:
                         return pair
