@@ -300,7 +300,7 @@ class World:
                     places = [bounds[int(i)][1] for i in np.unravel_index(int(k), gain.shape)]
                     if clash(places[0].candidate, [places[1].candidate]):
                         continue
-                    if self.name != EXACT and short.flat[k] > 2.0 * SHORT:
+                    if self.name != EXACT and short.flat[k] > SHORT:
                         continue  # in "exact" nothing takes up what a set lacks, and bounds lie far too low
                     pair = self._with(fewer, places, anchor)
                     if pair.score > model.score + PROGRESS:
