@@ -11,6 +11,7 @@ import pytest
 
 import stiffmap as sm
 from stiffmap.common.errors import FileError
+from stiffmap.common.tables.lines import Spelling, is_finite
 from stiffmap.common.tables.poses import read_pose_table
 from stiffmap.common.tables.sheet import read_sheet
 from stiffmap.experiment.files.table import read_table
@@ -260,3 +261,9 @@ def test_responses_of_complex_numbers(text: str, tmp_path: Path) -> None:
     )
     with pytest.raises(FileError):
         read_responses(tmp_path / "t.csv")
+
+
+def test_numbers_of_columns_in_brackets_are_no_readings() -> None:
+    plain = Spelling(False)
+    assert [is_finite(c, plain) for c in ("0.33 + 0.42", "2*0.15", "-π/2")] == [True] * 3
+    assert [is_finite(c, plain) for c in ("(3)", "90°", "1/2", "0 - 1")] == [False] * 4

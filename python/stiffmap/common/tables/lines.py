@@ -260,7 +260,7 @@ def is_finite(cell: str, spelling: Spelling) -> bool:
     """Whether a cell holds a number."""
     value = number(cell, spelling)
     if value is None:
-        return complex_number(cell) is not None or ("°" not in cell and sum_in(cell) is not None)
+        return complex_number(cell) is not None or (not re.search("[°(]", cell) and sum_in(cell) is not None)
     return math.isfinite(value)
 
 
