@@ -13,7 +13,9 @@ not list.
 from __future__ import annotations
 
 import faulthandler
+import subprocess
 from collections import defaultdict
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -56,9 +58,11 @@ def pytest_configure(config: pytest.Config) -> None:
 @pytest.hookimpl(optionalhook=True)
 def pytest_testnodedown(node: Any, error: object) -> None:
     if error is not None:
-        code = node.gateway._io.popen.wait(10)
-        lines = faults(node.config.rootpath, node.gateway.id).read_text(encoding="utf-8").splitlines()
-        ENDS.append("\n".join([f"{node.gateway.id} ended with {code}", *lines[:40]]))
+        code, path = "no exit code yet", faults(node.config.rootpath, node.gateway.id)
+        with suppress(subprocess.TimeoutExpired):
+            code = node.gateway._io.popen.wait(10)
+        lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
+        ENDS.append("\n".join([f"{node.gateway.id} ended: {code}", *lines[:40]]))
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:

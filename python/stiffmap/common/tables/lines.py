@@ -237,12 +237,14 @@ def sum_in(cell: str, comma: bool = False) -> float | None:
 
     None for anything else: ``0 - 1`` may be a range, ``1/2`` a date.
     """
+    if len(cell) > LONGEST_SUM:
+        return None
     text = plain(cell.strip())
     if comma or "°" in text:
         text = text.replace(",", ".")
     for pattern, sign in SIGNS:
         text = pattern.sub(sign, text)
-    summed = re.fullmatch(r"[-+*/().\de ]*[+*(][-+*/().\de ]*", text) and len(cell) <= LONGEST_SUM
+    summed = re.fullmatch(r"[-+*/().\de ]*[+*(][-+*/().\de ]*", text)
     if not summed or re.search(r"[\d.)] *-", text):
         return None
     with suppress(SyntaxError, TypeError, ArithmeticError):

@@ -92,7 +92,7 @@ def read_dh(given: Table, units: Mapping[str, str], convention: str) -> list[DHR
 
     Raises StiffmapError that names the column which is missing or has no unit, or the columns of another convention.
     """
-    header = [_plain(h).replace("\\", "") for h in given.header]
+    header = _symbols(given)
     cells = tuple(Cells.of(map(_plain, c)) for c in given.columns)
     sheet = replace(given, header=tuple(INDEX.sub(r"\1", h) for h in header), columns=cells)
     columns = {n: sheet.find(pattern) for n, pattern in (NUMBERS | WORDS).items()}
@@ -151,10 +151,15 @@ def read_dh(given: Table, units: Mapping[str, str], convention: str) -> list[DHR
     return out
 
 
+def _symbols(given: Table) -> list[str]:
+    """Names of the columns without marks."""
+    return [_plain(h).replace("\\", "") for h in given.header]
+
+
 def unused(given: Table) -> list[str]:
     """Names of the columns that `read_dh` makes nothing of."""
     known = "|".join(f"({p})" for p in (*NUMBERS.values(), *WORDS.values(), MORE, "r", "i|#|no|nr"))
-    plain = (split_unit(INDEX.sub(r"\1", _plain(h).replace("\\", "")))[0] for h in given.header)
+    plain = (split_unit(INDEX.sub(r"\1", h))[0] for h in _symbols(given))
     each = zip(given.header, plain, given.columns, strict=True)
     return [h for h, n, cells in each if any(cells) and not re.fullmatch(known, n, re.IGNORECASE)]
 

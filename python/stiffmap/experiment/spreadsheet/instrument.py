@@ -78,9 +78,7 @@ def as_readings(m: Meant, instrument: Instrument) -> None:
     """
     of = {k: quantity_of(k) or {"angle": "angle"}.get(k, "length") for k in instrument.units}
     usual = {k: u for k, u in instrument.units.items() if not m.usual_unit(of[k])}
-    instrument = replace(
-        instrument, units=usual
-    )  # --unit length=m and a line above speak of every length without one
+    instrument = replace(instrument, units=usual)  # --unit and a line above speak of all without one
     if instrument.circle:
         _of_circle(m, instrument)
         return

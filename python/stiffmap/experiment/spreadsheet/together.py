@@ -220,9 +220,8 @@ def _hung(m: Meant) -> None:
 
 def quaternion(sheet: Table) -> list[int]:
     """Columns w x y z of quaternions, by their names (Motive: Rotation W, ROS: pose.orientation.w) and length of one, or none."""
-    numbered = (
-        [f"(?-i:{q}{k + i})" for i in range(4)] for k in (1, 0) for q in "qQ"
-    )  # q1 is a joint next to Q0 to Q3
+    # q1 is a joint next to Q0 to Q3
+    numbered = ([f"(?-i:{q}{k + i})" for i in range(4)] for k in (1, 0) for q in "qQ")
     for names in (WXYZ, *numbered, ("q0", *WXYZ[1:])):
         at = [i for i in map(sheet.find, names) if i is not None and sheet.is_numeric(i)]
         if len(at) == 4:

@@ -34,6 +34,9 @@ STEP = 1e-3
 """Of a parameter's scale, for differences."""
 STEPS, STEPS_OF_A_FOLD = 30, 6
 """Evaluations at most, of all readings and of those outside a fold."""
+LITTLE = 1e-4
+"""Of the squares, and of the size of all values: a change that ends a fit. Below it steps go to and fro, since the columns of
+numbers are held."""
 FRAMINGS, SETTLED = 4, 0.3
 """Fits with frames and tools where the machine of the last one stands, and their change, in noise, that ends them: within a fit
 they are held, since a tool that hardly turns takes up another pattern with every small turn of the machine."""
@@ -218,8 +221,8 @@ def _optimum(
             lambda x, q=q: jacobian(x, q),
             (low, high),
             x_scale="jac",
-            ftol=1e-4,
-            xtol=1e-4,
+            ftol=LITTLE,
+            xtol=LITTLE,
             max_nfev=steps,
         ).x
         left, before = raw(x), q

@@ -232,6 +232,24 @@ def test_declared_numbers_out_of_tolerance_in_the_stead_of_a_name_do_not_take_it
         assert v.word == (("ambiguous" if numbers else "effects") if named else "none")
 
 
+@pytest.mark.parametrize("name", ["exact", "groups"])
+def test_pairs_far_below_the_best_are_fitted_in_the_exact_world_alone(
+    name: str, monkeypatch: pytest.MonkeyPatch
+):
+    c = setting(3, (9.0, 8.0, 0.0))
+    world = World(c, (), name, (), None, lambda: False, {})
+    null = world.null
+    fit = fitted(c, tuple(Chosen.at(p, 0).part for p in c.places[:2]))
+    model = Model(name, tuple(Chosen.at(p, 0).by_posterior(fit) for p in c.places[:2]), fit, fit.score)
+    tried: list[int] = []
+    monkeypatch.setattr(World, "_with", lambda self, m, places, anchor: tried.append(len(places)) or null)
+    for much, expected in ((0.0, True), (1000.0, name == "exact")):
+        tried.clear()
+        fast = replace(model, score=model.score + much, fit=replace(fit, score=fit.score + much))
+        world._by_pairs(fast)
+        assert bool(tried) is expected
+
+
 def test_errors_along_the_travel_are_found_next_to_rows_that_slipped():
     rng = np.random.default_rng(2)
     bare = replace(columns(rng), rows=np.arange(READINGS) // 4)
