@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import ctypes
 import importlib
+import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import ModuleType
@@ -36,7 +38,10 @@ def gmsh_session() -> Iterator[ModuleType]:
     Lengths in the model are millimetres, since OpenCASCADE's tolerances are absolute.
     """
     gmsh = need("gmsh")
-    gmsh.initialize(interruptible=False)
+    with _same_action(
+        "SIGPIPE"
+    ):  # gmsh takes the default: a connection that is closed later would end the process
+        gmsh.initialize(interruptible=False)
     try:
         gmsh.option.setNumber("General.Terminal", 0)
         gmsh.option.setNumber("General.NumThreads", 1)  # meshes repeat bit for bit
@@ -50,3 +55,18 @@ def gmsh_session() -> Iterator[ModuleType]:
         raise StiffmapError(f"gmsh: {' '.join(str(error).split())}") from None
     finally:
         gmsh.finalize()
+
+
+@contextmanager
+def _same_action(name: str) -> Iterator[None]:
+    """What the process does on a signal is the same before and after, in any thread, whatever a library sets meanwhile."""
+    if not hasattr(signal, name):  # a system without it
+        yield
+        return
+    number, sigaction = int(getattr(signal, name)), ctypes.CDLL(None).sigaction
+    action = ctypes.create_string_buffer(512)  # a struct sigaction has some 150 bytes
+    sigaction(number, None, action)
+    try:
+        yield
+    finally:
+        sigaction(number, action, None)

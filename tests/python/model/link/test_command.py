@@ -16,7 +16,7 @@ from stiffmap.model.link import calculix, load_link
 from stiffmap.model.link.gmshmesh import mesh_file
 from stiffmap.model.link.identify import identify_link
 from stiffmap.model.link.mesh import checked_mesh
-from stiffmap.model.link.optional import need
+from stiffmap.model.link.optional import gmsh_session, need
 from stiffmap.model.link.readers import read_dat, read_field
 from stiffmap.model.link.solve import Material, Setup, solve_skfem
 from stiffmap.ui.cli import main
@@ -112,6 +112,26 @@ def test_bad_arguments_exit_with_two_and_one_line(run, tmp_path, arguments, word
     assert len(done.output.strip().splitlines()) == 1
 
 
+def test_a_connection_that_is_closed_after_meshing_ends_no_process(fea):
+    code = """
+import socket, threading
+from stiffmap.model.link.optional import gmsh_session
+def mesh():
+    with gmsh_session() as gmsh:
+        gmsh.model.occ.addBox(0, 0, 0, 1, 1, 1)
+for call in (mesh, lambda: [t.start() or t.join() for t in [threading.Thread(target=mesh)]]):
+    call()
+    here, there = socket.socketpair()
+    there.close()
+    try:
+        here.send(b"x")
+    except BrokenPipeError:
+        print("an error")
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (0, "an error\nan error\n"), done.stderr[-500:]
+
+
 def test_unknown_face_lists_those_that_exist(run, tmp_path, fea):
     (tmp_path / "bar.yaml").write_text(PART)
     done = run("bar.yaml", "--fixed", "left", "--quick", "--size", "8", "--solver", "skfem")
@@ -128,11 +148,7 @@ def test_number_of_cases_must_match(run, tmp_path):
 
 
 def test_step_and_msh_of_one_bar_agree(tmp_path, fea):
-    import gmsh
-
-    gmsh.initialize(interruptible=False)
-    try:
-        gmsh.option.setNumber("General.Terminal", 0)
+    with gmsh_session() as gmsh:
         gmsh.model.occ.addBox(0, 0, 0, 60, 10, 20)
         gmsh.model.occ.synchronize()
         gmsh.write(str(tmp_path / "bar.step"))
@@ -142,8 +158,6 @@ def test_step_and_msh_of_one_bar_agree(tmp_path, fea):
         gmsh.option.setNumber("Mesh.SaveAll", 1)
         gmsh.model.mesh.generate(3)
         gmsh.write(str(tmp_path / "bar.msh"))
-    finally:
-        gmsh.finalize()
     step, msh = mesh_file(tmp_path / "bar.step", 0.006), mesh_file(tmp_path / "bar.msh", unit="mm")
     assert step.volume() == pytest.approx(1.2e-5, rel=1e-9)
     assert msh.volume() == pytest.approx(1.2e-5, rel=1e-9)

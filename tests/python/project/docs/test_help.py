@@ -165,18 +165,14 @@ def _parts(at: Path) -> None:
     (at / "cases.csv").write_text(cases, encoding="utf-8")
     if importlib.util.find_spec("gmsh") is None:
         return
-    import gmsh
+    from stiffmap.model.link.optional import gmsh_session
 
-    gmsh.initialize(interruptible=False)
-    gmsh.option.setNumber("General.Terminal", 0)
-    block, hole = (
-        gmsh.model.occ.addBox(0, 0, 0, 40, 20, 20),
-        gmsh.model.occ.addCylinder(30, -1, 10, 0, 22, 0, 4),
-    )
-    gmsh.model.occ.cut([(3, block)], [(3, hole)])
-    gmsh.model.occ.synchronize()
-    gmsh.write(str(at / "bracket.step"))
-    gmsh.finalize()
+    with gmsh_session() as gmsh:
+        block = gmsh.model.occ.addBox(0, 0, 0, 40, 20, 20)
+        hole = gmsh.model.occ.addCylinder(30, -1, 10, 0, 22, 0, 4)
+        gmsh.model.occ.cut([(3, block)], [(3, hole)])
+        gmsh.model.occ.synchronize()
+        gmsh.write(str(at / "bracket.step"))
 
 
 def _workbook(path: Path) -> None:
