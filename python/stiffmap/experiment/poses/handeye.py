@@ -34,6 +34,13 @@ LATE = 1e-3
 PARALLEL = 1e-3
 """Second singular value of the relative turns, over the first: below it they have one axis only."""
 
+ERROR = 0.01
+"""m: a machine whose tool is off by more was not commanded in the frame of the readings."""
+SAME = 0.1
+"""Share of the size of the commanded pattern, at most, by which readings of it differ once their own frame is found."""
+FEWEST, MOST = 5, 2000
+"""Rows that show a frame, and of which it is found at most."""
+
 
 @dataclass
 class Frames:
@@ -72,6 +79,24 @@ def find_frames(s: Sighting) -> Frames:
     """Frames of instruments and targets of best fit."""
     refined = (_refined(s, f) for f in _starts(s))
     return min(refined, key=lambda f: float(np.sum(np.abs(_linear(s, f)[0]))))
+
+
+def in_own_frame(seen: Floats, commanded: Floats) -> bool:
+    """Whether places (n, 3) m lie far from the commanded ones, but in their pattern: the instrument has a frame of its own."""
+    good = np.flatnonzero(np.isfinite(seen).all(axis=1) & np.isfinite(commanded).all(axis=1))
+    if len(good) < FEWEST:
+        return False
+    some = good[:: max(1, len(good) // MOST)]
+    p, q = commanded[some], seen[some]
+    if _middle(q - p) <= ERROR:
+        return False
+    turn, one = np.tile(np.eye(3), (len(p), 1, 1)), np.zeros(len(p), dtype=np.intp)
+    s = Sighting(p, turn, q, np.full_like(turn, np.nan), one, one, tool_unknown=False)
+    return _middle(as_commanded(s, find_frames(s))[0]) < SAME * _middle(p - np.median(p, axis=0))
+
+
+def _middle(vectors: Floats) -> float:
+    return float(np.median(np.linalg.norm(vectors, axis=1)))
 
 
 def unmoved(s: Sighting) -> Frames:

@@ -13,7 +13,9 @@ from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.tables.meaning import COMMANDED, MEASURED
 from stiffmap.common.yaml_text import read
 from stiffmap.experiment.files.fields import READ, SEEN, quantity_of
+from stiffmap.experiment.poses.handeye import in_own_frame
 from stiffmap.experiment.spreadsheet.answers import Meant
+from stiffmap.experiment.spreadsheet.places import without_lost
 
 FOLDER = Path(__file__).parent / "instruments"
 KEYS = {"title", "quantity", "columns", "measured", "circle", "units"}
@@ -96,22 +98,32 @@ def as_readings(m: Meant, instrument: Instrument) -> None:
         unit = instrument.units.get(READ.get(c.meaning, c.meaning))
         if unit and not c.unit and (seen or c.meaning in m.chosen):
             units[c.meaning] = unit
+    at: dict[str, tuple[int, int]] = {}
     for reading, pattern in ({} if seen else instrument.measured).items():
-        axis = reading[-1]
         own = m.sheet.find(pattern)
         if own is None:
             continue
-        if axis not in chosen:
+        if reading[-1] not in chosen:
             raise StiffmapError(
-                f"{m.sheet.file}: '{m.sheet.header[own]}' was measured; no column is its commanded {axis}"
+                f"{m.sheet.file}: '{m.sheet.header[own]}' was measured; no column is its commanded {reading[-1]}"
             )
-        command = m.sheet.header.index(chosen[axis][0])
-        name = f"{m.sheet.header[own]} less {m.sheet.header[command]} [mm]"
-        values = _si(m, own, reading, instrument) - _si(m, command, axis, instrument)
-        m.sheet = m.sheet.with_column(name, values)
-        chosen[reading] = [name]
-        if reading not in m.chosen:
-            m.units.pop(reading, None)
+        at[reading] = own, m.sheet.header.index(chosen[reading[-1]][0])
+    if at:
+        read = np.column_stack([_si(m, own, r, instrument) for r, (own, _) in at.items()])
+        asked = np.column_stack([_si(m, command, r[-1], instrument) for r, (_, command) in at.items()])
+        read = without_lost(m, read, asked, [m.sheet.header[own] for own, _ in at.values()])
+        apart = len(at) == 3 and in_own_frame(1e-3 * read, 1e-3 * asked)
+        for (reading, (own, command)), values in zip(
+            at.items(), (read if apart else read - asked).T, strict=True
+        ):
+            meaning, less = reading, f" less {m.sheet.header[command]}"
+            if apart:
+                meaning, less = f"p{reading[-1]}", ""
+            name = f"{m.sheet.header[own]}{less} [mm]"
+            m.sheet = m.sheet.with_column(name, values)
+            chosen[meaning] = [name]
+            if meaning not in m.chosen:
+                m.units.pop(meaning, None)
     m.chosen, m.units = chosen | m.chosen, units | m.units
 
 

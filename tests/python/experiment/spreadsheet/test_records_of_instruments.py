@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import stiffmap as sm
 from stiffmap.common.errors import StiffmapError
@@ -214,3 +215,65 @@ def test_one_joint_more_from_0_is_asked(name: str, tmp_path: Path) -> None:
     e = made(tmp_path, text, "ur10", units=units, constants=LOAD, columns=columns).experiment
     assert e.command is not None
     np.testing.assert_allclose(e.command, [[float(c) for c in COMMANDS]])
+
+
+GRID = np.array([[x, y, z] for x in (-100, 0, 100) for y in (-100, 0, 100) for z in (-50, 50)], float)
+ERRORS = 0.05 * np.sin(np.arange(3 * len(GRID)).reshape(-1, 3) ** 2)
+"""mm."""
+
+
+def points(errors: np.ndarray, turn: float, shift: tuple[float, float, float], head: str, **more: Any) -> str:
+    """Commanded points in mm, and where an instrument saw them that is turned about z (deg) and shifted."""
+    seen = (GRID + errors) @ Rotation.from_euler("z", turn, degrees=True).as_matrix().T + shift
+    seen[more.get("lost", [])] = 0.0
+    rows = (";".join(f"{v:.5f}" for v in (*p, *q)) for p, q in zip(GRID, seen, strict=True))
+    return head + "\n" + "\n".join(rows) + "\n"
+
+
+NOISE = {"dx": 0.05, "dy": 0.05, "dz": 0.05}
+SIDE = "X nominal;Y nominal;Z nominal;X actual;Y actual;Z actual"
+PLACES = "x [mm];y [mm];z [mm];px [mm];py [mm];pz [mm]"
+
+
+@pytest.mark.parametrize("turn", [0.0, 30.0, 180.0])
+@pytest.mark.parametrize(("head", "instrument"), [(SIDE, "tracker"), (PLACES, None)])
+def test_points_in_the_frame_of_the_instrument(
+    head: str, instrument: str | None, turn: float, tmp_path: Path
+) -> None:
+    text = points(ERRORS, turn, (2500, 300, -120), head, lost=[4] if instrument else [])
+    found = made(tmp_path, text, "tripteron", instrument=instrument, noise=NOISE)
+    e = found.experiment
+    assert (e.quantity, e.frame, e.tool) == ("position", "unknown", "unknown")
+    assert any("in the instrument's own frame" in r for r in found.remarks)
+    lost = "left out: line 6: 'X actual', 'Y actual', 'Z actual' are 0, as of a target that was not seen"
+    assert (lost in found.remarks) == (instrument is not None)
+    assert len(e) == len(GRID) - (instrument is not None)
+    kept = np.delete(np.arange(len(GRID)), [4] if instrument else [])
+    left = sm.residual("tripteron", e).values[:, :3]
+    pattern = np.column_stack(
+        [np.ones(len(kept)), GRID[kept]]
+    )  # a frame takes up a shift and turns of the errors
+    own = ERRORS[kept] - pattern @ np.linalg.lstsq(pattern, ERRORS[kept], rcond=None)[0]
+    assert np.nanmax(np.abs(left)) < 1.5e-3 * np.abs(ERRORS).max()
+    assert np.corrcoef(left.ravel(), own.ravel())[0, 1] > 0.8
+
+
+@pytest.mark.parametrize("head", [SIDE, PLACES])
+@pytest.mark.parametrize("shift", [0.0, 3.0])
+def test_points_near_the_commands_are_in_their_frame(head: str, shift: float, tmp_path: Path) -> None:
+    text = points(ERRORS, 0.0, (shift, 0, 0), head)
+    instrument = "tracker" if head == SIDE else None
+    e = made(tmp_path, text, "tripteron", instrument=instrument, noise=NOISE).experiment
+    assert (e.quantity, e.frame) == ("position", "known")
+    left = sm.residual("tripteron", e).values[:, :3]
+    np.testing.assert_allclose(left, 1e-3 * (ERRORS + [shift, 0, 0]), atol=2e-8)
+
+
+def test_differences_from_places_far_away_are_no_places(tmp_path: Path) -> None:
+    far = GRID + [900.0, 0, 0]
+    rows = "\n".join(";".join(f"{v:g}" for v in (*p, *e)) for p, e in zip(far, ERRORS, strict=True))
+    text = f"x [mm];y [mm];z [mm];dx [mm];dy [mm];dz [mm]\n{rows}\n"
+    assert not made(tmp_path, text, "ur10", quantity="position", noise=NOISE).warnings
+    seen = points(ERRORS, 90.0, (900, 0, 0), "x [mm];y [mm];z [mm];dx [mm];dy [mm];dz [mm]")
+    found = made(tmp_path, seen, "ur10", quantity="position", noise=NOISE, overwrite=True)
+    assert "change as the commanded places do" in found.warnings[0]
