@@ -10,7 +10,7 @@ from scipy.stats import chi2
 from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.channels import Channel, metres
 from stiffmap.experiment.experiment import Experiment, Floats, Integers, Mask, numbered
-from stiffmap.experiment.poses.handeye import in_own_frame
+from stiffmap.experiment.poses.handeye import own_frame
 
 CONTRADICTION = 1e-4
 ENOUGH = 5
@@ -117,7 +117,7 @@ def no_difference(experiment: Experiment) -> str:
     """What to say where readings change along with the commanded places, as places that were seen do; empty where they do not."""
     at, read = experiment.position, experiment.reading[:, :3]
     same = np.ptp(read - at, axis=0) < 0.1 * np.ptp(at, axis=0)  # not where one of the two is NaN
-    if experiment.seen is not None or not (same.any() or in_own_frame(read, at)):
+    if experiment.seen is not None or not (same.any() or own_frame(read, at) is not None):
         return ""
     names = ", ".join(c.name for c, s in zip(experiment.channels, same, strict=False) if s or not same.any())
     return f"{names} change as the commanded places do: places that were seen are no differences; --instrument tracker takes what was commanded off"

@@ -81,18 +81,20 @@ def find_frames(s: Sighting) -> Frames:
     return min(refined, key=lambda f: float(np.sum(np.abs(_linear(s, f)[0]))))
 
 
-def in_own_frame(seen: Floats, commanded: Floats) -> bool:
-    """Whether places (n, 3) m lie far from the commanded ones, but in their pattern: the instrument has a frame of its own."""
+def own_frame(seen: Floats, commanded: Floats) -> Floats | None:
+    """(3, 3) base axes in the instrument's, where places (n, 3) m lie far from the commanded ones, but in their pattern; else None."""
     good = np.flatnonzero(np.isfinite(seen).all(axis=1) & np.isfinite(commanded).all(axis=1))
     if len(good) < FEWEST:
-        return False
+        return None
     some = good[:: max(1, len(good) // MOST)]
     p, q = commanded[some], seen[some]
     if _middle(q - p) <= ERROR:
-        return False
+        return None
     turn, one = np.tile(np.eye(3), (len(p), 1, 1)), np.zeros(len(p), dtype=np.intp)
     s = Sighting(p, turn, q, np.full_like(turn, np.nan), one, one, tool_unknown=False)
-    return _middle(as_commanded(s, find_frames(s))[0]) < SAME * _middle(p - np.median(p, axis=0))
+    found = find_frames(s)
+    alike = _middle(as_commanded(s, found)[0]) < SAME * _middle(p - np.median(p, axis=0))
+    return found.base_r[0] if alike else None
 
 
 def _middle(vectors: Floats) -> float:

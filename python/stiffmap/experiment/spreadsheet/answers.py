@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from copy import deepcopy
 from dataclasses import dataclass, field, fields
 from typing import Any, NoReturn
@@ -63,6 +64,8 @@ class Meant(Answers):
     """Of commanded joints: column of data.csv -> full name of the drive, unit."""
     placed: bool = False
     """Whether an instrument read, with commanded joints, places or lengths in coordinates of its own."""
+    unloaded: dict[str, int] = field(default_factory=dict)
+    """Reading that is a difference -> the column that was read without the load."""
     spent: dict[str, float] = field(default_factory=dict)
     """Numbers of --set of which columns were made."""
     answered: bool = False
@@ -151,6 +154,11 @@ class Meant(Answers):
                 f"rows; found {', '.join(sorted(units))}"
             )
         return units.pop() if units else ""
+
+    def metres(self, columns: Sequence[int], names: Sequence[str]) -> Floats:
+        """(n, columns) lengths, by their names for --unit."""
+        sizes = [self.unit(i, name).size for i, name in zip(columns, names, strict=True)]
+        return np.column_stack([self.sheet.numbers(i) for i in columns]) * sizes
 
     def coordinates(self) -> Floats:
         """(n, drives) commanded coordinates, m and rad."""

@@ -38,7 +38,7 @@ from stiffmap.experiment.spreadsheet.dialogue import (
 from stiffmap.experiment.spreadsheet.guess import has_meaning
 from stiffmap.experiment.spreadsheet.instrument import Instrument, as_readings, load_instrument
 from stiffmap.experiment.spreadsheet.joints import DIFFERENCES, as_seen, commanded, drives_of, turned
-from stiffmap.experiment.spreadsheet.places import seen_next_to_commands
+from stiffmap.experiment.spreadsheet.places import in_base_axes, seen_next_to_commands
 from stiffmap.experiment.spreadsheet.sockets import seated
 from stiffmap.experiment.spreadsheet.together import one_point_a_row, oriented, together
 from stiffmap.solve.machine import Machine, load_machine
@@ -231,10 +231,11 @@ def _understood(
         as_seen(m, difference)
     elif wrote is not None:
         as_readings(m, wrote)
+    asked(m, ask, partial(in_base_axes, m))
     oriented(m)
     if not m.placed:
         turned(m, difference)
-    seen_next_to_commands(m)
+    asked(m, ask, partial(seen_next_to_commands, m))
     try:
         found = ask_all(m, ask, deflection and not m.placed)
     except Unanswered as left:

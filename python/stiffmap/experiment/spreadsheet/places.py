@@ -7,8 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from stiffmap.common.broadcasting import Floats
+from stiffmap.experiment.channels import AXES
 from stiffmap.experiment.files.fields import POSE, SEEN
-from stiffmap.experiment.poses.handeye import in_own_frame
+from stiffmap.experiment.poses.handeye import own_frame
 from stiffmap.experiment.spreadsheet.answers import Meant
 
 NAMED = 5
@@ -18,23 +19,43 @@ NAMED = 5
 def seen_next_to_commands(m: Meant) -> None:
     """Columns px, py, pz next to x, y, z: their frame, and the place of the target on the tool, are unknown where they lie elsewhere."""
     of = {c.meaning: c.index for c in m.guessed if c.repeat == 0}
-    if m.columns or not set(SEEN) <= set(of) or not set(POSE) <= {*of, *m.constants}:
+    if m.columns or not set(SEEN) <= set(of) or (commanded := commands(m)) is None:
         return
     m.placed = True
-
-    def column(meaning: str) -> Floats:
-        if meaning not in of:
-            return np.full(len(m.sheet), 1e-3 * m.constants[meaning])
-        return m.unit(of[meaning], meaning).size * m.sheet.numbers(of[meaning])
-
-    seen, commanded = (np.column_stack([column(a) for a in names]) for names in (SEEN, POSE))
-    if in_own_frame(seen, commanded):
+    if own_frame(m.metres([of[s] for s in SEEN], SEEN), commanded) is not None:
         names = ", ".join(f"'{m.sheet.header[of[s]]}'" for s in SEEN)
         m.head |= {"frame": "unknown", "tool": "unknown"}
         m.said.append(
             f"{names} lie elsewhere than the commands: they are places in the instrument's own frame, which is unknown, as is the place "
             "of the target on the tool"
         )
+
+
+def in_base_axes(m: Meant) -> None:
+    """Differences dx, dy, dz of places in the instrument's own frame along base axes, which the columns of the places without load show,
+    next to the commands; as they are where those are in one frame."""
+    if m.columns or not set(AXES[:3]) <= set(m.unloaded) or (commanded := commands(m)) is None:
+        return
+    turn = own_frame(m.metres([m.unloaded[a] for a in AXES[:3]], AXES[:3]), commanded)
+    if turn is None:
+        return
+    at = [m.index(m.chosen[a][0]) for a in AXES[:3]]
+    names = [m.sheet.names[i] for i in at]
+    for a, name, values in zip(AXES[:3], names, (m.metres(at, AXES[:3]) @ turn).T, strict=True):
+        m.add(f"{name}, along the base's {a[1]}", "mm", 1e3 * values, a)
+    m.said.append(
+        "the places without load lie elsewhere than the commands: they are in the instrument's own frame, and differences are turned "
+        "from its axes into those of the base"
+    )
+
+
+def commands(m: Meant) -> Floats | None:
+    """(n, 3) m, commanded positions of a sheet; None where it has not all three."""
+    of = {c.meaning: c.index for c in m.guessed if c.repeat == 0}
+    if not set(POSE) <= {*of, *m.constants}:
+        return None
+    same = {a: np.full(len(m.sheet), 1e-3 * m.constants[a]) for a in POSE if a not in of}
+    return np.column_stack([same[a] if a in same else m.metres([of[a]], [a])[:, 0] for a in POSE])
 
 
 def without_lost(m: Meant, seen: Floats, commanded: Floats, names: Sequence[str]) -> Floats:

@@ -160,6 +160,8 @@ def _differences(m: Meant) -> None:
         others = [h for h in m.chosen.get(meaning, []) if m.index(h) != i]
         m.add(f"{m.sheet.names[i]} less {m.sheet.names[j]}", unit, values, meaning)
         m.chosen[meaning] = [*others, *m.chosen[meaning]]
+        if not others:
+            m.unloaded[meaning] = j
         idle = [f"'{header[k]}'" for k, (n, s) in enumerate(states) if n == name and s and k not in (i, j)]
         left = f"; not used, as read again: {', '.join(idle)}" if idle else ""
         m.said.append(f"{meaning} is '{header[i]}' less '{header[j]}'{left}")

@@ -277,3 +277,29 @@ def test_differences_from_places_far_away_are_no_places(tmp_path: Path) -> None:
     seen = points(ERRORS, 90.0, (900, 0, 0), "x [mm];y [mm];z [mm];dx [mm];dy [mm];dz [mm]")
     found = made(tmp_path, seen, "ur10", quantity="position", noise=NOISE, overwrite=True)
     assert "change as the commanded places do" in found.warnings[0]
+
+
+@pytest.mark.parametrize("turn", [0.0, 40.0, -120.0])
+def test_loaded_and_unloaded_places_in_the_frame_of_the_instrument(turn: float, tmp_path: Path) -> None:
+    axes = Rotation.from_euler("zx", [turn, 0.2 * turn], degrees=True).as_matrix()
+    deflections = 0.1 * np.cos(np.arange(3 * len(GRID)).reshape(-1, 3))
+    places = [(p @ axes.T) + (2500, 300, -120) for p in (GRID + ERRORS, GRID + ERRORS + deflections)]
+    rows = (";".join(f"{v:.6f}" for v in (*p, 100, *u, *w)) for p, u, w in zip(GRID, *places, strict=True))
+    head = ";".join(
+        ["x [mm];y [mm];z [mm];Fx [N]", *(f"{a} {s} [mm]" for s in ("unloaded", "loaded") for a in "XYZ")]
+    )
+    found = made(tmp_path, head + "\n" + "\n".join(rows) + "\n", "tripteron", noise=NOISE)
+    np.testing.assert_allclose(found.experiment.reading[:, :3], 1e-3 * deflections, atol=2e-7)
+    assert any("turned from its axes into those of the base" in r for r in found.remarks)
+
+
+def test_unloaded_gauges_that_are_no_places_are_taken_as_they_are(tmp_path: Path) -> None:
+    rows = (
+        ";".join(f"{v:.6f}" for v in (*p, 100, *e, *(e + 0.1))) for p, e in zip(GRID, ERRORS, strict=True)
+    )
+    head = ";".join(
+        ["x [mm];y [mm];z [mm];Fx [N]", *(f"{a} {s} [mm]" for s in ("unloaded", "loaded") for a in "XYZ")]
+    )
+    found = made(tmp_path, head + "\n" + "\n".join(rows) + "\n", "tripteron", noise=NOISE)
+    np.testing.assert_allclose(found.experiment.reading[:, :3], 1e-4, atol=1e-9)
+    assert not any("turned" in r for r in found.remarks)
