@@ -14,13 +14,7 @@ from stiffmap.model.description.elements import (
     Spring,
 )
 from stiffmap.model.description.laws import CommandError, GuideError, JointFriction, Law
-from stiffmap.model.description.machine import (
-    TASK,
-    AppliedEffect,
-    ExternalSpring,
-    Leg,
-    MachineDescription,
-)
+from stiffmap.model.description.machine import TASK, AppliedEffect, ExternalSpring, Leg, MachineDescription
 from stiffmap.model.description.pose import Pose
 from stiffmap.model.description.strokes import BeamStroke, TableStroke
 

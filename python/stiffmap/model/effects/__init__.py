@@ -1,4 +1,4 @@
-"""Effects: whatever a real machine has beyond the declared one. One kind is one file in `library`."""
+"""Effects: whatever a real machine has beyond the declared one. The kinds are in `library`, one file for each family."""
 
 from stiffmap.model.effects.apply import add_effect, apply_records, place_text
 from stiffmap.model.effects.parse import effect_text, parse_effect

@@ -5,6 +5,7 @@ from __future__ import annotations
 from difflib import get_close_matches
 from functools import cache
 from os import PathLike
+from types import ModuleType
 
 from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.python_file import modules_of, run_python_file
@@ -17,7 +18,13 @@ from stiffmap.model.effects.types import EffectType
 def _library() -> dict[str, EffectType]:
     import stiffmap.model.effects.library as library
 
-    return {m.EFFECT.kind: m.EFFECT for m in modules_of(library) if hasattr(m, "EFFECT")}
+    return {e.kind: e for module in modules_of(library) for e in _effects_of(module)}
+
+
+def _effects_of(module: ModuleType) -> tuple[EffectType, ...]:
+    """Its ``EFFECT``, or each of its ``EFFECTS``."""
+    one = getattr(module, "EFFECT", None)
+    return tuple(getattr(module, "EFFECTS", ())) or ((one,) if isinstance(one, EffectType) else ())
 
 
 @cache
@@ -63,9 +70,7 @@ def load_effects(path: str | PathLike[str]) -> tuple[EffectType, ...]:
 
     Raises `FileError` where it cannot be run or defines none.
     """
-    module = run_python_file(path, "effect", "an effect")
-    one = getattr(module, "EFFECT", None)
-    found = tuple(getattr(module, "EFFECTS", ())) or ((one,) if isinstance(one, EffectType) else ())
+    found = _effects_of(run_python_file(path, "effect", "an effect"))
     if not found:
         raise FileError("defines no effect: expected EFFECT = EffectType(...)", file=str(path))
     return tuple(register(e) for e in found)

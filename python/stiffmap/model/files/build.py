@@ -12,12 +12,7 @@ import numpy as np
 from stiffmap.common.errors import unknown_name
 from stiffmap.common.units import LENGTH, NONE, UnitSystem
 from stiffmap.common.yaml_text import Document
-from stiffmap.model.description import (
-    TASK,
-    AppliedEffect,
-    ExternalSpring,
-    MachineDescription,
-)
+from stiffmap.model.description import TASK, AppliedEffect, ExternalSpring, MachineDescription
 from stiffmap.model.description.pose import Pose, Vector
 from stiffmap.model.description.strokes import as_rows
 from stiffmap.model.description.tree import point_names

@@ -10,15 +10,7 @@ import yaml
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs import write_text
 from stiffmap.common.yaml_text import text_of
-from stiffmap.model.description import (
-    TASK,
-    AppliedEffect,
-    Element,
-    Joint,
-    Leg,
-    MachineDescription,
-    Offset,
-)
+from stiffmap.model.description import TASK, AppliedEffect, Element, Joint, Leg, MachineDescription, Offset
 from stiffmap.model.description.tree import Elements, edit_elements, walk
 from stiffmap.model.files.dump_elements import Plain, dump_elements, dump_numbers, dump_pose, floats
 from stiffmap.model.files.load import description_from_text

@@ -59,10 +59,7 @@ def analyse_correlation(points: Floats, residuals: Floats) -> Correlation:
     length, nugget = _fit_exponential(points, live)
     inflation = _inflation(points, length, nugget)
     return tested._replace(
-        correlated=True,
-        length=length,
-        inflation=inflation,
-        effective_nodes=float(n / inflation.mean()),
+        correlated=True, length=length, inflation=inflation, effective_nodes=float(n / inflation.mean())
     )
 
 

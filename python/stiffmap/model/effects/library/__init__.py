@@ -1,1 +1,1 @@
-"""One file per kind of effect: every module here that has an ``EFFECT`` is a kind of the library."""
+"""The kinds of the library by families: the ``EFFECTS`` of every module here, or its one ``EFFECT``."""
