@@ -6,18 +6,6 @@ from stiffmap.model.effects.registry import get, kinds, load_effects, register, 
 from stiffmap.model.effects.types import EffectType, Option, Parameter, Placed
 
 __all__ = [
-    "EffectType",
-    "Option",
-    "Parameter",
-    "Placed",
-    "add_effect",
-    "apply_records",
-    "effect_text",
-    "get",
-    "kinds",
-    "load_effects",
-    "parse_effect",
-    "place_text",
-    "register",
-    "unregister",
-]
+    "EffectType", "Option", "Parameter", "Placed", "add_effect", "apply_records", "effect_text", "get",
+    "kinds", "load_effects", "parse_effect", "place_text", "register", "unregister",
+]  # fmt: skip

@@ -21,7 +21,6 @@ def stretched(e: Cable, placed: Placed) -> Elements:
 
 CABLE_STRETCH = EffectType(
     kind="cable_stretch",
-    precedence=35,
     title="elasticity of a cable",
     doc=(
         "The cable (with its lead and the stiffness in series) is `scale` times as compliant as declared; lengths are "
@@ -29,7 +28,6 @@ CABLE_STRETCH = EffectType(
     ),
     parameters=(Parameter("scale", "1", 0.05, 50.0, 1.0, 0.1, "of the compliance", plausible=(0.3, 5.0)),),
     **each(cables, stretched),
-    moves="nothing",
     compared=("soft", "stiff"),
 )
 
@@ -41,7 +39,6 @@ def rubbing(e: Cable, placed: Placed) -> Elements:
 
 GUIDE_FRICTION = EffectType(
     kind="guide_friction",
-    precedence=75,
     title="friction of a cable's guide",
     doc=(
         "The guide takes `share` of the free length's tension while that grows: the lead between winch and guide "
@@ -50,7 +47,6 @@ GUIDE_FRICTION = EffectType(
     ),
     parameters=(Parameter("share", "1", -1.0, 1.0, 0.0, 0.05, "of the tension", plausible=(-0.3, 0.3)),),
     **each(led_cables, rubbing),
-    moves="nothing",
 )
 
 
@@ -69,13 +65,11 @@ def displaced(e: Cable, placed: Placed) -> Elements:
 
 CABLE_ANCHOR = EffectType(
     kind="cable_anchor",
-    precedence=165,
     title="anchor of a cable",
     doc="The cable enters its guide (dx, dy, dz) away from where its controller believes.",
     **components(OFF),
     **each(cables, displaced),
     frame="base axes",
-    moves="nothing",
 )
 
 
@@ -92,7 +86,6 @@ def with_weight(description: MachineDescription, placed: Placed) -> MachineDescr
 
 CABLE_MASS = EffectType(
     kind="cable_mass",
-    precedence=305,
     title="mass of a cable",
     doc=(
         "The cable weighs `density` per length: half of its length at home hangs at its fixing point, the other half "
@@ -104,5 +97,3 @@ CABLE_MASS = EffectType(
     moves="with the platform",
     stage=70,
 )
-
-EFFECTS = (CABLE_STRETCH, GUIDE_FRICTION, CABLE_ANCHOR, CABLE_MASS)

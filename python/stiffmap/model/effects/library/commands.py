@@ -31,7 +31,6 @@ def of_command(error: Callable[[Placed], CommandError], sites: Sites = drives) -
 
 ZERO_OFFSET = EffectType(
     kind="zero_offset",
-    precedence=90,
     title="zero of a drive",
     doc="The drive stands `error` further along (or about) its axis than commanded, at every stroke.",
     parameters=(
@@ -43,7 +42,6 @@ ZERO_OFFSET = EffectType(
 
 LEAD_ERROR = EffectType(
     kind="lead_error",
-    precedence=100,
     title="lead error of a drive",
     doc="The drive travels `slope` more per unit of commanded travel; no error at its home coordinate.",
     parameters=(
@@ -62,16 +60,10 @@ WAVE = (
     Parameter("amplitude", "m", 0.0, 0.01, 0.0, 1e-5, "half of peak to peak", angular="rad"),
     Parameter("period", "m", 1e-5, 10.0, None, 0.01, "travel after which the error repeats", angular="rad"),
     Parameter(
-        "phase",
-        "rad",
-        -2 * math.pi,
-        2 * math.pi,
-        None,
-        1.0,
-        "of the sine at the home coordinate",
+        "phase", "rad", -2 * math.pi, 2 * math.pi, None, 1.0, "of the sine at the home coordinate",
         default=0.0,
     ),
-)
+)  # fmt: skip
 
 
 def wave(placed: Placed) -> CommandError:
@@ -122,7 +114,6 @@ def _offset(probe: Probe, element: str, leg: str) -> Floats:
 
 PERIODIC_ERROR = EffectType(
     kind="periodic_error",
-    precedence=110,
     title="periodic error of a screw or gear",
     doc=(
         "The drive stands amplitude·sin(2π(u - u_home)/period + phase) further than commanded at the "
@@ -156,7 +147,6 @@ def bent(e: Joint, placed: Placed) -> Elements:
 
 STRAIGHTNESS = EffectType(
     kind="straightness",
-    precedence=120,
     title="straightness of a guide",
     doc=(
         "The carriage stands amplitude·sin(2π(u - u_home)/period + phase) off its guide at the commanded coordinate u, "
@@ -175,31 +165,20 @@ STRAIGHTNESS = EffectType(
 
 
 PER_TURN = Parameter(
-    "per_turn",
-    "m",
-    -0.1,
-    0.1,
-    0.0,
-    1e-4,
+    "per_turn", "m", -0.1, 0.1, 0.0, 1e-4,
     "how much further the drive stands per turn of the other joint from home",
-    angular="rad",
-    angular_upper=2.0 * math.pi,
-)
+    angular="rad", angular_upper=2.0 * math.pi,
+)  # fmt: skip
 PARALLEL = 1e-6
 """Sine of the angle between a screw and the joint that turns it."""
 
 
 def pairs(elements: Elements) -> dict[str, tuple[int, ...]]:
     """Each actuated joint with each other joint of its sequence that turns about one axis: ``j3.j2``."""
-    drives = [(i, e) for i, e in enumerate(elements) if isinstance(e, Joint) and e.actuated]
-    turning = [e for e in elements if isinstance(e, Joint) and _turns(e)]
-    return {
-        f"{e.name}.{o.name}": (i,)
-        for i, e in drives
-        if not isinstance(e, Cable)
-        for o in turning
-        if o.name != e.name
-    }
+    driven = {i: e for i, e in enumerate(elements) if isinstance(e, Joint) and e.actuated}
+    drives = [(i, e) for i, e in driven.items() if not isinstance(e, Cable)]
+    turning = [e for e in elements if isinstance(e, Joint) and e.kind == "revolute" and len(e.axes) == 1]
+    return {f"{e.name}.{o.name}": (i,) for i, e in drives for o in turning if o.name != e.name}
 
 
 def likely(elements: Elements) -> dict[str, tuple[int, ...]]:
@@ -220,10 +199,6 @@ def likely(elements: Elements) -> dict[str, tuple[int, ...]]:
     return out
 
 
-def _turns(e: Joint) -> bool:
-    return e.kind == "revolute" and len(e.axes) == 1
-
-
 def coupled(placed: Placed) -> CommandError:
     """A command error that grows with the other joint's coordinate."""
     slope = placed.values["per_turn"] / (2.0 * math.pi)
@@ -232,7 +207,6 @@ def coupled(placed: Placed) -> CommandError:
 
 JOINT_COUPLING = EffectType(
     kind="joint_coupling",
-    precedence=115,
     title="coupling of a drive to another joint",
     doc=(
         "The drive stands `per_turn` further for each turn of the other joint away from home, at `j3.j2` the drive j3 by "
@@ -244,5 +218,3 @@ JOINT_COUPLING = EffectType(
     tried=at_sites(likely),
     pivot="home coordinate of the other joint",
 )
-
-EFFECTS = (ZERO_OFFSET, LEAD_ERROR, PERIODIC_ERROR, STRAIGHTNESS, JOINT_COUPLING)

@@ -88,7 +88,6 @@ def dry(force: str, torque: str, *branches: str) -> dict[str, Any]:
 
 FRICTION = EffectType(
     kind="friction",
-    precedence=60,
     title="dry friction of a drive, an elastic joint or a spring's direction",
     doc=(
         "Coulomb friction parallel to the spring of a drive, an elastic joint or an uncoupled direction of a link spring "
@@ -118,7 +117,6 @@ def with_joint_friction(description: MachineDescription, placed: Placed) -> Mach
 
 JOINT_FRICTION = EffectType(
     kind="joint_friction",
-    precedence=250,
     title="dry friction of a passive joint",
     doc=(
         "Coulomb friction about each axis of a free passive joint, level L, against its motion q from the commanded "
@@ -193,7 +191,6 @@ def deflection(force: Floats, compliance: float, values: Mapping[str, float]) ->
 
 HYSTERESIS = EffectType(
     kind="hysteresis",
-    precedence=70,
     reverses=True,
     title="friction, play and stiffening of a drive along a sequence of loads",
     doc=(
@@ -216,5 +213,3 @@ HYSTERESIS = EffectType(
     needs=("order",),
     drive=deflection,
 )
-
-EFFECTS = (FRICTION, JOINT_FRICTION, HYSTERESIS)

@@ -74,7 +74,6 @@ def tilted(e: Joint, placed: Placed) -> Elements:
 
 TILT = EffectType(
     kind="tilt",
-    precedence=170,
     title="tilt of a guide or joint with what it carries",
     doc=(
         "Guide tilt: the guide, its carriage and the joint axes that the carriage carries turn together "
@@ -99,7 +98,6 @@ def axis_tilted(e: Joint, placed: Placed) -> Elements:
 
 AXIS_TILT = EffectType(
     kind="axis_tilt",
-    precedence=180,
     title="direction of a guide or joint axis alone",
     doc=(
         "The axis of a guide or joint is turned, and nothing else: at its zero (a guide: at the carriage's "
@@ -129,7 +127,6 @@ def leg_tilted(description: MachineDescription, placed: Placed) -> MachineDescri
 
 LEG_TILT = EffectType(
     kind="leg_tilt",
-    precedence=190,
     title="whole leg mounted askew",
     doc="The whole leg is mounted on the base turned about the origin of its frame.",
     **rotations("rotation"),
@@ -166,7 +163,6 @@ def displaced(description: MachineDescription, placed: Placed) -> MachineDescrip
 
 POSITION_OFFSET = EffectType(
     kind="position_offset",
-    precedence=160,
     title="line of a guide or joint axis; base and platform joint points",
     doc=(
         "A joint (guide) stands displaced on the part that carries it. On `base` the leg's beginning stands "
@@ -191,7 +187,6 @@ def tool_displaced(description: MachineDescription, placed: Placed) -> MachineDe
 
 TCP_OFFSET = EffectType(
     kind="tcp_offset",
-    precedence=220,
     title="position of the tool on the platform",
     doc="The tool (TCP) sits displaced on the platform; the external wrench acts at the displaced TCP.",
     **translations("displacement of the tool"),
@@ -201,5 +196,3 @@ TCP_OFFSET = EffectType(
     moves="the TCP; other points and bodies of the platform stay",
     stage=60,
 )
-
-EFFECTS = (TILT, AXIS_TILT, LEG_TILT, POSITION_OFFSET, TCP_OFFSET)

@@ -9,7 +9,7 @@ from itertools import pairwise
 from typing import Any
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.model.description import Joint, Law, MachineDescription, Spring
+from stiffmap.model.description import Joint, Law, MachineDescription
 from stiffmap.model.description.tree import Elements
 from stiffmap.model.effects.edit import change_sites
 from stiffmap.model.effects.evidence import shares_of_load
@@ -28,7 +28,8 @@ def change_law(
             assert e.law is not None
             return (replace(e, law=change(e.law)),)
         assert i is not None
-        laws = {**dict(e.laws), i: change(dict(e.laws).get(i) or Law(_stiffness(e, i)))}
+        stiffness = e.stiffness[i][i] if e.stiffness is not None else 1.0 / e.compliance[i][i]
+        laws = {**dict(e.laws), i: change(dict(e.laws).get(i) or Law(stiffness))}
         return (replace(e, laws=tuple(sorted(laws.items(), key=lambda pair: pair[0]))),)
 
     return change_sites(description, placed.legs, placed.element, elastic_directions, element)
@@ -46,13 +47,6 @@ def on_law(law: Callable[[Law, Placed], Law], **more: Any) -> dict[str, Any]:
     }
 
 
-def _stiffness(e: Spring, i: int) -> float:
-    if e.stiffness is not None:
-        return e.stiffness[i][i]
-    assert e.compliance is not None
-    return 1.0 / e.compliance[i][i]
-
-
 def linear(law: Law) -> Law:
     """The law, which must be linear yet; raises StiffmapError."""
     if law.cubic or law.knots:
@@ -61,17 +55,9 @@ def linear(law: Law) -> Law:
 
 
 HALF_WIDTH = Parameter(
-    "half_width",
-    "m",
-    0.0,
-    0.01,
-    0.0,
-    1e-5,
-    "deflection without force to each side of the centre",
-    angular="rad",
-    angular_upper=0.5,
-    angular_scale=1e-4,
-)
+    "half_width", "m", 0.0, 0.01, 0.0, 1e-5, "deflection without force to each side of the centre",
+    angular="rad", angular_upper=0.5, angular_scale=1e-4,
+)  # fmt: skip
 
 
 def with_gap(old: Law, placed: Placed) -> Law:
@@ -82,7 +68,6 @@ def with_gap(old: Law, placed: Placed) -> Law:
 
 DEAD_ZONE = EffectType(
     kind="dead_zone",
-    precedence=20,
     reverses=True,
     title="backlash of a drive, gap in a joint or a spring's direction",
     doc=(
@@ -108,7 +93,6 @@ def two_slopes(old: Law, placed: Placed) -> Law:
 
 BILINEAR = EffectType(
     kind="bilinear",
-    precedence=40,
     title="spring whose stiffness changes at a force",
     doc=(
         "The nominal compliance up to the force `knee` in both directions, `ratio` times it for the force "
@@ -127,6 +111,12 @@ BILINEAR = EffectType(
 )
 
 
+CUBIC = Parameter(
+    "cubic", "N/m^3", 0.0, 1e20, 0.0, 1e14, "coefficient of the deflection's third power",
+    angular="N·m/rad^3", angular_scale=1e9,
+)  # fmt: skip
+
+
 def hardened(old: Law, placed: Placed) -> Law:
     """force = a/c + cubic a^3."""
     return Law(linear(old).stiffness, cubic=placed.values["cubic"])
@@ -134,25 +124,12 @@ def hardened(old: Law, placed: Placed) -> Law:
 
 HARDENING = EffectType(
     kind="hardening",
-    precedence=30,
     title="spring that stiffens with load",
     doc=(
         "Force = a/c + cubic·a³ at the deflection a, with the nominal compliance c, of a drive, an elastic joint or "
         "an uncoupled direction of a link spring (element `foot.k22`)."
     ),
-    parameters=(
-        Parameter(
-            "cubic",
-            "N/m^3",
-            0.0,
-            1e20,
-            0.0,
-            1e14,
-            "coefficient of the deflection's third power",
-            angular="N·m/rad^3",
-            angular_scale=1e9,
-        ),
-    ),
+    parameters=(CUBIC,),
     **on_law(hardened),
     excludes=("hardening", "dead_zone", "friction", "position_dependent_compliance", "tabulated"),
 )
@@ -183,7 +160,6 @@ def polyline(old: Law, placed: Placed) -> Law:
 
 TABULATED = EffectType(
     kind="tabulated",
-    precedence=50,
     title="spring with a measured force-deflection curve",
     doc=(
         "Force of a drive, an elastic joint or an uncoupled direction of a link spring (element `foot.k22`) by a "
@@ -213,7 +189,6 @@ def sloped(e: Joint, placed: Placed) -> Elements:
 
 POSITION_DEPENDENT_COMPLIANCE = EffectType(
     kind="position_dependent_compliance",
-    precedence=80,
     title="drive compliance that depends on the stroke",
     doc=(
         "Drive compliance times 1 + slope·(u - u_home) at the commanded coordinate u (a screw that yields "
@@ -225,5 +200,3 @@ POSITION_DEPENDENT_COMPLIANCE = EffectType(
     frame="the drive's coordinate",
     excludes=("hardening", "friction"),
 )
-
-EFFECTS = (DEAD_ZONE, BILINEAR, HARDENING, TABULATED, POSITION_DEPENDENT_COMPLIANCE)

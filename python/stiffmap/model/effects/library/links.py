@@ -32,7 +32,6 @@ def with_error(e: Element, placed: Placed) -> Elements:
 
 LENGTH = EffectType(
     kind="length",
-    precedence=130,
     title="length of a link",
     doc=(
         "The link is built `error` longer than declared (both bars of a parallelogram alike); the "
@@ -49,28 +48,15 @@ LENGTH = EffectType(
 
 GROWTH = (
     Parameter(
-        "coefficient",
-        "1/K",
-        -1e-3,
-        1e-3,
-        0.0,
-        1e-5,
-        "growth per length and kelvin",
+        "coefficient", "1/K", -1e-3, 1e-3, 0.0, 1e-5, "growth per length and kelvin",
         plausible=(-5e-5, 5e-5),  # metals, ceramics and composites
     ),
     Parameter(
-        "temperature_difference",
-        "K",
-        -200.0,
-        200.0,
-        None,
-        1.0,
+        "temperature_difference", "K", -200.0, 200.0, None, 1.0,
         "temperature above that of the declared length; left out, the coefficient is the strain",
-        default=1.0,
-        fitted=False,
-        recorded="temperature",
+        default=1.0, fitted=False, recorded="temperature",
     ),
-)
+)  # fmt: skip
 
 
 def grown(e: Element, placed: Placed) -> Elements:
@@ -81,7 +67,6 @@ def grown(e: Element, placed: Placed) -> Elements:
 
 THERMAL_GROWTH = EffectType(
     kind="thermal_growth",
-    precedence=150,
     title="thermal growth of a link",
     doc="The link is longer by coefficient·temperature_difference times its declared length.",
     parameters=GROWTH,
@@ -150,7 +135,6 @@ def unequal(block: Block, b: Branch, share: float, placed: Placed) -> Branch:
 
 LENGTH_DIFFERENCE = EffectType(
     kind="length_difference",
-    precedence=140,
     title="rods of unequal length",
     doc=(
         "The second rod of a parallelogram is built longer by half of `difference`, the first one shorter by "
@@ -178,7 +162,6 @@ def widened(block: Block, b: Branch, share: float, placed: Placed) -> Branch:
 
 PARALLELOGRAM_WIDTH = EffectType(
     kind="parallelogram_width",
-    precedence=200,
     title="width of a parallelogram",
     doc=(
         "The two pins at one `end` of a parallelogram (proximal: nearer the base) stand `error` further "
@@ -206,7 +189,6 @@ def turned(block: Block, b: Branch, share: float, placed: Placed) -> Branch:
 
 PARALLELOGRAM_PARALLELISM = EffectType(
     kind="parallelogram_parallelism",
-    precedence=210,
     title="parallelism of a parallelogram's pins",
     doc=(
         "The axes of the two pins at one `end` are not parallel: the second branch's pin is turned by half "
@@ -221,5 +203,3 @@ PARALLELOGRAM_PARALLELISM = EffectType(
     excludes=("parallelogram_parallelism",),
     stage=40,
 )
-
-EFFECTS = (LENGTH, THERMAL_GROWTH, LENGTH_DIFFERENCE, PARALLELOGRAM_WIDTH, PARALLELOGRAM_PARALLELISM)

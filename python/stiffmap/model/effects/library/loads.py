@@ -56,7 +56,6 @@ def scale_or_mass(
 
 GRAVITY = EffectType(
     kind="gravity",
-    precedence=290,
     title="weight of the machine's bodies",
     doc=(
         "The bodies weigh: 9.81 m/s² along base -z. On `machine` all declared masses times `scale`; on a "
@@ -86,19 +85,14 @@ def with_payload(description: MachineDescription, placed: Placed) -> MachineDesc
         body = Body(name, placed.values["mass"], centre)
         return replace(description, platform=(*description.platform, body))
     platform = (*description.platform, Point(name, centre))
-    weight = _weight(name, placed.values["mass"])
+    # a dead force: to an anchor so far that neither size nor direction change (by 1e-9 per metre of motion)
+    stiffness = placed.values["mass"] * STANDARD / FAR
+    weight = ExternalSpring(f"weight_{name}", f"platform.{name}", (0.0, 0.0, -FAR), stiffness, 0.0)
     return replace(description, platform=platform, external_springs=(*description.external_springs, weight))
-
-
-def _weight(name: str, mass: float) -> ExternalSpring:
-    """A dead force: a spring of no length to an anchor so far that neither size nor direction change
-    (by 1e-9 per metre of motion)."""
-    return ExternalSpring(f"weight_{name}", f"platform.{name}", (0.0, 0.0, -FAR), mass * STANDARD / FAR, 0.0)
 
 
 PAYLOAD = EffectType(
     kind="payload",
-    precedence=300,
     title="load carried on the platform",
     doc=(
         "A mass on the platform that the declaration leaves out; it weighs along the machine's gravity. In a "
@@ -128,14 +122,12 @@ def points(description: MachineDescription) -> list[Place]:
 def with_spring(description: MachineDescription, placed: Placed) -> MachineDescription:
     """One more external spring, from the point to the anchor."""
     v = placed.values
-    spring = ExternalSpring(
+    name, pulls_only = (
         f"effect_{len(description.external_springs) + 1}",
-        placed.element,
-        (v["anchor_x"], v["anchor_y"], v["anchor_z"]),
-        v["stiffness"],
-        v["length"],
         placed.options["tension_only"] == "yes",
     )
+    anchor = (v["anchor_x"], v["anchor_y"], v["anchor_z"])
+    spring = ExternalSpring(name, placed.element, anchor, v["stiffness"], v["length"], pulls_only)
     return replace(description, external_springs=(*description.external_springs, spring))
 
 
@@ -174,7 +166,6 @@ def _force(at: Floats, anchor: Floats, length: float) -> Floats:
 
 EXTERNAL_SPRING = EffectType(
     kind="external_spring",
-    precedence=310,
     title="cable, hose or counterbalance",
     doc=(
         "A straight spring pulls the point towards an anchor fixed in the base: force stiffness·(distance - "
@@ -190,7 +181,6 @@ EXTERNAL_SPRING = EffectType(
     signature=signature,
     pivot="the anchor",
     frame="base axes",
-    moves="nothing",
     options=(Option("tension_only", ("no", "yes"), "whether it can push"),),
 )
 
@@ -204,7 +194,6 @@ def pulled(e: Spring, placed: Placed) -> Elements:
 
 PRELOAD = EffectType(
     kind="preload",
-    precedence=280,
     title="link mounted under tension",
     doc=(
         "The link is free of force not at zero deflection but at `rest`: mounted, it pulls the machine. In a "
@@ -215,5 +204,3 @@ PRELOAD = EffectType(
     frame="local axes of the spring",
     moves="all behind the link",
 )
-
-EFFECTS = (GRAVITY, PAYLOAD, EXTERNAL_SPRING, PRELOAD)

@@ -80,7 +80,6 @@ def measured(kind: str, element: str, parameters: tuple[Parameter, ...]) -> dict
 
 LOAD_DIRECTION = EffectType(
     **measured("load_direction", "load", ANGLES),
-    precedence=320,
     title="direction of the applied force",
     doc="The force that acts is the declared one turned: f = Rx·Ry·Rz f_declared.",
     frame="base axes; about x, then the turned y, then the twice turned z",
@@ -91,7 +90,6 @@ LOAD_DIRECTION = EffectType(
 
 LOAD_GAIN = EffectType(
     **measured("load_gain", "load", gains("acting force over declared force")),
-    precedence=330,
     title="gain of the force measurement",
     doc="The force that acts is the declared one times gain, per axis times gain·gain_axis.",
     frame="base axes",
@@ -101,7 +99,6 @@ LOAD_GAIN = EffectType(
 
 SENSOR_AXES = EffectType(
     **measured("sensor_axes", "sensor", ANGLES),
-    precedence=350,
     title="orientation of the displacement sensor",
     doc="The sensor's axes are turned against the declared ones: reading = (Rx·Ry·Rz)^T displacement.",
     frame="declared axes of the reading; about x, then the turned y, then the twice turned z",
@@ -112,7 +109,6 @@ SENSOR_AXES = EffectType(
 
 SENSOR_GAIN = EffectType(
     **measured("sensor_gain", "sensor", gains("reading over displacement")),
-    precedence=340,
     title="gain of the displacement sensor",
     doc="The reading is the displacement times gain, per axis times gain·gain_axis.",
     frame="axes of the reading",
@@ -144,7 +140,6 @@ def offset(plan: Plan, term: AppliedEffect) -> Floats:
 
 FRAME_OFFSET = EffectType(
     **measured("frame_offset", "sensor", FRAME),
-    precedence=360,
     title="position and orientation of the instrument's frame",
     doc=(
         "The instrument's frame is not where it is believed: a measured position p reads as shift + "
@@ -175,7 +170,6 @@ RATES = tuple(Parameter(a, "m", -1e-3, 1e-3, 0.0, 1e-8, f"per reading or per hou
 
 DRIFT = EffectType(
     **measured("drift", "sensor", RATES),
-    precedence=370,
     title="drift of the instrument",
     doc="The reading gains the drift times (order - first order), or times the hours since the first reading.",
     frame="axes of the reading",
@@ -197,7 +191,6 @@ def share_of_motor(read: Floats, motion: Floats, plan: Plan, term: AppliedEffect
 
 SERVO_SHARE = EffectType(
     kind="servo_share",
-    precedence=380,
     title="yield of a drive before its motor's encoder",
     doc=(
         "The motor side of a drive reads `share` of the drive's deflection: what its position control "
@@ -213,5 +206,3 @@ SERVO_SHARE = EffectType(
     excludes=("servo_share",),
     needs=("motor",),
 )
-
-EFFECTS = (LOAD_DIRECTION, LOAD_GAIN, SENSOR_AXES, SENSOR_GAIN, FRAME_OFFSET, DRIFT, SERVO_SHARE)

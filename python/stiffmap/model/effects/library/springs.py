@@ -51,7 +51,6 @@ def spring_at(end: str) -> dict[str, Any]:
 
 BASE_COMPLIANCE = EffectType(
     kind="base_compliance",
-    precedence=260,
     title="compliance of the base",
     doc=(
         "An isotropic spring in translation and rotation between the ground, from which readings are taken, "
@@ -68,7 +67,6 @@ BASE_COMPLIANCE = EffectType(
 
 TOOL_COMPLIANCE = EffectType(
     kind="tool_compliance",
-    precedence=270,
     title="compliance of tool and holder",
     doc=(
         "An isotropic spring in translation and rotation between the platform and the tool, on which the "
@@ -126,7 +124,6 @@ def with_springs(description: MachineDescription, placed: Placed) -> MachineDesc
 
 JOINT_COMPLIANCE = EffectType(
     kind="joint_compliance",
-    precedence=230,
     title="compliance of passive joints (pins, bearings)",
     doc=(
         "An isotropic spring in translation and rotation between a passive joint and the link that it "
@@ -187,7 +184,6 @@ def _axis_first(axis: NDArray[np.float64]) -> NDArray[np.float64]:
 
 JOINT_CLEARANCE = EffectType(
     kind="joint_clearance",
-    precedence=240,
     reverses=True,
     title="clearance of pins",
     doc=(
@@ -205,5 +201,3 @@ JOINT_CLEARANCE = EffectType(
     excludes=("joint_clearance",),
     stage=55,
 )
-
-EFFECTS = (BASE_COMPLIANCE, TOOL_COMPLIANCE, JOINT_COMPLIANCE, JOINT_CLEARANCE)
