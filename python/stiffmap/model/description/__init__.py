@@ -19,27 +19,7 @@ from stiffmap.model.description.pose import Pose
 from stiffmap.model.description.strokes import BeamStroke, TableStroke
 
 __all__ = [
-    "TASK",
-    "AppliedEffect",
-    "BeamNumbers",
-    "BeamStroke",
-    "Block",
-    "Body",
-    "Branch",
-    "Cable",
-    "CommandError",
-    "Drive",
-    "Element",
-    "ExternalSpring",
-    "GuideError",
-    "Joint",
-    "JointFriction",
-    "Law",
-    "Leg",
-    "MachineDescription",
-    "Offset",
-    "Point",
-    "Pose",
-    "Spring",
-    "TableStroke",
-]
+    "TASK", "AppliedEffect", "BeamNumbers", "BeamStroke", "Block", "Body", "Branch", "Cable",
+    "CommandError", "Drive", "Element", "ExternalSpring", "GuideError", "Joint", "JointFriction", "Law",
+    "Leg", "MachineDescription", "Offset", "Point", "Pose", "Spring", "TableStroke",
+]  # fmt: skip

@@ -33,11 +33,8 @@ def description_text(description: MachineDescription) -> str:
     except yaml.YAMLError as error:
         raise StiffmapError(f"machine '{description.name}' cannot be saved: {error}") from error
     if back != description:
-        changed = [
-            f.name
-            for f in fields(description)
-            if f.compare and getattr(back, f.name) != getattr(description, f.name)
-        ]
+        compared = [f.name for f in fields(description) if f.compare]
+        changed = [name for name in compared if getattr(back, name) != getattr(description, name)]
         raise StiffmapError(
             f"machine '{description.name}' cannot be saved unchanged: a file would not keep its "
             f"{', '.join(changed)}"
