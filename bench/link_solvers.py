@@ -12,12 +12,11 @@ from pathlib import Path
 
 import numpy as np
 
-from stiffmap.model.link.calculix import has_ccx, solve_ccx
 from stiffmap.model.link.identify import identify_link
 from stiffmap.model.link.inputs import UNIT_WRENCHES
 from stiffmap.model.link.refine import richardson
 from stiffmap.model.link.shapes import Bar
-from stiffmap.model.link.solve import Material, Setup, solve_skfem
+from stiffmap.model.link.solve import Material, Setup, has_ccx, solve_ccx, solve_skfem
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "examples"))
 from link_bars import cantilever, rectangle

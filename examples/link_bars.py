@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from stiffmap.model.beams import Section, cantilever_compliance, hollow_section, rectangle_section
-from stiffmap.model.link.arrays import Floats
-from stiffmap.model.link.transport import twist_transport
+from stiffmap.model.link.transport import Floats, twist_transport
 
 
 def rectangle(width: float, height: float) -> Section:

@@ -24,7 +24,7 @@ from stiffmap.experiment.noise.whitening import LinearProblem, nuisance_part
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.model.description import AppliedEffect
 from stiffmap.model.effects import parse_effect
-from stiffmap.model.effects.check import place_of
+from stiffmap.model.effects.apply import place_of
 from stiffmap.model.effects.registry import get
 from stiffmap.model.files.load import Source
 from stiffmap.solve.machine import Machine, as_machine

@@ -29,7 +29,7 @@ from stiffmap.model.description.tree import Elements, edit_all, edit_named
 from stiffmap.model.effects import apply_records
 from stiffmap.model.effects.edit import built as as_built
 from stiffmap.model.effects.library.geometry import about, home_position
-from stiffmap.model.effects.library.length import longer
+from stiffmap.model.effects.library.links import longer
 
 FRAME = ("x", "y", "z", "rx", "ry", "rz")
 END = "end"

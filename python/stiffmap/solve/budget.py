@@ -16,7 +16,7 @@ from stiffmap.common.json_text import plain
 from stiffmap.common.number_text import percents
 from stiffmap.common.short import short_repr
 from stiffmap.model.description import Cable
-from stiffmap.model.description.sources import in_words, source_of
+from stiffmap.model.description.machine import in_words, source_of
 from stiffmap.model.description.tree import joint_of, joints
 from stiffmap.solve.compiled import Role, Status
 from stiffmap.solve.machine import Machine, metres_expected, takes_machine

@@ -26,7 +26,7 @@ ELSEWHERE = {
     },  # the folder in which a map grows; a folder that is renamed
     "stiffmap.workspace.maps.store": {"open_memmap"},  # takes up what `mapped_array` made
     "stiffmap.workspace.maps.zarr_map": {"copyfile", "mkdir"},  # chunks and frame of a map that grows
-    "stiffmap.model.link.calculix": {"write_text"},  # a temporary folder, for another program
+    "stiffmap.model.link.solve": {"write_text"},  # a temporary folder, for another program
     "stiffmap.ui.report.sheet": {"savefig"},  # into memory
 }
 

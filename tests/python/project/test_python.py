@@ -12,7 +12,7 @@ import pytest
 import stiffmap as sm
 from stiffmap.common.html import MOST_ROWS, table
 from stiffmap.model.effects import kinds
-from stiffmap.model.effects.synonyms import SYNONYMS, found_by
+from stiffmap.model.effects.registry import SYNONYMS, found_by
 from stiffmap.ui.cli import main
 
 EXAMPLES = Path(__file__).parents[3] / "examples/experiments"

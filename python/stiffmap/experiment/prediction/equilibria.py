@@ -16,7 +16,7 @@ from stiffmap.experiment.prediction.joints import joint_channels, joint_motions
 from stiffmap.experiment.prediction.metrology_loop import carrier, rigged, targets
 from stiffmap.experiment.prediction.unloaded_state import is_sided, lagging, signs
 from stiffmap.experiment.readings import Seen, kind_of
-from stiffmap.model.description.strain import rests_at_command
+from stiffmap.model.description.alike import rests_at_command
 from stiffmap.solve.closing import of_drives
 from stiffmap.solve.machine import Machine, solve_with
 from stiffmap.solve.options import SolveOptions

@@ -18,7 +18,7 @@ from stiffmap.experiment.prediction.metrology_loop import targets
 from stiffmap.experiment.readings import Seen, kind_of
 from stiffmap.model.description import AppliedEffect
 from stiffmap.model.description.tree import joints
-from stiffmap.model.effects.check import values_at
+from stiffmap.model.effects.apply import values_at
 from stiffmap.model.effects.evidence import Drive
 from stiffmap.model.effects.registry import get
 from stiffmap.solve.machine import Machine

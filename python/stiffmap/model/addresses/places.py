@@ -39,11 +39,8 @@ class Listed(NamedTuple):
 
 def listed(description: MachineDescription) -> list[Listed]:
     """Every number under the address by which files keep its uncertainty."""
-    uncertainty, notes, sources = (
-        dict(description.uncertainty),
-        dict(description.notes),
-        dict(description.sources),
-    )
+    uncertainty = dict(description.uncertainty)
+    notes, sources = dict(description.notes), dict(description.sources)
 
     def row(address: str, field: Field) -> Listed:
         name = address.partition("/")[0]

@@ -14,38 +14,12 @@ from stiffmap.model.description.elements import (
     Spring,
 )
 from stiffmap.model.description.laws import CommandError, GuideError, JointFriction, Law
-from stiffmap.model.description.machine import (
-    TASK,
-    AppliedEffect,
-    ExternalSpring,
-    Leg,
-    MachineDescription,
-)
+from stiffmap.model.description.machine import TASK, AppliedEffect, ExternalSpring, Leg, MachineDescription
 from stiffmap.model.description.pose import Pose
 from stiffmap.model.description.strokes import BeamStroke, TableStroke
 
 __all__ = [
-    "TASK",
-    "AppliedEffect",
-    "BeamNumbers",
-    "BeamStroke",
-    "Block",
-    "Body",
-    "Branch",
-    "Cable",
-    "CommandError",
-    "Drive",
-    "Element",
-    "ExternalSpring",
-    "GuideError",
-    "Joint",
-    "JointFriction",
-    "Law",
-    "Leg",
-    "MachineDescription",
-    "Offset",
-    "Point",
-    "Pose",
-    "Spring",
-    "TableStroke",
-]
+    "TASK", "AppliedEffect", "BeamNumbers", "BeamStroke", "Block", "Body", "Branch", "Cable",
+    "CommandError", "Drive", "Element", "ExternalSpring", "GuideError", "Joint", "JointFriction", "Law",
+    "Leg", "MachineDescription", "Offset", "Point", "Pose", "Spring", "TableStroke",
+]  # fmt: skip

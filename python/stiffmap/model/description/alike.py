@@ -1,5 +1,5 @@
 """What two machines have in common: where their joints close, and whether one step from the equilibrium of one leads to
-that of the other (docs/fast_path.md F10)."""
+that of the other (docs/fast_path.md F10); and whether one without load stays where it is commanded."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from functools import lru_cache
 from stiffmap.model.description.elements import Block, Body, Cable, Element, Joint, Offset, Point, Spring
 from stiffmap.model.description.laws import Law
 from stiffmap.model.description.machine import MachineDescription
-from stiffmap.model.description.tree import ENDS, Elements, chains, edit_all, edit_elements
+from stiffmap.model.description.tree import ENDS, Elements, all_elements, chains, edit_all, edit_elements
 
 KEPT = 128
 """Sequences whose geometry is kept: variants of a machine share most of theirs."""
@@ -93,19 +93,17 @@ def _fixed(e: Element, heavy: bool) -> Hashable:
     """What one step must find as it is."""
     match e:
         case Joint() if not isinstance(e, Cable):
-            laws = tuple(law if law is None or _bends(law) else "straight" for law in e.laws)
+            plain = [law and not (law.cubic or law.knots or law.friction) for law in e.laws]
+            laws = tuple("straight" if p else law for law, p in zip(e.laws, plain, strict=True))
             return e.kind, e.axes, e.home, e.actuated, e.friction, len(e.guide_errors), laws
         case Spring():
-            return e.laws, e.stroke, e.compliance is None, _zeros(e)
+            zeros = tuple(v == 0.0 for row in e.compliance or e.stiffness or () for v in row)
+            return e.laws, e.stroke, e.compliance is None, zeros
         case Body():
             return e.mass > 0.0
         case Block():
             return tuple(_standing(branch.elements, heavy) for branch in e.branches)
     return e
-
-
-def _bends(law: Law) -> bool:
-    return bool(law.cubic or law.knots or law.friction)
 
 
 def _frame(e: Element) -> Element | None:
@@ -115,8 +113,21 @@ def _frame(e: Element) -> Element | None:
     return replace(e, law=None, axis_laws=(), compliance_slope=0.0, drive=None, rest=None)
 
 
-def _zeros(e: Spring) -> tuple[bool, ...]:
-    """Entries of the matrix that are zero."""
-    matrix = e.compliance if e.compliance is not None else e.stiffness
-    assert matrix is not None
-    return tuple(v == 0.0 for row in matrix for v in row)
+def rests_at_command(description: MachineDescription) -> bool:
+    """True where nothing but wrenches and gravity can deflect the machine: no geometric or command
+    error, no preload, no passive joint with a spring, no external spring."""
+    return not description.external_springs and not any(_strains(e) for _, e in all_elements(description))
+
+
+def _strains(e: Element) -> bool:
+    match e:
+        case Offset():
+            return e.actual is not None and e.actual != e.nominal
+        case Cable():
+            return True  # gravity or pretension may stretch it differently from what its controller believes
+        case Joint():
+            sprung = not e.actuated and any(e.laws)  # away from home
+            return bool(e.command_errors or e.guide_errors or sprung)
+        case Spring():
+            return any(e.rest)
+    return False

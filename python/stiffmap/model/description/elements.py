@@ -39,8 +39,9 @@ class Drive:
     encoder_error: float | None = number("encoder_error", "Error of the encoder.", coordinate=1, lower=0.0)
     coulomb_friction: float | None = number("friction.coulomb", "Coulomb friction.", effort=1, lower=0.0)
     viscous_friction: float | None = number(
-        "friction.viscous", "Friction per speed.", coordinate=-1, effort=1, time=1, lower=0.0
-    )
+        "friction.viscous", "Friction per speed.",
+        coordinate=-1, effort=1, time=1, lower=0.0,
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -71,13 +72,9 @@ class Joint:
     kind: str
     axes: tuple[Vector, ...]
     home: tuple[float, ...] = number(
-        "home",
-        "Coordinates in the home configuration.",
-        default=(0.0,),
-        coordinate=1,
-        shape="axes",
-        saved=True,
-    )
+        "home", "Coordinates in the home configuration.",
+        default=(0.0,), coordinate=1, shape="axes", saved=True,
+    )  # fmt: skip
     actuated: bool = False
     law: Law | None = None
     axis_laws: tuple[Law, ...] = ()
@@ -85,21 +82,13 @@ class Joint:
         "rest", "Coordinates at which its laws are free of force.", coordinate=1, shape="axes"
     )
     compliance_slope: float = number(
-        "compliance_slope",
-        "Relative change of the drive's compliance per travel.",
-        default=0.0,
-        coordinate=-1,
-        core="compliance_slope",
-    )
+        "compliance_slope", "Relative change of the drive's compliance per travel.",
+        default=0.0, coordinate=-1, core="compliance_slope",
+    )  # fmt: skip
     damping: float | None = number(
-        "damping",
-        "Viscous damping of its motion about the equilibrium.",
-        coordinate=-1,
-        effort=1,
-        time=1,
-        lower=0.0,
-        passive=True,
-    )
+        "damping", "Viscous damping of its motion about the equilibrium.",
+        coordinate=-1, effort=1, time=1, lower=0.0, passive=True,
+    )  # fmt: skip
     loss_factor: float | None = number(
         "loss_factor", "Structural loss factor of its compliance.", lower=0.0, passive=True
     )
@@ -148,32 +137,28 @@ class Cable(Joint):
     guide: Vector = (0.0, 0.0, 1.0)
     elasticity: float | None = number("elasticity", "Axial stiffness EA.", effort=1, lower=0.0)
     stiffness: float | None = number(
-        "stiffness",
-        "Stiffness that does not depend on the length, in series.",
-        coordinate=-1,
-        effort=1,
-        lower=0.0,
-    )
+        "stiffness", "Stiffness that does not depend on the length, in series.",
+        coordinate=-1, effort=1, lower=0.0,
+    )  # fmt: skip
     lead: float = number(
-        "lead", "Length between winch and anchor, which yields too.", default=0.0, coordinate=1, lower=0.0
-    )
+        "lead", "Length between winch and anchor, which yields too.",
+        default=0.0, coordinate=1, lower=0.0,
+    )  # fmt: skip
     pretension: float = number(
-        "pretension", "Tension that the controller commands lengths for.", default=0.0, effort=1, lower=0.0
-    )
+        "pretension", "Tension that the controller commands lengths for.",
+        default=0.0, effort=1, lower=0.0,
+    )  # fmt: skip
     radius: float = number(
         "radius", "Of the guide's pulley; 0: an eye.", default=0.0, coordinate=1, lower=0.0
     )
     anchor: tuple[float, float, float] = number(
-        "anchor", default=ORIGIN, fixed=LENGTH, shape="vector", saved=True, needed=True
-    )
+        "anchor",
+        default=ORIGIN, fixed=LENGTH, shape="vector", saved=True, needed=True,
+    )  # fmt: skip
     at: tuple[float, float, float] = number(
-        "at",
-        "Where it is fixed, in the current frame.",
-        default=ORIGIN,
-        fixed=LENGTH,
-        shape="vector",
-        saved=True,
-    )
+        "at", "Where it is fixed, in the current frame.",
+        default=ORIGIN, fixed=LENGTH, shape="vector", saved=True,
+    )  # fmt: skip
     stretch: float = 1.0
     """Factor of the real cable's compliance on the one that is believed in."""
     lead_tension: float = 1.0

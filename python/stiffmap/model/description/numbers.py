@@ -81,9 +81,9 @@ def number(key: str, doc: str = "", *, default: Any = None, **more: Any) -> Any:
     return field(default=default, metadata={"number": DeclaredNumber(key, doc, default=default, **more)})
 
 
-def required(key: str, doc: str = "", **more: object) -> Any:
+def required(key: str, **more: Any) -> Any:
     """A field without a default value."""
-    return number(key, doc, default=MISSING, **more)
+    return number(key, default=MISSING, **more)
 
 
 def interval(key: str, doc: str, *, passive: bool = False) -> Any:

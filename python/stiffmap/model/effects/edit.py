@@ -8,14 +8,7 @@ from typing import Any
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.model.description import MachineDescription, Offset, Pose
-from stiffmap.model.description.tree import (
-    ENDS,
-    Edit,
-    Elements,
-    edit_all,
-    edit_named,
-    in_sequence,
-)
+from stiffmap.model.description.tree import ENDS, Edit, Elements, edit_all, edit_named, in_sequence
 
 Sites = Callable[[Elements], dict[str, tuple[int, ...]]]
 Change = Callable[[Any], Elements]

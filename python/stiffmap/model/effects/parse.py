@@ -10,7 +10,7 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.common.value_units import read_value
 from stiffmap.model.description import AppliedEffect, MachineDescription
 from stiffmap.model.effects import registry
-from stiffmap.model.effects.check import place_of
+from stiffmap.model.effects.apply import place_of
 from stiffmap.model.effects.types import EffectType
 
 _FORM = "KIND [ELEMENT [LEG,LEG…]] name=value… such as: dead_zone actuator y half_width=12um"

@@ -9,15 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from stiffmap.model.description import (
-    Body,
-    Cable,
-    Element,
-    Joint,
-    MachineDescription,
-    Offset,
-    Spring,
-)
+from stiffmap.model.description import Body, Cable, Element, Joint, MachineDescription, Offset, Spring
 from stiffmap.model.description.tree import ENDS, Elements, chains, in_sequence, offset_before, sequences
 from stiffmap.model.effects.edit import Sites, change_sites
 from stiffmap.model.effects.types import Place, Placed, Places

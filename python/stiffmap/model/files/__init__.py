@@ -5,10 +5,6 @@ from stiffmap.model.files.save import description_text, save_description
 from stiffmap.model.files.shipped import ShippedMachine, shipped_machines
 
 __all__ = [
-    "ShippedMachine",
-    "description_from_text",
-    "description_text",
-    "load_description",
-    "save_description",
+    "ShippedMachine", "description_from_text", "description_text", "load_description", "save_description",
     "shipped_machines",
-]
+]  # fmt: skip

@@ -26,9 +26,8 @@ from stiffmap.model.description import (
 from stiffmap.model.description.numbers import numbers_of
 from stiffmap.model.description.pose import Rows, Vector, rows, vector
 from stiffmap.model.description.strokes import entry_dimension
-from stiffmap.model.files.build_geometry import build_pose
-from stiffmap.model.files.build_numbers import build_number, build_numbers
 from stiffmap.model.files.build_springs import beam_body, build_law, build_spring
+from stiffmap.model.files.build_values import build_number, build_numbers, build_pose
 from stiffmap.model.files.context import Context
 from stiffmap.model.files.schema.base import Number
 from stiffmap.model.files.schema.elements import (
@@ -225,15 +224,10 @@ def _inertia(terms: list[Number | list[Number]], context: Context) -> Rows:
             given[i] = term
         else:
             given[i][i] = term
-    matrix = np.array(
-        [
-            [
-                context.si(n, INERTIA, f"inertia.{'xyz'[min(i, j)]}{'xyz'[max(i, j)]}")
-                for j, n in enumerate(row)
-            ]
-            for i, row in enumerate(given)
-        ]
-    )
+    matrix = np.zeros((3, 3))
+    for i, j in np.ndindex(3, 3):
+        key = f"inertia.{'xyz'[min(i, j)]}{'xyz'[max(i, j)]}"
+        matrix[i, j] = context.si(given[i][j], INERTIA, key)
     if np.any(matrix != matrix.T):
         here.fail(f"the inertia is not symmetric (by {np.abs(matrix - matrix.T).max():.3g} kg m^2)")
     principal = np.linalg.eigvalsh(matrix)

@@ -1,19 +1,31 @@
-"""Springs and force laws of a file to SI."""
+"""Springs, force laws and strokes of a file to SI; strokes once all joints of the machine are known."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
+from stiffmap.common.errors import unknown_name
+from stiffmap.common.units import ANGLE, LENGTH, Dimension
 from stiffmap.model import beams
-from stiffmap.model.description import BeamNumbers, Law, Spring
+from stiffmap.model.description import (
+    BeamNumbers,
+    BeamStroke,
+    Joint,
+    Law,
+    MachineDescription,
+    Spring,
+    TableStroke,
+)
 from stiffmap.model.description.numbers import DIRECTIONS
 from stiffmap.model.description.strokes import Matrix6, as_rows, entry_dimension
-from stiffmap.model.files.build_numbers import build_numbers
-from stiffmap.model.files.context import Context, LinkUse
+from stiffmap.model.description.tree import all_elements, edit
+from stiffmap.model.files.build_values import build_numbers
+from stiffmap.model.files.context import Context, Gathered, LinkUse
 from stiffmap.model.files.schema.base import FileModel, Number
 from stiffmap.model.files.schema.elements import SpringModel
 from stiffmap.model.files.schema.springs import Beam, LawModel, MaterialModel, Matrix
@@ -194,3 +206,78 @@ def _scale(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
         # a zero diagonal term has no scale of its own; its couplings, which must vanish, give one
         scale[i] = max(np.abs(matrix[i, known]) / scale[known], default=0.0)
     return np.where(scale > 0.0, scale, 1.0)
+
+
+def with_strokes(description: MachineDescription, gathered: Gathered) -> MachineDescription:
+    """The machine with the strokes that its file gives; problems are kept in ``gathered``."""
+    for spring, context in gathered.strokes:
+        stroke = context.attempt(_stroke, description, spring, context)
+        if stroke is not None:
+            put = lambda e, s=stroke: replace(e, stroke=s) if isinstance(e, Spring) else None  # noqa: E731
+            description = edit(description, context.full, put) or description
+    return description
+
+
+def _stroke(
+    description: MachineDescription, spring: SpringModel, context: Context
+) -> BeamStroke | TableStroke:
+    model = spring.stroke
+    assert model is not None
+    joint = stroke_joint(description, model.joint, context)
+    coordinate = LENGTH if joint.kind == "prismatic" else ANGLE
+    if model.table is None:
+        return _beam_stroke(spring, context, joint, coordinate)
+    at = tuple(context.at("table", i, "at").si(row.at, coordinate) for i, row in enumerate(model.table))
+    for i in range(1, len(at)):
+        if at[i] <= at[i - 1]:
+            context.at("table", i, "at").fail("the coordinates of a table must rise")
+    quiet = replace(context, gathered=Gathered())  # uncertainties are those of the first row
+    rows = tuple(
+        build_matrix(row.compliance, "compliance", quiet.at("table", i, "compliance"))
+        for i, row in enumerate(model.table)
+    )
+    for end in (*joint.home, *(joint.ends or ())):
+        if not at[0] <= end <= at[-1]:
+            say = context.units.say
+            context.at("table").fail(
+                f"the table goes from {say(at[0], coordinate)} to {say(at[-1], coordinate)}, "
+                f"'{model.joint}' to {say(end, coordinate)}"
+            )
+    return TableStroke(model.joint, at, rows)
+
+
+def _beam_stroke(spring: SpringModel, context: Context, joint: Joint, coordinate: Dimension) -> BeamStroke:
+    model, beam = spring.stroke, spring.beam
+    assert model is not None
+    length, along = model.length or (beam and beam.length), model.along or (beam and beam.along)
+    assert length and along  # the schema asks for them
+    per = Dimension(*(a - b for a, b in zip(LENGTH, coordinate, strict=True)))
+    out = BeamStroke(
+        model.joint,
+        length=context.si(length, LENGTH),
+        along="xyz".index(along[-1]),
+        at=0.0 if model.at is None else context.at("at").si(model.at, coordinate),
+        rate=context.at("rate").si(model.rate or Number(value=1.0), per),
+    )
+    for end in (*joint.home, *(joint.ends or ())):
+        left = out.length + out.rate * (end - out.at)
+        if left <= 0.0:
+            say = context.units.say
+            context.fail(
+                f"with '{model.joint}' at {say(end, coordinate)} the beam would be {say(left, LENGTH)} long"
+            )
+    return out
+
+
+def stroke_joint(description: MachineDescription, name: str, context: Context) -> Joint:
+    """The joint that the spring at this place varies with; raises `FileError`."""
+    joints = {n: e for n, e in all_elements(description) if isinstance(e, Joint) and len(e.axes) == 1}
+    scope = context.full
+    while scope:
+        scope = scope.rpartition(".")[0]
+        found = joints.get(f"{scope}.{name}" if scope else name)
+        if found is not None:
+            return found
+    own = context.full.partition(".")[0]
+    near = [n.partition(".")[2] if n.partition(".")[0] == own else n for n in joints]
+    raise context.at("joint").error(unknown_name("joint of one axis", name, near))

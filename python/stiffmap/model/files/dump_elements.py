@@ -24,7 +24,7 @@ from stiffmap.model.description import (
 from stiffmap.model.description.numbers import DIRECTIONS, numbers_of
 from stiffmap.model.description.pose import IDENTITY
 from stiffmap.model.description.strokes import present_rows
-from stiffmap.model.files.schema.geometry import NAMED
+from stiffmap.model.files.schema.base import NAMED
 
 Plain = dict[str, Any]
 _NAMES = {vector: name for name, vector in NAMED.items()}
@@ -46,9 +46,10 @@ def dump_element(element: Element) -> Plain:
         case Offset():
             actual = {} if element.actual is None else {"actual": dump_pose(element.actual)}
             return {"offset": element.name, **dump_pose(element.nominal), **actual}
-        case Cable():
-            return _cable(element)
         case Joint():
+            _refuse_unsaved(element)
+            if isinstance(element, Cable):
+                return _cable(element)
             return _actuator(element) if element.actuated else _joint(element)
         case Spring():
             return _spring(element)
@@ -84,7 +85,6 @@ def _refuse_unsaved(joint: Joint) -> None:
 
 
 def _joint(joint: Joint) -> Plain:
-    _refuse_unsaved(joint)
     axes = [_axis(axis) for axis in joint.axes]
     plain: Plain = {"joint": joint.name, "kind": joint.kind}
     plain.update({"axis": axes[0]} if len(axes) == 1 else {"axes": axes})
@@ -97,7 +97,6 @@ def _joint(joint: Joint) -> Plain:
 
 
 def _actuator(joint: Joint) -> Plain:
-    _refuse_unsaved(joint)
     numbers = dump_numbers(joint)
     return {
         "actuator": joint.name,
@@ -112,7 +111,6 @@ def _actuator(joint: Joint) -> Plain:
 
 
 def _cable(cable: Cable) -> Plain:
-    _refuse_unsaved(cable)
     numbers = dump_numbers(cable)
     places = {"anchor": numbers.pop("anchor"), "at": numbers.pop("at")}
     guide = {} if cable.guide == Cable.guide else {"guide": _axis(cable.guide)}
@@ -180,12 +178,7 @@ def dump_matrix(rows: object) -> object:
     if np.count_nonzero(matrix - np.diag(np.diag(matrix))) == 0:
         return floats(np.diag(matrix))
     diagonal = {f"k{i}{i}": float(matrix[i - 1, i - 1]) for i in range(1, 7)}
-    upper = {
-        f"k{i + 1}{j + 1}": float(matrix[i, j])
-        for i in range(6)
-        for j in range(i + 1, 6)
-        if matrix[i, j] != 0.0
-    }
+    upper = {f"k{i + 1}{j + 1}": float(matrix[i, j]) for i, j in np.argwhere(np.triu(matrix, 1))}
     return {**diagonal, **upper}
 
 

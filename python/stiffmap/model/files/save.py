@@ -10,15 +10,7 @@ import yaml
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs import write_text
 from stiffmap.common.yaml_text import text_of
-from stiffmap.model.description import (
-    TASK,
-    AppliedEffect,
-    Element,
-    Joint,
-    Leg,
-    MachineDescription,
-    Offset,
-)
+from stiffmap.model.description import TASK, AppliedEffect, Element, Joint, Leg, MachineDescription, Offset
 from stiffmap.model.description.tree import Elements, edit_elements, walk
 from stiffmap.model.files.dump_elements import Plain, dump_elements, dump_numbers, dump_pose, floats
 from stiffmap.model.files.load import description_from_text
@@ -41,11 +33,8 @@ def description_text(description: MachineDescription) -> str:
     except yaml.YAMLError as error:
         raise StiffmapError(f"machine '{description.name}' cannot be saved: {error}") from error
     if back != description:
-        changed = [
-            f.name
-            for f in fields(description)
-            if f.compare and getattr(back, f.name) != getattr(description, f.name)
-        ]
+        compared = [f.name for f in fields(description) if f.compare]
+        changed = [name for name in compared if getattr(back, name) != getattr(description, name)]
         raise StiffmapError(
             f"machine '{description.name}' cannot be saved unchanged: a file would not keep its "
             f"{', '.join(changed)}"

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from stiffmap.common.broadcasting import real_array
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import SMALLEST
-from stiffmap.model.link.arrays import Bools, Floats
+from stiffmap.model.link.transport import Bools, Floats
 
 AXES = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
 COLLINEAR = 1e-6  # second singular value of the centred nodes over the first

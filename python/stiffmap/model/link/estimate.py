@@ -8,13 +8,18 @@ from typing import NamedTuple
 import numpy as np
 from scipy.stats import chi2, t
 
-from stiffmap.model.link.arrays import Bools, Floats, Ints, standard_errors, unit_diagonal
 from stiffmap.model.link.checks import DisplacementField
-from stiffmap.model.link.correlation import Correlation
-from stiffmap.model.link.noise import FieldNoise
+from stiffmap.model.link.noise import Correlation, FieldNoise
 from stiffmap.model.link.regression import Regression
 from stiffmap.model.link.rigidfit import RigidFit
-from stiffmap.model.link.transport import transport_compliance
+from stiffmap.model.link.transport import (
+    Bools,
+    Floats,
+    Ints,
+    standard_errors,
+    transport_compliance,
+    unit_diagonal,
+)
 
 
 class Evidence(NamedTuple):

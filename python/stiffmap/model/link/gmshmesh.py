@@ -2,23 +2,73 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import ctypes
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType
 
 import numpy as np
 
-from stiffmap.common.errors import StiffmapError, refuse_folder
+from stiffmap.common.errors import StiffmapError, needed, refuse_folder
 from stiffmap.common.units import size_of
-from stiffmap.model.link.arrays import Ints
 from stiffmap.model.link.mesh import SolidMesh, checked_mesh
-from stiffmap.model.link.optional import gmsh_session
+from stiffmap.model.link.transport import Ints
 
 CAD, MESH = {".step", ".stp", ".iges", ".igs", ".brep"}, {".msh", ".inp", ".unv", ".bdf", ".med", ".stl"}
 UNITS = {u: size_of(u) for u in ("mm", "m", "cm", "in", "inch")}
 _GMSH_TO_OURS = [0, 1, 2, 3, 4, 5, 6, 7, 9, 8]  # gmsh lists edge 23 before 13
 
 Faces = dict[str, list[int]]
+
+
+@contextmanager
+def gmsh_session() -> Iterator[ModuleType]:
+    """A fresh, silent gmsh model; its errors become :class:`StiffmapError`.
+
+    Lengths in the model are millimetres, since OpenCASCADE's tolerances are absolute.
+    """
+    try:
+        with needed("a finite-element mesh", "fea"):
+            import gmsh
+    except OSError as error:  # gmsh's wheel loads libGLU and libX11 libraries of the system
+        raise StiffmapError(
+            f"gmsh is installed but misses a system library ({error}); on Debian: "
+            "apt install libglu1-mesa libxcursor1 libxft2 libxinerama1"
+        ) from None
+    with _same_action(
+        "SIGPIPE"
+    ):  # gmsh takes the default, by which a connection that closes ends the process
+        gmsh.initialize(interruptible=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.option.setNumber("General.NumThreads", 1)  # meshes repeat bit for bit
+        gmsh.option.setString("Geometry.OCCTargetUnit", "MM")
+        yield gmsh
+    except StiffmapError:
+        raise
+    except Exception as error:
+        if type(error) is not Exception:  # gmsh raises bare Exception; anything else is ours
+            raise
+        raise StiffmapError(f"gmsh: {' '.join(str(error).split())}") from None
+    finally:
+        gmsh.finalize()
+
+
+@contextmanager
+def _same_action(name: str) -> Iterator[None]:
+    """What the process does on a signal is the same before and after, in any thread, whatever a library sets meanwhile."""
+    if not hasattr(signal, name):  # a system without it
+        yield
+        return
+    number, sigaction = int(getattr(signal, name)), ctypes.CDLL(None).sigaction
+    action = ctypes.create_string_buffer(512)  # a struct sigaction has some 150 bytes
+    sigaction(number, None, action)
+    try:
+        yield
+    finally:
+        sigaction(number, action, None)
 
 
 def mesh_model(build: Callable[[ModuleType], Faces], size: float) -> SolidMesh:

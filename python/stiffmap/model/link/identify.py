@@ -9,7 +9,6 @@ from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import real_array
 from stiffmap.common.errors import StiffmapError
-from stiffmap.model.link.arrays import Bools, Floats
 from stiffmap.model.link.checks import (
     DisplacementField,
     check_points,
@@ -17,14 +16,13 @@ from stiffmap.model.link.checks import (
     identifiable_columns,
     on_one_line,
 )
-from stiffmap.model.link.correlation import Correlation, analyse_correlation
 from stiffmap.model.link.estimate import Evidence
-from stiffmap.model.link.noise import FieldNoise, estimate_noise
+from stiffmap.model.link.noise import Correlation, FieldNoise, analyse_correlation, estimate_noise
 from stiffmap.model.link.outliers import LEVEL, find_outliers
 from stiffmap.model.link.regression import regress
 from stiffmap.model.link.result import Link, build_link
 from stiffmap.model.link.rigidfit import RigidFit, fit_exact, fit_linear, parting_rotation, turn_back
-from stiffmap.model.link.transport import twist_transport
+from stiffmap.model.link.transport import Bools, Floats, twist_transport
 
 Known = float | ArrayLike | Literal["independent"] | None
 FITS = {"linear": fit_linear, "exact": fit_exact}

@@ -12,11 +12,11 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.units import STRESSES, size_of
 from stiffmap.common.yaml_text import read
-from stiffmap.model.link.arrays import Floats
 from stiffmap.model.link.gmshmesh import UNITS
 from stiffmap.model.link.readers import known_columns
 from stiffmap.model.link.shapes import Bar, Foot, ForkBar, HollowBar
 from stiffmap.model.link.solve import Material
+from stiffmap.model.link.transport import Floats
 
 # Handbook values for a first estimate; a measured modulus belongs in the part file.
 MATERIALS = {

@@ -12,7 +12,7 @@ import yaml
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs import write_text
 from stiffmap.common.yaml_text import read
-from stiffmap.model.link.arrays import Floats, standard_errors, unit_diagonal
+from stiffmap.model.link.transport import Floats, standard_errors, unit_diagonal
 
 SYMMETRY = 1e-6  # of sqrt(C_ii C_jj)
 UNITS = {"length": "m", "force": "N", "angle": "rad"}

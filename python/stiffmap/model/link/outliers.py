@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.stats import chi2
 
-from stiffmap.model.link.arrays import Bools, Floats
 from stiffmap.model.link.rigidfit import design_matrix
+from stiffmap.model.link.transport import Bools, Floats
 
 LEVEL = 0.01  # probability that a clean field of independent noise loses any node
 STARTS = 200
@@ -94,8 +94,5 @@ def _standardised(A: Floats, u: Floats, inlier: Bools) -> Floats:
     r = u - A @ (N @ (Ai.T @ u[inlier].ravel()))
     lever = np.einsum("nia,ab,njb->nij", A, N, A)
     sign = np.where(inlier, -1.0, 1.0)  # inside the fit the residual is smaller, outside larger
-    return np.asarray(
-        np.einsum(
-            "ni,ni->n", r, np.linalg.solve(np.eye(3) + sign[:, None, None] * lever, r[..., None])[..., 0]
-        )
-    )
+    over = np.linalg.solve(np.eye(3) + sign[:, None, None] * lever, r[..., None])[..., 0]
+    return np.asarray(np.einsum("ni,ni->n", r, over))

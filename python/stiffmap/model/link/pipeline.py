@@ -9,15 +9,14 @@ from typing import Literal
 import numpy as np
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.model.link.arrays import Floats, Ints, standard_errors
-from stiffmap.model.link.calculix import has_ccx, solve_ccx
 from stiffmap.model.link.checks import spread
 from stiffmap.model.link.identify import identify_link
 from stiffmap.model.link.linkfile import LinkFile
 from stiffmap.model.link.mesh import SolidMesh
 from stiffmap.model.link.refine import Refinement, richardson
 from stiffmap.model.link.result import Link
-from stiffmap.model.link.solve import Material, Setup, mean_motion, solve_skfem
+from stiffmap.model.link.solve import Material, Setup, has_ccx, mean_motion, solve_ccx, solve_skfem
+from stiffmap.model.link.transport import Floats, Ints, standard_errors
 
 
 @dataclass(frozen=True)

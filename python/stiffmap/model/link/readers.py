@@ -9,15 +9,14 @@ from pathlib import Path
 
 import numpy as np
 
-from stiffmap.common.errors import FileError, StiffmapError, refuse_folder
+from stiffmap.common.errors import FileError, StiffmapError, needed, refuse_folder
 from stiffmap.common.number_text import number_in
 from stiffmap.common.tables.named import Known, named
 from stiffmap.common.tables.sheet import Layout, read_sheet
 from stiffmap.common.tables.table import Table
 from stiffmap.common.texts import text_of
-from stiffmap.model.link.arrays import Floats, Ints
 from stiffmap.model.link.gmshmesh import UNITS
-from stiffmap.model.link.optional import need
+from stiffmap.model.link.transport import Floats, Ints
 
 Rows = tuple[Ints, Floats]
 FIELDS = (".csv", ".dat", ".frd", ".lis", ".rpt", ".txt", ".vtk", ".vtu")
@@ -148,17 +147,15 @@ def read_frd(path: str | Path) -> tuple[Floats, Floats]:
 
 def read_vtk(path: str | Path) -> tuple[Floats, Floats]:
     """Points and displacements, in the file's unit, of a VTK/VTU: every (n, 3) point array is a case."""
-    meshio = need("meshio")
+    with needed("reading VTK files", "fea"):
+        import meshio
     try:
         mesh = meshio.read(path)
     except (Exception, SystemExit) as error:
         raise StiffmapError(f"{path}: meshio cannot read it ({' '.join(str(error).split())[:80]})") from None
     in_order = sorted(mesh.point_data, key=lambda n: [part.zfill(12) for part in re.split(r"(\d+)", n)])
-    fields = [
-        np.asarray(mesh.point_data[n], dtype=float)
-        for n in in_order
-        if np.shape(mesh.point_data[n])[1:] == (3,)
-    ]
+    vectors = [mesh.point_data[n] for n in in_order if np.shape(mesh.point_data[n])[1:] == (3,)]
+    fields = [np.asarray(v, dtype=float) for v in vectors]
     if not fields:
         raise StiffmapError(
             f"{path}: expected point arrays with three components, got {sorted(mesh.point_data)}"

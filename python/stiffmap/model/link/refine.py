@@ -8,7 +8,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.model.link.arrays import Floats
+from stiffmap.model.link.transport import Floats
 
 PLAUSIBLE = (0.5, 5.0)  # an order outside is not believed; order one is then assumed
 

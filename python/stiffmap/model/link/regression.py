@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import pinvh
 
-from stiffmap.model.link.arrays import Bools, Floats
+from stiffmap.model.link.transport import Bools, Floats
 
 
 class Regression(NamedTuple):
@@ -37,12 +37,8 @@ def regress(wrenches: Floats, twists: Floats, covariances: Floats) -> Regression
     normal = np.einsum("kab,ki,kj->aibj", weight, w, w).reshape(36, 36)
     inverse = pinvh(normal, rtol=1e-12)
     unit = np.kron(scale_x, 1 / scale_w)
-    gain = np.array(
-        [
-            unit[:, None] * (inverse @ np.kron(Q, wk[:, None])) / scale_x
-            for Q, wk in zip(weight, w, strict=True)
-        ]
-    )
+    pairs = zip(weight, w, strict=True)
+    gain = np.array([unit[:, None] * (inverse @ np.kron(Q, wk[:, None])) / scale_x for Q, wk in pairs])
     entries = np.einsum("kea,ka->e", gain, twists)
     left = (twists - wrenches @ entries.reshape(6, 6).T) / scale_x
     chi = float(np.einsum("ka,kab,kb->", left, weight, left))

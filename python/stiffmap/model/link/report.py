@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.model.link.arrays import Floats
 from stiffmap.model.link.estimate import SpringEstimate
+from stiffmap.model.link.transport import Floats
 
 
 def unit_factor(length: str) -> Floats:
@@ -144,13 +144,8 @@ def findings(compliance: Floats, covariance: Floats) -> list[str]:
     bad = [f"k{i + 1}{i + 1}" for i in range(6) if compliance[i, i] <= 0]
     lines.append("diagonal: " + (f"NOT positive: {', '.join(bad)}" if bad else "positive"))
     value, error = smallest_eigenvalue(compliance, covariance)
-    verdict = (
-        "positive definite"
-        if value > 2 * error
-        else "NOT positive definite"
-        if value < -2 * error
-        else "open"
-    )
+    sign = "positive definite" if value > 0 else "NOT positive definite"
+    verdict = sign if abs(value) > 2 * error else "open"
     lines.append(f"definiteness: {verdict}; smallest eigenvalue at unit diagonal {value:.4g} ± {error:.1g}")
     axis, found = bending_lengths(compliance)
     lengths = ", ".join(f"{k} = {1e3 * v:.1f} mm" for k, v in found.items())

@@ -9,12 +9,12 @@ import numpy as np
 from stiffmap.common.broadcasting import random_numbers
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.html import table, titled
-from stiffmap.model.link.arrays import Bools, Floats, Ints, standard_errors
 from stiffmap.model.link.estimate import Evidence, SpringEstimate, critical_multiple
 from stiffmap.model.link.noise import FieldNoise
 from stiffmap.model.link.regression import constrain, structure
 from stiffmap.model.link.report import unit_factor, unit_name, write_report
 from stiffmap.model.link.rigidfit import design_matrix
+from stiffmap.model.link.transport import Bools, Floats, Ints, standard_errors
 
 
 @dataclass(frozen=True)
@@ -53,17 +53,10 @@ class Link(SpringEstimate):
         return np.asarray(np.cov(np.einsum("kea,ska->se", gain, twists).T))
 
     def _repr_html_(self) -> str:
-        c, s, f = self.compliance, self.standard_error, unit_factor("mm")
+        c, s = self.compliance * unit_factor("mm"), self.standard_error * unit_factor("mm")
+        shown = np.argwhere(np.triu(~self.insignificant | np.eye(6, dtype=bool)))
         rows = [
-            (
-                f"k{i + 1}{j + 1}",
-                f"{c[i, j] * f[i, j]:.4g}",
-                f"{s[i, j] * f[i, j]:.1g}",
-                unit_name(i, j, "mm"),
-            )
-            for i in range(6)
-            for j in range(i, 6)
-            if i == j or not self.insignificant[i, j]
+            (f"k{i + 1}{j + 1}", f"{c[i, j]:.4g}", f"{s[i, j]:.1g}", unit_name(i, j, "mm")) for i, j in shown
         ]
         return titled("compliance of the link", table(("entry", "value", "±", "unit"), rows))
 

@@ -9,8 +9,7 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
-from stiffmap.model.link.arrays import Floats, skew
-from stiffmap.model.link.transport import twist_transport
+from stiffmap.model.link.transport import Floats, skew, twist_transport
 
 
 class RigidFit(NamedTuple):

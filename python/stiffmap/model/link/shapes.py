@@ -12,9 +12,9 @@ from typing import Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from stiffmap.model.link.arrays import Floats
 from stiffmap.model.link.gmshmesh import Faces, mesh_model, with_others
 from stiffmap.model.link.mesh import SolidMesh
+from stiffmap.model.link.transport import Floats
 
 Length = Field(gt=0)
 Vector = tuple[float, float, float]
@@ -22,10 +22,6 @@ Vector = tuple[float, float, float]
 
 class _Shape(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
-
-    def reference(self) -> Floats:
-        """(3,) m, centre of the loaded face."""
-        raise NotImplementedError
 
     def default_size(self) -> float:
         """Target edge length in m."""
@@ -60,7 +56,7 @@ class Bar(_Shape):
         """One box."""
         _box(gmsh, 0, self.length, self.width, self.height)
         gmsh.model.occ.synchronize()
-        return _end_faces(gmsh, 0, 0.0, 1e3 * self.length)
+        return _end_faces(gmsh, 0, 1e3 * self.length)
 
 
 class HollowBar(Bar):
@@ -85,7 +81,7 @@ class HollowBar(Bar):
         hole = _box(gmsh, 0, self.length, self.width - 2 * self.wall, self.height - 2 * self.wall)
         gmsh.model.occ.cut(outer, hole)
         gmsh.model.occ.synchronize()
-        return _end_faces(gmsh, 0, 0.0, 1e3 * self.length)
+        return _end_faces(gmsh, 0, 1e3 * self.length)
 
 
 class ForkBar(Bar):
@@ -122,20 +118,12 @@ class ForkBar(Bar):
         x0, x1 = self.fork, self.length - self.fork
         body = _box(gmsh, x0, x1, self.width, self.height)
         if self.wall:
-            inner = _box(
-                gmsh,
-                x0 + self.prong,
-                x1 - self.prong,
-                self.width - 2 * self.wall,
-                self.height - 2 * self.wall,
-            )
-            body, _ = occ.cut(body, inner)
+            width, height = self.width - 2 * self.wall, self.height - 2 * self.wall
+            body, _ = occ.cut(body, _box(gmsh, x0 + self.prong, x1 - self.prong, width, height))
         outside = self.gap + 2 * self.prong
         prongs, holes = [], []
-        for axis, start, end in (
-            (0.0, -self.height / 2, x0),
-            (self.length, x1, self.length + self.height / 2),
-        ):
+        ends = ((0.0, -self.height / 2, x0), (self.length, x1, self.length + self.height / 2))
+        for axis, start, end in ends:
             plate = self.prong if axis == 0.0 else -self.prong
             edge = x0 if axis == 0.0 else x1
             prongs += _box(gmsh, min(edge, edge + plate), max(edge, edge + plate), outside, self.height)
@@ -190,10 +178,7 @@ class Foot(_Shape):
         upright = _cuboid(gmsh, (back, -self.height, side), (self.upright, self.height, self.depth))
         gmsh.model.occ.fuse(plate, upright)
         gmsh.model.occ.synchronize()
-        return _end_faces(gmsh, 1, 0.0, -1e3 * self.height)
-
-
-Shape = Bar | HollowBar | ForkBar | Foot
+        return _end_faces(gmsh, 1, -1e3 * self.height)
 
 
 def _box(
@@ -208,14 +193,14 @@ def _cuboid(gmsh: ModuleType, low: Vector, size: Vector) -> list[tuple[int, int]
     return [(3, gmsh.model.occ.addBox(*(1e3 * np.array([*low, *size]))))]
 
 
-def _end_faces(gmsh: ModuleType, axis: int, fixed: float, loaded: float) -> Faces:
-    """Plane faces across an axis at two places, in mm; every other face keeps its number."""
+def _end_faces(gmsh: ModuleType, axis: int, loaded: float) -> Faces:
+    """Plane faces across an axis at 0 and at another place, in mm; every other face keeps its number."""
     names: Faces = {"fixed": [], "loaded": []}
     for _, tag in gmsh.model.getEntities(2):
         box = gmsh.model.getBoundingBox(2, tag)
         low, high = box[axis], box[axis + 3]
         flat = high - low < 1e-4
-        for name, place in (("fixed", fixed), ("loaded", loaded)):
+        for name, place in (("fixed", 0.0), ("loaded", loaded)):
             if flat and abs(low - place) < 1e-3:
                 names[name].append(tag)
     return with_others(gmsh, names)

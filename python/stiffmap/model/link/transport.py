@@ -1,10 +1,30 @@
-"""Compliance and its covariance at another reference point or in other axes (docs/link.md §2)."""
+"""Arrays of the link modules; a compliance and its covariance at another reference point or in other axes (docs/link.md §2)."""
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
-from stiffmap.model.link.arrays import Floats, skew
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+Ints = NDArray[np.int64]
+
+
+def skew(vectors: Floats) -> Floats:
+    """Cross-product matrices S(v), (..., 3) -> (..., 3, 3), so that ``S(v) @ w == cross(v, w)``."""
+    return np.asarray(np.cross(np.eye(3), np.asarray(vectors, dtype=float)[..., None, :]))
+
+
+def standard_errors(covariance: Floats) -> Floats:
+    """(6, 6) standard errors of the entries whose covariance (36, 36), row-major, is given."""
+    return np.asarray(np.sqrt(np.maximum(np.diag(covariance), 0.0)).reshape(6, 6))
+
+
+def unit_diagonal(matrix: Floats) -> Floats:
+    """(6, 6) matrix over the square roots of its diagonal terms; those that are zero count as one."""
+    size = np.sqrt(np.abs(np.diag(matrix)))
+    size = np.where(size > 0, size, 1.0)
+    return np.asarray(matrix / np.outer(size, size))
 
 
 def twist_transport(shift: Floats, rotation: Floats | None = None) -> Floats:

@@ -6,6 +6,7 @@ import re
 import xml.etree.ElementTree as xml
 from collections import Counter
 from difflib import get_close_matches
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -16,8 +17,7 @@ from stiffmap.common.number_text import LARGEST, number_in
 from stiffmap.common.rotations import rotation_about
 from stiffmap.model.description import Body, Pose
 from stiffmap.model.description.pose import vector
-from stiffmap.model.urdf.model import Mimic, UrdfJoint, UrdfModel, tensor
-from stiffmap.model.urdf.tip import listed
+from stiffmap.model.urdf.model import Mimic, UrdfJoint, UrdfModel, listed, tensor
 
 KINDS = {"revolute": "revolute", "continuous": "revolute", "prismatic": "prismatic", "fixed": "fixed"}
 READ = ("link", "joint", "inertial", "mass", "inertia", "origin", "axis", "parent", "child", "limit", "mimic")
@@ -27,32 +27,33 @@ SHORT = {"min": "lower", "max": "upper"}
 X, Y, Z = np.eye(3)
 MOST = 4 * np.pi
 """Angle of an origin, two turns, beyond which none is in radians."""
+Wrong = partial[FileError]
+"""Makes the error of a place of the file from a message."""
 
 
 def read_urdf(path: Path) -> UrdfModel:
     """Model of a URDF file; FileError for what cannot be used, one line each."""
     file = str(path)
+    wrong = partial(FileError, file=file)
     with reading(path):
         text = path.read_bytes()
     try:
         robot = xml.fromstring(_with_prefixes(text))
-    except (
-        xml.ParseError,
-        LookupError,
-        ValueError,
-    ) as error:  # the latter two: an encoding that there is not
-        raise FileError(f"not XML: {error}", file=file) from None
+    except (xml.ParseError, LookupError, ValueError) as error:  # the latter two: no such encoding
+        raise wrong(f"not XML: {error}") from None
     if path.suffix == ".xacro" or any(_is_xacro(e) for e in robot.iter()):
-        raise _unexpanded(path)
+        plain = path.name.removesuffix(".xacro").removesuffix(".urdf")
+        out = f"{plain}.urdf" if f"{plain}.urdf" != path.name else f"{plain}_expanded.urdf"
+        raise wrong(f"this is xacro, expand it with: xacro {path.name} > {out}")
     if robot.tag.rpartition("}")[2] != "robot":
-        raise FileError(f"expected a URDF, whose root element is <robot>; found <{robot.tag}>", file=file)
-    plain = robot.tag.removesuffix("robot")
-    for e in robot.iter():  # a namespace that has no prefix says nothing
-        e.tag = e.tag.removeprefix(plain)
-    _check_tags(robot, file)
-    links = [(_name(e, file), _body(e, file)) for e in robot.findall("link")]
-    joints = [_joint(e, file) for e in robot.findall("joint")]
-    _check_tree([name for name, _ in links], joints, file)
+        raise wrong(f"expected a URDF, whose root element is <robot>; found <{robot.tag}>")
+    namespace = robot.tag.removesuffix("robot")
+    for e in robot.iter():  # one that has no prefix says nothing
+        e.tag = e.tag.removeprefix(namespace)
+    _check_tags(robot, wrong)
+    links = [(_name(e, wrong), _body(e, wrong)) for e in robot.findall("link")]
+    joints = [_joint(e, wrong) for e in robot.findall("joint")]
+    _check_tree([name for name, _ in links], joints, wrong)
     return UrdfModel(file, robot.get("name") or path.stem, dict(links), {j.child: j for j in joints})
 
 
@@ -69,144 +70,130 @@ def _is_xacro(e: xml.Element) -> bool:
     return "xacro" in str(e.tag).partition("}")[0] or any("${" in t or "$(" in t for t in texts)
 
 
-def _unexpanded(path: Path) -> FileError:
-    plain = path.name.removesuffix(".xacro").removesuffix(".urdf")
-    out = f"{plain}.urdf" if f"{plain}.urdf" != path.name else f"{plain}_expanded.urdf"
-    return FileError(f"this is xacro, expand it with: xacro {path.name} > {out}", file=str(path))
-
-
-def _check_tags(robot: xml.Element, file: str) -> None:
+def _check_tags(robot: xml.Element, wrong: Wrong) -> None:
     """FileError for elements that would be passed over: a robot in the robot, and names that differ from known ones by a slip."""
     for top in robot:
         if top.tag == "robot":
-            raise FileError(f"expected one <robot>, found another in it: '{top.get('name', '')}'", file=file)
+            raise wrong(f"expected one <robot>, found another in it: '{top.get('name', '')}'")
+        key = f"{top.tag} {top.get('name', '')}"
         for e in (top, *top, *(e for inner in top.findall("inertial") for e in inner)):
             meant = [] if e.tag in READ else get_close_matches(e.tag.lower(), READ, 1, 0.8)
             if meant:
-                raise FileError(f"expected <{meant[0]}>, found <{e.tag}>", file=file,
-                                key="" if e is top else f"{top.tag} {top.get('name', '')}")  # fmt: skip
+                raise wrong(f"expected <{meant[0]}>, found <{e.tag}>", key="" if e is top else key)
             names = ATTRIBUTES.get(e.tag, ())
             for k in (k for k in e.attrib if names and k not in names):
                 close = [SHORT[k]] if k in SHORT else get_close_matches(k.lower(), names, 1, 0.8)
                 if close:
-                    raise FileError(f"{e.tag}: expected {close[0]}, found {k}='{e.get(k)}'", file=file,
-                                    key=f"{top.tag} {top.get('name', '')}")  # fmt: skip
+                    raise wrong(f"{e.tag}: expected {close[0]}, found {k}='{e.get(k)}'", key=key)
 
 
-def _name(element: xml.Element, file: str) -> str:
+def _name(element: xml.Element, wrong: Wrong) -> str:
     name = element.get("name")
     if not name:
-        raise FileError(f"a <{element.tag}> has no name", file=file)
+        raise wrong(f"a <{element.tag}> has no name")
     return name
 
 
-def _check_tree(links: list[str], joints: list[UrdfJoint], file: str) -> None:
+def _check_tree(links: list[str], joints: list[UrdfJoint], wrong: Wrong) -> None:
     for tag, names in {"link": links, "joint": [j.name for j in joints]}.items():
         name, times = Counter(names).most_common(1)[0] if names else ("", 0)
         if times > 1:
-            raise FileError(f"there are {times} of this name", file=file, key=f"{tag} {name}")
+            raise wrong(f"there are {times} of this name", key=f"{tag} {name}")
     for joint in joints:
         for end in (joint.parent, joint.child):
             if end not in links:
-                raise FileError(f"no link '{end}'", file=file, key=f"joint {joint.name}")
+                raise wrong(f"no link '{end}'", key=f"joint {joint.name}")
     children = [j.child for j in joints]
     twice = next((c for c in children if children.count(c) > 1), None)
     if twice:
-        raise FileError(f"link '{twice}' hangs on two joints; loops belong in the sidecar", file=file)
+        raise wrong(f"link '{twice}' hangs on two joints; loops belong in the sidecar")
     roots = [link for link in links if link not in children]
     if len(roots) != 1:
-        raise FileError(
-            f"expected one root link, found {len(roots)}: {', '.join(roots) or 'none'}", file=file
-        )
+        raise wrong(f"expected one root link, found {len(roots)}: {', '.join(roots) or 'none'}")
     reached = set(roots)
     while more := {j.child for j in joints if j.parent in reached} - reached:
         reached |= more
     ring = [link for link in links if link not in reached]
     if ring:
-        raise FileError(f"links hang on each other in a ring and not on the root link '{roots[0]}': {listed(ring)}",
-                        file=file)  # fmt: skip
+        raise wrong(
+            f"links hang on each other in a ring and not on the root link '{roots[0]}': {listed(ring)}"
+        )
 
 
-def _joint(e: xml.Element, file: str) -> UrdfJoint:
-    name = _name(e, file)
-    key, kind = f"joint {name}", e.get("type", "")
-    parent, child = (str(_wanted(e, tag, "link", file, key).get("link")) for tag in ("parent", "child"))
-    along = _only(e, "axis", file, key)
-    axis = _numbers(along, "xyz", X if along is None else np.zeros(3), file, key)
+def _joint(e: xml.Element, wrong: Wrong) -> UrdfJoint:
+    name = _name(e, wrong)
+    wrong, kind = partial(wrong, key=f"joint {name}"), e.get("type", "")
+    parent, child = (str(_wanted(e, tag, "link", wrong).get("link")) for tag in ("parent", "child"))
+    along = _only(e, "axis", wrong)
+    axis = _numbers(along, "xyz", X if along is None else np.zeros(3), wrong)
     largest = float(np.abs(axis).max())  # taken out first: the square of 1e308 overflows
     axis = axis / (largest or 1.0)
     length = float(np.linalg.norm(axis))
     if KINDS.get(kind) in ("revolute", "prismatic") and length == 0:
-        raise FileError("a zero-length axis has no direction", file=file, key=key)
-    limit, mimic = _only(e, "limit", file, key), _only(e, "mimic", file, key)
-    lower, upper = (_limit(limit, k, file, key) for k in ("lower", "upper"))
+        raise wrong("a zero-length axis has no direction")
+    limit, mimic = _only(e, "limit", wrong), _only(e, "mimic", wrong)
+    lower, upper = (_limit(limit, k, wrong) for k in ("lower", "upper"))
     ranged = kind != "continuous" and lower != upper and max(abs(lower), abs(upper)) < LARGEST
     return UrdfJoint(
-        name, KINDS.get(kind, kind), parent, child, _origin(e, file, key),
+        name, KINDS.get(kind, kind), parent, child, _origin(e, wrong),
         axis=vector(axis / (length or 1.0)),
         limits=(lower, upper) if ranged else None,
-        effort=_largest(limit, "effort", file, key),
-        velocity=_largest(limit, "velocity", file, key),
+        effort=_largest(limit, "effort", wrong),
+        velocity=_largest(limit, "velocity", wrong),
         mimic=None if mimic is None else Mimic(mimic.get("joint", "?"), _number(
-            mimic, "multiplier", file, key, 1.0), _number(mimic, "offset", file, key)),
+            mimic, "multiplier", wrong, 1.0), _number(mimic, "offset", wrong)),
     )  # fmt: skip
 
 
-def _only(e: xml.Element, tag: str, file: str, key: str) -> xml.Element | None:
+def _only(e: xml.Element, tag: str, wrong: Wrong) -> xml.Element | None:
     """The one element of a tag, if there is one; FileError where there are several."""
     found = e.findall(tag)
     if len(found) > 1:
-        raise FileError(f"expected one <{tag}>, found {len(found)}", file=file, key=key)
+        raise wrong(f"expected one <{tag}>, found {len(found)}")
     return found[0] if found else None
 
 
-def _wanted(e: xml.Element, tag: str, attribute: str, file: str, key: str) -> xml.Element:
+def _wanted(e: xml.Element, tag: str, attribute: str, wrong: Wrong) -> xml.Element:
     """The one element of a tag, with an attribute that must be there."""
-    found = _only(e, tag, file, key)
+    found = _only(e, tag, wrong)
     if found is None or not found.get(attribute):
-        raise FileError(f"has no <{tag} {attribute}=...>", file=file, key=key)
+        raise wrong(f"has no <{tag} {attribute}=...>")
     return found
 
 
-def _body(e: xml.Element, file: str) -> Body | None:
-    name = _name(e, file)
-    key = f"link {name}"
-    inertial = _only(e, "inertial", file, key)
+def _body(e: xml.Element, wrong: Wrong) -> Body | None:
+    name = _name(e, wrong)
+    wrong = partial(wrong, key=f"link {name}")
+    inertial = _only(e, "inertial", wrong)
     if inertial is None or not len(inertial):
         return None
-    mass = _number(_wanted(inertial, "mass", "value", file, key), "value", file, key)
+    mass = _number(_wanted(inertial, "mass", "value", wrong), "value", wrong)
     if mass == 0:
         return None
     if mass < 0:
-        raise FileError(f"the mass is negative: {mass}", file=file, key=key)
-    at, given = _origin(inertial, file, key), _only(inertial, "inertia", file, key)
+        raise wrong(f"the mass is negative: {mass}")
+    at, given = _origin(inertial, wrong), _only(inertial, "inertia", wrong)
     for k in ("ixx", "iyy", "izz") if given is not None else ():
-        _wanted(inertial, "inertia", k, file, key)
-    xx, yy, zz, xy, xz, yz = (
-        _number(given, k, file, key) for k in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
-    )
+        _wanted(inertial, "inertia", k, wrong)
+    xx, yy, zz, xy, xz, yz = (_number(given, k, wrong) for k in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz"))
     about_com = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     return Body(name, mass, at.translation, tensor(at.r @ about_com @ at.r.T, mass))
 
 
-def _origin(e: xml.Element, file: str, key: str) -> Pose:
-    found = _only(e, "origin", file, key)
+def _origin(e: xml.Element, wrong: Wrong) -> Pose:
+    found = _only(e, "origin", wrong)
     other = [k for k in (found.attrib if found is not None else ()) if k not in ("xyz", "rpy")]
     if found is not None and other:
-        raise FileError(
-            f"origin: expected xyz and rpy, found {other[0]}='{found.get(other[0])}'", file=file, key=key
-        )
-    angles = _numbers(found, "rpy", np.zeros(3), file, key)
+        raise wrong(f"origin: expected xyz and rpy, found {other[0]}='{found.get(other[0])}'")
+    angles = _numbers(found, "rpy", np.zeros(3), wrong)
     if found is not None and np.abs(angles).max() > MOST:
-        raise FileError(
-            f"rpy: expected radians, found '{found.get('rpy')}', as degrees are", file=file, key=key
-        )
+        raise wrong(f"rpy: expected radians, found '{found.get('rpy')}', as degrees are")
     roll, pitch, yaw = angles
     turned = rotation_about(Z, yaw) @ rotation_about(Y, pitch) @ rotation_about(X, roll)
-    return Pose.of(_numbers(found, "xyz", np.zeros(3), file, key), turned)
+    return Pose.of(_numbers(found, "xyz", np.zeros(3), wrong), turned)
 
 
-def _numbers(e: xml.Element | None, attribute: str, default: Floats, file: str, key: str) -> Floats:
+def _numbers(e: xml.Element | None, attribute: str, default: Floats, wrong: Wrong) -> Floats:
     text = None if e is None else e.get(attribute)
     if text is None:
         return default
@@ -215,31 +202,31 @@ def _numbers(e: xml.Element | None, attribute: str, default: Floats, file: str, 
     except ValueError:
         values = np.zeros(0)
     if values.shape != (3,) or not np.isfinite(values).all():
-        raise FileError(f"{attribute}: expected three numbers, found '{text}'", file=file, key=key)
+        raise wrong(f"{attribute}: expected three numbers, found '{text}'")
     return values
 
 
-def _limit(e: xml.Element | None, attribute: str, file: str, key: str) -> float:
+def _limit(e: xml.Element | None, attribute: str, wrong: Wrong) -> float:
     """A limit as it is written; endless where it is too large for a machine, as exporters write 'none'."""
     try:
         value = abs(float((e.get(attribute) if e is not None else None) or 0.0))
     except ValueError:
         value = 0.0
-    return np.inf if value >= LARGEST else _number(e, attribute, file, key)
+    return np.inf if value >= LARGEST else _number(e, attribute, wrong)
 
 
-def _largest(e: xml.Element | None, attribute: str, file: str, key: str) -> float | None:
+def _largest(e: xml.Element | None, attribute: str, wrong: Wrong) -> float | None:
     """The largest effort or speed; None where it is not given: 0, negative, or endless."""
-    value = _limit(e, attribute, file, key)
+    value = _limit(e, attribute, wrong)
     return value if 0 < value < LARGEST else None
 
 
-def _number(e: xml.Element | None, attribute: str, file: str, key: str, default: float = 0.0) -> float:
+def _number(e: xml.Element | None, attribute: str, wrong: Wrong, default: float = 0.0) -> float:
     text = None if e is None else e.get(attribute)
     try:
         value = number_in(text) if text is not None else default
     except ValueError:
-        raise FileError(f"{attribute}: expected a number, found '{text}'", file=file, key=key) from None
+        raise wrong(f"{attribute}: expected a number, found '{text}'") from None
     if not np.isfinite(value):
-        raise FileError(f"{attribute}: expected a finite number, found '{text}'", file=file, key=key)
+        raise wrong(f"{attribute}: expected a finite number, found '{text}'")
     return value

@@ -8,7 +8,7 @@ from typing import Any
 from rich.text import Text
 
 from stiffmap.model.effects import EffectType, get, kinds
-from stiffmap.model.effects.synonyms import found_by
+from stiffmap.model.effects.registry import found_by
 from stiffmap.model.files.shipped import machine_names
 from stiffmap.solve.machine import Machine, load_machine
 from stiffmap.ui.cli import options

@@ -10,7 +10,6 @@ from typing import Any, cast
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs.option import written
-from stiffmap.model.link.arrays import Floats
 from stiffmap.model.link.gmshmesh import CAD, MESH, mesh_file
 from stiffmap.model.link.identify import identify_link
 from stiffmap.model.link.inputs import UNIT_WRENCHES, read_cases, read_material, read_part
@@ -20,6 +19,7 @@ from stiffmap.model.link.pipeline import PartLink, Solver, Support, link_from_pa
 from stiffmap.model.link.readers import FIELDS, read_field
 from stiffmap.model.link.result import Link
 from stiffmap.model.link.solve import Material, Setup
+from stiffmap.model.link.transport import Floats
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import in_si
 from stiffmap.ui.cli.options import argument, flag, option

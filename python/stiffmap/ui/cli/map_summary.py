@@ -15,7 +15,7 @@ from rich.table import Table
 from rich.text import Text
 
 from stiffmap.common.number_text import length_text, place_text
-from stiffmap.model.description.sources import in_words as source_words
+from stiffmap.model.description.machine import in_words as source_words
 from stiffmap.solve.budget import in_shares
 from stiffmap.solve.machine import Machine
 from stiffmap.ui.cli.output import failed, failed_in_words, table

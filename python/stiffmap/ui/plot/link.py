@@ -12,10 +12,10 @@ from mpl_toolkits.mplot3d import Axes3D
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from stiffmap.common.outputs import write_picture
-from stiffmap.model.link.arrays import Floats, Ints
 from stiffmap.model.link.pipeline import PartLink
 from stiffmap.model.link.report import unit_factor, unit_name
 from stiffmap.model.link.result import Link
+from stiffmap.model.link.transport import Floats, Ints
 from stiffmap.ui.plot.style import BLUE, COLOURS, VERMILLION, new_figure, wrench_text
 
 GREY = "#999999"

@@ -21,8 +21,8 @@ from stiffmap.model.files.build import build_workspace
 from stiffmap.model.files.build_elements import build_element
 from stiffmap.model.files.context import Context, Gathered
 from stiffmap.model.files.load import describe_document, validate
+from stiffmap.model.files.schema.base import BoxModel
 from stiffmap.model.files.schema.elements import ElementModel
-from stiffmap.model.files.schema.geometry import BoxModel
 
 _STEP = re.compile(r"^([^\[\]]+)?((?:\[[^\[\]]+\])*)$")
 

@@ -16,7 +16,7 @@ from stiffmap.experiment.prediction.history import drives_of
 from stiffmap.experiment.ramps import directions
 from stiffmap.identification.planning import estimate
 from stiffmap.model.description.tree import joints
-from stiffmap.model.effects.library.hysteresis import deflection, spring_force
+from stiffmap.model.effects.library.friction import deflection, spring_force
 
 ONE_JOINT = """
 name: gear

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import stiffmap as sm
-from stiffmap.model.description.sources import UNMARKED, in_words, source_of
+from stiffmap.model.description.machine import UNMARKED, in_words, source_of
 from stiffmap.model.files.shipped import starter_text
 
 STARTER = starter_text("m")

@@ -12,13 +12,12 @@ import pytest
 from tests.python.model.link.link_fields import REFERENCE, WRENCHES, noisy_field
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.model.link import calculix, load_link
-from stiffmap.model.link.gmshmesh import mesh_file
+from stiffmap.model.link import load_link
+from stiffmap.model.link.gmshmesh import gmsh_session, mesh_file
 from stiffmap.model.link.identify import identify_link
 from stiffmap.model.link.mesh import checked_mesh
-from stiffmap.model.link.optional import gmsh_session, need
 from stiffmap.model.link.readers import read_dat, read_field
-from stiffmap.model.link.solve import Material, Setup, solve_skfem
+from stiffmap.model.link.solve import Material, Setup, ccx_input, has_ccx, solve_ccx, solve_skfem
 from stiffmap.ui.cli import main
 
 PART = """
@@ -115,7 +114,7 @@ def test_bad_arguments_exit_with_two_and_one_line(run, tmp_path, arguments, word
 def test_a_connection_that_is_closed_after_meshing_ends_no_process(fea):
     code = """
 import socket, threading
-from stiffmap.model.link.optional import gmsh_session
+from stiffmap.model.link.gmshmesh import gmsh_session
 def mesh():
     with gmsh_session() as gmsh:
         gmsh.model.occ.addBox(0, 0, 0, 1, 1, 1)
@@ -210,24 +209,24 @@ def test_part_that_is_not_held_is_refused(fea):
 
 
 def test_unsolved_calculix_run_is_refused():
-    if not calculix.has_ccx():
+    if not has_ccx():
         pytest.skip("CalculiX (ccx) is not installed")
     nodes, tets = one_tet(CORNERS)
     mesh = checked_mesh(nodes, tets, {k: np.array([[0, 1, 2, 4, 5, 6]]) for k in ("fixed", "loaded")})
     with pytest.raises(StiffmapError, match="ccx stopped") as error:
-        calculix.solve_ccx(mesh, Material(0.0, 0.3), Setup("fixed", "loaded", np.zeros(3)), np.eye(6))
+        solve_ccx(mesh, Material(0.0, 0.3), Setup("fixed", "loaded", np.zeros(3)), np.eye(6))
     assert "\n" not in str(error.value)
 
 
 def test_frd_of_a_calculix_run_is_read(tmp_path):
     """The file that ccx itself writes, against its .dat of the same run."""
-    if not calculix.has_ccx():
+    if not has_ccx():
         pytest.skip("CalculiX (ccx) is not installed")
     nodes, tets = one_tet(CORNERS)
     face = {"fixed": np.array([[0, 2, 1, 6, 5, 4]]), "loaded": np.array([[0, 1, 3, 4, 8, 7]])}
     mesh = checked_mesh(nodes, tets, face)
     setup = Setup("fixed", "loaded", np.zeros(3))
-    deck = calculix.ccx_input(mesh, Material(1e9, 0.3), setup, np.eye(6))
+    deck = ccx_input(mesh, Material(1e9, 0.3), setup, np.eye(6))
     deck = deck.replace("*NODE PRINT, NSET=ALL", "*NODE FILE\nU\n*NODE PRINT, NSET=ALL")
     (tmp_path / "t.inp").write_text(deck)
     subprocess.run(["ccx", "t"], cwd=tmp_path, capture_output=True, check=True)
@@ -268,8 +267,8 @@ def test_nan_in_a_field_file_through_the_command(run, tmp_path):
 
 def test_missing_extra_names_the_command(monkeypatch):
     monkeypatch.setitem(sys.modules, "gmsh", None)
-    with pytest.raises(StiffmapError, match=r"need gmsh, .* pip install stiffmap\[fea\]"):
-        need("gmsh")
-    monkeypatch.setattr(calculix.shutil, "which", lambda _: None)
+    with pytest.raises(StiffmapError, match=r"needs gmsh, .* pip install 'stiffmap\[fea\]'"), gmsh_session():
+        pass
+    monkeypatch.setattr("shutil.which", lambda _: None)
     with pytest.raises(StiffmapError, match=r"CalculiX .* is not installed"):
-        calculix.solve_ccx(None, Material(1.0, 0.3), Setup("a", "b", np.zeros(3)), np.eye(6))
+        solve_ccx(None, Material(1.0, 0.3), Setup("a", "b", np.zeros(3)), np.eye(6))

@@ -8,8 +8,8 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 from tests.python.model.link.link_fields import REFERENCE, bar_compliance, end_nodes
 
-from stiffmap.model.link.arrays import skew
 from stiffmap.model.link.rigidfit import design_matrix, fit_exact, fit_factor, fit_linear, parting_rotation
+from stiffmap.model.link.transport import skew
 
 POINTS = end_nodes(40)
 TWIST = np.array([2e-6, -5e-6, 1e-6, 3e-5, -2e-5, 4e-5])

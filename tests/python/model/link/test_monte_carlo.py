@@ -8,8 +8,8 @@ from bench.link_monte_carlo import miss_probability
 from scipy.stats import binom, kstest
 from tests.python.model.link.link_fields import REFERENCE, WRENCHES, bar_compliance, end_nodes, rigid_field
 
-from stiffmap.model.link.correlation import analyse_correlation
 from stiffmap.model.link.identify import identify_link
+from stiffmap.model.link.noise import analyse_correlation
 from stiffmap.model.link.rigidfit import fit_linear
 
 RUNS, SIGMA = 1000, 2e-8

@@ -165,7 +165,7 @@ def _parts(at: Path) -> None:
     (at / "cases.csv").write_text(cases, encoding="utf-8")
     if importlib.util.find_spec("gmsh") is None:
         return
-    from stiffmap.model.link.optional import gmsh_session
+    from stiffmap.model.link.gmshmesh import gmsh_session
 
     with gmsh_session() as gmsh:
         block = gmsh.model.occ.addBox(0, 0, 0, 40, 20, 20)

@@ -88,7 +88,7 @@ def test_a_sample_depends_on_its_seed_only_and_no_two_touch() -> None:
 
 
 def test_every_room_has_tests() -> None:
-    assert folders("python/stiffmap/model/effects/library/bars.py")[0] == "model/effects"
+    assert folders("python/stiffmap/model/effects/library/links.py")[0] == "model/effects"
     assert folders("python/stiffmap/solve/budget.py")[0] == "solve"
     everything = {
         f for file in ("python/stiffmap/ui/cli/app.py", "cpp/src/model/law.cpp") for f in folders(file)

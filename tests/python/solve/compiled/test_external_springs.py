@@ -10,7 +10,7 @@ from tests.python.solve.compiled.agreement import TOLERANCE, compare, draw
 
 import stiffmap as sm
 from stiffmap.model.description import ExternalSpring, Point
-from stiffmap.model.effects.library.gravity import DOWN
+from stiffmap.model.effects.library.loads import DOWN
 
 GRAVITY = (0.0, 0.0, -9.81)
 

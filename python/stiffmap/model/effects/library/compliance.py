@@ -16,16 +16,9 @@ from stiffmap.model.effects.types import EffectType, Parameter, Placed, entry_of
 
 SCALE = Parameter("scale", "1", 1e-3, 1e3, 1.0, 0.1, "factor on the nominal compliance")
 VALUE = Parameter(
-    "value",
-    "m/N",
-    1e-15,
-    1.0,
-    None,
-    1e-8,
-    "the new total, for a drive or elastic joint",
-    fitted=False,
-    angular="rad/(N·m)",
-)
+    "value", "m/N", 1e-15, 1.0, None, 1e-8, "the new total, for a drive or elastic joint",
+    fitted=False, angular="rad/(N·m)",
+)  # fmt: skip
 
 
 def sites(elements: Elements) -> dict[str, tuple[int, ...]]:
@@ -120,7 +113,6 @@ def derived(description: MachineDescription, placed: Placed) -> dict[str, float]
 
 EFFECT = EffectType(
     kind="compliance",
-    precedence=10,
     title="compliance other than nominal",
     doc=(
         "The nominal compliance of a drive, an elastic joint or a link times `scale`; on a 6x6 spring the "

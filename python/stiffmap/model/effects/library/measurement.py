@@ -1,4 +1,4 @@
-"""What the effects of a measurement share.
+"""Effects of the measurement: loads that act otherwise than noted, instruments that show something else.
 
 Load side: the wrench that acts is ``R G w``. Reading, ``deflection``: it is ``G Rᵀ u``, the sensor's axes being turned
 by R; ``position``: instruments give coordinates, so gain and axes act on commanded position plus displacement and the
@@ -8,17 +8,20 @@ of a pose; joints and distances are read by other instruments.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from stiffmap.common.broadcasting import Floats
+from stiffmap.common.errors import StiffmapError
 from stiffmap.model.description import AppliedEffect
 from stiffmap.model.effects.evidence import Plan, Reading
-from stiffmap.model.effects.library.geometry import AXES, components, rotations
-from stiffmap.model.effects.sites import at
-from stiffmap.model.effects.types import Parameter
+from stiffmap.model.effects.library.geometry import AXES, components, rotation_of, rotations, translation_of
+from stiffmap.model.effects.sites import at, at_sites, elastic_drives
+from stiffmap.model.effects.types import EffectType, Option, Parameter
 
 ANGLES: tuple[Parameter, ...] = rotations("rotation")["parameters"]
 
@@ -73,3 +76,133 @@ def measured(kind: str, element: str, parameters: tuple[Parameter, ...]) -> dict
         "excludes": (kind,),
         **components(parameters),
     }
+
+
+LOAD_DIRECTION = EffectType(
+    **measured("load_direction", "load", ANGLES),
+    title="direction of the applied force",
+    doc="The force that acts is the declared one turned: f = Rx·Ry·Rz f_declared.",
+    frame="base axes; about x, then the turned y, then the twice turned z",
+    pivot="the point where the force acts",
+    load=lambda wrench, plan, term: turned(wrench, rotation_of(dict(term.parameters))),
+)
+
+
+LOAD_GAIN = EffectType(
+    **measured("load_gain", "load", gains("acting force over declared force")),
+    title="gain of the force measurement",
+    doc="The force that acts is the declared one times gain, per axis times gain·gain_axis.",
+    frame="base axes",
+    load=lambda wrench, plan, term: scaled(wrench, dict(term.parameters)),
+)
+
+
+SENSOR_AXES = EffectType(
+    **measured("sensor_axes", "sensor", ANGLES),
+    title="orientation of the displacement sensor",
+    doc="The sensor's axes are turned against the declared ones: reading = (Rx·Ry·Rz)^T displacement.",
+    frame="declared axes of the reading; about x, then the turned y, then the twice turned z",
+    reading=of_coordinates(lambda values, parameters: turned(values, rotation_of(parameters).T)),
+    hidden=lambda plan: plan.frame == "unknown",
+)
+
+
+SENSOR_GAIN = EffectType(
+    **measured("sensor_gain", "sensor", gains("reading over displacement")),
+    title="gain of the displacement sensor",
+    doc="The reading is the displacement times gain, per axis times gain·gain_axis.",
+    frame="axes of the reading",
+    reading=of_coordinates(scaled),
+    instrument_scale="gain",
+)
+
+
+FRAME = (
+    *(Parameter(a, "m", -1.0, 1.0, 0.0, 1e-4, f"shift of every reading along {a}") for a in AXES),
+    *(
+        Parameter(
+            f"angle_{a}", "rad", -math.pi, math.pi, 0.0, 1e-4, f"turn of the instrument's frame about {a}"
+        )
+        for a in AXES
+    ),
+)
+
+
+def offset(plan: Plan, term: AppliedEffect) -> Floats:
+    """(n, 6) of a position: the instrument's frame is offset, and turned about the base origin."""
+    if plan.quantity != "position":
+        return np.zeros((len(plan.position), 6))
+    parameters = dict(term.parameters)
+    r, shift = rotation_of(parameters), translation_of(parameters, "")
+    turn = np.broadcast_to(Rotation.from_matrix(r).as_rotvec(), plan.position.shape)
+    return np.hstack([shift + plan.position @ (r - np.eye(3)).T, turn])
+
+
+FRAME_OFFSET = EffectType(
+    **measured("frame_offset", "sensor", FRAME),
+    title="position and orientation of the instrument's frame",
+    doc=(
+        "The instrument's frame is not where it is believed: a measured position p reads as shift + "
+        "Rx·Ry·Rz p, so that an error of position gains shift + (Rx·Ry·Rz - 1) p."
+    ),
+    frame="base axes",
+    pivot="origin of the base",
+    reading=added(offset),
+    hidden=lambda plan: plan.frame != "known",
+)
+
+
+def drift(plan: Plan, term: AppliedEffect) -> Floats:
+    """(n, 6) proportional to the order of measurement or to the hours, zero at the first reading.
+
+    StiffmapError where the experiment has no such column.
+    """
+    per = str(dict(term.options).get("per", "order"))
+    column = "hours" if per == "hour" else "order"
+    clock = plan.hours if per == "hour" else plan.order
+    if clock is None:
+        raise StiffmapError(f"{plan.name}: drift per {per} needs a column '{column}'")
+    rate = np.concatenate([translation_of(dict(term.parameters), ""), np.zeros(3)])
+    return np.asarray((clock - clock.min())[:, None] * rate)
+
+
+RATES = tuple(Parameter(a, "m", -1e-3, 1e-3, 0.0, 1e-8, f"per reading or per hour, {a}") for a in AXES)
+
+DRIFT = EffectType(
+    **measured("drift", "sensor", RATES),
+    title="drift of the instrument",
+    doc="The reading gains the drift times (order - first order), or times the hours since the first reading.",
+    frame="axes of the reading",
+    options=(Option("per", ("order", "hour"), "what the drift goes with"),),
+    needs=("order",),
+    reading=added(drift),
+)
+
+
+def share_of_motor(read: Floats, motion: Floats, plan: Plan, term: AppliedEffect) -> Floats:
+    """A motor shows the share of its drive's deflection that lies before it."""
+    mine = {f"{leg}.{term.element}" for leg in term.legs}
+    out = read.copy()
+    for i, channel in enumerate(plan.extra, start=6):
+        if channel.side == "motor" and channel.joint in mine:
+            out[:, i] = motion[:, i] * dict(term.parameters)["share"]
+    return out
+
+
+SERVO_SHARE = EffectType(
+    kind="servo_share",
+    title="yield of a drive before its motor's encoder",
+    doc=(
+        "The motor side of a drive reads `share` of the drive's deflection: what its position control "
+        "yields. At 0 the motor stands and all yields behind it, at 1 behind the encoder nothing does. The "
+        "machine at the tool is the same."
+    ),
+    parameters=(Parameter("share", "1", 0.0, 1.0, 0.0, 0.1, "share of the drive's deflection"),),
+    places=at_sites(elastic_drives),
+    apply=None,
+    reading=share_of_motor,
+    frame="the drive's coordinate",
+    moves="nothing of the machine",
+    excludes=("servo_share",),
+    needs=("motor",),
+)

@@ -8,8 +8,17 @@ from pydantic import Discriminator, Field, Tag, create_model, model_validator
 
 from stiffmap.model.description import Body, Cable, CommandError, Drive, Joint, Point, Spring
 from stiffmap.model.description.numbers import DIRECTIONS, DeclaredNumber, numbers_of
-from stiffmap.model.files.schema.base import FileModel, Name, Noted, Number, Numbers, Pair, Vector3
-from stiffmap.model.files.schema.geometry import Axis, FrameModel
+from stiffmap.model.files.schema.base import (
+    Axis,
+    FileModel,
+    FrameModel,
+    Name,
+    Noted,
+    Number,
+    Numbers,
+    Pair,
+    Vector3,
+)
 from stiffmap.model.files.schema.springs import Beam, LawModel, Matrix, Stroke
 
 SORTS = ("offset", "joint", "actuator", "spring", "body", "point", "block", "cable")

@@ -7,9 +7,19 @@ from typing import Annotated, Any, Literal
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from stiffmap.model.description import TASK
-from stiffmap.model.files.schema.base import FileModel, Name, Noted, Number, Numbers, Source, Vector3
+from stiffmap.model.files.schema.base import (
+    BoxModel,
+    FileModel,
+    FrameModel,
+    HomeModel,
+    Name,
+    Noted,
+    Number,
+    Numbers,
+    Source,
+    Vector3,
+)
 from stiffmap.model.files.schema.elements import BodyModel, CableModel, ElementModel, OffsetModel, PointModel
-from stiffmap.model.files.schema.geometry import BoxModel, FrameModel, HomeModel
 from stiffmap.model.files.schema.springs import MaterialModel
 
 Components = Annotated[list[Literal[TASK]], Field(min_length=1)]  # type: ignore[valid-type]

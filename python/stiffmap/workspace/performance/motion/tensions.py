@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
-from stiffmap.model.link.arrays import skew
+from stiffmap.model.link.transport import skew
 from stiffmap.solve.machine import Machine
 from stiffmap.workspace.cables.structure import Hanging, hanging, lines, matrix, nearest, scaled, weight
 from stiffmap.workspace.performance.motion.closing import DriveKinematics
