@@ -132,8 +132,9 @@ def styled(text: str) -> str:
 
 
 def flowed(text: str) -> str:
-    """Paragraphs without the source's line breaks: the terminal breaks them at its own width."""
-    return "\n\n".join(" ".join(paragraph.split()) for paragraph in text.split("\n\n"))
+    """Paragraphs and examples without the source's line breaks: the terminal breaks them at its own width."""
+    paragraphs = re.split(r"\n\n|\n(?= *\[cyan\])", text)
+    return "\n\n".join(" ".join(paragraph.split()) for paragraph in paragraphs)
 
 
 def _version(wanted: bool) -> None:

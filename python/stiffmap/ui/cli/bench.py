@@ -41,9 +41,7 @@ def command(
     turn. Close other programs first. The environment variable STIFFMAP_ISA chooses the instruction set.
 
     Examples:
-
       [cyan]stiffmap bench[/cyan]
-
       [cyan]STIFFMAP_ISA=base stiffmap bench --json[/cyan]
     """
     from stiffmap import load_machine

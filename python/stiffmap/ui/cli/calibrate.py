@@ -34,9 +34,7 @@ def command(
     Exit codes: 0 as declared or within tolerance, 1 beyond tolerance or unattributed, 2 bad input.
 
     Examples:
-
       [cyan]stiffmap calibrate ur10 experiments/tracker -o result[/cyan]
-
       [cyan]stiffmap calibrate linear-delta experiments/heights --exclude gains --tolerance 2[/cyan]
     """
     result = calibrate(

@@ -29,11 +29,8 @@ def command(
     Exit codes: 0 usable, 1 usable with warnings (--strict), 2 not usable.
 
     Examples:
-
       [cyan]stiffmap check my_machine.yaml[/cyan]
-
       [cyan]stiffmap check orthoglide-revised --json[/cyan]
-
       [cyan]stiffmap check --strict my_machine.yaml[/cyan]
     """
     found = check_file(file)

@@ -73,19 +73,12 @@ def command(
     Exit codes: 1 where --check finds that compensation would make the error larger, 2 bad input.
 
     Examples:
-
       [cyan]stiffmap compensate corrected.yaml poses.csv -o commands.csv[/cyan]
-
       [cyan]stiffmap compensate orthoglide-revised poses.csv --effect 'length bar x error=0.1mm' --force 0,0,-300 -o c.csv[/cyan]
-
       [cyan]stiffmap compensate travelling-column --axis z --gravity 0,0,-9.81 --format linuxcnc -o z.comp[/cyan]
-
       [cyan]stiffmap compensate results/map.nc --case Fx --axis x --format siemens -o x.mpf[/cyan]
-
       [cyan]stiffmap compensate calibrated_arm.yaml --urdf arm.urdf -o corrected.urdf[/cyan]
-
       [cyan]stiffmap compensate ur10 --effect 'zero_offset elbow error=1mrad' --dh arm.csv[/cyan]
-
       [cyan]stiffmap compensate result/machine.yaml --check held_out[/cyan]
     """
     if all(given is None for given in (axis, poses, urdf, dh, check)):

@@ -41,11 +41,8 @@ def command(
     Exit codes: 0 verdict none, 1 verdict with findings, 2 bad input.
 
     Examples:
-
       [cyan]stiffmap diagnose orthoglide-revised experiments/servo -o result[/cyan]
-
       [cyan]stiffmap diagnose my.yaml dial_gauges --date 2025-03-14 -o result[/cyan]
-
       [cyan]stiffmap diagnose ur10 tracker --exclude sensor_gain --budget 60[/cyan]
     """
     refuse_unused(context, {"without output": "date"})

@@ -28,13 +28,9 @@ def command(
     """List the effects that a machine can have beyond what is declared, for --effect and with_effect.
 
     Examples:
-
       [cyan]stiffmap effects[/cyan]
-
       [cyan]stiffmap effects friction[/cyan]
-
       [cyan]stiffmap effects backlash[/cyan]
-
       [cyan]stiffmap effects straightness --on orthoglide-revised[/cyan]
     """
     if kind and not on and kind not in kinds() and kind in machine_names():

@@ -44,13 +44,9 @@ def command(
     reach or through a singularity says where and when).
 
     Examples:
-
       [cyan]stiffmap efforts orthoglide-revised trim -o results[/cyan]
-
       [cyan]stiffmap efforts orthoglide-revised cut.yaml --gravity 0,0,-9.81[/cyan]
-
       [cyan]stiffmap efforts ur10 path.csv --feed 3000 --gravity 0,0,-9.81[/cyan]
-
       [cyan]stiffmap efforts ur10 path.csv --duration 2 --gravity 0,0,-9.81 --json[/cyan]
     """
     from stiffmap.workspace.performance import drive_efforts, load_motion

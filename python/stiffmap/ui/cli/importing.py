@@ -42,13 +42,9 @@ def command(
     Exit codes: 0 done, 2 bad input.
 
     Examples:
-
       [cyan]stiffmap import arm.urdf -o arm.yaml[/cyan]
-
       [cyan]stiffmap import arm_dh.csv --dh-convention modified -o craig.yaml[/cyan]
-
       [cyan]stiffmap import delta.urdf --sidecar robot.yaml[/cyan]
-
       [cyan]stiffmap import arm.urdf --tip tool -o tool.yaml[/cyan]
     """
     table = urdf.suffix.lower() in (*TABLES, ".txt", ".md", ".tex")

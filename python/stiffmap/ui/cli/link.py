@@ -49,11 +49,8 @@ def command(
     """Identify a link's 6x6 spring, with error bars, from a part or a displacement field.
 
     Examples:
-
       [cyan]stiffmap link bar.yaml --out bar-link.yaml --picture bar.png[/cyan]
-
       [cyan]stiffmap link bracket.step --fixed face3 --loaded face7 --material aluminium --size 4[/cyan]
-
       [cyan]stiffmap link field.csv --cases cases.csv --reference 310,0,0[/cyan]
     """
     wrenches = UNIT_WRENCHES if cases is None else read_cases(cases)

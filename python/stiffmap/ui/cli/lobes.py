@@ -57,11 +57,8 @@ def command(
     Exit codes: 0 the process is stable at all poses, 1 it chatters at one, 2 bad input.
 
     Examples:
-
       [cyan]stiffmap lobes ur10 --process slot --at -800,-100,250 -o results[/cyan]
-
       [cyan]stiffmap lobes examples/taps/kr210.yaml --process examples/taps/cut.yaml --speeds 2000,12000 --damping 3[/cyan]
-
       [cyan]stiffmap lobes linear-delta --process slot --mode 1243,6.2,0.048,x --mode 1747,2.9,0.1,y --json[/cyan]
     """
     m = machine_with(machine, effect)

@@ -16,9 +16,7 @@ def command(as_json: options.Json = False) -> None:
     """List the machines that come with stiffmap.
 
     Examples:
-
       [cyan]stiffmap machines[/cyan]
-
       [cyan]stiffmap machines --json[/cyan]
     """
     shipped = shipped_machines()

@@ -91,25 +91,15 @@ def command(
     Exit codes: 0 done, 1 some poses failed (they hold NaN and their status), 2 bad input.
 
     Examples:
-
       [cyan]stiffmap map orthoglide-revised -o results[/cyan]
-
       [cyan]stiffmap map orthoglide-revised --force 200,0,-100 --points 41 -o results[/cyan]
-
       [cyan]stiffmap map my_machine.yaml --uncertainty --points 21[/cyan]
-
       [cyan]stiffmap map tripteron --force 100 --points 41 --z 300 --z 500[/cyan]
-
       [cyan]stiffmap map orthoglide-revised --y 0 --plane xz --points 41 --format svg[/cyan]
-
       [cyan]stiffmap map orthoglide-revised --gravity 0,0,-9.81 --tolerance 0.1 --json[/cyan]
-
       [cyan]stiffmap map orthoglide-revised --points 21 --table csv,xlsx -o results[/cyan]
-
       [cyan]stiffmap map orthoglide-revised --points 2001 --estimate[/cyan]
-
       [cyan]stiffmap map orthoglide-revised --points 51 --statistics[/cyan]
-
       [cyan]stiffmap map orthoglide-revised --toolpath trim -o results[/cyan]
     """
     import stiffmap

@@ -58,13 +58,9 @@ def command(
     Exit codes: 0 done, 1 a requirement does not hold, 2 bad input.
 
     Examples:
-
       [cyan]stiffmap measures orthoglide-revised --requirements trimming -o results[/cyan]
-
       [cyan]stiffmap measures ur10 --nodes 11 --force 50[/cyan]
-
       [cyan]stiffmap measures linear-delta --only largest_box,frequency --json[/cyan]
-
       [cyan]stiffmap measures orthoglide-revised --only workspace --clearance 60 --deflection 0.5[/cyan]
     """
     m = machine_with(machine, effect)

@@ -62,13 +62,9 @@ def command(
     Exit code 1: a point without an equilibrium, an error beyond the tolerance after compensation, or a drive or joint beyond its limits.
 
     Examples:
-
       [cyan]stiffmap mill orthoglide-revised outline.ngc --process trimming --at 50,50,0 -o result[/cyan]
-
       [cyan]stiffmap mill linear-delta rectangle --size 120,80,15 --process trimming.yaml --at 0,0,300 -o result[/cyan]
-
       [cyan]stiffmap mill linear-delta circle --size 60 --process trimming --at 0,0,300 --entry best --feeds --tolerance 0.1 -o result[/cyan]
-
       [cyan]stiffmap mill corrected.yaml outline.ngc --process trimming --true my.yaml --band -o cut[/cyan]
     """
     found = mill_job(

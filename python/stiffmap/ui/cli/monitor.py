@@ -31,9 +31,7 @@ def command(
     did, 2 bad input.
 
     Examples:
-
       [cyan]stiffmap monitor orthoglide-revised january june --effect 'dead_zone actuator y half_width=10um'[/cyan]
-
       [cyan]stiffmap monitor orthoglide-revised january june --diagnosis january/diagnosis.json --budget[/cyan]
     """
     m = load_machine(machine)

@@ -65,13 +65,9 @@ def command(
     With --from, the file is complete: geometry, steel tubes, drives, masses and a workspace within reach.
 
     Examples:
-
       [cyan]stiffmap new my_machine.yaml[/cyan]
-
       [cyan]stiffmap new --from 3-rrr my_3rrr.yaml --radius 300 --arm 180 --forearm 200[/cyan]
-
       [cyan]stiffmap new --from hexapod my_hexapod.yaml --radius 400 --height 600[/cyan]
-
       [cyan]stiffmap new --list[/cyan]
     """
     dimensions = {"radius": radius, "platform": platform, "arm": arm, "forearm": forearm, "rod": rod, "height": height,

@@ -41,11 +41,8 @@ def command(
     no design meets all constraints.
 
     Examples:
-
       [cyan]stiffmap optimize redesign -o results/redesign[/cyan]
-
       [cyan]stiffmap optimize my_design.yaml --generations 5 --json[/cyan]
-
       [cyan]stiffmap optimize redesign --scheduler tcp://HOST:8786 -o results/redesign[/cyan]
     """
     console = Console(stderr=True, highlight=False)

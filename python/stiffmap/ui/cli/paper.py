@@ -32,11 +32,8 @@ def command(
     Exit codes: 0 done (whatever the verdicts), 2 bad input.
 
     Examples:
-
       [cyan]stiffmap paper -o results[/cyan]
-
       [cyan]stiffmap paper --json[/cyan]
-
       [cyan]stiffmap paper --points 31 --no-figures -o results[/cyan]
     """
     target = make_folder(output) if output else None

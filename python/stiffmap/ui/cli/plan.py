@@ -60,15 +60,10 @@ def command(
     Rows are within reach and within the drives' range; the same number of random rows is shown for comparison.
 
     Examples:
-
       [cyan]stiffmap plan orthoglide-revised --identify 'compliance actuator x scale=1' --rows 8 -o plan.csv[/cyan]
-
       [cyan]stiffmap plan ur10 --identify 'zero_offset elbow error=1mrad' --quantity position --frame unknown[/cyan]
-
       [cyan]stiffmap plan examples/taps/kr210.yaml --taps 3 -o taps.csv[/cyan]
-
       [cyan]stiffmap plan orthoglide-revised --identify 'dead_zone actuator y half_width=10um' --rival 'compliance actuator y scale=1.2'[/cyan]
-
       [cyan]stiffmap plan orthoglide-revised --identify 'compliance actuator scale=1' --until 0.05 --twin 'compliance actuator scale=1.4'[/cyan]
     """
     refuse_unused(context, UNUSED)

@@ -39,11 +39,8 @@ def command(
     Exit codes: 0 done, 1 some directions failed, 2 bad input.
 
     Examples:
-
       [cyan]stiffmap polar orthoglide-revised --at -200,-200,-200 -o results[/cyan]
-
       [cyan]stiffmap polar orthoglide-revised --at 0,0,0 --at 300,300,300 --force 500[/cyan]
-
       [cyan]stiffmap polar tripteron --at 300,400,500 --plane xz --json[/cyan]
     """
     import stiffmap

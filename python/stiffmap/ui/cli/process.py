@@ -28,9 +28,7 @@ def command(
     law, Kienzle's and, from signals, run-out are judged by their errors at feeds that were left out.
 
     Examples:
-
       [cyan]stiffmap process forces.csv[/cyan]
-
       [cyan]stiffmap process forces.csv --process slot -o process.yaml[/cyan]
     """
     from stiffmap.machining.process import identify_process, load_process

@@ -30,11 +30,8 @@ def command(
     predicted, 1 they are not (p-value below 1e-3), 2 bad input.
 
     Examples:
-
       [cyan]stiffmap residual orthoglide-revised experiments/servo[/cyan]
-
       [cyan]stiffmap residual orthoglide-revised experiments/servo --rows 20 -o result[/cyan]
-
       [cyan]stiffmap residual orthoglide-revised experiments/servo --effect 'compliance actuator z scale=2.1'[/cyan]
     """
     declared = load_machine(machine)

@@ -48,11 +48,8 @@ def command(
     in the deflection of the tool.
 
     Examples:
-
       [cyan]stiffmap show orthoglide-revised[/cyan]
-
       [cyan]stiffmap show tripteron --at 300,400,500 -o tripteron.png --view 15,-60[/cyan]
-
       [cyan]stiffmap show orthoglide-revised --at -200,-200,-200 --load 300,0,0 --page loaded.html[/cyan]
     """
     m, p, how = machine_at(machine, effect, at, turned)

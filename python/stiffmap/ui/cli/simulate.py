@@ -73,15 +73,10 @@ def command(
     [bold]stiffmap diagnose[/bold] on it says what the plan would have found, and how small.
 
     Examples:
-
       [cyan]stiffmap simulate orthoglide-revised --effect 'dead_zone actuator y half_width=5um' -o twin[/cyan]
-
       [cyan]stiffmap simulate orthoglide-revised --effect 'length bar x error=0.1mm' --quantity position --plan grid:5x5x3 --noise 0.01 -o twin[/cyan]
-
       [cyan]stiffmap simulate orthoglide-revised --effect 'friction actuator y force=40N' --effect 'compliance actuator z scale=1.5' --branches --loads full --poses 8 -o twin[/cyan]
-
       [cyan]stiffmap simulate orthoglide-revised --plan my_poses.csv --temperature 20,26 --shuffle --outliers 0.02 -o twin[/cyan]
-
       [cyan]stiffmap simulate orthoglide-revised --plan experiments/servo --effect 'dead_zone actuator y half_width=5um' -o twin[/cyan]
     """
     chosen = load_machine(machine)

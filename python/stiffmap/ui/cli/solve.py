@@ -57,15 +57,10 @@ def command(
     Exit codes: 0 converged, 1 any other status, 2 bad input.
 
     Examples:
-
       [cyan]stiffmap solve orthoglide-revised --at -200,-200,-200 --force 300,0,0[/cyan]
-
       [cyan]stiffmap solve orthoglide-revised --at -200 -200 -200 --force 300[/cyan]
-
       [cyan]stiffmap solve tripteron --at 300,400,500 --force 0,0,100 --json[/cyan]
-
       [cyan]stiffmap solve orthoglide-revised --force 0,0,-50 --moment 0,2000,0 --gravity 0,0,-9.81[/cyan]
-
       [cyan]stiffmap solve orthoglide-revised --at poses.csv --force 0,0,-100 -o answers.csv[/cyan]
     """
     file = Path(at) if at is not None and is_file_name(at) else None

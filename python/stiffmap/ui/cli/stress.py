@@ -30,9 +30,7 @@ def command(
     Exit codes: 0 converged, 1 any other status, 2 bad input.
 
     Examples:
-
       [cyan]stiffmap stress my_machine.yaml --at 0,200[/cyan]
-
       [cyan]stiffmap stress swing-table --gravity 0,0,-9.81 -o out[/cyan]
     """
     import stiffmap

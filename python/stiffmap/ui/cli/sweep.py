@@ -47,11 +47,8 @@ def command(
     Exit codes: 0 done, 1 some equilibria are unstable or were not found, 2 bad input.
 
     Examples:
-
       [cyan]stiffmap sweep orthoglide-revised --at -200,-200,-200 --direction 1,1,0 -o results[/cyan]
-
       [cyan]stiffmap sweep orthoglide-revised --from 0 --to 8000 --points 41[/cyan]
-
       [cyan]stiffmap sweep linear-delta --direction 0,0,-1 --control displacement --limit 20 -o out[/cyan]
     """
     import stiffmap

@@ -39,9 +39,7 @@ def command(
     Exit codes: 0 nothing is missing, 1 an effect was named or the readings do not fit, 2 bad input.
 
     Examples:
-
       [cyan]stiffmap taps examples/taps/kr210.yaml examples/taps/taps.csv -o result[/cyan]
-
       [cyan]stiffmap taps examples/taps/kr210.yaml examples/taps/taps.csv --only compliance --json[/cyan]
     """
     if not 0 < mass_u < 100:

@@ -70,17 +70,11 @@ def command(
     With --html or --picture: writes the file and ends; the page opens without a network.
 
     Examples:
-
       [cyan]stiffmap view orthoglide-revised[/cyan]
-
       [cyan]stiffmap view orthoglide-revised --at 280,280,280 --force 300,0,0 --quantity worst[/cyan]
-
       [cyan]stiffmap view hexapod --plane x --html hexapod.html[/cyan]
-
       [cyan]stiffmap view orthoglide-revised --experiment experiments/servo --diagnosis result[/cyan]
-
       [cyan]stiffmap view calibrated_arm.yaml --meshes arm.urdf[/cyan]
-
       [cyan]stiffmap view orthoglide-revised --set x.foot/beam.EIx=4000 --no-browser --port 8090[/cyan]
     """
     refuse_unused(context, UNUSED | (PICTURE_ALONE if html is None else {}))
