@@ -167,20 +167,8 @@ def _root(
 _root.__doc__ = HELP
 
 
-VECTORS = frozenset(
-    (
-        "--at",
-        "--force",
-        "--moment",
-        "--direction",
-        "--by",
-        "--turn",
-        "--rotation",
-        "--gravity",
-        "--view",
-        "--load",
-    )
-)
+VECTORS = ("--at", "--force", "--moment", "--direction", "--by", "--turn", "--rotation", "--gravity", "--view",
+           "--load")  # fmt: skip
 """Options whose value is a vector; all but ``--view`` have three numbers."""
 
 

@@ -38,14 +38,9 @@ def command(
       [cyan]stiffmap calibrate linear-delta experiments/heights --exclude gains --tolerance 2[/cyan]
     """
     result = calibrate(
-        machine,
-        data,
-        tolerances=Tolerances().scaled(tolerance),
-        exclude=exclude or (),
-        time_limit=budget,
-        seed=seed,
-        threads=threads,
-    )
+        machine, data, tolerances=Tolerances().scaled(tolerance), exclude=exclude or (), time_limit=budget,
+        seed=seed, threads=threads,
+    )  # fmt: skip
     if output is not None:
         write(result, output)
     table = result.table(rows)

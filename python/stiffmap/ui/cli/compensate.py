@@ -139,7 +139,6 @@ def _sizes(sizes: tuple[Summary, Summary]) -> dict[str, object]:
 
 
 def _table(errors: AxisErrors, form: str, output: Path | None) -> dict[str, object]:
-    """A controller's table of an axis."""
     text = compensation_table(errors, form)
     if output is not None:
         write_table(errors, output, form)

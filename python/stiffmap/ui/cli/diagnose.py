@@ -48,15 +48,10 @@ def command(
     refuse_unused(context, {"without output": "date"})
     silent = quiet or as_json or not sys.stderr.isatty()
     result = diagnose(
-        machine,
-        data,
-        seed=seed,
-        threads=threads,
-        exclude=exclude or (),
-        time_limit=budget,
+        machine, data, seed=seed, threads=threads, exclude=exclude or (), time_limit=budget,
         tolerances=Tolerances().scaled(tolerance),
         progress=None if silent else partial(print, "trying:", file=sys.stderr),
-    )
+    )  # fmt: skip
     if output is not None:
         write(result, output, date, [p for p in (Path(machine), Path(data)) if p.exists()])
     wrote = None if output is None else f"wrote {output}: start with report.html"

@@ -45,7 +45,6 @@ def command(
 
 
 def _lines(effect: EffectType, machine: Machine | None) -> Iterator[str | Text]:
-    """An effect and its parameters, and where it can be."""
     names = ", ".join(f"{p.name} ({p.unit})" if p.unit != "1" else p.name for p in effect.parameters)
     yield Text.assemble((effect.kind, "bold"), f"  {effect.title}: {names}")
     if machine is not None:

@@ -56,15 +56,8 @@ def command(
     run = load_motion(trajectory).trajectory(m, duration=duration, gravity=g, feed=in_si(feed, unit=MM / 60))
     found = drive_efforts(m, run, gravity=g, friction=friction, threads=threads)
     files = write_files(output, _files(found))
-    names = (
-        "peak_effort",
-        "rms_effort",
-        "effort_margin",
-        "peak_speed",
-        "speed_margin",
-        "peak_power",
-        "range_margin",
-    )
+    names = ("peak_effort", "rms_effort", "effort_margin", "peak_speed", "speed_margin", "peak_power",
+             "range_margin")  # fmt: skip
     data = {"machine": m.name, "time": found.time.values[-1], "drives": list(map(str, found.drive.values))}
     show(as_json, data | {n: found[n].values for n in names}, [as_table(found)], files)
     finish(bool(exceeded(found).any()))
@@ -77,7 +70,6 @@ def exceeded(found: xr.Dataset) -> np.ndarray:
 
 
 def _files(found: xr.Dataset) -> Iterator[tuple[str, Any]]:
-    """Data and picture."""
     from stiffmap.ui.plot.efforts import efforts_figure
 
     yield "efforts.nc", found

@@ -81,7 +81,6 @@ def _remarks(found: Imported, assumed: bool) -> Iterator[Text]:
 
 
 def _of_table(file: Path, convention: str, unit: list[str] | None) -> Imported:
-    """The arm of a table of Denavit and Hartenberg."""
     from stiffmap.common.tables.sheet import read_sheet
     from stiffmap.experiment.spreadsheet.dh import QUANTITIES, arm, read_dh, unused
 

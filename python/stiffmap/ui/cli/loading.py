@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import wraps
 from importlib import import_module
+from types import SimpleNamespace
 from typing import Any, cast
 
 from stiffmap.common.errors import MissingPartError
@@ -65,16 +66,6 @@ class _Waits:
         return iter(imported(self))
 
 
-class _Source:
-    """The module of ``from module import name``: hands out what waits."""
-
-    def __init__(self, module: str) -> None:
-        self._module = module
-
-    def __getattr__(self, name: str) -> _Waits:
-        return _Waits(self._module, name)
-
-
 def imported(waits: _Waits) -> Any:
     """What has waited, imported now."""
     module, name = waits._of
@@ -115,7 +106,8 @@ def imports_wait() -> Iterator[None]:
         asks = isinstance(globals, dict) and str(globals.get("__name__")).startswith(HERE)
         if asks and below and name not in sys.modules and (fromlist or name == top):
             _waiting.append(cast(dict[str, Any], globals))
-            return _Source(name) if fromlist else _Waits(name)
+            waiting = SimpleNamespace(**{part: _Waits(name, part) for part in fromlist or ()})
+            return waiting if fromlist else _Waits(name)
         return usual(name, globals, locals, fromlist, level)
 
     builtins.__import__ = to_wait

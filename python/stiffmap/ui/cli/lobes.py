@@ -90,7 +90,6 @@ def command(
 def _one(
     machine: Any, p: Process, at: str | None, given: dict[str, Any], output: Path | None, i: int
 ) -> dict[str, Any]:
-    """Answer of one pose; files where there is a folder."""
     place = position(at, machine)
     ds = stability_lobes(machine, p, place, **given)
     a = ds.attrs

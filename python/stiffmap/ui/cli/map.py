@@ -17,17 +17,8 @@ from stiffmap.common.outputs.option import written
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.status import Status
 from stiffmap.ui.cli import options
-from stiffmap.ui.cli.inputs import (
-    MM,
-    finish,
-    force_given,
-    gravity,
-    machine_with,
-    options_given,
-    refuse_unused,
-)
-from stiffmap.ui.cli.map_files import write_map_files
-from stiffmap.ui.cli.map_summary import MapSummary
+from stiffmap.ui.cli.inputs import MM, finish, force_given, gravity, machine_with, refuse_unused
+from stiffmap.ui.cli.map_summary import MapSummary, assumptions, write_map_files
 from stiffmap.ui.cli.options import flag, option
 from stiffmap.ui.cli.output import failed_in_words, show, table
 from stiffmap.workspace.maps.inputs import magnitude, plane_axes
@@ -133,28 +124,6 @@ def command(
     files = [target, *write_map_files(result, output, kinds, sheets, own_scales)]
     show(as_json, result.as_plain(files), result.lines(), files)
     finish(bool(result.failed))
-
-
-def assumptions(context: typer.Context, force: str, tolerance: float) -> str:
-    """The force and the tolerance, and where they come from: the command line, or the default."""
-    values = {"force": f"({force}) N" if "," in force else f"{force} N", "tolerance": f"{tolerance:g} mm"}
-    given = options_given(context)
-    taken = [n for n in values if n not in given]
-    own = [f"{n} {v}" for n, v in values.items() if n in given]
-    text = f"{_sentence(own)} as given. " if own else ""
-    if not taken:
-        return text.rstrip()
-    are, they = ("are those", "they are") if len(taken) > 1 else ("is that", "it is")
-    return (
-        f"{text}{_sentence([f'{n} {values[n]}' for n in taken])} {are} of the Orthoglide's application in the paper; {they} used "
-        f"because the machine file has none. Give your own by {' and '.join(f'--{n}' for n in taken)}."
-    )
-
-
-def _sentence(parts: Sequence[str]) -> str:
-    """``Force 300 N and tolerance 0.25 mm``."""
-    text = " and ".join(parts)
-    return text[:1].upper() + text[1:]
 
 
 def planes(across: dict[str, list[float] | None]) -> dict[str, Any]:

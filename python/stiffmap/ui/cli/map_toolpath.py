@@ -70,7 +70,6 @@ def _load(m: Machine, position: Floats, force: str, how: dict[str, Any]) -> Floa
 
 
 def _table(ds: xr.Dataset, path: Path) -> Path:
-    """A row per point."""
     head = ["way [mm]", "x [mm]", "y [mm]", "z [mm]", "fx [N]", "fy [N]", "fz [N]",
             "dx [mm]", "dy [mm]", "dz [mm]", "deflection [mm]"]  # fmt: skip
     columns = np.column_stack([

@@ -78,7 +78,6 @@ def command(
 
 
 def _told(table: MeasuresTable) -> Iterator[Table | Text | str]:
-    """The table as text."""
     yield as_table(table, narrow=get_console().width < WIDE)
     yield from (Text(note, "dim") for note in (*table.notes, *remarks(table)))
     if table.requirements.bounds:
@@ -143,16 +142,9 @@ def write_report(table: MeasuresTable, path: Path, figures: dict[str, Figure | b
     from stiffmap.ui.plot.measures import caption
     from stiffmap.ui.report.sheet import ReportSheet, write_sheet
 
-    text = as_table(table)
-    head, rows = as_text(text)
-    sheet = ReportSheet(
-        title=f"Measures of {table.machine.name}",
-        answer=verdict_of(table),
-        lines=[f"{text.title}.", *table.notes, *remarks(table)],
-        head=head,
-        rows=rows,
-        numbers=(2, 4, 5, 6, 7),
-    )
+    text, title = as_table(table), f"Measures of {table.machine.name}"
+    lines = [f"{text.title}.", *table.notes, *remarks(table)]
+    sheet = ReportSheet(title, verdict_of(table), lines, *as_text(text), numbers=(2, 4, 5, 6, 7))
     digests = {f"machine {table.machine.name}, as loaded": machine_digest(table.machine)}
     return write_sheet(path, sheet, {caption(n): f for n, f in figures.items()}, digests)
 

@@ -64,13 +64,8 @@ def command(
     report = measured(found, place)
     files = write_files(place, _files(found, report))
     console.print(f"{found.evaluated} designs in {time.monotonic() - begun:.0f} s")
-    data = {
-        "design": problem.model.name,
-        "evaluated": found.evaluated,
-        "front": len(found.x),
-        **report.as_plain(),
-        "files": files,
-    }
+    data = {"design": problem.model.name, "evaluated": found.evaluated, "front": len(found.x)}
+    data |= report.as_plain() | {"files": files}
     machines = ", ".join(f"{k}.yaml" for k in report.chosen)
     told = [
         *(Text(line, "dim") for line in report.lines()),
@@ -81,7 +76,6 @@ def command(
 
 
 def _files(found: ParetoSet, report: ComparedDesigns) -> Iterator[tuple[str, Any]]:
-    """The set and its pictures."""
     from stiffmap.ui.plot.design import comparison_figure, front_figure, parallel_figure, progress_figure
     from stiffmap.ui.plot.measures import path_measures_figure
 

@@ -45,7 +45,6 @@ def command(
 
 
 def _files(results: Results, statements: list[Statement], figures: bool) -> Iterator[tuple[str, Any]]:
-    """Figures and tables."""
     from stiffmap.ui.paper.figures import all_figures
 
     yield from all_figures(results).items() if figures else ()

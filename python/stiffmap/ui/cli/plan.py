@@ -94,7 +94,6 @@ def command(
 
 
 def _taps(m: Machine, count: int, tries: int, seed: int, output: Path | None, as_json: bool) -> None:
-    """Poses to tap."""
     from stiffmap.identification.taps import where_to_tap
 
     poses = [[round(float(v), 1) for v in p] for p in where_to_tap(m, count, tries=tries, seed=seed) / MM]
@@ -119,12 +118,7 @@ def _sequential(
     terms = effects_of(m, identify)
     seeds = itertools.count(how["seed"])
     steps = follow(
-        m,
-        terms,
-        lambda e: simulate(m, e, twin or terms, seed=next(seeds)),
-        until=until,
-        batch=rows,
-        **how,
+        m, terms, lambda e: simulate(m, e, twin or terms, seed=next(seeds)), until=until, batch=rows, **how
     )
     met = steps[-1][1].worst <= until
     told = []

@@ -70,7 +70,6 @@ def _under(place: Any, vector: Any, displacement: Any) -> str:
 
 
 def _files(many: list[xr.Dataset], plane: str, tolerance: float) -> Iterator[tuple[str, Any]]:
-    """Data and pictures."""
     from stiffmap.ui.plot import ellipse_figure, polar_figure
 
     for i, d in enumerate(many, 1):

@@ -100,7 +100,6 @@ def as_plain(m: Machine, counts: Mobility, file: Path | None) -> Any:
 
 
 def _lines(m: Machine, counts: Mobility, file: Path | None) -> Iterator[Any]:
-    """For the terminal."""
     d = m.description
     tree = Tree(Text.assemble((m.name, "bold"), f"  {d.title}"))
     legs = [(f"leg {leg.name}", leg.elements) for leg in d.legs]

@@ -120,7 +120,6 @@ def command(
 
 
 def _sizes(text: str) -> list[float]:
-    """Sizes of forces, N."""
     found: list[float] = numbers(text, "forces").tolist()
     if min(found) <= 0:
         raise StiffmapError(
@@ -130,7 +129,6 @@ def _sizes(text: str) -> list[float]:
 
 
 def _axes(text: str) -> tuple[str, ...]:
-    """Axes that are read."""
     if text == "none":
         return ()
     wanted = tuple(a.strip() for a in text.split(",") if a.strip())

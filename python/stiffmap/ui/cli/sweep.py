@@ -70,7 +70,6 @@ def command(
 
 
 def _files(ds: xr.Dataset, tolerance: float) -> Iterator[tuple[str, Any]]:
-    """Data and picture."""
     from stiffmap.ui.plot import sweep_figure
 
     u = ", ".join(f"{v:.3g}" for v in ds.direction.values)

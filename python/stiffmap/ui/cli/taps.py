@@ -58,7 +58,6 @@ def command(
 
 
 def _row(r: dict[str, Any]) -> str:
-    """A mode in a line."""
     after = "" if r["after_Hz"] is None else f", after {r['after_Hz']:.2f}"
     mac = "" if r["mac"] is None or np.isnan(r["mac"]) else f", MAC {r['mac']:.2f}"
     text = f"  {r['measured_Hz']:8.2f} Hz measured, {r['before_Hz']:8.2f} before{after}{mac}"
@@ -69,7 +68,6 @@ def _row(r: dict[str, Any]) -> str:
 
 
 def _files(machine: Any, measured: TapTest, found: TapDiagnosis) -> Iterator[tuple[str, Any]]:
-    """Corrected machine and responses before and after."""
     from stiffmap.ui.plot.vibration import response_figure
     from stiffmap.workspace.vibration import frequency_response
 

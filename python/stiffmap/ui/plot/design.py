@@ -92,7 +92,6 @@ def _map(table: MeasuresTable, name: str) -> BoxMap | None:
 
 
 def _middle(over: BoxMap) -> Floats:
-    """(x, y) values of the plane in the middle of the box."""
     return np.asarray(over.values[:, :, len(over.z) // 2])
 
 

@@ -47,7 +47,6 @@ def _check(path: xr.Dataset) -> None:
 
 
 def _draw_branch(ax: Axes, branch: xr.Dataset, colour: str, name: str) -> None:
-    """One branch, by stability."""
     if branch.sizes["step"] < 2:
         return
     x, y = MM * branch.deflection_along.values, branch.force.values

@@ -117,7 +117,6 @@ class Data:
         self._said: dict[str, str] = {}
 
     def __call__(self, scene: Scene, moment: Moment) -> None:
-        """Draw into a scene."""
         if self.experiment is not None:
             self._rows(scene, moment, self.experiment)
         if self.diagnosis is not None:

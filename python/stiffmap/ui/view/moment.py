@@ -68,25 +68,19 @@ class Moment:
     def frame(self) -> Frame:
         """The rectangle across the workspace box that holds the tool."""
         low, high = drawn_box(self.machine)
-        s, p = self.state, np.array(self.state.position)
+        s, p, axes = self.state, np.array(self.state.position), np.eye(3)
         if s.plane == "free":
             n = np.array(s.normal) / np.linalg.norm(s.normal)
-            other = np.eye(3)[int(np.argmin(np.abs(n)))]
-            u = np.cross(other, n)
+            u = np.cross(axes[int(np.argmin(np.abs(n)))], n)
             u /= np.linalg.norm(u)
             v = np.cross(n, u)
-            corners = box_corners(low, high) - p
-            along = np.stack([corners @ u, corners @ v])
-            lowest, highest = along.min(axis=1), along.max(axis=1)
-            middle = (lowest + highest) / 2
-            width, height = highest - lowest
-            return Frame(p + middle[0] * u + middle[1] * v, u, v, float(width), float(height))
-        axis = "xyz".index(s.plane)
-        right, up = (i for i in range(3) if i != axis)
-        centre = (low + high) / 2
-        centre[axis] = p[axis]
-        e = np.eye(3)
-        return Frame(centre, e[right], e[up], float(high[right] - low[right]), float(high[up] - low[up]))
+        else:
+            u, v = np.delete(axes, "xyz".index(s.plane), axis=0)
+        along = box_corners(low, high) @ np.stack([u, v], axis=1)
+        lowest, highest = along.min(axis=0), along.max(axis=0)
+        right, up = (lowest + highest) / 2
+        width, height = map(float, highest - lowest)
+        return Frame(p + (right - p @ u) * u + (up - p @ v) * v, u, v, width, height)
 
     def plane(self, count: int = FINE) -> PlaneMap:
         """The plane through the tool; outside the box its poses are solved as well and hidden."""

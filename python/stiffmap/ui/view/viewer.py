@@ -15,6 +15,7 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.solution import Solution
 from stiffmap.ui.plot.elements import element_links
+from stiffmap.ui.view import panels
 from stiffmap.ui.view.animation import Swing
 from stiffmap.ui.view.colours import colours_of
 from stiffmap.ui.view.controls import NONE, Controls
@@ -23,14 +24,6 @@ from stiffmap.ui.view.hands import ProbePoint, listen, listen_to_nodes
 from stiffmap.ui.view.model import ViewModel
 from stiffmap.ui.view.moment import COARSE, FINE, Moment
 from stiffmap.ui.view.numbers import write
-from stiffmap.ui.view.panels import (
-    colour_bar,
-    compliance_panel,
-    efforts_panel,
-    frequencies_panel,
-    shares_panel,
-    status_line,
-)
 from stiffmap.ui.view.plane import PlaneMap
 from stiffmap.ui.view.quantities import QUANTITIES
 from stiffmap.ui.view.scene import Scene, look_at_machine
@@ -130,7 +123,9 @@ class Viewer:
                 self.scene.tool(moment)
             if found is not None:
                 self._show(found, moment.state)
-            write(self.controls.status, "content", status_line(moment, s, self.model.message, self.error))
+            write(
+                self.controls.status, "content", panels.status_line(moment, s, self.model.message, self.error)
+            )
         self.server.flush()
 
     def fine(self) -> None:
@@ -171,7 +166,7 @@ class Viewer:
             self._held = found
         limits = self._held.range
         self.scene.plane(found, limits, state.tolerance, self.controls.isolines.value)
-        write(self.controls.bar, "content", colour_bar(found, limits, state.tolerance))
+        write(self.controls.bar, "content", panels.colour_bar(found, limits, state.tolerance))
 
     def redraw(self) -> None:
         """The plane is to be drawn again though the machine is the same."""
@@ -187,13 +182,13 @@ class Viewer:
         try:
             budget = moment.shares()
             self.controls.elements([n for n, _, _ in budget.ranked()])
-            parts.append(shares_panel(budget, lit))
+            parts.append(panels.shares_panel(budget, lit))
         except StiffmapError as problem:
-            parts.append(status_line(moment, s, "", str(problem)))
-        parts += [compliance_panel(s), efforts_panel(moment, s)]
+            parts.append(panels.status_line(moment, s, "", str(problem)))
+        parts += [panels.compliance_panel(s), panels.efforts_panel(moment, s)]
         w = self.swing.frequencies(moment)
         if w is not None:
-            parts.append(frequencies_panel(w.frequency.tolist(), self.controls.mode.value - 1))
+            parts.append(panels.frequencies_panel(w.frequency.tolist(), self.controls.mode.value - 1))
         if self.data is not None:
             self.data(self.scene, moment)
             parts.insert(0, self.data.html)
@@ -218,7 +213,7 @@ class Viewer:
         )
         s = self._solution
         if s is not None:
-            write(self.controls.status, "content", status_line(self.now(), s, "", self.error))
+            write(self.controls.status, "content", panels.status_line(self.now(), s, "", self.error))
 
     def renew(self) -> None:
         """The machine's file has changed: its own scene and addresses, made by the thread that draws."""

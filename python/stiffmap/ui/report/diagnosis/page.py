@@ -189,7 +189,6 @@ def _at(p: Rest) -> str:
 
 
 def _seen(d: Diagnosis) -> list[tuple[str, str, str]]:
-    """What could have been found, the easiest first."""
     turning = {n for n, j in joints(d.declared.description).items() if j.kind != "prismatic"}
     return [row for _, row in sorted((_one_seen(x, turning) for x in d.detectable), key=lambda pair: pair[0])]
 
@@ -210,7 +209,6 @@ def _one_seen(x: Detectability, turning: set[str]) -> tuple[float, tuple[str, st
 
 
 def _digests(d: Diagnosis) -> dict[str, str]:
-    """Of the machine and the readings as they were used."""
     e = d.experiment
     return {
         f"machine {d.declared.name}, as loaded": digest(d.declared.description),
