@@ -149,10 +149,7 @@ def as_data(link: Link, part: PartLink | None, file: LinkFile) -> dict[str, Any]
         "reference": link.reference,
         "compliance": file.compliance,
         "standard_error": file.standard_error,
-        "insignificant": link.insignificant,
-        "level": link.level,
-        "sigma": link.sigma,
-        "dof": link.dof,
+        **{n: getattr(link, n) for n in ("insignificant", "level", "sigma", "dof")},
         "outliers": int(link.outliers.sum()),
         "asymmetry": link.asymmetry,
     }

@@ -12,7 +12,7 @@ from stiffmap.ui.cli import options
 from stiffmap.ui.cli.options import option
 from stiffmap.ui.cli.output import show, write_files
 from stiffmap.ui.paper import Results, Statement, all_statements, compute
-from stiffmap.ui.paper.table import as_csv, as_markdown, as_rich, count, count_text
+from stiffmap.ui.paper.statement import as_csv, as_markdown, as_rich, count, count_text
 
 NO_CURVES = "The paper prints no numbers of the curves in Figures 5 to 7; the numbers above are those of its text and Table 1."
 

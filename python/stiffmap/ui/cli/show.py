@@ -77,10 +77,8 @@ def command(
 def _draw(m: Machine, p: Any, r: Any, path: Path, view: str | None, wrench: Any) -> Path:
     from stiffmap.ui.plot import loaded_figure, machine_figure, save
 
-    looks = None if view is None else tuple(numbers(view, "view", 2).tolist())
-    if wrench is not None:
-        return save(loaded_figure(m, p, wrench, rotation=r, view=looks), path)
-    return save(machine_figure(m, p, rotation=r, view=looks), path)
+    how = {"rotation": r, "view": None if view is None else tuple(numbers(view, "view", 2).tolist())}
+    return save(machine_figure(m, p, **how) if wrench is None else loaded_figure(m, p, wrench, **how), path)
 
 
 def as_plain(m: Machine, counts: Mobility, file: Path | None) -> Any:

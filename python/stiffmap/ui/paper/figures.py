@@ -33,12 +33,8 @@ def all_figures(results: Results) -> dict[str, Figure]:
     figure_6 = sweep_figure(list(results.sweeps.values()), tolerance=TOLERANCE)
     headline(figure_6, "Figure 6. Deflection against force at the four points")
     figures = {"figure5.png": figure_5(results), "figure6.png": figure_6}
-    for name, variable, case in (
-        ("worst", "worst_deflection_xy", None),
-        ("best", "best_deflection_xy", None),
-        ("Fx", "deflection_xy", "Fx"),
-        ("Fy", "deflection_xy", "Fy"),
-    ):
+    for name in ("worst", "best", "Fx", "Fy"):
+        variable, case = (f"{name}_deflection_xy", None) if name.islower() else ("deflection_xy", name)
         figures[f"figure7-{name}.png"] = map_figure(results.maps, variable, case=case, tolerance=TOLERANCE)
     worst = float(results.maps.worst_deflection_xy.max()) * MM
     title = f"Figure 7. {FORCE:g} N in the worst direction of the plane, up to {worst:.2f} mm"

@@ -35,10 +35,9 @@ def efforts_figure(found: xr.Dataset) -> Figure:
             for limit, colour in limits.items():
                 if np.isfinite(limit) and limit < 4 * span:
                     within = True
-                    for sign in (1, -1):
-                        axes.axhline(
-                            sign * limit, color="black" if len(limits) == 1 else colour, linewidth=0.6
-                        )
+                    look = {"color": "black" if len(limits) == 1 else colour, "linewidth": 0.6}
+                    axes.axhline(limit, **look)
+                    axes.axhline(-limit, **look)
             axes.axhline(0, color="0.8", linewidth=0.6, zorder=0)
             axes.set_ylabel(label if margin is None else f"{label}, {_unit(turns, name == 'effort')}")
         panels[-1].set_xlabel("time, s")

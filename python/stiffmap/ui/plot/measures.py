@@ -199,12 +199,8 @@ def requirement_figure(table: MeasuresTable) -> Figure:
     with paper(6.4, 0.6 + 0.42 * len(rows), most=0) as figure:
         axes = figure.add_subplot()
         shares = np.nan_to_num([_share(r) for r in rows], posinf=0.0, neginf=0.0)
-        axes.barh(
-            range(len(rows)),
-            shares,
-            color=[BLUE if r.verdict == "pass" else VERMILLION for r in rows],
-            height=0.6,
-        )
+        colours = [BLUE if r.verdict == "pass" else VERMILLION for r in rows]
+        axes.barh(range(len(rows)), shares, color=colours, height=0.6)
         for i, (r, share) in enumerate(zip(rows, shares, strict=True)):
             text = f"{r.measure.factor * r.found.worst:.4g} {r.measure.shown} – {r.verdict}"
             axes.text(max(share, 1.0) * 1.02, i, text, va="center")

@@ -55,17 +55,13 @@ def outline_figure(found: Milled) -> Figure:
         ax = figure.subplots()
         ax.plot(*(MM * wanted[:, :2].T), color=BLACK, lw=1.0, label="wanted")
         cut = magnified(before)
-        lines = LineCollection(
-            [cut[k : k + 2] for k in range(len(cut) - 1)],
-            array=scale * np.abs(np.insert(before, corner + 1, np.nan)[1:]),
-            cmap=COLOURS,
-            linewidths=2.2,
-        )
+        pieces = [cut[k : k + 2] for k in range(len(cut) - 1)]
+        sizes = scale * np.abs(np.insert(before, corner + 1, np.nan)[1:])
+        lines = LineCollection(pieces, array=sizes, cmap=COLOURS, linewidths=2.2)
         ax.add_collection(lines)
         ax.plot(*magnified(after).T, color=GREEN, lw=1.0, ls="--", label="compensated")
-        figure.colorbar(
-            lines, ax=ax, shrink=0.7, label=f"as it is cut: size of the error across the wall, {unit}"
-        )
+        label = f"as it is cut: size of the error across the wall, {unit}"
+        figure.colorbar(lines, ax=ax, shrink=0.7, label=label)
         ax.set_aspect("equal")
         ax.autoscale_view()
         ax.set(xlabel="x of the part, mm", ylabel="y of the part, mm")

@@ -79,7 +79,9 @@ def html(d: Diagnosis, *, date: str | None = None, inputs: Iterable[str | PathLi
             (a, in_axis_units(a, d.before.per_axis[a]), in_axis_units(a, v))
             for a, v in d.after.per_axis.items()
         ],
-        folds=_folds(d),
+        folds="Not held out."
+        if d.held_out is None
+        else f"{d.held_out.folds} folds by {d.held_out.by}, each predicted by the machine that the others make in the same way.",
         noise=_noise(d),
         fit=f"Lack of fit: p-value {p_text(d.noise.lack_of_fit_before)} before, "
         f"{p_text(d.noise.lack_of_fit_after)} after. "
@@ -160,12 +162,6 @@ def _budget(d: Diagnosis) -> dict[str, object] | None:
             for n, s, _ in budget_rows(found)
         ],
     }
-
-
-def _folds(d: Diagnosis) -> str:
-    if d.held_out is None:
-        return "Not held out."
-    return f"{d.held_out.folds} folds by {d.held_out.by}, each predicted by the machine that the others make in the same way."
 
 
 def _noise(d: Diagnosis) -> list[tuple[str, ...]]:

@@ -199,15 +199,8 @@ def histogram(d: Diagnosis) -> Figure:
     width = min(12.0, max(4.0, float(np.nanpercentile(np.abs(both[0]), 99))))
     bins = np.linspace(-width, width, 61)
     for z, colour, label in zip(both, (BEFORE, AFTER), ("before", "after"), strict=True):
-        ax.hist(
-            np.clip(z[np.isfinite(z)], bins[0], bins[-1]),
-            bins.tolist(),
-            density=True,
-            histtype="step",
-            color=colour,
-            label=label,
-            lw=1.5,
-        )
+        seen = np.clip(z[np.isfinite(z)], bins[0], bins[-1])
+        ax.hist(seen, bins.tolist(), density=True, histtype="step", color=colour, label=label, lw=1.5)
     ax.plot(bins, np.exp(-(bins**2) / 2) / np.sqrt(2 * np.pi), color="0.4", ls="--", label="noise alone")
     ax.set(xlabel="residual / noise (standard deviations)", ylabel="density")
     ax.legend()
