@@ -21,8 +21,7 @@ from rich.markup import escape
 from stiffmap.common.errors import FileError, FileErrors, StiffmapError
 from stiffmap.common.number_text import number_in
 from stiffmap.common.outputs.keeping import one_command
-from stiffmap.ui.cli.commands import COMMANDS
-from stiffmap.ui.cli.loading import import_all, load
+from stiffmap.ui.cli.commands import COMMANDS, import_all, load
 from stiffmap.ui.cli.options import option
 
 BAD_INPUT = 2

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from statistics import median
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -63,13 +63,11 @@ def machine_lines(machine: Machine, rounds: int) -> list[BenchCase]:
     wrench = np.array([0, 0, FORCE, 0, 0, 0])
     many, few, one = grid(machine, GRID), grid(machine, REFERENCE_GRID), grid(machine, 1)
     t = in_turn(
-        {
-            "unloaded": lambda: machine.solve(many, threads=1),
-            "loaded": lambda: machine.solve(many, wrench, threads=1),
-            "reference": lambda: machine.solve(few, wrench, method="reference", threads=1),
-            "one": lambda: machine.solve(one, threads=1),
-        },
         rounds,
+        unloaded=lambda: machine.solve(many, threads=1),
+        loaded=lambda: machine.solve(many, wrench, threads=1),
+        reference=lambda: machine.solve(few, wrench, method="reference", threads=1),
+        one=lambda: machine.solve(one, threads=1),
     )
     loaded, reference = t["loaded"] / len(many), t["reference"] / len(few)
     return [
@@ -86,11 +84,9 @@ def thread_lines(machine: Machine, rounds: int) -> list[BenchCase]:
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     poses, wrench = grid(machine, MANY), np.array([0, 0, FORCE, 0, 0, 0])
     t = in_turn(
-        {
-            "one": lambda: machine.solve(poses, wrench, threads=1),
-            "all": lambda: machine.solve(poses, wrench, threads=cores),
-        },
         rounds,
+        one=lambda: machine.solve(poses, wrench, threads=1),
+        all=lambda: machine.solve(poses, wrench, threads=cores),
     )
     return [BenchCase(f"{machine.name}, {cores} threads against one", t["one"] / t["all"], "times")]
 
@@ -103,7 +99,7 @@ def grid(machine: Machine, n: int) -> np.ndarray[Any, np.dtype[np.float64]]:
     return np.asarray(low + s * (high - low))
 
 
-def in_turn(works: Mapping[str, Callable[[], object]], rounds: int) -> dict[str, float]:
+def in_turn(rounds: int, **works: Callable[[], object]) -> dict[str, float]:
     """Median seconds of each work; all of them once per round, so that a disturbance meets them all."""
     times: dict[str, list[float]] = {name: [] for name in works}
     for work in works.values():

@@ -65,17 +65,11 @@ def command(
         mesher, made_of, name, centre = _part(
             part, unit, None if material is None else read_material(material)
         )
+        setup = Setup(fixed, loaded, _reference(mesher, loaded, place, centre, edge))
         found = link_from_part(
-            mesher,
-            made_of,
-            Setup(fixed, loaded, _reference(mesher, loaded, place, centre, edge)),
-            wrenches,
-            size=edge,
-            solver=cast(Solver, solver),
-            study=not quick,
-            other_support=cast(Support, support),
-            refine=not quick and part.suffix.lower() not in MESH,
-        )
+            mesher, made_of, setup, wrenches, size=edge, solver=cast(Solver, solver), study=not quick,
+            other_support=cast(Support, support), refine=not quick and part.suffix.lower() not in MESH,
+        )  # fmt: skip
         link = found.link
     link = link.with_zeros() if zeros else link
     if found is None:

@@ -256,13 +256,11 @@ def trends(d: Diagnosis, drivers: list[Driver]) -> Figure:
     # a row per driver fits an upright page; its columns are the channels
     figure = new_figure(max(6.0, 3.0 * len(axes_read)), 1.9 * len(drivers) + 0.6)
     grid = figure.subplots(len(drivers), len(axes_read), squeeze=False, sharex="row", sharey="col")
+    both = ((d.residual_before, BEFORE, "before"), (d.residual_after, AFTER, "after"))
     for row, (name, x, _) in enumerate(drivers):
         for column, axis in enumerate(axes_read):
             ax = grid[row][column]
-            for values, colour, label in (
-                (d.residual_before, BEFORE, "before"),
-                (d.residual_after, AFTER, "after"),
-            ):
+            for values, colour, label in both:
                 ax.plot(x, kept(d, values)[:, axis] * UM, ".", ms=3, color=colour, alpha=0.6, label=label)
             ax.axhline(0, color="0.5", lw=0.6)
             ax.set_xlabel(name, fontsize=9)

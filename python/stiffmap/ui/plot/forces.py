@@ -15,18 +15,7 @@ from numpy.typing import NDArray
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import place_text
 from stiffmap.solve.status import Status
-from stiffmap.ui.plot.style import (
-    BLACK,
-    BLUE,
-    CYCLE,
-    MM,
-    TOLERANCE,
-    headline,
-    length_unit,
-    line_look,
-    panel,
-    paper,
-)
+from stiffmap.ui.plot.style import BLACK, BLUE, MM, TOLERANCE, headline, length_unit, line_look, panel, paper
 
 
 def polar_figure(
@@ -120,10 +109,10 @@ def sweep_figure(
 def draw_sweeps(ax: Axes, lines: Mapping[str, xr.Dataset], variable: str, tolerance: float | None) -> None:
     """The sweeps of one panel."""
     for i, (label, swp) in enumerate(lines.items()):
-        colour = CYCLE[i % len(CYCLE)]
+        look = line_look(i)
         stable = swp.status == Status.CONVERGED
         force, value = swp.force, MM * swp[variable]
-        ax.plot(force, value.where(stable), label=label, **line_look(i))
+        ax.plot(force, value.where(stable), label=label, **look)
         known = np.isfinite(value)
         for chosen, at, mark, size, words in (
             ((swp.status == Status.UNSTABLE) & known, value, "o", 3.5, "unstable"),
@@ -131,7 +120,7 @@ def draw_sweeps(ax: Axes, lines: Mapping[str, xr.Dataset], variable: str, tolera
         ):
             if chosen.any():
                 told = f"{label}: {words}"
-                ax.plot(force[chosen], at[chosen], mark, mfc="none", ms=size, color=colour, label=told)
+                ax.plot(force[chosen], at[chosen], mark, mfc="none", ms=size, color=look["color"], label=told)
     if tolerance is not None:
         ax.axhline(MM * tolerance, color=BLACK, lw=1, ls=":", label=f"tolerance {MM * tolerance:g} mm")
     ax.set_xlabel("force, N")

@@ -79,10 +79,10 @@ def _draw_shape(axes: Axes3D, part: PartLink, triangles: Ints, case: int) -> Non
     for axis, centre, width in zip("xyz", middle, size, strict=True):
         getattr(axes, f"set_{axis}lim")(centre - 0.55 * width, centre + 0.55 * width)
         getattr(axes, f"set_{axis}label")(f"{axis}, mm", fontsize=7, labelpad=-3)
+        # labels of a thin side would overlap
+        axes.locator_params(axis=axis, nbins=4 if width > 0.5 * size.max() else 2)
     axes.set_box_aspect(size, zoom=0.8)  # room for the labels
     axes.tick_params(labelsize=6)
-    for axis, width in zip("xyz", size, strict=True):  # labels of a thin side would overlap
-        axes.locator_params(axis=axis, nbins=4 if width > 0.5 * size.max() else 2)
     axes.set_title(
         f"case {case + 1}: {wrench_text(part.wrenches[case])}\n(displacement × {scale:.0f})", fontsize=9
     )

@@ -8,17 +8,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from stiffmap.ui.plot.style import (
-    BLACK,
-    BLUE,
-    COLOURS,
-    MM,
-    UM,
-    VERMILLION,
-    legend_below,
-    line_look,
-    paper,
-)
+from stiffmap.ui.plot.style import BLACK, BLUE, COLOURS, MM, UM, VERMILLION, legend_below, line_look, paper
 
 RPM = 60 / (2 * np.pi)
 

@@ -21,8 +21,8 @@ from stiffmap.solve.machine import Machine, load_machine
 from stiffmap.ui.plot.elements import element_links
 from stiffmap.ui.plot.loaded import round_factor
 from stiffmap.ui.plot.style import BLUE, GREEN, VERMILLION
-from stiffmap.ui.view.colours import rgb
 from stiffmap.ui.view.moment import Moment
+from stiffmap.ui.view.plane import rgb
 from stiffmap.ui.view.scene import DIAGNOSED, Scene
 
 if TYPE_CHECKING:
@@ -173,11 +173,8 @@ class Data:
 
     def _ribbon(self, scene: Scene, moment: Moment, path: Floats) -> None:
         wanted, cut, corrected, factor = path_errors(moment, path, DRAWN * scene.extent)
-        for name, colour, line in (
-            ("wanted", GREEN, wanted),
-            ("cut", VERMILLION, cut),
-            ("compensated", BLUE, corrected),
-        ):
+        lines = (("wanted", GREEN, wanted), ("cut", VERMILLION, cut), ("compensated", BLUE, corrected))
+        for name, colour, line in lines:
             pieces = np.stack([line[:-1], line[1:]], axis=1)
             good = np.isfinite(pieces).all(axis=(1, 2))
             scene.lines(f"/path/{name}", pieces[good], colour, 0.003 * scene.extent)

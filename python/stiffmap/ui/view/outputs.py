@@ -27,13 +27,12 @@ from stiffmap.ui.plot.loaded import draw_budget
 from stiffmap.ui.plot.scene import draw_box, draw_force, draw_skeleton, finish
 from stiffmap.ui.plot.style import COLOURS, MM, ORANGE, TOLERANCE, headline, leg_colours, paper
 from stiffmap.ui.view import panels
-from stiffmap.ui.view.colours import plane_image
 from stiffmap.ui.view.data import Data
 from stiffmap.ui.view.model import ViewModel
 from stiffmap.ui.view.moment import Moment
 from stiffmap.ui.view.numbers import write
 from stiffmap.ui.view.place import box_of
-from stiffmap.ui.view.plane import PlaneMap
+from stiffmap.ui.view.plane import PlaneMap, plane_image
 from stiffmap.ui.view.quantities import QUANTITIES
 from stiffmap.ui.view.scene import Scene, look_at_machine
 from stiffmap.ui.view.serving import HERE, need_viser, silent

@@ -12,17 +12,9 @@ from stiffmap.common.fingerprints import digest
 from stiffmap.common.number_text import length_text, length_unit, place_text, vector_text
 from stiffmap.common.outputs import write_text
 from stiffmap.experiment.noise.checks import Check
+from stiffmap.identification.diagnosis.report import sentences
 from stiffmap.identification.diagnosis.report.findings import Detectability, Effect, Rest
 from stiffmap.identification.diagnosis.report.result import Diagnosis
-from stiffmap.identification.diagnosis.report.sentences import (
-    UNITS,
-    alias_words,
-    effect_text,
-    interval,
-    next_step,
-    opening,
-    separation_text,
-)
 from stiffmap.model.description.tree import joints
 from stiffmap.model.effects import registry
 from stiffmap.solve.budget import budget_where_stable
@@ -57,12 +49,12 @@ def html(d: Diagnosis, *, date: str | None = None, inputs: Iterable[str | PathLi
         rows=len(d.experiment),
         quantity=d.experiment.quantity,
         axes=", ".join(d.experiment.axes),
-        opening=opening(d),
-        next=next_step(d),
+        opening=sentences.opening(d),
+        next=sentences.next_step(d),
         lines=[in_shop_words(line) for line in d.lines()[1:]],  # the headline has the verdict
         effects=[_effect(e) for e in d.effects],
         rivals=[
-            ("; ".join(map(effect_text, other)), separation_text(s))
+            ("; ".join(map(sentences.effect_text, other)), sentences.separation_text(s))
             for other, s in zip(d.alternatives, d.separations, strict=True)
         ],
         first=[pictures[n] for n in FIRST if n in pictures],
@@ -130,8 +122,8 @@ def _effect(e: Effect) -> dict[str, object]:
     legs = f", leg {', '.join(e.legs)}" if e.legs else ""
     return {
         "name": f"{registry.get(e.kind).title}: {in_shop_words(e.element)}{legs}",
-        "rows": [(n.replace("_", " "), *interval(*v)) for n, v in e.parameters.items()],
-        "same": "; ".join(alias_words(a) for a in e.aliases),
+        "rows": [(n.replace("_", " "), *sentences.interval(*v)) for n, v in e.parameters.items()],
+        "same": "; ".join(sentences.alias_words(a) for a in e.aliases),
         "definition": in_shop_words(e.definition),
         "evidence": f"The odds for it, over all places together, are e^{e.evidence['ln_odds']:.0f} to 1; it is "
         f"{100 * e.evidence['share']:.0f} % of the squares, and the same everywhere to {100 * e.evidence['same_everywhere']:.0f} %.",
@@ -226,7 +218,7 @@ def in_axis_units(axis: str, value: float) -> str:
 
 def in_shop_units(value: float, unit: str, digits: int = 4) -> str:
     """A number of an effect or a machine: µm, µm/N, mrad."""
-    factor, name = UNITS.get(unit, (1.0, unit))
+    factor, name = sentences.UNITS.get(unit, (1.0, unit))
     return f"{factor * value:.{digits}g} {name}".rstrip()
 
 
