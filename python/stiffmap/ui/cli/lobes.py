@@ -125,7 +125,7 @@ def _modes(given: list[str] | None) -> list[tuple[float, float, float, str]]:
 
 
 def _files(ds: xr.Dataset, p: Process, name: str, place: Any, i: int) -> Iterator[tuple[str, Any]]:
-    from stiffmap.ui.plot.vibration import lobes_figure
+    from stiffmap.ui.plot.modes import lobes_figure
 
     stem = "lobes" if i == 0 else f"lobes_{i + 1}"
     yield f"{stem}.png", lobes_figure(ds, f"{name} at {place_text(place)}: {p.name}", p.spindle, p.cut.axial)

@@ -12,6 +12,7 @@ from stiffmap.ui.cli import options
 from stiffmap.ui.cli.options import option
 from stiffmap.ui.cli.output import show, write_files
 from stiffmap.ui.paper import Results, Statement, all_statements, compute
+from stiffmap.ui.paper.results import all_figures
 from stiffmap.ui.paper.statement import as_csv, as_markdown, as_rich, count, count_text
 
 NO_CURVES = "The paper prints no numbers of the curves in Figures 5 to 7; the numbers above are those of its text and Table 1."
@@ -45,8 +46,6 @@ def command(
 
 
 def _files(results: Results, statements: list[Statement], figures: bool) -> Iterator[tuple[str, Any]]:
-    from stiffmap.ui.paper.figures import all_figures
-
     yield from all_figures(results).items() if figures else ()
     yield "statements.csv", as_csv(statements)
     yield "statements.md", as_markdown(statements)

@@ -68,7 +68,7 @@ def _row(r: dict[str, Any]) -> str:
 
 
 def _files(machine: Any, measured: TapTest, found: TapDiagnosis) -> Iterator[tuple[str, Any]]:
-    from stiffmap.ui.plot.vibration import response_figure
+    from stiffmap.ui.plot.modes import response_figure
     from stiffmap.workspace.vibration import frequency_response
 
     f = np.geomspace(0.3 * measured.frequency.min(), 2 * measured.frequency.max(), 600)

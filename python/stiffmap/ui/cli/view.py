@@ -118,16 +118,11 @@ def _model(
 
 def _state(g: dict[str, Any]) -> dict[str, Any]:
     """Fields of the state (SI) from the texts of the options."""
-    out: dict[str, Any] = {
-        "force": tuple(numbers(g["force"], "force", 3)),
-        "moment": tuple(numbers(g["moment"], "moment", 3)),
-        "quantity": g["quantity"],
-        "tolerance": MM * g["tolerance"],
-        "frequency": g["frequency"],
-        "magnification": g["magnify"],
-    }
+    out = {"quantity": g["quantity"], "frequency": g["frequency"], "magnification": g["magnify"]}
+    out["tolerance"] = MM * g["tolerance"]
     for field, name, count, unit in (
         ("position", "at", 3, MM), ("rotation", "rotation", 3, DEGREE), ("gravity", "gravity", 3, 1.0), ("start", "start", None, 1.0),
+        ("force", "force", 3, 1.0), ("moment", "moment", 3, 1.0),
     ):  # fmt: skip
         if g[name] is not None:
             out[field] = tuple(in_si(g[name], name, count, unit))

@@ -45,12 +45,9 @@ def _files(inputs: Iterable[str | PathLike[str]]) -> list[Path]:
 
 @cache
 def _environment() -> Environment:
+    pages = FileSystemLoader(Path(__file__).parent / "pages")
     return Environment(
-        loader=FileSystemLoader(Path(__file__).parent / "pages"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
+        loader=pages, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
 
 

@@ -156,7 +156,8 @@ class Data:
             pieces = np.stack([at, at + factor * arrows], axis=1)
             scene.lines(f"/rows/{name}", pieces, colour, 0.004 * scene.extent)
             if found is not None:
-                words.append(f"{said} {which} {1e6 * rms(arrows):.3g} µm rms")
+                rms = float(np.sqrt(np.mean(np.sum(arrows**2, axis=1))))
+                words.append(f"{said} {which} {1e6 * rms:.3g} µm rms")
         text = f"{len(places)} rows, residuals (measured less predicted) × {factor:g}: {', '.join(words)}"
         self._said["Experiment"] = f"{escape(e.name)}, {text}"
         scene.points("/rows/places", places, rgb("#444444"), 0.005)
@@ -187,11 +188,6 @@ class Data:
             f"errors × {factor:g}: wanted green, as cut red (most {off[0]:.3g} µm), "
             f"compensated by one mirror step blue (most {off[1]:.3g} µm){more}"
         )
-
-
-def rms(arrows: Floats) -> float:
-    """Root mean square length (m)."""
-    return float(np.sqrt(np.mean(np.sum(arrows**2, axis=1))))
 
 
 def largest(arrows: Floats) -> float:

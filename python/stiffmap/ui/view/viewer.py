@@ -16,12 +16,11 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.solution import Solution
 from stiffmap.ui.plot.elements import element_links
 from stiffmap.ui.view import panels
-from stiffmap.ui.view.animation import Swing
 from stiffmap.ui.view.controls import NONE, Controls
 from stiffmap.ui.view.data import Data
-from stiffmap.ui.view.hands import ProbePoint, listen, listen_to_nodes
 from stiffmap.ui.view.model import ViewModel
 from stiffmap.ui.view.moment import COARSE, FINE, Moment
+from stiffmap.ui.view.moving import ProbePoint, Swing, listen, listen_to_nodes
 from stiffmap.ui.view.numbers import write
 from stiffmap.ui.view.plane import PlaneMap, colours_of
 from stiffmap.ui.view.quantities import QUANTITIES
