@@ -100,10 +100,7 @@ def build_app(arguments: Sequence[str]) -> typer.Typer:
     """App in which only the command that ``arguments`` name is imported; the others are their summaries."""
     wanted = next((a for a in _without_effects(arguments) if not a.startswith("-")), None)
     app = typer.Typer(
-        help=flowed(HELP),
-        no_args_is_help=True,
-        rich_markup_mode="rich",
-        pretty_exceptions_enable=False,
+        help=flowed(HELP), no_args_is_help=True, rich_markup_mode="rich", pretty_exceptions_enable=False
     )
     app.callback()(_root)
     for command in (c for c in COMMANDS if c.exists()):
@@ -132,7 +129,7 @@ def styled(text: str) -> str:
 
 def flowed(text: str) -> str:
     """Paragraphs and examples without the source's line breaks: the terminal breaks them at its own width."""
-    paragraphs = re.split(r"\n\n|\n(?= *\[cyan\])", text)
+    paragraphs = text.replace("\n  [cyan]", "\n\n[cyan]").split("\n\n")
     return "\n\n".join(" ".join(paragraph.split()) for paragraph in paragraphs)
 
 

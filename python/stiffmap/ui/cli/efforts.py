@@ -89,16 +89,11 @@ def as_table(found: xr.Dataset) -> Table:
     for i, drive in enumerate(found.drive.values):
         at = found.isel(drive=i)
         out.add_row(
-            str(drive),
-            "N·m, rad/s" if turns[i] else "N, m/s",
-            f"{float(at.peak_effort):.4g}",
-            _share(at.peak_effort, at.effort_margin),
-            f"{float(at.rms_effort):.4g}",
-            f"{float(at.peak_speed):.4g}",
-            _share(at.peak_speed, at.speed_margin),
-            f"{float(at.peak_power):.4g}",
-            "[red]over[/red]" if over[i] else "",
-        )
+            str(drive), "N·m, rad/s" if turns[i] else "N, m/s",
+            f"{float(at.peak_effort):.4g}", _share(at.peak_effort, at.effort_margin), f"{float(at.rms_effort):.4g}",
+            f"{float(at.peak_speed):.4g}", _share(at.peak_speed, at.speed_margin),
+            f"{float(at.peak_power):.4g}", "[red]over[/red]" if over[i] else "",
+        )  # fmt: skip
     return out
 
 

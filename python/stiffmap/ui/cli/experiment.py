@@ -125,9 +125,8 @@ def _told(table: FromTable, words: Sequence[str]) -> Iterator[Any]:
         yield f"'{header[c.index]}': {said}"
     for name, value in found.constants.items():
         yield f"{name} = {value:g} in every row"
-    if (
-        commands or made.seen is not None or made.absolute
-    ):  # what was seen is no deviation before the frame is known
+    # what was seen is no deviation before the frame is known
+    if commands or made.seen is not None or made.absolute:
         head: Sequence[str] = found.rows.header
         rows: Any = (
             [f"{c:.7g}" if isinstance(c, float) else str(c) for c in row]

@@ -149,10 +149,8 @@ def _lines(a: dict[str, Any]) -> Iterator[str]:
         f"couple from {_down(a['coupling_limit_mm'])} mm on"
     )
     if a["stable_speeds"]:
-        pockets = ", ".join(
-            f"{s['speed_rpm']:.0f} rpm ({_down(s['limit_mm'])} mm)" for s in a["stable_speeds"]
-        )
-        yield f"  deepest between lobes: {pockets}"
+        pockets = (f"{s['speed_rpm']:.0f} rpm ({_down(s['limit_mm'])} mm)" for s in a["stable_speeds"])
+        yield f"  deepest between lobes: {', '.join(pockets)}"
     yield f"  {a['modes']} modes"
     for f in a.get("files", []):
         yield f"  wrote {f}"

@@ -66,12 +66,10 @@ def command(
     console.print(f"{found.evaluated} designs in {time.monotonic() - begun:.0f} s")
     data = {"design": problem.model.name, "evaluated": found.evaluated, "front": len(found.x)}
     data |= report.as_plain() | {"files": files}
+    lines = (Text(line, "dim") for line in report.lines())
     machines = ", ".join(f"{k}.yaml" for k in report.chosen)
-    told = [
-        *(Text(line, "dim") for line in report.lines()),
-        f"wrote {', '.join(map(str, files))} and the machine files {machines}",
-    ]
-    show(as_json, data, [as_table(found, report), *told])
+    wrote = f"wrote {', '.join(map(str, files))} and the machine files {machines}"
+    show(as_json, data, [as_table(found, report), *lines, wrote])
     finish(not all(c.table.passed for c in report.chosen.values()))
 
 

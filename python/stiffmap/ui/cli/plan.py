@@ -126,7 +126,6 @@ def _sequential(
     for step in found:
         each = (f"{p['name']} {with_uncertainty(p['value'], p['u'])} {p['unit']}" for p in step["parameters"])
         told.append(f"{step['rows']} rows: {', '.join(each)}")
-    told.append(
-        f"stopped: every u is at most {until:g} of a typical size" if met else "stopped: rows used up"
-    )
+    why = f"every u is at most {until:g} of a typical size" if met else "rows used up"
+    told.append(f"stopped: {why}")
     show(as_json, {"met": met, "steps": found}, told)

@@ -52,14 +52,12 @@ def command(
     many = [stiffmap.polar(m, p, size, plane, directions=directions, **how) for p in places]
     files = write_files(output, _files(many, plane, MM * tolerance))
     moved = [] if vector is None else [m.solve(p, [*vector, 0, 0, 0], **how).displacement for p in places]
-    statuses = np.concatenate([d.status.values.ravel() for d in many])
+    lost = failed(np.concatenate([d.status.values.ravel() for d in many]))
     told = [_under(p, vector, d) for p, d in zip(places, moved, strict=False)]
     data: dict[str, Any] = {"machine": m.name, "diagrams": [as_plain(d, plane) for d in many], "files": files}
     data |= {} if vector is None else {"displacement_under_the_vector": moved}
-    show(
-        as_json, data, [as_table(many, plane), *told, *failed_in_words(failed(statuses), "directions")], files
-    )
-    finish(any(bool((d.status != 0).any()) for d in many))
+    show(as_json, data, [as_table(many, plane), *told, *failed_in_words(lost, "directions")], files)
+    finish(bool(lost))
 
 
 def _under(place: Any, vector: Any, displacement: Any) -> str:

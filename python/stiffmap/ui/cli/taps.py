@@ -46,10 +46,8 @@ def command(
         raise StiffmapError(f"--mass-u: expected an uncertainty above 0 and below 100 %, got {mass_u:g}")
     m = machine_with(machine, effect)
     measured = load_taps(table, m)
-    found = explain_taps(
-        m, measured, None if statics is None else load_experiment(statics), default_u=mass_u / 100,
-        only=words(only),
-    )  # fmt: skip
+    readings = None if statics is None else load_experiment(statics)
+    found = explain_taps(m, measured, readings, default_u=mass_u / 100, only=words(only))
     rows = found.modes(m, measured)
     files = write_files(output, _files(m, measured, found))
     data = {"machine": m.name, **found.as_plain(), "modes": rows}

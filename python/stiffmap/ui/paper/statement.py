@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import csv
+import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal
 from enum import StrEnum
 from functools import partial
 
-import pandas as pd
 from rich.console import Group, RenderableType
 from rich.markup import escape
 from rich.padding import Padding
@@ -103,8 +104,10 @@ def as_markdown(statements: Sequence[Statement]) -> str:
 
 def as_csv(statements: Sequence[Statement]) -> str:
     """For spreadsheets."""
-    table = pd.DataFrame(map(cells, statements), columns=["section", *HEAD[1:]])
-    return table.to_csv(index=False, lineterminator="\n")
+    out = io.StringIO()
+    rows = (["section", *HEAD[1:]], *map(cells, statements))
+    csv.writer(out, lineterminator="\n").writerows(rows)
+    return out.getvalue()
 
 
 def cells(s: Statement) -> tuple[str, ...]:

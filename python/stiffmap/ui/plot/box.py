@@ -86,11 +86,7 @@ def edges(low: Floats, high: Floats, a: int, b: int, **look: Any) -> Rectangle:
 
 
 def paint(
-    axes: Axes,
-    u: Floats,
-    v: Floats,
-    inside: NDArray[np.bool_],
-    broken: Mapping[str, NDArray[np.bool_]],
+    axes: Axes, u: Floats, v: Floats, inside: NDArray[np.bool_], broken: Mapping[str, NDArray[np.bool_]]
 ) -> None:
     """Poses on the nodes of u and v (m), first axis u, coloured by what excludes them."""
     kind, seen = np.where(inside, 0, 1), {"inside": SKY}

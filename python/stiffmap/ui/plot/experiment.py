@@ -124,10 +124,8 @@ def against(r: Residual, drivers: list[Driver], channels: list[int]) -> Figure:
     for column, (name, _, _) in enumerate(drivers):
         grid[-1][column].set_xlabel(name)
     aside = "; crosses: outliers" if r.set_aside.any() else ""
-    title = (
-        f"{r.experiment.name}: reading minus prediction\ngrey: two standard deviations of the noise{aside}"
-    )
-    figure.suptitle(title, fontsize=9)
+    told = "reading minus prediction\ngrey: two standard deviations of the noise"
+    figure.suptitle(f"{r.experiment.name}: {told}{aside}", fontsize=9)
     return figure
 
 
@@ -223,12 +221,8 @@ def trending(d: Diagnosis) -> tuple[list[Driver], list[Driver]]:
     drivers = drivers_of(d.experiment)
     read = np.flatnonzero(d.experiment.axis_read)
     level = TREND / max(2 * len(drivers) * len(read), 1)
-    followed = [
-        any(
-            _follows(x, kept(d, r)[:, i]) < level for r in (d.residual_before, d.residual_after) for i in read
-        )
-        for _, x, _ in drivers
-    ]
+    left = [kept(d, r)[:, i] for r in (d.residual_before, d.residual_after) for i in read]
+    followed = [any(_follows(x, values) < level for values in left) for _, x, _ in drivers]
     both = list(zip(drivers, followed, strict=True))
     return [v for v, f in both if f], [v for v, f in both if not f]
 

@@ -71,9 +71,8 @@ def _draw_shape(axes: Axes3D, part: PartLink, triangles: Ints, case: int) -> Non
     extent = np.ptp(p, axis=0).max()
     scale = 0.15 * extent / max(float(np.abs(u).max()), 1e-300)
     for nodes, colour, alpha in ((p, GREY, 0.25), (p + scale * u, BLUE, 0.8)):
-        axes.add_collection3d(
-            Poly3DCollection(1e3 * nodes[triangles[::step]], facecolor=colour, alpha=alpha, lw=0)
-        )
+        corners = 1e3 * nodes[triangles[::step]]
+        axes.add_collection3d(Poly3DCollection(corners, facecolor=colour, alpha=alpha, lw=0))
     low, size = 1e3 * p.min(axis=0), np.maximum(1e3 * np.ptp(p, axis=0), 300 * extent)
     middle = low + 1e3 * np.ptp(p, axis=0) / 2
     for axis, centre, width in zip("xyz", middle, size, strict=True):

@@ -86,9 +86,8 @@ def loaded_shape(
         )
     rest, loaded = (skeleton(machine, s.coordinates) for s in (free, under))
     d = np.asarray(under.displacement - free.displacement)
-    return LoadedShape(
-        rest, loaded, round_factor(SHOWN * rest.extent, float(np.linalg.norm(d[:3]))), d, load[:3]
-    )
+    factor = round_factor(SHOWN * rest.extent, float(np.linalg.norm(d[:3])))
+    return LoadedShape(rest, loaded, factor, d, load[:3])
 
 
 def round_factor(wanted: float, size: float) -> float:

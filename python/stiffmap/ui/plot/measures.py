@@ -96,9 +96,8 @@ def measure_figures(table: MeasuresTable) -> dict[str, Figure]:
     rows = {r.measure.name: r for r in table.rows}
     space = rows.get("workspace")
     if space is not None and space.found.worst > 0:
-        out["map-workspace"] = workspace_figure(
-            table.machine, cast(Workspace, space.found.extra["workspace"])
-        )
+        found = cast(Workspace, space.found.extra["workspace"])
+        out["map-workspace"] = workspace_figure(table.machine, found)
     box = rows.get("largest_box")
     if box is not None and box.found.worst > 0:
         with suppress(StiffmapError):  # a line

@@ -58,9 +58,8 @@ class _Scene:
         self.w = w = natural_frequencies(machine, position, modes=modes, **options)  # type: ignore[arg-type]
         count = int(np.isfinite(w.frequency).sum())
         if w.frequency.ndim != 1 or not count:
-            raise StiffmapError(
-                f"{machine.name}: no mode at {np.asarray(position).tolist()} m (one pose (3,))"
-            )
+            at = np.asarray(position).tolist()
+            raise StiffmapError(f"{machine.name}: no mode at {at} m (one pose (3,))")
         rest = skeleton(machine, w.coordinates)
         lines = [line for _, line in rest.bars]
         points = np.concatenate(lines)

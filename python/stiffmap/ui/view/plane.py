@@ -102,10 +102,8 @@ class PlaneMap:
         """(n, 2, 3) m, pieces of the line on which the value (unit of the screen) is `level`."""
         if self.count < 2 or not np.isfinite(self.shown).any():
             return NO_LINES
-        pieces = contour_generator(*self.frame.nodes(self.count), np.ma.masked_invalid(self.shown)).lines(
-            level
-        )
-        lines = [np.asarray(line) for line in pieces]
+        values = contour_generator(*self.frame.nodes(self.count), np.ma.masked_invalid(self.shown))
+        lines = [np.asarray(line) for line in values.lines(level)]
         ends = [np.stack([line[:-1], line[1:]], axis=1) for line in lines if len(line) > 1]
         if not ends:
             return NO_LINES

@@ -121,9 +121,8 @@ class Viewer:
                 self.scene.tool(moment)
             if found is not None:
                 self._show(found, moment.state)
-            write(
-                self.controls.status, "content", panels.status_line(moment, s, self.model.message, self.error)
-            )
+            said = panels.status_line(moment, s, self.model.message, self.error)
+            write(self.controls.status, "content", said)
         self.server.flush()
 
     def fine(self) -> None:

@@ -144,16 +144,11 @@ def _budget(d: Diagnosis) -> dict[str, object] | None:
         return None
     whole = float(np.linalg.norm(found.displacement[:3]))
     unit, factor, decimals = length_unit(whole)
-    return {
-        "at": vector_text(1e3 * p, 4),
-        "force": vector_text(force[:3], 4),
-        "size": length_text(whole),
-        "unit": unit,
-        "rows": [
-            (in_shop_words(n), f"{factor * whole * s:.{decimals}f}", 100 * s)
-            for n, s, _ in budget_rows(found)
-        ],
-    }
+    rows = [
+        (in_shop_words(n), f"{factor * whole * s:.{decimals}f}", 100 * s) for n, s, _ in budget_rows(found)
+    ]
+    at, pull = vector_text(1e3 * p, 4), vector_text(force[:3], 4)
+    return {"at": at, "force": pull, "size": length_text(whole), "unit": unit, "rows": rows}
 
 
 def _noise(d: Diagnosis) -> list[tuple[str, ...]]:

@@ -128,9 +128,8 @@ def loops(d: Diagnosis) -> Figure:
         for name, values, colour in told:
             shown = y - values[here, channel] * scale
             ax.plot(x, shown, lw=1.0, color=colour, label=None if k else name)
-    ax.set(
-        xlabel=f"{WRENCH[load]}, {'N' if load < 3 else 'N·m'}", ylabel=f"{e.channels[channel].name}, {unit}"
-    )
+    of_load = "N" if load < 3 else "N·m"
+    ax.set(xlabel=f"{WRENCH[load]}, {of_load}", ylabel=f"{e.channels[channel].name}, {unit}")
     ax.legend()
     return figure
 

@@ -26,9 +26,8 @@ def place_figure(d: Diagnosis) -> Figure:
     ax = scene_axes(figure, shape, None)
     legs = {leg for e in d.effects for leg in e.legs}
     dark = legs if len(legs) < len(machine.legs) else ()
-    draw_skeleton(
-        ax, shape, {leg: "0.2" if leg in dark else GREY for leg in ("", *machine.legs)}, joints=False
-    )
+    colours = {leg: "0.2" if leg in dark else GREY for leg in ("", *machine.legs)}
+    draw_skeleton(ax, shape, colours, joints=False)
     for e in d.effects:
         points, pieces = lit(machine, shape.coordinates, e)
         for ends in pieces:
