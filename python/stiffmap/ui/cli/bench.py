@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import os
-import time
 from collections.abc import Callable
 from statistics import median
+from timeit import timeit
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -102,11 +102,7 @@ def grid(machine: Machine, n: int) -> np.ndarray[Any, np.dtype[np.float64]]:
 def in_turn(rounds: int, **works: Callable[[], object]) -> dict[str, float]:
     """Median seconds of each work; all of them once per round, so that a disturbance meets them all."""
     times: dict[str, list[float]] = {name: [] for name in works}
-    for work in works.values():
-        work()
-    for _ in range(rounds):
+    for _ in range(1 + rounds):  # the first one warms up
         for name, work in works.items():
-            start = time.perf_counter()
-            work()
-            times[name].append(time.perf_counter() - start)
-    return {name: median(t) for name, t in times.items()}
+            times[name].append(timeit(work, number=1))
+    return {name: median(t[1:]) for name, t in times.items()}
