@@ -1,5 +1,3 @@
-"""``stiffmap bench``."""
-
 from __future__ import annotations
 
 import os

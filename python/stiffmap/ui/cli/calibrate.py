@@ -1,5 +1,3 @@
-"""``stiffmap calibrate``."""
-
 from __future__ import annotations
 
 import math

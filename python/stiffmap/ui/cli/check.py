@@ -1,5 +1,3 @@
-"""``stiffmap check``."""
-
 from __future__ import annotations
 
 from collections.abc import Iterator

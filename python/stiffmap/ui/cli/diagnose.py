@@ -1,5 +1,3 @@
-"""``stiffmap diagnose``."""
-
 from __future__ import annotations
 
 import sys

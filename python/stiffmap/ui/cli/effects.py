@@ -1,5 +1,3 @@
-"""``stiffmap effects``."""
-
 from __future__ import annotations
 
 from collections.abc import Iterator

@@ -1,5 +1,3 @@
-"""``stiffmap import``."""
-
 from __future__ import annotations
 
 import re

@@ -1,5 +1,3 @@
-"""``stiffmap lobes``."""
-
 from __future__ import annotations
 
 import math

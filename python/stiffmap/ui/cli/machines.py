@@ -1,5 +1,3 @@
-"""``stiffmap machines``."""
-
 from __future__ import annotations
 
 from itertools import chain

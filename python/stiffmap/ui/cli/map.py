@@ -1,5 +1,3 @@
-"""``stiffmap map``."""
-
 from __future__ import annotations
 
 from collections.abc import Sequence

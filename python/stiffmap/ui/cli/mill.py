@@ -1,5 +1,3 @@
-"""``stiffmap mill``."""
-
 from __future__ import annotations
 
 import math

@@ -1,5 +1,3 @@
-"""``stiffmap monitor``."""
-
 from __future__ import annotations
 
 from pathlib import Path

@@ -1,5 +1,3 @@
-"""``stiffmap new``."""
-
 from __future__ import annotations
 
 import re

@@ -1,5 +1,3 @@
-"""``stiffmap optimize``."""
-
 from __future__ import annotations
 
 import time

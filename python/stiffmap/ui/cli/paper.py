@@ -1,5 +1,3 @@
-"""``stiffmap paper``."""
-
 from __future__ import annotations
 
 from collections.abc import Iterator

@@ -1,5 +1,3 @@
-"""``stiffmap plan``."""
-
 from __future__ import annotations
 
 import itertools

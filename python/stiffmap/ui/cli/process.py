@@ -1,5 +1,3 @@
-"""``stiffmap process``."""
-
 from __future__ import annotations
 
 from pathlib import Path

@@ -1,5 +1,3 @@
-"""``stiffmap residual``."""
-
 from __future__ import annotations
 
 from pathlib import Path

@@ -1,5 +1,3 @@
-"""``stiffmap simulate``."""
-
 from __future__ import annotations
 
 import re

@@ -1,5 +1,3 @@
-"""``stiffmap solve``."""
-
 from __future__ import annotations
 
 from collections.abc import Iterator

@@ -1,5 +1,3 @@
-"""``stiffmap view``."""
-
 from __future__ import annotations
 
 import math

@@ -1,5 +1,3 @@
-"""``stiffmap wrench``."""
-
 from __future__ import annotations
 
 from typing import Any
