@@ -68,7 +68,7 @@ def exceeded(found: xr.Dataset) -> np.ndarray:
 
 
 def _files(found: xr.Dataset) -> Iterator[tuple[str, Any]]:
-    from stiffmap.ui.plot.efforts import efforts_figure
+    from stiffmap.ui.plot.forces import efforts_figure
 
     yield "efforts.nc", found
     yield "efforts.png", efforts_figure(found)

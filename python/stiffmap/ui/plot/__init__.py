@@ -5,9 +5,8 @@ never shown as a value. No display is needed.
 """
 
 from stiffmap.common.arguments import checked
-from stiffmap.ui.plot.efforts import stress_figure
 from stiffmap.ui.plot.error_maps import map_figure
-from stiffmap.ui.plot.forces import ellipse_figure, polar_figure, sweep_figure
+from stiffmap.ui.plot.forces import ellipse_figure, polar_figure, stress_figure, sweep_figure
 from stiffmap.ui.plot.loaded import loaded_figure, machine_figure
 from stiffmap.ui.plot.paths import mode_figure, path_figure
 from stiffmap.ui.plot.style import save

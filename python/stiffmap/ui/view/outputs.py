@@ -29,9 +29,8 @@ from stiffmap.ui.plot.style import COLOURS, MM, ORANGE, TOLERANCE, headline, leg
 from stiffmap.ui.view import panels
 from stiffmap.ui.view.data import Data
 from stiffmap.ui.view.model import ViewModel
-from stiffmap.ui.view.moment import Moment
+from stiffmap.ui.view.moment import Moment, box_of
 from stiffmap.ui.view.numbers import write
-from stiffmap.ui.view.place import box_of
 from stiffmap.ui.view.plane import PlaneMap, plane_image
 from stiffmap.ui.view.quantities import QUANTITIES
 from stiffmap.ui.view.scene import Scene, look_at_machine

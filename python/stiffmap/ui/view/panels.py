@@ -18,8 +18,7 @@ from stiffmap.ui.plot.planes import levels
 from stiffmap.ui.plot.scene import FORCE
 from stiffmap.ui.plot.skeleton import Skeleton
 from stiffmap.ui.plot.style import BLACK, BLUE, ORANGE, TOLERANCE, leg_colours
-from stiffmap.ui.view.moment import Moment
-from stiffmap.ui.view.place import turns
+from stiffmap.ui.view.moment import Moment, turns
 from stiffmap.ui.view.plane import STATUS_COLOURS, PlaneMap, table
 from stiffmap.ui.view.quantities import QUANTITIES, tolerance_level
 from stiffmap.ui.view.scene import DARK, GHOST, GREY

@@ -16,8 +16,7 @@ from stiffmap.ui.plot.scene import ARROW, FORCE, box_edges
 from stiffmap.ui.plot.skeleton import COINCIDENT, Skeleton
 from stiffmap.ui.plot.style import BLACK, ORANGE, SKY, TOLERANCE, leg_colours
 from stiffmap.ui.view.meshes import Meshes
-from stiffmap.ui.view.moment import Moment
-from stiffmap.ui.view.place import box_of, moves, turns
+from stiffmap.ui.view.moment import Moment, box_of, moves, turns
 from stiffmap.ui.view.plane import NO_LINES, PlaneMap, plane_image, rgb
 
 if TYPE_CHECKING:
