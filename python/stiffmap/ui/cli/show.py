@@ -59,7 +59,7 @@ def command(
     wrench = None if load is None else np.r_[numbers(load, "load", 3), np.zeros(3)]
     file = _draw(m, p, r, output or Path(f"{m.name}.png"), view, wrench) if picture else None
     if page is not None:
-        from stiffmap.ui.report.page import write_page
+        from stiffmap.ui.report.sheet import write_page
 
         if wrench is None:
             raise StiffmapError("--page: needs --load, the force under which the machine is drawn")

@@ -16,10 +16,7 @@ from stiffmap.ui.cli.options import option
 from stiffmap.ui.cli.output import show
 
 LOCAL = "127.0.0.1"
-
 DEGREE = math.pi / 180
-
-
 UNUSED = {"with link": "at rotation force moment gravity plane quantity tolerance frequency magnify changes start",
           "with html": "port host browser", "with picture": "port host browser"}  # fmt: skip
 PICTURE_ALONE = {"with picture": "port host browser experiment diagnosis path"}

@@ -67,7 +67,7 @@ def machine_statements(results: Results) -> Iterator[Statement]:
         because="the paper gives no criterion (drive force, deflection or stress) for it",
         printed="4 kg",
     )
-    over_box = factors(original, box_nodes(*original.workspace, 5))
+    over_box = factors(original, box_nodes(original.workspace[0], original.workspace[1], 5))
     low, high = float(over_box.min()), float(over_box.max())
     yield of_section_5_2(
         "transmission factor range 0.5–2.0",
