@@ -4,17 +4,16 @@ import os
 from collections.abc import Callable
 from statistics import median
 from timeit import timeit
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from stiffmap.common.errors import StiffmapError
+from stiffmap.solve.compiled import kernel_levels
+from stiffmap.solve.machine import Machine, load_machine
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.options import option
 from stiffmap.ui.cli.output import show, table
-
-if TYPE_CHECKING:
-    from stiffmap import Machine
 
 MACHINES = ("tripteron", "orthoglide-revised")
 FORCE = 300.0  # N, along z
@@ -42,9 +41,6 @@ def command(
       [cyan]stiffmap bench[/cyan]
       [cyan]STIFFMAP_ISA=base stiffmap bench --json[/cyan]
     """
-    from stiffmap import load_machine
-    from stiffmap.solve.compiled import kernel_levels
-
     if rounds < 1:
         raise StiffmapError(f"rounds: expected a positive number, got {rounds}")
     level = os.environ.get("STIFFMAP_ISA") or kernel_levels()[-1]

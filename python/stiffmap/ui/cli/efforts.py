@@ -12,6 +12,7 @@ from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import MM, finish, gravity, in_si, machine_with
 from stiffmap.ui.cli.options import argument, option
 from stiffmap.ui.cli.output import show, table, write_files
+from stiffmap.workspace.performance import drive_efforts, load_motion
 
 
 def command(
@@ -47,8 +48,6 @@ def command(
       [cyan]stiffmap efforts ur10 path.csv --feed 3000 --gravity 0,0,-9.81[/cyan]
       [cyan]stiffmap efforts ur10 path.csv --duration 2 --gravity 0,0,-9.81 --json[/cyan]
     """
-    from stiffmap.workspace.performance import drive_efforts, load_motion
-
     m = machine_with(machine, effect)
     g = gravity(gravity_)
     run = load_motion(trajectory).trajectory(m, duration=duration, gravity=g, feed=in_si(feed, unit=MM / 60))

@@ -9,6 +9,7 @@ import typer
 import xarray as xr
 from rich.table import Table
 
+import stiffmap
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs import make_folder
 from stiffmap.common.outputs.option import written
@@ -91,8 +92,6 @@ def command(
       [cyan]stiffmap map orthoglide-revised --points 51 --statistics[/cyan]
       [cyan]stiffmap map orthoglide-revised --toolpath trim -o results[/cyan]
     """
-    import stiffmap
-
     refuse_unused(context, UNUSED)
     kinds = named_formats(formats, "--format", ("png", "svg", "pdf")) if pictures else []
     sheets = named_formats(tables, "--table", ("csv", "xlsx")) if tables else []

@@ -16,6 +16,7 @@ from stiffmap.experiment import simulate
 from stiffmap.experiment.calls import effects_of
 from stiffmap.experiment.files.save import plan_columns
 from stiffmap.identification.planning import follow, plan
+from stiffmap.identification.taps import where_to_tap
 from stiffmap.solve.machine import Machine, load_machine
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import MM, in_si, numbers, refuse_unused
@@ -92,8 +93,6 @@ def command(
 
 
 def _taps(m: Machine, count: int, tries: int, seed: int, output: Path | None, as_json: bool) -> None:
-    from stiffmap.identification.taps import where_to_tap
-
     poses = [[round(float(v), 1) for v in p] for p in where_to_tap(m, count, tries=tries, seed=seed) / MM]
     if output is not None:
         write_rows(output, ["x_mm", "y_mm", "z_mm"], poses)

@@ -7,6 +7,7 @@ import numpy as np
 import xarray as xr
 from rich.table import Table
 
+import stiffmap
 from stiffmap.common.number_text import place_text
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import MM, finish, force_given, gravity, machine_with, position
@@ -41,8 +42,6 @@ def command(
       [cyan]stiffmap polar orthoglide-revised --at 0,0,0 --at 300,300,300 --force 500[/cyan]
       [cyan]stiffmap polar tripteron --at 300,400,500 --plane xz --json[/cyan]
     """
-    import stiffmap
-
     m = machine_with(machine, effect)
     places = [position(text, m) for text in at] if at else [position(None, m)]
     size, vector = force_given(force)

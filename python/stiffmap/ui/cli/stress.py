@@ -5,6 +5,7 @@ from typing import Any
 
 from rich.table import Table
 
+import stiffmap
 from stiffmap.solve.internal_wrenches import InternalWrenches
 from stiffmap.solve.status import Status
 from stiffmap.ui.cli import options
@@ -31,8 +32,6 @@ def command(
       [cyan]stiffmap stress my_machine.yaml --at 0,200[/cyan]
       [cyan]stiffmap stress swing-table --gravity 0,0,-9.81 -o out[/cyan]
     """
-    import stiffmap
-
     m, place, how = machine_at(machine, effect, at, turned, gravity_ or "0,0,0")
     result = stiffmap.assembly_wrenches(m, place, **how)
     files = write_files(output, _picture(result, m.name))

@@ -7,6 +7,7 @@ import numpy as np
 import xarray as xr
 from rich.table import Table
 
+import stiffmap
 from stiffmap.common.number_text import place_text
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.status import Status
@@ -49,8 +50,6 @@ def command(
       [cyan]stiffmap sweep orthoglide-revised --from 0 --to 8000 --points 41[/cyan]
       [cyan]stiffmap sweep linear-delta --direction 0,0,-1 --control displacement --limit 20 -o out[/cyan]
     """
-    import stiffmap
-
     m, place, posed = machine_at(machine, effect, at, acting=gravity_)
     path = limit is not None or control != "force" or bool(cross)
     how: dict[str, Any] = {"forces": np.linspace(from_, to, max(points, 0)), "method": method}

@@ -56,11 +56,6 @@ def margin(s: Solution, force: float, tolerance: float) -> Floats:
     return np.asarray(tolerance - deflection(s, force, tolerance))
 
 
-def status(s: Solution, force: float, tolerance: float) -> Floats:
-    """(...) `Status` as a number."""
-    return np.asarray(s.status, dtype=float)
-
-
 QUANTITIES: dict[str, ShownQuantity] = {
     "deflection": ShownQuantity("deflection under this load", "µm", 1e6, deflection),
     "worst": ShownQuantity(
@@ -70,7 +65,7 @@ QUANTITIES: dict[str, ShownQuantity] = {
         "stiffness of the softest direction", "N/µm", 1e-6, weakest_stiffness, stiffness=True
     ),
     "margin": ShownQuantity("margin to the tolerance", "µm", 1e6, margin),
-    "status": ShownQuantity("status", "", 1.0, status),
+    "status": ShownQuantity("status", "", 1.0, lambda s, *_: np.asarray(s.status, dtype=float)),
     "frequency": ShownQuantity("lowest natural frequency", "Hz", 1.0, None),
     "dynamic": ShownQuantity(
         "dynamic stiffness of the softest direction", "N/µm", 1e-6, None, stiffness=True
