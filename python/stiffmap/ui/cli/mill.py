@@ -80,7 +80,6 @@ def command(
 
 
 def _read(count: int) -> None:
-    """Progress of a long program, on a terminal only."""
     print(f"\r{count} lines read", end="", file=sys.stderr, flush=True)
 
 

@@ -97,7 +97,6 @@ SHOWN = 20
 
 
 def _path_files(machine: Machine, ds: xr.Dataset) -> Iterator[tuple[str, Any]]:
-    """Data, the path, and one picture per critical point."""
     from stiffmap.ui.plot import mode_figure, path_figure
 
     yield "path.nc", ds

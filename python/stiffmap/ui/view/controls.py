@@ -15,7 +15,7 @@ from stiffmap.ui.view.moment import Moment, moves, turns
 from stiffmap.ui.view.numbers import ChangedNumbers, write
 from stiffmap.ui.view.outputs import Outputs
 from stiffmap.ui.view.panels import hint, legend
-from stiffmap.ui.view.quantities import QUANTITIES
+from stiffmap.ui.view.plane import QUANTITIES
 from stiffmap.ui.view.state import PLANES
 
 if TYPE_CHECKING:

@@ -23,8 +23,7 @@ from stiffmap.solve.solution import Solution
 from stiffmap.ui.plot.loaded import SHOWN, round_factor
 from stiffmap.ui.plot.scene import box_corners
 from stiffmap.ui.plot.skeleton import Skeleton, skeleton, standing
-from stiffmap.ui.view.plane import NO_LINES, Frame, PlaneMap
-from stiffmap.ui.view.quantities import QUANTITIES
+from stiffmap.ui.view.plane import NO_LINES, QUANTITIES, Frame, PlaneMap
 from stiffmap.ui.view.state import ViewState
 from stiffmap.workspace.maps.inputs import box_nodes
 from stiffmap.workspace.performance.motion.inertia import NaturalFrequencies, natural_frequencies

@@ -31,8 +31,7 @@ from stiffmap.ui.view.data import Data
 from stiffmap.ui.view.model import ViewModel
 from stiffmap.ui.view.moment import Moment, box_of
 from stiffmap.ui.view.numbers import write
-from stiffmap.ui.view.plane import PlaneMap, plane_image
-from stiffmap.ui.view.quantities import QUANTITIES
+from stiffmap.ui.view.plane import QUANTITIES, PlaneMap, plane_image
 from stiffmap.ui.view.scene import Scene, look_at_machine
 from stiffmap.ui.view.serving import HERE, need_viser, silent
 from stiffmap.ui.view.state import ViewState, as_plain, permalink

@@ -19,8 +19,7 @@ from stiffmap.ui.plot.scene import FORCE
 from stiffmap.ui.plot.skeleton import Skeleton
 from stiffmap.ui.plot.style import BLACK, BLUE, ORANGE, TOLERANCE, leg_colours
 from stiffmap.ui.view.moment import Moment, turns
-from stiffmap.ui.view.plane import STATUS_COLOURS, PlaneMap, table
-from stiffmap.ui.view.quantities import QUANTITIES, tolerance_level
+from stiffmap.ui.view.plane import QUANTITIES, STATUS_COLOURS, PlaneMap, table, tolerance_level
 from stiffmap.ui.view.scene import DARK, GHOST, GREY
 from stiffmap.workspace.performance.motion.closing import drive_table
 

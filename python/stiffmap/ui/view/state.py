@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import bounded
-from stiffmap.ui.view.quantities import QUANTITIES
+from stiffmap.ui.view.plane import QUANTITIES
 
 PLANES = ("x", "y", "z", "free")
 MOST_LINK, MOST_TEXT = 16_000, 200_000

@@ -22,8 +22,7 @@ from stiffmap.ui.view.model import ViewModel
 from stiffmap.ui.view.moment import COARSE, FINE, Moment
 from stiffmap.ui.view.moving import ProbePoint, Swing, listen, listen_to_nodes
 from stiffmap.ui.view.numbers import write
-from stiffmap.ui.view.plane import PlaneMap, colours_of
-from stiffmap.ui.view.quantities import QUANTITIES
+from stiffmap.ui.view.plane import QUANTITIES, PlaneMap, colours_of
 from stiffmap.ui.view.scene import Scene, look_at_machine
 from stiffmap.ui.view.serving import silent
 from stiffmap.ui.view.state import ViewState
