@@ -27,8 +27,7 @@ from stiffmap.ui.cli.options import option
 BAD_INPUT = 2
 DEFECT = 70
 INTERRUPTED = 130
-COMPLETION = "_STIFFMAP_COMPLETE"
-"""Set by a shell that asks what a word can become."""
+COMPLETION = "_STIFFMAP_COMPLETE"  # set by a shell that asks what a word can become
 TRACEBACK = "STIFFMAP_TRACEBACK"
 
 HELP = """How far is a loaded machine pushed off its commanded position?

@@ -21,8 +21,7 @@ MM = 1e3
 WORSE = "worse: these commands would enlarge the error of these readings; the file does not hold where they were taken"
 BETTER = "better"
 BEYOND = "rows beyond what the machine was calibrated by"
-NAMED = 12
-"""Rows that a line names."""
+NAMED = 12  # rows that a line names
 
 LINE, LOADS = {"through", "zero", "format", "output"}, {"effect", "force", "gravity"}
 USES = {"axis": {*LINE, *LOADS, "points"}, "axis of a map": {*LINE, "case"}, "poses": {*LOADS, "output"},

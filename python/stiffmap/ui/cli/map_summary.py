@@ -37,8 +37,7 @@ from stiffmap.workspace.maps.summary import (
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-RANKED = 8
-"""Numbers in the table of shares in the variance."""
+RANKED = 8  # numbers in the table of shares in the variance
 
 
 @dataclass(frozen=True)

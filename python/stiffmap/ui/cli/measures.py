@@ -82,8 +82,7 @@ def _told(table: MeasuresTable) -> Iterator[Table | Text | str]:
         yield verdict_of(table)
 
 
-WIDE = 100
-"""Columns of a terminal from which on there is room between those of the table."""
+WIDE = 100  # columns of a terminal from which on there is room between those of the table
 
 
 def as_table(table: MeasuresTable, narrow: bool = False) -> Table:

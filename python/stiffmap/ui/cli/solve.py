@@ -29,8 +29,7 @@ from stiffmap.ui.cli.output import table as table_of
 SCALE = [1e3] * 3 + [1.0] * 3
 """m to mm, rad stays: a compliance then is in mm/N, rad/N, mm/(N mm), rad/(N mm)."""
 NAMES = ("dx", "dy", "dz", "rx", "ry", "rz")
-SHOWN = 20
-"""Rows of a file that are printed."""
+SHOWN = 20  # rows of a file that are printed
 
 
 def command(

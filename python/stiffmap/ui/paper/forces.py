@@ -11,8 +11,7 @@ import xarray as xr
 from stiffmap.ui.paper.results import Results
 from stiffmap.ui.paper.statement import Statement, by_point, judge, of_section_5_3, rounds_to
 
-LINEAR = 5.0
-"""Percent: what a straight line in a printed figure can hide."""
+LINEAR = 5.0  # percent: what a straight line in a printed figure can hide
 
 
 def force_statements(results: Results) -> Iterator[Statement]:

@@ -138,8 +138,7 @@ PRINTED = {
     "original": ("4.55e-5", "2.33e-1", "5.08e-2", "2.88e-5", "1.50e-6", "7.19e-6"),
     "revised": ("3.10e-5", "3.54e-1", "6.91e-2", "0.39e-5", "0.33e-6", "1.74e-6"),
 }
-TO_PRINTED = np.array([1e3] * 3 + [1e-3] * 3)
-"""m/N to mm/N; rad/(N m) to rad/(N mm)."""
+TO_PRINTED = np.array([1e3] * 3 + [1e-3] * 3)  # m/N to mm/N; rad/(N m) to rad/(N mm)
 LENGTH = {"original": 310.0, "revised": 775.0}
 
 

@@ -24,8 +24,7 @@ POINTS = {
     "asymmetric": (-0.2, 0.3, 0.0),
 }
 """The four work points of §5.3, m."""
-PLANES = (-0.2, 0.0, 0.3)
-"""z of the error maps, m."""
+PLANES = (-0.2, 0.0, 0.3)  # z of the error maps, m
 FORCE = 300.0
 TOLERANCE = 0.25e-3
 LARGEST_FORCE = 1000.0

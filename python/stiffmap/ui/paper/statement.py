@@ -68,11 +68,7 @@ def by_point(name: str, values: Mapping[str, float]) -> dict[str, float]:
     return {f"{name}_{point.replace(' ', '_')}": float(v) for point, v in values.items()}
 
 
-COLOUR = {
-    StatementVerdict.AGREES: "green",
-    StatementVerdict.DIFFERS: "yellow",
-    StatementVerdict.NOT_CHECKED: "dim",
-}
+COLOUR = dict(zip(StatementVerdict, ("green", "yellow", "dim"), strict=True))
 HEAD = ("§", "the paper's words", "the paper's number", "our number", "verdict", "our own input", "because")
 INDENT = 5
 

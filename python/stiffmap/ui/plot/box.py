@@ -22,8 +22,7 @@ from stiffmap.workspace.performance.box.inside import REACH
 from stiffmap.workspace.performance.box.proof import BOX
 from stiffmap.workspace.performance.box.workspace import Workspace
 
-AROUND = 0.85
-"""Of the box's edges: how far about its centre the sections reach."""
+AROUND = 0.85  # of the box's edges: how far about its centre the sections reach
 THIN = 1e-6
 KINDS = (
     (REACH, "0.9", "out of reach"),

@@ -18,8 +18,7 @@ from stiffmap.ui.plot.style import AFTER, BEFORE, MM, UM, new_figure
 
 NOISE = "#d9d9d9"
 MOST_LABELS = 12
-FLAT = 0.05
-"""Share of the largest extent below which poses lie in a plane."""
+FLAT = 0.05  # share of the largest extent below which poses lie in a plane
 
 Driver = tuple[str, Floats, list[str]]
 """Label, value of each row, and names of the values where they are classes."""
@@ -212,8 +211,7 @@ def history_drivers(e: Experiment) -> list[Driver]:
     return out
 
 
-TREND = 1e-3
-"""p-value below which residuals follow a driver, over all drivers and channels."""
+TREND = 1e-3  # p-value below which residuals follow a driver, over all drivers and channels
 
 
 def trending(d: Diagnosis) -> tuple[list[Driver], list[Driver]]:

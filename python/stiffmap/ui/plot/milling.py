@@ -14,8 +14,7 @@ from stiffmap.ui.plot.scene import draw_skeleton, finish, on, scene_axes
 from stiffmap.ui.plot.skeleton import standing
 from stiffmap.ui.plot.style import BLACK, BLUE, COLOURS, GREEN, MM, TOLERANCE, leg_colours, length_unit, paper
 
-SHARE = 0.08
-"""Of the outline's size, that the largest error takes as it is drawn."""
+SHARE = 0.08  # of the outline's size, that the largest error takes as it is drawn
 ROUND = np.arange(1, 20) / 20.5
 """Shares of the turn of an inside corner, where the wanted wall has the tool's rounding; never the half, where opposite directions cancel."""
 

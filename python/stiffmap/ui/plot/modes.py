@@ -19,10 +19,8 @@ from stiffmap.ui.plot.skeleton import skeleton
 from stiffmap.ui.plot.style import BLACK, BLUE, COLOURS, MM, UM, VERMILLION, legend_below, line_look, paper
 from stiffmap.workspace.performance.motion.inertia import NaturalFrequencies, natural_frequencies
 
-FRAMES = 9
-"""From one end of a swing to the other."""
-SWING = 0.08
-"""Of the machine's extent: how far the point that moves most is drawn from its place."""
+FRAMES = 9  # from one end of a swing to the other
+SWING = 0.08  # of the machine's extent: how far the point that moves most is drawn from its place
 
 
 def mode_figure(machine: Machine, position: ArrayLike, *, modes: int = 3, **options: object) -> Figure:

@@ -61,8 +61,7 @@ def new_figure(width: float, height: float) -> Figure:
     return Picture(figsize=(width, height), layout="constrained")
 
 
-EDGE = 0.98
-"""Share of a picture's width that a title or a legend may take."""
+EDGE = 0.98  # share of a picture's width that a title or a legend may take
 
 
 def _renderer(figure: Figure) -> RendererBase:

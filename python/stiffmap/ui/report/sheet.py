@@ -28,10 +28,8 @@ from stiffmap.solve.machine import Machine
 from stiffmap.ui.plot.loaded import LoadedShape, loaded_shape
 from stiffmap.ui.plot.style import leg_colours
 
-SHOWN = 16
-"""Digits of a digest that are printed."""
-PAUSE = 70
-"""ms between two frames."""
+SHOWN = 16  # digits of a digest that are printed
+PAUSE = 70  # ms between two frames
 
 
 def provenance(

@@ -28,10 +28,8 @@ from stiffmap.ui.view.scene import DIAGNOSED, Scene
 if TYPE_CHECKING:
     from stiffmap.identification.diagnosis.report.result import Diagnosis
 
-DRAWN = 0.06
-"""Of the machine's extent, the longest arrow and the widest ribbon."""
-MOST_POINTS = 400
-"""Of a path that are solved."""
+DRAWN = 0.06  # of the machine's extent, the longest arrow and the widest ribbon
+MOST_POINTS = 400  # of a path that are solved
 BEFORE, NOW, NAMED = VERMILLION, BLUE, DIAGNOSED
 """Residuals of the machine as opened, with what was changed in the view, and with what a diagnosis named."""
 Arrows = tuple[Floats, Floats]

@@ -29,12 +29,9 @@ from stiffmap.workspace.maps.inputs import box_nodes
 from stiffmap.workspace.performance.motion.inertia import NaturalFrequencies, natural_frequencies
 from stiffmap.workspace.vibration import frequency_response
 
-SMALL_TURN = 0.03
-"""rad, with which it is tried whether a machine turns."""
-DEFAULT_BOX = 0.25
-"""Of the machine's length, half edge of the box of a machine that declares none."""
-WIDE = 0.5
-"""Of the longest commanded edge of the box, edge of the plane along what is not commanded."""
+SMALL_TURN = 0.03  # rad, with which it is tried whether a machine turns
+DEFAULT_BOX = 0.25  # of the machine's length, half edge of the box of a machine that declares none
+WIDE = 0.5  # of the longest commanded edge of the box, edge of the plane along what is not commanded
 
 
 def box_of(machine: Machine) -> tuple[Floats, Floats]:
@@ -79,14 +76,10 @@ def moves(machine: Machine) -> tuple[bool, bool, bool]:
 
 FINE, COARSE, DEAR = 101, 51, 15
 """Poses along each edge: at rest, while something is dragged, and of quantities that need modes."""
-MODES = 40
-"""As parallel machines have dozens of modes of their bars below those that move the tool."""
-DAMPING = 0.02
-"""Modal damping ratio of every mode."""
-INSIDE = 1e-9
-"""Of the box, how far outside it a pose may lie by round-off."""
-CLOUD = 15
-"""Poses of the cloud along each commanded axis."""
+MODES = 40  # as parallel machines have dozens of modes of their bars below those that move the tool
+DAMPING = 0.02  # modal damping ratio of every mode
+INSIDE = 1e-9  # of the box, how far outside it a pose may lie by round-off
+CLOUD = 15  # poses of the cloud along each commanded axis
 
 
 @dataclass(frozen=True)

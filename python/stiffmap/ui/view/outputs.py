@@ -39,8 +39,7 @@ from stiffmap.ui.view.state import ViewState, as_plain, permalink
 if TYPE_CHECKING:
     from viser import GuiApi, GuiButtonHandle, GuiEvent, ViserServer
 
-SHOWN = 51
-"""Poses along each edge of the plane in a picture."""
+SHOWN = 51  # poses along each edge of the plane in a picture
 STYLE = """<style>
 #said { position: fixed; z-index: 1000; left: .6em; top: .6em; width: min(24em, 45vw); max-height: 90vh; overflow: auto;
   background: rgba(255,255,255,.92); color: #111; font: 13px system-ui,sans-serif; border-radius: 4px; padding: .3em .6em; }

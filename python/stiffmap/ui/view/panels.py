@@ -28,8 +28,7 @@ Row = tuple[str, float, str, str]
 """Label, length of the bar (-1 … 1), colour, text."""
 
 
-DUST = 1e-12
-"""m and m/N, below which a deflection and a compliance are round-off."""
+DUST = 1e-12  # m and m/N, below which a deflection and a compliance are round-off
 
 
 def status_line(moment: Moment, solution: Solution, message: str, error: str) -> str:

@@ -24,8 +24,7 @@ if TYPE_CHECKING:
 
 Shape = Literal["circle", "square"]
 Units = Literal["world", "screen"]
-SURFACE = 0.12
-"""Of the extent, size of the surface at the tool."""
+SURFACE = 0.12  # of the extent, size of the surface at the tool
 GHOST, LIT, DIAGNOSED = ORANGE, "#FFD400", "#E8279B"
 GREY, DARK = "#BBBBBB", "#666666"
 
@@ -232,8 +231,7 @@ def look_at_machine(server: ViserServer, rest: Skeleton) -> None:
     server.initial_camera.up = (0.0, 0.0, 1.0)
 
 
-RINGS, SECTORS = 24, 48
-"""Of the sphere of directions in which the tool is pushed."""
+RINGS, SECTORS = 24, 48  # of the sphere of directions in which the tool is pushed
 
 
 @cache

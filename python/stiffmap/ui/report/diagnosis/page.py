@@ -19,8 +19,7 @@ from stiffmap.model.description.tree import joints
 from stiffmap.model.effects import registry
 from stiffmap.solve.budget import budget_where_stable
 
-SHOWN = 12
-"""Detectable effects above the fold."""
+SHOWN = 12  # detectable effects above the fold
 FIRST, FOLDED = ("place", "before_after"), ("residual_others",)
 """Pictures of the first page, and those that are folded."""
 
