@@ -64,7 +64,7 @@ BY_NAME = {
     "stiffmap",  # public names, when they are first used
     "stiffmap.common.from_above",  # the two methods that hand their work to a room above, as the face of the package says
     "stiffmap.common.python_file",  # files of one folder, and a file that a user wrote
-    "stiffmap.ui.cli.loading",  # the module of a command, and what it imports when it runs
+    "stiffmap.ui.cli.commands",  # the module of a command, and what it imports when it runs
 }
 LOADERS = {
     "import_module",

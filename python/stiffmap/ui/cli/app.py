@@ -21,15 +21,13 @@ from rich.markup import escape
 from stiffmap.common.errors import FileError, FileErrors, StiffmapError
 from stiffmap.common.number_text import number_in
 from stiffmap.common.outputs.keeping import one_command
-from stiffmap.ui.cli.commands import COMMANDS
-from stiffmap.ui.cli.loading import import_all, load
+from stiffmap.ui.cli.commands import COMMANDS, import_all, load
 from stiffmap.ui.cli.options import option
 
 BAD_INPUT = 2
 DEFECT = 70
 INTERRUPTED = 130
-COMPLETION = "_STIFFMAP_COMPLETE"
-"""Set by a shell that asks what a word can become."""
+COMPLETION = "_STIFFMAP_COMPLETE"  # set by a shell that asks what a word can become
 TRACEBACK = "STIFFMAP_TRACEBACK"
 
 HELP = """How far is a loaded machine pushed off its commanded position?
@@ -101,10 +99,7 @@ def build_app(arguments: Sequence[str]) -> typer.Typer:
     """App in which only the command that ``arguments`` name is imported; the others are their summaries."""
     wanted = next((a for a in _without_effects(arguments) if not a.startswith("-")), None)
     app = typer.Typer(
-        help=flowed(HELP),
-        no_args_is_help=True,
-        rich_markup_mode="rich",
-        pretty_exceptions_enable=False,
+        help=flowed(HELP), no_args_is_help=True, rich_markup_mode="rich", pretty_exceptions_enable=False
     )
     app.callback()(_root)
     for command in (c for c in COMMANDS if c.exists()):
@@ -132,8 +127,9 @@ def styled(text: str) -> str:
 
 
 def flowed(text: str) -> str:
-    """Paragraphs without the source's line breaks: the terminal breaks them at its own width."""
-    return "\n\n".join(" ".join(paragraph.split()) for paragraph in text.split("\n\n"))
+    """Paragraphs and examples without the source's line breaks: the terminal breaks them at its own width."""
+    paragraphs = text.replace("\n  [cyan]", "\n\n[cyan]").split("\n\n")
+    return "\n\n".join(" ".join(paragraph.split()) for paragraph in paragraphs)
 
 
 def _version(wanted: bool) -> None:
@@ -166,20 +162,8 @@ def _root(
 _root.__doc__ = HELP
 
 
-VECTORS = frozenset(
-    (
-        "--at",
-        "--force",
-        "--moment",
-        "--direction",
-        "--by",
-        "--turn",
-        "--rotation",
-        "--gravity",
-        "--view",
-        "--load",
-    )
-)
+VECTORS = ("--at", "--force", "--moment", "--direction", "--by", "--turn", "--rotation", "--gravity", "--view",
+           "--load")  # fmt: skip
 """Options whose value is a vector; all but ``--view`` have three numbers."""
 
 

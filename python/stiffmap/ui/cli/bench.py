@@ -1,22 +1,19 @@
-"""``stiffmap bench``."""
-
 from __future__ import annotations
 
 import os
-import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from statistics import median
-from typing import TYPE_CHECKING, Any, NamedTuple
+from timeit import timeit
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from stiffmap.common.errors import StiffmapError
+from stiffmap.solve.compiled import kernel_levels
+from stiffmap.solve.machine import Machine, load_machine
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.options import option
 from stiffmap.ui.cli.output import show, table
-
-if TYPE_CHECKING:
-    from stiffmap import Machine
 
 MACHINES = ("tripteron", "orthoglide-revised")
 FORCE = 300.0  # N, along z
@@ -41,14 +38,9 @@ def command(
     turn. Close other programs first. The environment variable STIFFMAP_ISA chooses the instruction set.
 
     Examples:
-
       [cyan]stiffmap bench[/cyan]
-
       [cyan]STIFFMAP_ISA=base stiffmap bench --json[/cyan]
     """
-    from stiffmap import load_machine
-    from stiffmap.solve.compiled import kernel_levels
-
     if rounds < 1:
         raise StiffmapError(f"rounds: expected a positive number, got {rounds}")
     level = os.environ.get("STIFFMAP_ISA") or kernel_levels()[-1]
@@ -65,13 +57,11 @@ def machine_lines(machine: Machine, rounds: int) -> list[BenchCase]:
     wrench = np.array([0, 0, FORCE, 0, 0, 0])
     many, few, one = grid(machine, GRID), grid(machine, REFERENCE_GRID), grid(machine, 1)
     t = in_turn(
-        {
-            "unloaded": lambda: machine.solve(many, threads=1),
-            "loaded": lambda: machine.solve(many, wrench, threads=1),
-            "reference": lambda: machine.solve(few, wrench, method="reference", threads=1),
-            "one": lambda: machine.solve(one, threads=1),
-        },
         rounds,
+        unloaded=lambda: machine.solve(many, threads=1),
+        loaded=lambda: machine.solve(many, wrench, threads=1),
+        reference=lambda: machine.solve(few, wrench, method="reference", threads=1),
+        one=lambda: machine.solve(one, threads=1),
     )
     loaded, reference = t["loaded"] / len(many), t["reference"] / len(few)
     return [
@@ -88,11 +78,9 @@ def thread_lines(machine: Machine, rounds: int) -> list[BenchCase]:
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     poses, wrench = grid(machine, MANY), np.array([0, 0, FORCE, 0, 0, 0])
     t = in_turn(
-        {
-            "one": lambda: machine.solve(poses, wrench, threads=1),
-            "all": lambda: machine.solve(poses, wrench, threads=cores),
-        },
         rounds,
+        one=lambda: machine.solve(poses, wrench, threads=1),
+        all=lambda: machine.solve(poses, wrench, threads=cores),
     )
     return [BenchCase(f"{machine.name}, {cores} threads against one", t["one"] / t["all"], "times")]
 
@@ -105,14 +93,10 @@ def grid(machine: Machine, n: int) -> np.ndarray[Any, np.dtype[np.float64]]:
     return np.asarray(low + s * (high - low))
 
 
-def in_turn(works: Mapping[str, Callable[[], object]], rounds: int) -> dict[str, float]:
+def in_turn(rounds: int, **works: Callable[[], object]) -> dict[str, float]:
     """Median seconds of each work; all of them once per round, so that a disturbance meets them all."""
     times: dict[str, list[float]] = {name: [] for name in works}
-    for work in works.values():
-        work()
-    for _ in range(rounds):
+    for _ in range(1 + rounds):  # the first one warms up
         for name, work in works.items():
-            start = time.perf_counter()
-            work()
-            times[name].append(time.perf_counter() - start)
-    return {name: median(t) for name, t in times.items()}
+            times[name].append(timeit(work, number=1))
+    return {name: median(t[1:]) for name, t in times.items()}

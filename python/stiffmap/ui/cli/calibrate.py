@@ -1,5 +1,3 @@
-"""``stiffmap calibrate``."""
-
 from __future__ import annotations
 
 import math
@@ -34,20 +32,13 @@ def command(
     Exit codes: 0 as declared or within tolerance, 1 beyond tolerance or unattributed, 2 bad input.
 
     Examples:
-
       [cyan]stiffmap calibrate ur10 experiments/tracker -o result[/cyan]
-
       [cyan]stiffmap calibrate linear-delta experiments/heights --exclude gains --tolerance 2[/cyan]
     """
     result = calibrate(
-        machine,
-        data,
-        tolerances=Tolerances().scaled(tolerance),
-        exclude=exclude or (),
-        time_limit=budget,
-        seed=seed,
-        threads=threads,
-    )
+        machine, data, tolerances=Tolerances().scaled(tolerance), exclude=exclude or (), time_limit=budget,
+        seed=seed, threads=threads,
+    )  # fmt: skip
     if output is not None:
         write(result, output)
     table = result.table(rows)

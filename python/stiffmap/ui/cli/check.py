@@ -1,5 +1,3 @@
-"""``stiffmap check``."""
-
 from __future__ import annotations
 
 from collections.abc import Iterator
@@ -29,11 +27,8 @@ def command(
     Exit codes: 0 usable, 1 usable with warnings (--strict), 2 not usable.
 
     Examples:
-
       [cyan]stiffmap check my_machine.yaml[/cyan]
-
       [cyan]stiffmap check orthoglide-revised --json[/cyan]
-
       [cyan]stiffmap check --strict my_machine.yaml[/cyan]
     """
     found = check_file(file)

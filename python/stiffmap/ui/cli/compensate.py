@@ -1,5 +1,3 @@
-"""``stiffmap compensate``."""
-
 from __future__ import annotations
 
 from pathlib import Path
@@ -11,18 +9,7 @@ import typer
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs.option import written
 from stiffmap.experiment.comparison.summary import Summary
-from stiffmap.machining.compensation import (
-    AxisErrors,
-    Commands,
-    axis_errors,
-    axis_errors_of_map,
-    check_compensation,
-    compensate,
-    compensation_table,
-    write_dh,
-    write_table,
-    write_urdf,
-)
+from stiffmap.machining import compensation
 from stiffmap.solve.machine import Machine
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import finish, flags_of, in_si, machine_with, numbers, options_given
@@ -34,8 +21,7 @@ MM = 1e3
 WORSE = "worse: these commands would enlarge the error of these readings; the file does not hold where they were taken"
 BETTER = "better"
 BEYOND = "rows beyond what the machine was calibrated by"
-NAMED = 12
-"""Rows that a line names."""
+NAMED = 12  # rows that a line names
 
 LINE, LOADS = {"through", "zero", "format", "output"}, {"effect", "force", "gravity"}
 USES = {"axis": {*LINE, *LOADS, "points"}, "axis of a map": {*LINE, "case"}, "poses": {*LOADS, "output"},
@@ -73,19 +59,12 @@ def command(
     Exit codes: 1 where --check finds that compensation would make the error larger, 2 bad input.
 
     Examples:
-
       [cyan]stiffmap compensate corrected.yaml poses.csv -o commands.csv[/cyan]
-
       [cyan]stiffmap compensate orthoglide-revised poses.csv --effect 'length bar x error=0.1mm' --force 0,0,-300 -o c.csv[/cyan]
-
       [cyan]stiffmap compensate travelling-column --axis z --gravity 0,0,-9.81 --format linuxcnc -o z.comp[/cyan]
-
       [cyan]stiffmap compensate results/map.nc --case Fx --axis x --format siemens -o x.mpf[/cyan]
-
       [cyan]stiffmap compensate calibrated_arm.yaml --urdf arm.urdf -o corrected.urdf[/cyan]
-
       [cyan]stiffmap compensate ur10 --effect 'zero_offset elbow error=1mrad' --dh arm.csv[/cyan]
-
       [cyan]stiffmap compensate result/machine.yaml --check held_out[/cyan]
     """
     if all(given is None for given in (axis, poses, urdf, dh, check)):
@@ -108,15 +87,16 @@ def command(
     if axis is not None:
         line: dict[str, Any] = {"through": in_si(through, "through", 3), "zero": in_si(zero)}
         if of_map:
-            errors = axis_errors_of_map(machine, axis, case=case, **line)
+            errors = compensation.axis_errors_of_map(machine, axis, case=case, **line)
         else:
             m = machine_with(machine, effect)
-            errors = axis_errors(m, axis, points=points, wrench=load, gravity=pull, **line)
+            errors = compensation.axis_errors(m, axis, points=points, wrench=load, gravity=pull, **line)
         out = _table(errors, form, output)
     else:
         m = machine_with(machine, effect)
         out = {} if urdf is None and dh is None else _geometry(m, urdf, dh, output)
-        out |= {} if poses is None else _commands(compensate(m, poses, wrench=load, gravity=pull), output)
+        if poses is not None:
+            out |= _commands(compensation.compensate(m, poses, wrench=load, gravity=pull), output)
         out |= {} if check is None else _checked(m, check)
     show(as_json, out, (f"{key}: {value}" for key, value in out.items()))
     finish(out.get("verdict") == WORSE)
@@ -124,7 +104,7 @@ def command(
 
 def _checked(m: Machine, folder: Path) -> dict[str, object]:
     """Sizes of readings as they are and as compensation would leave them; those beyond what the machine was calibrated by apart."""
-    found = check_compensation(m, folder)
+    found = compensation.check_compensation(m, folder)
     out = _sizes(found.whole)
     if (v := found.validity) is not None and v.error is not None:
         out[f"promised by the file, m{v.unit}"] = f"{MM * v.error:.4g} ± {MM * v.error_u:.1g} rms ({v})"
@@ -145,11 +125,10 @@ def _sizes(sizes: tuple[Summary, Summary]) -> dict[str, object]:
     return out
 
 
-def _table(errors: AxisErrors, form: str, output: Path | None) -> dict[str, object]:
-    """A controller's table of an axis."""
-    text = compensation_table(errors, form)
+def _table(errors: compensation.AxisErrors, form: str, output: Path | None) -> dict[str, object]:
+    text = compensation.compensation_table(errors, form)
     if output is not None:
-        write_table(errors, output, form)
+        compensation.write_table(errors, output, form)
     forward, backward = errors.positioning
     return {
         "positions": len(errors.position),
@@ -161,7 +140,7 @@ def _table(errors: AxisErrors, form: str, output: Path | None) -> dict[str, obje
     }
 
 
-def _commands(found: Commands, output: Path | None) -> dict[str, object]:
+def _commands(found: compensation.Commands, output: Path | None) -> dict[str, object]:
     if output is not None:
         found.write(output)
     lost = [found.ids[i] for i in np.flatnonzero(~found.ok)]
@@ -182,8 +161,8 @@ def _commands(found: Commands, output: Path | None) -> dict[str, object]:
 def _geometry(m: Machine, urdf: Path | None, dh: Path | None, output: Path | None) -> dict[str, object]:
     left: list[str] = []
     if dh is not None:
-        left = write_dh(m, dh)
+        left = compensation.write_dh(m, dh)
     if urdf is not None and output is not None:
-        left = write_urdf(m, urdf, output)
+        left = compensation.write_urdf(m, urdf, output)
     files = [str(f) for f in (dh, output if urdf is not None else None) if f is not None]
     return {"file": ", ".join(files), "not in the geometry": "; ".join(left) or "nothing"}

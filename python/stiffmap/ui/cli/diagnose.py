@@ -1,5 +1,3 @@
-"""``stiffmap diagnose``."""
-
 from __future__ import annotations
 
 import sys
@@ -41,25 +39,17 @@ def command(
     Exit codes: 0 verdict none, 1 verdict with findings, 2 bad input.
 
     Examples:
-
       [cyan]stiffmap diagnose orthoglide-revised experiments/servo -o result[/cyan]
-
       [cyan]stiffmap diagnose my.yaml dial_gauges --date 2025-03-14 -o result[/cyan]
-
       [cyan]stiffmap diagnose ur10 tracker --exclude sensor_gain --budget 60[/cyan]
     """
     refuse_unused(context, {"without output": "date"})
     silent = quiet or as_json or not sys.stderr.isatty()
     result = diagnose(
-        machine,
-        data,
-        seed=seed,
-        threads=threads,
-        exclude=exclude or (),
-        time_limit=budget,
+        machine, data, seed=seed, threads=threads, exclude=exclude or (), time_limit=budget,
         tolerances=Tolerances().scaled(tolerance),
         progress=None if silent else partial(print, "trying:", file=sys.stderr),
-    )
+    )  # fmt: skip
     if output is not None:
         write(result, output, date, [p for p in (Path(machine), Path(data)) if p.exists()])
     wrote = None if output is None else f"wrote {output}: start with report.html"

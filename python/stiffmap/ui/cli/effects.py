@@ -1,5 +1,3 @@
-"""``stiffmap effects``."""
-
 from __future__ import annotations
 
 from collections.abc import Iterator
@@ -28,13 +26,9 @@ def command(
     """List the effects that a machine can have beyond what is declared, for --effect and with_effect.
 
     Examples:
-
       [cyan]stiffmap effects[/cyan]
-
       [cyan]stiffmap effects friction[/cyan]
-
       [cyan]stiffmap effects backlash[/cyan]
-
       [cyan]stiffmap effects straightness --on orthoglide-revised[/cyan]
     """
     if kind and not on and kind not in kinds() and kind in machine_names():
@@ -49,7 +43,6 @@ def command(
 
 
 def _lines(effect: EffectType, machine: Machine | None) -> Iterator[str | Text]:
-    """An effect and its parameters, and where it can be."""
     names = ", ".join(f"{p.name} ({p.unit})" if p.unit != "1" else p.name for p in effect.parameters)
     yield Text.assemble((effect.kind, "bold"), f"  {effect.title}: {names}")
     if machine is not None:

@@ -1,5 +1,3 @@
-"""``stiffmap efforts``."""
-
 from __future__ import annotations
 
 from collections.abc import Iterator
@@ -14,6 +12,7 @@ from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import MM, finish, gravity, in_si, machine_with
 from stiffmap.ui.cli.options import argument, option
 from stiffmap.ui.cli.output import show, table, write_files
+from stiffmap.workspace.performance import drive_efforts, load_motion
 
 
 def command(
@@ -44,31 +43,18 @@ def command(
     reach or through a singularity says where and when).
 
     Examples:
-
       [cyan]stiffmap efforts orthoglide-revised trim -o results[/cyan]
-
       [cyan]stiffmap efforts orthoglide-revised cut.yaml --gravity 0,0,-9.81[/cyan]
-
       [cyan]stiffmap efforts ur10 path.csv --feed 3000 --gravity 0,0,-9.81[/cyan]
-
       [cyan]stiffmap efforts ur10 path.csv --duration 2 --gravity 0,0,-9.81 --json[/cyan]
     """
-    from stiffmap.workspace.performance import drive_efforts, load_motion
-
     m = machine_with(machine, effect)
     g = gravity(gravity_)
     run = load_motion(trajectory).trajectory(m, duration=duration, gravity=g, feed=in_si(feed, unit=MM / 60))
     found = drive_efforts(m, run, gravity=g, friction=friction, threads=threads)
     files = write_files(output, _files(found))
-    names = (
-        "peak_effort",
-        "rms_effort",
-        "effort_margin",
-        "peak_speed",
-        "speed_margin",
-        "peak_power",
-        "range_margin",
-    )
+    names = ("peak_effort", "rms_effort", "effort_margin", "peak_speed", "speed_margin", "peak_power",
+             "range_margin")  # fmt: skip
     data = {"machine": m.name, "time": found.time.values[-1], "drives": list(map(str, found.drive.values))}
     show(as_json, data | {n: found[n].values for n in names}, [as_table(found)], files)
     finish(bool(exceeded(found).any()))
@@ -81,8 +67,7 @@ def exceeded(found: xr.Dataset) -> np.ndarray:
 
 
 def _files(found: xr.Dataset) -> Iterator[tuple[str, Any]]:
-    """Data and picture."""
-    from stiffmap.ui.plot.efforts import efforts_figure
+    from stiffmap.ui.plot.forces import efforts_figure
 
     yield "efforts.nc", found
     yield "efforts.png", efforts_figure(found)
@@ -101,16 +86,11 @@ def as_table(found: xr.Dataset) -> Table:
     for i, drive in enumerate(found.drive.values):
         at = found.isel(drive=i)
         out.add_row(
-            str(drive),
-            "N·m, rad/s" if turns[i] else "N, m/s",
-            f"{float(at.peak_effort):.4g}",
-            _share(at.peak_effort, at.effort_margin),
-            f"{float(at.rms_effort):.4g}",
-            f"{float(at.peak_speed):.4g}",
-            _share(at.peak_speed, at.speed_margin),
-            f"{float(at.peak_power):.4g}",
-            "[red]over[/red]" if over[i] else "",
-        )
+            str(drive), "N·m, rad/s" if turns[i] else "N, m/s",
+            f"{float(at.peak_effort):.4g}", _share(at.peak_effort, at.effort_margin), f"{float(at.rms_effort):.4g}",
+            f"{float(at.peak_speed):.4g}", _share(at.peak_speed, at.speed_margin),
+            f"{float(at.peak_power):.4g}", "[red]over[/red]" if over[i] else "",
+        )  # fmt: skip
     return out
 
 

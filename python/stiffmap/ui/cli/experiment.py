@@ -73,15 +73,10 @@ def command(
     read; further columns go to notes.csv. Exit codes: 0 done, 2 bad input, or a question that --map answers.
 
     Examples:
-
       [cyan]stiffmap experiment new readings.xlsx --machine five-bar --noise dx=1 --noise dy=1 -o readings[/cyan]
-
       [cyan]stiffmap experiment new points.csv --instrument tracker --machine hexapod --noise dx=0.01 -o points[/cyan]
-
       [cyan]stiffmap experiment new joints.csv --dh arm_dh.csv --unit joints=deg --noise dx=0.03 -o arm_readings[/cyan]
-
       [cyan]stiffmap experiment new readings.xlsx --machine five-bar --dialogue --noise dx=1 --noise dy=1 -o asked[/cyan]
-
       [cyan]stiffmap experiment new clocks.csv --machine five-bar --map dx='Uhr 1|Uhr 2' --set z=0 -o clocks[/cyan]
     """
     if action != "new":
@@ -130,9 +125,8 @@ def _told(table: FromTable, words: Sequence[str]) -> Iterator[Any]:
         yield f"'{header[c.index]}': {said}"
     for name, value in found.constants.items():
         yield f"{name} = {value:g} in every row"
-    if (
-        commands or made.seen is not None or made.absolute
-    ):  # what was seen is no deviation before the frame is known
+    # what was seen is no deviation before the frame is known
+    if commands or made.seen is not None or made.absolute:
         head: Sequence[str] = found.rows.header
         rows: Any = (
             [f"{c:.7g}" if isinstance(c, float) else str(c) for c in row]

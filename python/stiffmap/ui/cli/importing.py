@@ -1,5 +1,3 @@
-"""``stiffmap import``."""
-
 from __future__ import annotations
 
 import re
@@ -42,13 +40,9 @@ def command(
     Exit codes: 0 done, 2 bad input.
 
     Examples:
-
       [cyan]stiffmap import arm.urdf -o arm.yaml[/cyan]
-
       [cyan]stiffmap import arm_dh.csv --dh-convention modified -o craig.yaml[/cyan]
-
       [cyan]stiffmap import delta.urdf --sidecar robot.yaml[/cyan]
-
       [cyan]stiffmap import arm.urdf --tip tool -o tool.yaml[/cyan]
     """
     table = urdf.suffix.lower() in (*TABLES, ".txt", ".md", ".tex")
@@ -85,7 +79,6 @@ def _remarks(found: Imported, assumed: bool) -> Iterator[Text]:
 
 
 def _of_table(file: Path, convention: str, unit: list[str] | None) -> Imported:
-    """The arm of a table of Denavit and Hartenberg."""
     from stiffmap.common.tables.sheet import read_sheet
     from stiffmap.experiment.spreadsheet.dh import QUANTITIES, arm, read_dh, unused
 

@@ -49,11 +49,8 @@ def command(
     """Identify a link's 6x6 spring, with error bars, from a part or a displacement field.
 
     Examples:
-
       [cyan]stiffmap link bar.yaml --out bar-link.yaml --picture bar.png[/cyan]
-
       [cyan]stiffmap link bracket.step --fixed face3 --loaded face7 --material aluminium --size 4[/cyan]
-
       [cyan]stiffmap link field.csv --cases cases.csv --reference 310,0,0[/cyan]
     """
     wrenches = UNIT_WRENCHES if cases is None else read_cases(cases)
@@ -68,17 +65,11 @@ def command(
         mesher, made_of, name, centre = _part(
             part, unit, None if material is None else read_material(material)
         )
+        setup = Setup(fixed, loaded, _reference(mesher, loaded, place, centre, edge))
         found = link_from_part(
-            mesher,
-            made_of,
-            Setup(fixed, loaded, _reference(mesher, loaded, place, centre, edge)),
-            wrenches,
-            size=edge,
-            solver=cast(Solver, solver),
-            study=not quick,
-            other_support=cast(Support, support),
-            refine=not quick and part.suffix.lower() not in MESH,
-        )
+            mesher, made_of, setup, wrenches, size=edge, solver=cast(Solver, solver), study=not quick,
+            other_support=cast(Support, support), refine=not quick and part.suffix.lower() not in MESH,
+        )  # fmt: skip
         link = found.link
     link = link.with_zeros() if zeros else link
     if found is None:
@@ -152,10 +143,7 @@ def as_data(link: Link, part: PartLink | None, file: LinkFile) -> dict[str, Any]
         "reference": link.reference,
         "compliance": file.compliance,
         "standard_error": file.standard_error,
-        "insignificant": link.insignificant,
-        "level": link.level,
-        "sigma": link.sigma,
-        "dof": link.dof,
+        **{n: getattr(link, n) for n in ("insignificant", "level", "sigma", "dof")},
         "outliers": int(link.outliers.sum()),
         "asymmetry": link.asymmetry,
     }

@@ -1,5 +1,3 @@
-"""``stiffmap lobes``."""
-
 from __future__ import annotations
 
 import math
@@ -57,11 +55,8 @@ def command(
     Exit codes: 0 the process is stable at all poses, 1 it chatters at one, 2 bad input.
 
     Examples:
-
       [cyan]stiffmap lobes ur10 --process slot --at -800,-100,250 -o results[/cyan]
-
       [cyan]stiffmap lobes examples/taps/kr210.yaml --process examples/taps/cut.yaml --speeds 2000,12000 --damping 3[/cyan]
-
       [cyan]stiffmap lobes linear-delta --process slot --mode 1243,6.2,0.048,x --mode 1747,2.9,0.1,y --json[/cyan]
     """
     m = machine_with(machine, effect)
@@ -93,7 +88,6 @@ def command(
 def _one(
     machine: Any, p: Process, at: str | None, given: dict[str, Any], output: Path | None, i: int
 ) -> dict[str, Any]:
-    """Answer of one pose; files where there is a folder."""
     place = position(at, machine)
     ds = stability_lobes(machine, p, place, **given)
     a = ds.attrs
@@ -129,7 +123,7 @@ def _modes(given: list[str] | None) -> list[tuple[float, float, float, str]]:
 
 
 def _files(ds: xr.Dataset, p: Process, name: str, place: Any, i: int) -> Iterator[tuple[str, Any]]:
-    from stiffmap.ui.plot.vibration import lobes_figure
+    from stiffmap.ui.plot.modes import lobes_figure
 
     stem = "lobes" if i == 0 else f"lobes_{i + 1}"
     yield f"{stem}.png", lobes_figure(ds, f"{name} at {place_text(place)}: {p.name}", p.spindle, p.cut.axial)
@@ -153,10 +147,8 @@ def _lines(a: dict[str, Any]) -> Iterator[str]:
         f"couple from {_down(a['coupling_limit_mm'])} mm on"
     )
     if a["stable_speeds"]:
-        pockets = ", ".join(
-            f"{s['speed_rpm']:.0f} rpm ({_down(s['limit_mm'])} mm)" for s in a["stable_speeds"]
-        )
-        yield f"  deepest between lobes: {pockets}"
+        pockets = (f"{s['speed_rpm']:.0f} rpm ({_down(s['limit_mm'])} mm)" for s in a["stable_speeds"])
+        yield f"  deepest between lobes: {', '.join(pockets)}"
     yield f"  {a['modes']} modes"
     for f in a.get("files", []):
         yield f"  wrote {f}"

@@ -1,5 +1,3 @@
-"""``stiffmap machines``."""
-
 from __future__ import annotations
 
 from itertools import chain
@@ -16,9 +14,7 @@ def command(as_json: options.Json = False) -> None:
     """List the machines that come with stiffmap.
 
     Examples:
-
       [cyan]stiffmap machines[/cyan]
-
       [cyan]stiffmap machines --json[/cyan]
     """
     shipped = shipped_machines()

@@ -1,5 +1,3 @@
-"""``stiffmap map``."""
-
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -11,23 +9,15 @@ import typer
 import xarray as xr
 from rich.table import Table
 
+import stiffmap
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs import make_folder
 from stiffmap.common.outputs.option import written
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.status import Status
 from stiffmap.ui.cli import options
-from stiffmap.ui.cli.inputs import (
-    MM,
-    finish,
-    force_given,
-    gravity,
-    machine_with,
-    options_given,
-    refuse_unused,
-)
-from stiffmap.ui.cli.map_files import write_map_files
-from stiffmap.ui.cli.map_summary import MapSummary
+from stiffmap.ui.cli.inputs import MM, finish, force_given, gravity, machine_with, refuse_unused
+from stiffmap.ui.cli.map_summary import MapSummary, assumptions, write_map_files
 from stiffmap.ui.cli.options import flag, option
 from stiffmap.ui.cli.output import failed_in_words, show, table
 from stiffmap.workspace.maps.inputs import magnitude, plane_axes
@@ -91,29 +81,17 @@ def command(
     Exit codes: 0 done, 1 some poses failed (they hold NaN and their status), 2 bad input.
 
     Examples:
-
       [cyan]stiffmap map orthoglide-revised -o results[/cyan]
-
       [cyan]stiffmap map orthoglide-revised --force 200,0,-100 --points 41 -o results[/cyan]
-
       [cyan]stiffmap map my_machine.yaml --uncertainty --points 21[/cyan]
-
       [cyan]stiffmap map tripteron --force 100 --points 41 --z 300 --z 500[/cyan]
-
       [cyan]stiffmap map orthoglide-revised --y 0 --plane xz --points 41 --format svg[/cyan]
-
       [cyan]stiffmap map orthoglide-revised --gravity 0,0,-9.81 --tolerance 0.1 --json[/cyan]
-
       [cyan]stiffmap map orthoglide-revised --points 21 --table csv,xlsx -o results[/cyan]
-
       [cyan]stiffmap map orthoglide-revised --points 2001 --estimate[/cyan]
-
       [cyan]stiffmap map orthoglide-revised --points 51 --statistics[/cyan]
-
       [cyan]stiffmap map orthoglide-revised --toolpath trim -o results[/cyan]
     """
-    import stiffmap
-
     refuse_unused(context, UNUSED)
     kinds = named_formats(formats, "--format", ("png", "svg", "pdf")) if pictures else []
     sheets = named_formats(tables, "--table", ("csv", "xlsx")) if tables else []
@@ -143,28 +121,6 @@ def command(
     files = [target, *write_map_files(result, output, kinds, sheets, own_scales)]
     show(as_json, result.as_plain(files), result.lines(), files)
     finish(bool(result.failed))
-
-
-def assumptions(context: typer.Context, force: str, tolerance: float) -> str:
-    """The force and the tolerance, and where they come from: the command line, or the default."""
-    values = {"force": f"({force}) N" if "," in force else f"{force} N", "tolerance": f"{tolerance:g} mm"}
-    given = options_given(context)
-    taken = [n for n in values if n not in given]
-    own = [f"{n} {v}" for n, v in values.items() if n in given]
-    text = f"{_sentence(own)} as given. " if own else ""
-    if not taken:
-        return text.rstrip()
-    are, they = ("are those", "they are") if len(taken) > 1 else ("is that", "it is")
-    return (
-        f"{text}{_sentence([f'{n} {values[n]}' for n in taken])} {are} of the Orthoglide's application in the paper; {they} used "
-        f"because the machine file has none. Give your own by {' and '.join(f'--{n}' for n in taken)}."
-    )
-
-
-def _sentence(parts: Sequence[str]) -> str:
-    """``Force 300 N and tolerance 0.25 mm``."""
-    text = " and ".join(parts)
-    return text[:1].upper() + text[1:]
 
 
 def planes(across: dict[str, list[float] | None]) -> dict[str, Any]:

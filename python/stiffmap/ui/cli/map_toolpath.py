@@ -17,6 +17,8 @@ from stiffmap.solve.machine import Machine
 from stiffmap.ui.cli.inputs import MM, finish, force_given
 from stiffmap.ui.cli.output import show, write_files
 from stiffmap.ui.plot.style import BLACK, CYCLE, length_unit, paper
+from stiffmap.workspace.performance import load_motion
+from stiffmap.workspace.performance.motion.trajectory import way_along
 
 
 def map_toolpath(
@@ -29,9 +31,6 @@ def map_toolpath(
     as_json: bool,
 ) -> None:
     """Solve along the path, print the worst place, write table, data and pictures."""
-    from stiffmap.workspace.performance import load_motion
-    from stiffmap.workspace.performance.motion.trajectory import way_along
-
     position, given = load_motion(toolpath).places()
     must_take(m, position)
     load = given if given.any() else _load(m, position, force, how)
@@ -70,7 +69,6 @@ def _load(m: Machine, position: Floats, force: str, how: dict[str, Any]) -> Floa
 
 
 def _table(ds: xr.Dataset, path: Path) -> Path:
-    """A row per point."""
     head = ["way [mm]", "x [mm]", "y [mm]", "z [mm]", "fx [N]", "fy [N]", "fz [N]",
             "dx [mm]", "dy [mm]", "dz [mm]", "deflection [mm]"]  # fmt: skip
     columns = np.column_stack([

@@ -1,5 +1,3 @@
-"""``stiffmap measures``."""
-
 from __future__ import annotations
 
 from collections.abc import Iterator
@@ -58,13 +56,9 @@ def command(
     Exit codes: 0 done, 1 a requirement does not hold, 2 bad input.
 
     Examples:
-
       [cyan]stiffmap measures orthoglide-revised --requirements trimming -o results[/cyan]
-
       [cyan]stiffmap measures ur10 --nodes 11 --force 50[/cyan]
-
       [cyan]stiffmap measures linear-delta --only largest_box,frequency --json[/cyan]
-
       [cyan]stiffmap measures orthoglide-revised --only workspace --clearance 60 --deflection 0.5[/cyan]
     """
     m = machine_with(machine, effect)
@@ -82,15 +76,13 @@ def command(
 
 
 def _told(table: MeasuresTable) -> Iterator[Table | Text | str]:
-    """The table as text."""
     yield as_table(table, narrow=get_console().width < WIDE)
     yield from (Text(note, "dim") for note in (*table.notes, *remarks(table)))
     if table.requirements.bounds:
         yield verdict_of(table)
 
 
-WIDE = 100
-"""Columns of a terminal from which on there is room between those of the table."""
+WIDE = 100  # columns of a terminal from which on there is room between those of the table
 
 
 def as_table(table: MeasuresTable, narrow: bool = False) -> Table:
@@ -147,16 +139,9 @@ def write_report(table: MeasuresTable, path: Path, figures: dict[str, Figure | b
     from stiffmap.ui.plot.measures import caption
     from stiffmap.ui.report.sheet import ReportSheet, write_sheet
 
-    text = as_table(table)
-    head, rows = as_text(text)
-    sheet = ReportSheet(
-        title=f"Measures of {table.machine.name}",
-        answer=verdict_of(table),
-        lines=[f"{text.title}.", *table.notes, *remarks(table)],
-        head=head,
-        rows=rows,
-        numbers=(2, 4, 5, 6, 7),
-    )
+    text, title = as_table(table), f"Measures of {table.machine.name}"
+    lines = [f"{text.title}.", *table.notes, *remarks(table)]
+    sheet = ReportSheet(title, verdict_of(table), lines, *as_text(text), numbers=(2, 4, 5, 6, 7))
     digests = {f"machine {table.machine.name}, as loaded": machine_digest(table.machine)}
     return write_sheet(path, sheet, {caption(n): f for n, f in figures.items()}, digests)
 

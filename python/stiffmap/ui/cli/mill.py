@@ -1,5 +1,3 @@
-"""``stiffmap mill``."""
-
 from __future__ import annotations
 
 import math
@@ -62,13 +60,9 @@ def command(
     Exit code 1: a point without an equilibrium, an error beyond the tolerance after compensation, or a drive or joint beyond its limits.
 
     Examples:
-
       [cyan]stiffmap mill orthoglide-revised outline.ngc --process trimming --at 50,50,0 -o result[/cyan]
-
       [cyan]stiffmap mill linear-delta rectangle --size 120,80,15 --process trimming.yaml --at 0,0,300 -o result[/cyan]
-
       [cyan]stiffmap mill linear-delta circle --size 60 --process trimming --at 0,0,300 --entry best --feeds --tolerance 0.1 -o result[/cyan]
-
       [cyan]stiffmap mill corrected.yaml outline.ngc --process trimming --true my.yaml --band -o cut[/cyan]
     """
     found = mill_job(
@@ -86,7 +80,6 @@ def command(
 
 
 def _read(count: int) -> None:
-    """Progress of a long program, on a terminal only."""
     print(f"\r{count} lines read", end="", file=sys.stderr, flush=True)
 
 

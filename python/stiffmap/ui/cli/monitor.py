@@ -1,5 +1,3 @@
-"""``stiffmap monitor``."""
-
 from __future__ import annotations
 
 from pathlib import Path
@@ -31,9 +29,7 @@ def command(
     did, 2 bad input.
 
     Examples:
-
       [cyan]stiffmap monitor orthoglide-revised january june --effect 'dead_zone actuator y half_width=10um'[/cyan]
-
       [cyan]stiffmap monitor orthoglide-revised january june --diagnosis january/diagnosis.json --budget[/cyan]
     """
     m = load_machine(machine)

@@ -1,9 +1,6 @@
-"""``stiffmap new``."""
-
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -65,20 +62,21 @@ def command(
     With --from, the file is complete: geometry, steel tubes, drives, masses and a workspace within reach.
 
     Examples:
-
       [cyan]stiffmap new my_machine.yaml[/cyan]
-
       [cyan]stiffmap new --from 3-rrr my_3rrr.yaml --radius 300 --arm 180 --forearm 200[/cyan]
-
       [cyan]stiffmap new --from hexapod my_hexapod.yaml --radius 400 --height 600[/cyan]
-
       [cyan]stiffmap new --list[/cyan]
     """
     dimensions = {"radius": radius, "platform": platform, "arm": arm, "forearm": forearm, "rod": rod, "height": height,
                   "stroke": stroke, "reach": reach, "tube": tube, "wall": wall, "drive": drive}  # fmt: skip
     if listed:
         classes = {n: {"title": c.title, "dimensions": dict(c.defaults)} for n, c in CLASSES.items()}
-        show(as_json, classes, _class_lines())
+        lines = (
+            f"{name:<13}{c.title}\n{'':13}" + " ".join(f"--{k} {v:g}" for k, v in c.defaults.items())
+            for name, c in CLASSES.items()
+        )
+        units = "lengths in mm; --drive in N/µm where drives slide, in kN·m/rad where they turn"
+        show(as_json, classes, [*lines, units])
         return
     if file is None:
         raise StiffmapError("new: expected a file to write, such as my_machine.yaml (or --list)")
@@ -98,9 +96,3 @@ def command(
             (f"stiffmap show {file}", "cyan"), "; map it: ", (f"stiffmap map {file}", "cyan"),
         )  # fmt: skip
     show(as_json, data, [told])
-
-
-def _class_lines() -> Iterator[str]:
-    for name, c in CLASSES.items():
-        yield f"{name:<13}{c.title}\n{'':13}" + " ".join(f"--{k} {v:g}" for k, v in c.defaults.items())
-    yield "lengths in mm; --drive in N/µm where drives slide, in kN·m/rad where they turn"

@@ -1,5 +1,3 @@
-"""``stiffmap optimize``."""
-
 from __future__ import annotations
 
 import time
@@ -41,11 +39,8 @@ def command(
     no design meets all constraints.
 
     Examples:
-
       [cyan]stiffmap optimize redesign -o results/redesign[/cyan]
-
       [cyan]stiffmap optimize my_design.yaml --generations 5 --json[/cyan]
-
       [cyan]stiffmap optimize redesign --scheduler tcp://HOST:8786 -o results/redesign[/cyan]
     """
     console = Console(stderr=True, highlight=False)
@@ -67,24 +62,16 @@ def command(
     report = measured(found, place)
     files = write_files(place, _files(found, report))
     console.print(f"{found.evaluated} designs in {time.monotonic() - begun:.0f} s")
-    data = {
-        "design": problem.model.name,
-        "evaluated": found.evaluated,
-        "front": len(found.x),
-        **report.as_plain(),
-        "files": files,
-    }
+    data = {"design": problem.model.name, "evaluated": found.evaluated, "front": len(found.x)}
+    data |= report.as_plain() | {"files": files}
+    lines = (Text(line, "dim") for line in report.lines())
     machines = ", ".join(f"{k}.yaml" for k in report.chosen)
-    told = [
-        *(Text(line, "dim") for line in report.lines()),
-        f"wrote {', '.join(map(str, files))} and the machine files {machines}",
-    ]
-    show(as_json, data, [as_table(found, report), *told])
+    wrote = f"wrote {', '.join(map(str, files))} and the machine files {machines}"
+    show(as_json, data, [as_table(found, report), *lines, wrote])
     finish(not all(c.table.passed for c in report.chosen.values()))
 
 
 def _files(found: ParetoSet, report: ComparedDesigns) -> Iterator[tuple[str, Any]]:
-    """The set and its pictures."""
     from stiffmap.ui.plot.design import comparison_figure, front_figure, parallel_figure, progress_figure
     from stiffmap.ui.plot.measures import path_measures_figure
 

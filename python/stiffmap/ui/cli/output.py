@@ -40,9 +40,8 @@ def show(as_json: bool, data: Any, told: Iterable[Any], files: Iterable[str | Pa
     console = Console(highlight=False, emoji=False)
     for each in (*told, f"wrote {', '.join(map(str, files))}" if files else None):
         if each is not None:
-            console.print(
-                each, soft_wrap=isinstance(each, (str, Text, Tree)), markup=not isinstance(each, str)
-            )
+            unbroken = isinstance(each, (str, Text, Tree))
+            console.print(each, soft_wrap=unbroken, markup=not isinstance(each, str))
 
 
 def write_files(folder: Path | None, contents: Iterable[tuple[str, Any]]) -> list[Path]:

@@ -1,5 +1,3 @@
-"""``stiffmap paper``."""
-
 from __future__ import annotations
 
 from collections.abc import Iterator
@@ -12,7 +10,8 @@ from stiffmap.ui.cli import options
 from stiffmap.ui.cli.options import option
 from stiffmap.ui.cli.output import show, write_files
 from stiffmap.ui.paper import Results, Statement, all_statements, compute
-from stiffmap.ui.paper.table import as_csv, as_markdown, as_rich, count, count_text
+from stiffmap.ui.paper.results import all_figures
+from stiffmap.ui.paper.statement import as_csv, as_markdown, as_rich, count, count_text
 
 NO_CURVES = "The paper prints no numbers of the curves in Figures 5 to 7; the numbers above are those of its text and Table 1."
 
@@ -32,11 +31,8 @@ def command(
     Exit codes: 0 done (whatever the verdicts), 2 bad input.
 
     Examples:
-
       [cyan]stiffmap paper -o results[/cyan]
-
       [cyan]stiffmap paper --json[/cyan]
-
       [cyan]stiffmap paper --points 31 --no-figures -o results[/cyan]
     """
     target = make_folder(output) if output else None
@@ -48,9 +44,6 @@ def command(
 
 
 def _files(results: Results, statements: list[Statement], figures: bool) -> Iterator[tuple[str, Any]]:
-    """Figures and tables."""
-    from stiffmap.ui.paper.figures import all_figures
-
     yield from all_figures(results).items() if figures else ()
     yield "statements.csv", as_csv(statements)
     yield "statements.md", as_markdown(statements)

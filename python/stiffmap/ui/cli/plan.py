@@ -1,5 +1,3 @@
-"""``stiffmap plan``."""
-
 from __future__ import annotations
 
 import itertools
@@ -18,6 +16,7 @@ from stiffmap.experiment import simulate
 from stiffmap.experiment.calls import effects_of
 from stiffmap.experiment.files.save import plan_columns
 from stiffmap.identification.planning import follow, plan
+from stiffmap.identification.taps import where_to_tap
 from stiffmap.solve.machine import Machine, load_machine
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import MM, in_si, numbers, refuse_unused
@@ -60,15 +59,10 @@ def command(
     Rows are within reach and within the drives' range; the same number of random rows is shown for comparison.
 
     Examples:
-
       [cyan]stiffmap plan orthoglide-revised --identify 'compliance actuator x scale=1' --rows 8 -o plan.csv[/cyan]
-
       [cyan]stiffmap plan ur10 --identify 'zero_offset elbow error=1mrad' --quantity position --frame unknown[/cyan]
-
       [cyan]stiffmap plan examples/taps/kr210.yaml --taps 3 -o taps.csv[/cyan]
-
       [cyan]stiffmap plan orthoglide-revised --identify 'dead_zone actuator y half_width=10um' --rival 'compliance actuator y scale=1.2'[/cyan]
-
       [cyan]stiffmap plan orthoglide-revised --identify 'compliance actuator scale=1' --until 0.05 --twin 'compliance actuator scale=1.4'[/cyan]
     """
     refuse_unused(context, UNUSED)
@@ -99,9 +93,6 @@ def command(
 
 
 def _taps(m: Machine, count: int, tries: int, seed: int, output: Path | None, as_json: bool) -> None:
-    """Poses to tap."""
-    from stiffmap.identification.taps import where_to_tap
-
     poses = [[round(float(v), 1) for v in p] for p in where_to_tap(m, count, tries=tries, seed=seed) / MM]
     if output is not None:
         write_rows(output, ["x_mm", "y_mm", "z_mm"], poses)
@@ -124,12 +115,7 @@ def _sequential(
     terms = effects_of(m, identify)
     seeds = itertools.count(how["seed"])
     steps = follow(
-        m,
-        terms,
-        lambda e: simulate(m, e, twin or terms, seed=next(seeds)),
-        until=until,
-        batch=rows,
-        **how,
+        m, terms, lambda e: simulate(m, e, twin or terms, seed=next(seeds)), until=until, batch=rows, **how
     )
     met = steps[-1][1].worst <= until
     told = []
@@ -137,7 +123,6 @@ def _sequential(
     for step in found:
         each = (f"{p['name']} {with_uncertainty(p['value'], p['u'])} {p['unit']}" for p in step["parameters"])
         told.append(f"{step['rows']} rows: {', '.join(each)}")
-    told.append(
-        f"stopped: every u is at most {until:g} of a typical size" if met else "stopped: rows used up"
-    )
+    why = f"every u is at most {until:g} of a typical size" if met else "rows used up"
+    told.append(f"stopped: {why}")
     show(as_json, {"met": met, "steps": found}, told)

@@ -1,5 +1,3 @@
-"""``stiffmap polar``."""
-
 from __future__ import annotations
 
 from collections.abc import Iterator
@@ -9,6 +7,7 @@ import numpy as np
 import xarray as xr
 from rich.table import Table
 
+import stiffmap
 from stiffmap.common.number_text import place_text
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import MM, finish, force_given, gravity, machine_with, position
@@ -39,15 +38,10 @@ def command(
     Exit codes: 0 done, 1 some directions failed, 2 bad input.
 
     Examples:
-
       [cyan]stiffmap polar orthoglide-revised --at -200,-200,-200 -o results[/cyan]
-
       [cyan]stiffmap polar orthoglide-revised --at 0,0,0 --at 300,300,300 --force 500[/cyan]
-
       [cyan]stiffmap polar tripteron --at 300,400,500 --plane xz --json[/cyan]
     """
-    import stiffmap
-
     m = machine_with(machine, effect)
     places = [position(text, m) for text in at] if at else [position(None, m)]
     size, vector = force_given(force)
@@ -55,14 +49,12 @@ def command(
     many = [stiffmap.polar(m, p, size, plane, directions=directions, **how) for p in places]
     files = write_files(output, _files(many, plane, MM * tolerance))
     moved = [] if vector is None else [m.solve(p, [*vector, 0, 0, 0], **how).displacement for p in places]
-    statuses = np.concatenate([d.status.values.ravel() for d in many])
+    lost = failed(np.concatenate([d.status.values.ravel() for d in many]))
     told = [_under(p, vector, d) for p, d in zip(places, moved, strict=False)]
     data: dict[str, Any] = {"machine": m.name, "diagrams": [as_plain(d, plane) for d in many], "files": files}
     data |= {} if vector is None else {"displacement_under_the_vector": moved}
-    show(
-        as_json, data, [as_table(many, plane), *told, *failed_in_words(failed(statuses), "directions")], files
-    )
-    finish(any(bool((d.status != 0).any()) for d in many))
+    show(as_json, data, [as_table(many, plane), *told, *failed_in_words(lost, "directions")], files)
+    finish(bool(lost))
 
 
 def _under(place: Any, vector: Any, displacement: Any) -> str:
@@ -73,7 +65,6 @@ def _under(place: Any, vector: Any, displacement: Any) -> str:
 
 
 def _files(many: list[xr.Dataset], plane: str, tolerance: float) -> Iterator[tuple[str, Any]]:
-    """Data and pictures."""
     from stiffmap.ui.plot import ellipse_figure, polar_figure
 
     for i, d in enumerate(many, 1):

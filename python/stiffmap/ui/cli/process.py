@@ -1,10 +1,9 @@
-"""``stiffmap process``."""
-
 from __future__ import annotations
 
 from pathlib import Path
 
 from stiffmap.common.outputs.option import written
+from stiffmap.machining.process import identify_process, load_process
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.options import argument, option
 from stiffmap.ui.cli.output import show
@@ -28,13 +27,9 @@ def command(
     law, Kienzle's and, from signals, run-out are judged by their errors at feeds that were left out.
 
     Examples:
-
       [cyan]stiffmap process forces.csv[/cyan]
-
       [cyan]stiffmap process forces.csv --process slot -o process.yaml[/cyan]
     """
-    from stiffmap.machining.process import identify_process, load_process
-
     given = None if base is None else load_process(base)
     law = identify_process(table, given, sheet)
     files = [] if output is None else [law.save(output, given)]

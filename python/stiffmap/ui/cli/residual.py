@@ -1,5 +1,3 @@
-"""``stiffmap residual``."""
-
 from __future__ import annotations
 
 from pathlib import Path
@@ -30,11 +28,8 @@ def command(
     predicted, 1 they are not (p-value below 1e-3), 2 bad input.
 
     Examples:
-
       [cyan]stiffmap residual orthoglide-revised experiments/servo[/cyan]
-
       [cyan]stiffmap residual orthoglide-revised experiments/servo --rows 20 -o result[/cyan]
-
       [cyan]stiffmap residual orthoglide-revised experiments/servo --effect 'compliance actuator z scale=2.1'[/cyan]
     """
     declared = load_machine(machine)

@@ -1,5 +1,3 @@
-"""``stiffmap show``."""
-
 from __future__ import annotations
 
 from collections.abc import Iterator
@@ -48,11 +46,8 @@ def command(
     in the deflection of the tool.
 
     Examples:
-
       [cyan]stiffmap show orthoglide-revised[/cyan]
-
       [cyan]stiffmap show tripteron --at 300,400,500 -o tripteron.png --view 15,-60[/cyan]
-
       [cyan]stiffmap show orthoglide-revised --at -200,-200,-200 --load 300,0,0 --page loaded.html[/cyan]
     """
     m, p, how = machine_at(machine, effect, at, turned)
@@ -64,7 +59,7 @@ def command(
     wrench = None if load is None else np.r_[numbers(load, "load", 3), np.zeros(3)]
     file = _draw(m, p, r, output or Path(f"{m.name}.png"), view, wrench) if picture else None
     if page is not None:
-        from stiffmap.ui.report.page import write_page
+        from stiffmap.ui.report.sheet import write_page
 
         if wrench is None:
             raise StiffmapError("--page: needs --load, the force under which the machine is drawn")
@@ -80,10 +75,8 @@ def command(
 def _draw(m: Machine, p: Any, r: Any, path: Path, view: str | None, wrench: Any) -> Path:
     from stiffmap.ui.plot import loaded_figure, machine_figure, save
 
-    looks = None if view is None else tuple(numbers(view, "view", 2).tolist())
-    if wrench is not None:
-        return save(loaded_figure(m, p, wrench, rotation=r, view=looks), path)
-    return save(machine_figure(m, p, rotation=r, view=looks), path)
+    how = {"rotation": r, "view": None if view is None else tuple(numbers(view, "view", 2).tolist())}
+    return save(machine_figure(m, p, **how) if wrench is None else loaded_figure(m, p, wrench, **how), path)
 
 
 def as_plain(m: Machine, counts: Mobility, file: Path | None) -> Any:
@@ -103,7 +96,6 @@ def as_plain(m: Machine, counts: Mobility, file: Path | None) -> Any:
 
 
 def _lines(m: Machine, counts: Mobility, file: Path | None) -> Iterator[Any]:
-    """For the terminal."""
     d = m.description
     tree = Tree(Text.assemble((m.name, "bold"), f"  {d.title}"))
     legs = [(f"leg {leg.name}", leg.elements) for leg in d.legs]

@@ -1,5 +1,3 @@
-"""``stiffmap simulate``."""
-
 from __future__ import annotations
 
 import re
@@ -73,15 +71,10 @@ def command(
     [bold]stiffmap diagnose[/bold] on it says what the plan would have found, and how small.
 
     Examples:
-
       [cyan]stiffmap simulate orthoglide-revised --effect 'dead_zone actuator y half_width=5um' -o twin[/cyan]
-
       [cyan]stiffmap simulate orthoglide-revised --effect 'length bar x error=0.1mm' --quantity position --plan grid:5x5x3 --noise 0.01 -o twin[/cyan]
-
       [cyan]stiffmap simulate orthoglide-revised --effect 'friction actuator y force=40N' --effect 'compliance actuator z scale=1.5' --branches --loads full --poses 8 -o twin[/cyan]
-
       [cyan]stiffmap simulate orthoglide-revised --plan my_poses.csv --temperature 20,26 --shuffle --outliers 0.02 -o twin[/cyan]
-
       [cyan]stiffmap simulate orthoglide-revised --plan experiments/servo --effect 'dead_zone actuator y half_width=5um' -o twin[/cyan]
     """
     chosen = load_machine(machine)
@@ -125,7 +118,6 @@ def command(
 
 
 def _sizes(text: str) -> list[float]:
-    """Sizes of forces, N."""
     found: list[float] = numbers(text, "forces").tolist()
     if min(found) <= 0:
         raise StiffmapError(
@@ -135,7 +127,6 @@ def _sizes(text: str) -> list[float]:
 
 
 def _axes(text: str) -> tuple[str, ...]:
-    """Axes that are read."""
     if text == "none":
         return ()
     wanted = tuple(a.strip() for a in text.split(",") if a.strip())

@@ -1,5 +1,3 @@
-"""``stiffmap solve``."""
-
 from __future__ import annotations
 
 from collections.abc import Iterator
@@ -15,6 +13,7 @@ from stiffmap.common.number_text import length_text
 from stiffmap.common.outputs import write_rows
 from stiffmap.common.outputs.option import written
 from stiffmap.common.tables.poses import PoseTable, read_pose_table
+from stiffmap.solve.labels import WRENCH
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.mobility import free_motions
 from stiffmap.solve.solution import Solution
@@ -30,8 +29,7 @@ from stiffmap.ui.cli.output import table as table_of
 SCALE = [1e3] * 3 + [1.0] * 3
 """m to mm, rad stays: a compliance then is in mm/N, rad/N, mm/(N mm), rad/(N mm)."""
 NAMES = ("dx", "dy", "dz", "rx", "ry", "rz")
-SHOWN = 20
-"""Rows of a file that are printed."""
+SHOWN = 20  # rows of a file that are printed
 
 
 def command(
@@ -57,18 +55,14 @@ def command(
     Exit codes: 0 converged, 1 any other status, 2 bad input.
 
     Examples:
-
       [cyan]stiffmap solve orthoglide-revised --at -200,-200,-200 --force 300,0,0[/cyan]
-
       [cyan]stiffmap solve orthoglide-revised --at -200 -200 -200 --force 300[/cyan]
-
       [cyan]stiffmap solve tripteron --at 300,400,500 --force 0,0,100 --json[/cyan]
-
       [cyan]stiffmap solve orthoglide-revised --force 0,0,-50 --moment 0,2000,0 --gravity 0,0,-9.81[/cyan]
-
       [cyan]stiffmap solve orthoglide-revised --at poses.csv --force 0,0,-100 -o answers.csv[/cyan]
     """
-    file = Path(at) if at is not None and is_file_name(at) else None
+    named = Path(at or "")
+    file = named if named.suffix.lower() in (".csv", ".txt", ".tsv") or named.is_file() else None
     m, place, how = machine_at(machine, effect, None if file else at, turned, gravity_)
     how |= {"point": point, "method": method}
     if file is not None:
@@ -84,7 +78,9 @@ def command(
     acting = worst_force(m, place, size, **how) if vector is None else vector
     load = np.r_[acting, MM * numbers(moment, "moment", 3)]
     s = m.solve(place, load, **how)
-    why = reason(m, s, place, how["rotation"])
+    why = None if int(s.status) == Status.CONVERGED else MEANINGS[Status(int(s.status)).name]
+    if int(s.status) == Status.UNREACHABLE:
+        why = why_unreachable(m, place, how["rotation"])
     told: list[Any] = [position_words(place, m), *_lines(m, s)]
     if vector is None:
         furthest = ", ".join(f"{v:.1f}" for v in acting)
@@ -111,27 +107,9 @@ def _lines(m: Machine, s: Solution) -> Iterator[str | Table]:
             yield f"drive {name}: {effort:z.4f} {'N' if m.compiled.names.is_prismatic(name) else 'N·m'}"
     if np.isfinite(s.compliance).any():
         scaled = s.compliance * np.outer(SCALE, SCALE) / 1e3
-        yield _matrix("loaded compliance: mm and rad per N and N mm", scaled)
-
-
-def reason(m: Machine, s: Solution, at: Any, turned: Any) -> str | None:
-    """Why a pose has no answer, in words; None where it has one."""
-    if int(s.status) == Status.CONVERGED:
-        return None
-    if int(s.status) != Status.UNREACHABLE:
-        return MEANINGS[Status(int(s.status)).name]
-    return why_unreachable(m, at, turned)
-
-
-def _matrix(title: str, values: Any) -> Table:
-    rows = ([name, *(f"{v:11.3e}" for v in row)] for name, row in zip(NAMES, values, strict=True))
-    heads = ("", "fx", "fy", "fz", "mx", "my", "mz")
-    return table_of(title, heads, rows, padding=0, pad_edge=False, collapse_padding=True)
-
-
-def is_file_name(text: str) -> bool:
-    """Whether a position is the name of a file: it holds letters other than those of numbers."""
-    return Path(text).suffix.lower() in (".csv", ".txt", ".tsv") or Path(text).is_file()
+        rows = ([name, *(f"{v:11.3e}" for v in row)] for name, row in zip(NAMES, scaled, strict=True))
+        title = "loaded compliance: mm and rad per N and N mm"
+        yield table_of(title, ("", *WRENCH), rows, padding=0, pad_edge=False, collapse_padding=True)
 
 
 def solve_table(

@@ -1,5 +1,3 @@
-"""``stiffmap stress``."""
-
 from __future__ import annotations
 
 from collections.abc import Iterator
@@ -7,6 +5,7 @@ from typing import Any
 
 from rich.table import Table
 
+import stiffmap
 from stiffmap.solve.internal_wrenches import InternalWrenches
 from stiffmap.solve.status import Status
 from stiffmap.ui.cli import options
@@ -30,13 +29,9 @@ def command(
     Exit codes: 0 converged, 1 any other status, 2 bad input.
 
     Examples:
-
       [cyan]stiffmap stress my_machine.yaml --at 0,200[/cyan]
-
       [cyan]stiffmap stress swing-table --gravity 0,0,-9.81 -o out[/cyan]
     """
-    import stiffmap
-
     m, place, how = machine_at(machine, effect, at, turned, gravity_ or "0,0,0")
     result = stiffmap.assembly_wrenches(m, place, **how)
     files = write_files(output, _picture(result, m.name))

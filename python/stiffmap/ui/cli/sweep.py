@@ -1,5 +1,3 @@
-"""``stiffmap sweep``."""
-
 from __future__ import annotations
 
 from collections.abc import Iterator
@@ -9,6 +7,7 @@ import numpy as np
 import xarray as xr
 from rich.table import Table
 
+import stiffmap
 from stiffmap.common.number_text import place_text
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.status import Status
@@ -47,15 +46,10 @@ def command(
     Exit codes: 0 done, 1 some equilibria are unstable or were not found, 2 bad input.
 
     Examples:
-
       [cyan]stiffmap sweep orthoglide-revised --at -200,-200,-200 --direction 1,1,0 -o results[/cyan]
-
       [cyan]stiffmap sweep orthoglide-revised --from 0 --to 8000 --points 41[/cyan]
-
       [cyan]stiffmap sweep linear-delta --direction 0,0,-1 --control displacement --limit 20 -o out[/cyan]
     """
-    import stiffmap
-
     m, place, posed = machine_at(machine, effect, at, acting=gravity_)
     path = limit is not None or control != "force" or bool(cross)
     how: dict[str, Any] = {"forces": np.linspace(from_, to, max(points, 0)), "method": method}
@@ -73,7 +67,6 @@ def command(
 
 
 def _files(ds: xr.Dataset, tolerance: float) -> Iterator[tuple[str, Any]]:
-    """Data and picture."""
     from stiffmap.ui.plot import sweep_figure
 
     u = ", ".join(f"{v:.3g}" for v in ds.direction.values)
@@ -104,7 +97,6 @@ SHOWN = 20
 
 
 def _path_files(machine: Machine, ds: xr.Dataset) -> Iterator[tuple[str, Any]]:
-    """Data, the path, and one picture per critical point."""
     from stiffmap.ui.plot import mode_figure, path_figure
 
     yield "path.nc", ds

@@ -1,5 +1,3 @@
-"""``stiffmap taps``."""
-
 from __future__ import annotations
 
 from collections.abc import Iterator
@@ -39,19 +37,15 @@ def command(
     Exit codes: 0 nothing is missing, 1 an effect was named or the readings do not fit, 2 bad input.
 
     Examples:
-
       [cyan]stiffmap taps examples/taps/kr210.yaml examples/taps/taps.csv -o result[/cyan]
-
       [cyan]stiffmap taps examples/taps/kr210.yaml examples/taps/taps.csv --only compliance --json[/cyan]
     """
     if not 0 < mass_u < 100:
         raise StiffmapError(f"--mass-u: expected an uncertainty above 0 and below 100 %, got {mass_u:g}")
     m = machine_with(machine, effect)
     measured = load_taps(table, m)
-    found = explain_taps(
-        m, measured, None if statics is None else load_experiment(statics), default_u=mass_u / 100,
-        only=words(only),
-    )  # fmt: skip
+    readings = None if statics is None else load_experiment(statics)
+    found = explain_taps(m, measured, readings, default_u=mass_u / 100, only=words(only))
     rows = found.modes(m, measured)
     files = write_files(output, _files(m, measured, found))
     data = {"machine": m.name, **found.as_plain(), "modes": rows}
@@ -60,7 +54,6 @@ def command(
 
 
 def _row(r: dict[str, Any]) -> str:
-    """A mode in a line."""
     after = "" if r["after_Hz"] is None else f", after {r['after_Hz']:.2f}"
     mac = "" if r["mac"] is None or np.isnan(r["mac"]) else f", MAC {r['mac']:.2f}"
     text = f"  {r['measured_Hz']:8.2f} Hz measured, {r['before_Hz']:8.2f} before{after}{mac}"
@@ -71,8 +64,7 @@ def _row(r: dict[str, Any]) -> str:
 
 
 def _files(machine: Any, measured: TapTest, found: TapDiagnosis) -> Iterator[tuple[str, Any]]:
-    """Corrected machine and responses before and after."""
-    from stiffmap.ui.plot.vibration import response_figure
+    from stiffmap.ui.plot.modes import response_figure
     from stiffmap.workspace.vibration import frequency_response
 
     f = np.geomspace(0.3 * measured.frequency.min(), 2 * measured.frequency.max(), 600)

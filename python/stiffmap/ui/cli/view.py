@@ -1,5 +1,3 @@
-"""``stiffmap view``."""
-
 from __future__ import annotations
 
 import math
@@ -18,10 +16,7 @@ from stiffmap.ui.cli.options import option
 from stiffmap.ui.cli.output import show
 
 LOCAL = "127.0.0.1"
-
 DEGREE = math.pi / 180
-
-
 UNUSED = {"with link": "at rotation force moment gravity plane quantity tolerance frequency magnify changes start",
           "with html": "port host browser", "with picture": "port host browser"}  # fmt: skip
 PICTURE_ALONE = {"with picture": "port host browser experiment diagnosis path"}
@@ -70,17 +65,11 @@ def command(
     With --html or --picture: writes the file and ends; the page opens without a network.
 
     Examples:
-
       [cyan]stiffmap view orthoglide-revised[/cyan]
-
       [cyan]stiffmap view orthoglide-revised --at 280,280,280 --force 300,0,0 --quantity worst[/cyan]
-
       [cyan]stiffmap view hexapod --plane x --html hexapod.html[/cyan]
-
       [cyan]stiffmap view orthoglide-revised --experiment experiments/servo --diagnosis result[/cyan]
-
       [cyan]stiffmap view calibrated_arm.yaml --meshes arm.urdf[/cyan]
-
       [cyan]stiffmap view orthoglide-revised --set x.foot/beam.EIx=4000 --no-browser --port 8090[/cyan]
     """
     refuse_unused(context, UNUSED | (PICTURE_ALONE if html is None else {}))
@@ -124,16 +113,11 @@ def _model(
 
 def _state(g: dict[str, Any]) -> dict[str, Any]:
     """Fields of the state (SI) from the texts of the options."""
-    out: dict[str, Any] = {
-        "force": tuple(numbers(g["force"], "force", 3)),
-        "moment": tuple(numbers(g["moment"], "moment", 3)),
-        "quantity": g["quantity"],
-        "tolerance": MM * g["tolerance"],
-        "frequency": g["frequency"],
-        "magnification": g["magnify"],
-    }
+    out = {"quantity": g["quantity"], "frequency": g["frequency"], "magnification": g["magnify"]}
+    out["tolerance"] = MM * g["tolerance"]
     for field, name, count, unit in (
         ("position", "at", 3, MM), ("rotation", "rotation", 3, DEGREE), ("gravity", "gravity", 3, 1.0), ("start", "start", None, 1.0),
+        ("force", "force", 3, 1.0), ("moment", "moment", 3, 1.0),
     ):  # fmt: skip
         if g[name] is not None:
             out[field] = tuple(in_si(g[name], name, count, unit))

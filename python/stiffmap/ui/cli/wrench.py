@@ -1,5 +1,3 @@
-"""``stiffmap wrench``."""
-
 from __future__ import annotations
 
 from typing import Any
@@ -29,9 +27,7 @@ def command(
     Exit codes: 0 converged, 1 any other status, 2 bad input.
 
     Examples:
-
       [cyan]stiffmap wrench orthoglide-revised --at 0,0,200 --by 0.1,0,0[/cyan]
-
       [cyan]stiffmap wrench hexapod --by 0,0,-0.2 --turn 0,0.01,0 --json[/cyan]
     """
     m, place, how = machine_at(machine, effect, at, turned, gravity_)

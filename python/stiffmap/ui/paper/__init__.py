@@ -7,11 +7,10 @@ manipulators for milling application".
 from __future__ import annotations
 
 from stiffmap.ui.paper.directions import direction_statements
-from stiffmap.ui.paper.forces import force_statements
+from stiffmap.ui.paper.forces import force_statements, workspace_statements
 from stiffmap.ui.paper.machine import machine_statements
 from stiffmap.ui.paper.results import Results, compute
 from stiffmap.ui.paper.statement import Statement, StatementVerdict
-from stiffmap.ui.paper.workspace import workspace_statements
 
 __all__ = ["Results", "Statement", "StatementVerdict", "all_statements", "compute"]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from functools import partial
 
 import numpy as np
 from scipy.optimize import brentq
@@ -18,14 +19,14 @@ from stiffmap.workspace.performance.motion.closing import drive_kinematics
 from stiffmap.workspace.performance.motion.velocity import singular_values
 
 LOW, HIGH = 0.5, 2.0
+of_section_5_2 = partial(Statement, "5.2")
 
 
 def machine_statements(results: Results) -> Iterator[Statement]:
     """Workspace, speed, transmission factors, geometry, revised bar."""
     original = results.original
     edge, wanted = (cube_edge(m, reach) for m, reach in ((original, 0.13), (results.revised, 0.33)))
-    yield Statement(
-        "5.2",
+    yield of_section_5_2(
         "cubic Cartesian workspace of size 200×200×200 mm³",
         f"{edge:.2f} mm",
         judge(edge >= 200),
@@ -34,8 +35,7 @@ def machine_statements(results: Results) -> Iterator[Statement]:
         {"edge_mm": edge},
         printed="200 mm",
     )
-    yield Statement(
-        "5.2",
+    yield of_section_5_2(
         "for selection treatment required workspace 200×200×200 mm³",
         f"{wanted:.2f} mm (revised)",
         StatementVerdict.DIFFERS,
@@ -46,8 +46,7 @@ def machine_statements(results: Results) -> Iterator[Statement]:
         printed="200 mm",
     )
     f = factors(original, np.zeros(3))
-    yield Statement(
-        "5.2",
+    yield of_section_5_2(
         "Cartesian velocity … in the isotropic point of 1.2 m/s",
         f"{f[0]:.6f} … {f[-1]:.6f} times the drive's speed",
         judge(bool(np.allclose(f, 1, atol=1e-6))),
@@ -57,11 +56,20 @@ def machine_statements(results: Results) -> Iterator[Statement]:
         printed="1.2 m/s",
         own_input=True,
     )
-    for words, printed, because in UNCHECKED:
-        yield Statement("5.2", words, "no number", StatementVerdict.NOT_CHECKED, because, printed=printed)
-    low, high = box_factors(original, original.workspace)
-    yield Statement(
-        "5.2",
+    unchecked = partial(of_section_5_2, ours="no number", verdict=StatementVerdict.NOT_CHECKED)
+    yield unchecked(
+        "acceleration in the isotropic point of … 14 m/s²",
+        because="the paper gives neither masses nor drive forces; those of our machine files are declared by us",
+        printed="14 m/s²",
+    )
+    yield unchecked(
+        "payload of 4 kg",
+        because="the paper gives no criterion (drive force, deflection or stress) for it",
+        printed="4 kg",
+    )
+    over_box = factors(original, box_nodes(original.workspace[0], original.workspace[1], 5))
+    low, high = float(over_box.min()), float(over_box.max())
+    yield of_section_5_2(
         "transmission factor range 0.5–2.0",
         f"{low:.3f} … {high:.3f}",
         judge(low >= LOW and high <= HIGH),
@@ -71,8 +79,7 @@ def machine_statements(results: Results) -> Iterator[Statement]:
         printed="0.5 … 2.0",
     )
     length, r = lengths(original)
-    yield Statement(
-        "5.2",
+    yield of_section_5_2(
         "L = 310 mm, d = 100 mm, r = 31 mm",
         f"L = {length:.6g} mm, r = {r:.6g} mm",
         judge(rounds_to(length, "310.0") and rounds_to(r, "31.0")),
@@ -90,21 +97,6 @@ def machine_statements(results: Results) -> Iterator[Statement]:
         printed="200 mm < 500 mm",
     )
     yield from bar_statements({"original": bar(original), "revised": bar(results.revised)})
-
-
-UNCHECKED = (
-    (
-        "acceleration in the isotropic point of … 14 m/s²",
-        "14 m/s²",
-        "the paper gives neither masses nor drive forces; those of our machine files are declared by us",
-    ),
-    (
-        "payload of 4 kg",
-        "4 kg",
-        "the paper gives no criterion (drive force, deflection or stress) for it",
-    ),
-)
-"""The paper's words and number, and why it is not checked."""
 
 
 def cube_edge(machine: Machine, reach: float) -> float:
@@ -141,19 +133,12 @@ def diagonal_limits(machine: Machine, low: float, high: float, reach: float) -> 
     return low_end, high_end
 
 
-def box_factors(machine: Machine, box: Floats) -> tuple[float, float]:
-    """Least and largest factor over a grid of 5³ positions in a box (2, 3), corners included."""
-    f = factors(machine, box_nodes(box[0], box[1], 5))
-    return float(f.min()), float(f.max())
-
-
 # Table 1 as printed: k11, k22, k33 in mm/N; k44, k55, k66 in rad/(N mm).
 PRINTED = {
     "original": ("4.55e-5", "2.33e-1", "5.08e-2", "2.88e-5", "1.50e-6", "7.19e-6"),
     "revised": ("3.10e-5", "3.54e-1", "6.91e-2", "0.39e-5", "0.33e-6", "1.74e-6"),
 }
-TO_PRINTED = np.array([1e3] * 3 + [1e-3] * 3)
-"""m/N to mm/N; rad/(N m) to rad/(N mm)."""
+TO_PRINTED = np.array([1e3] * 3 + [1e-3] * 3)  # m/N to mm/N; rad/(N m) to rad/(N mm)
 LENGTH = {"original": 310.0, "revised": 775.0}
 
 

@@ -1,14 +1,20 @@
-"""Everything that the figures and the statements are made of, computed once."""
+"""Everything that the figures and the statements are made of, computed once; Figures 5, 6 and 7 in the paper's arrangement."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 import xarray as xr
+from matplotlib.figure import Figure
 
+from stiffmap.common.number_text import place_text
 from stiffmap.solve.machine import Machine, load_machine
+from stiffmap.ui.plot.error_maps import map_figure
+from stiffmap.ui.plot.forces import draw_ellipse, draw_polar, sweep_figure
+from stiffmap.ui.plot.style import MM, headline, panel, paper
 from stiffmap.workspace.maps import error_map, polar, sweep
 
 POINTS = {
@@ -18,8 +24,7 @@ POINTS = {
     "asymmetric": (-0.2, 0.3, 0.0),
 }
 """The four work points of §5.3, m."""
-PLANES = (-0.2, 0.0, 0.3)
-"""z of the error maps, m."""
+PLANES = (-0.2, 0.0, 0.3)  # z of the error maps, m
 FORCE = 300.0
 TOLERANCE = 0.25e-3
 LARGEST_FORCE = 1000.0
@@ -63,3 +68,32 @@ def sweeps_at(machine: Machine, position: tuple[float, ...], at: xr.Dataset) -> 
     forces = np.linspace(0.0, LARGEST_FORCE, 41)
     angles = {"Fx": 0.0, "Fy": np.pi / 2, "worst": worst, "best": best}
     return {n: sweep(machine, position, [np.cos(a), np.sin(a), 0.0], forces) for n, a in angles.items()}
+
+
+def figure_5(results: Results) -> Figure:
+    """(a)-(d) size of the deflection against the force's direction; (e)-(h) ellipses of deflections."""
+    many = list(results.polars.values())
+    title = f"Figure 5. Deflection in the xy plane, mm, under a force of {FORCE:g} N"
+    with paper(10.4, 5.7, title) as figure:
+        for i, pol in enumerate(many):
+            top: Any = figure.add_subplot(2, 4, i + 1, projection="polar")
+            draw_polar(top, pol, "deflection_xy", TOLERANCE)
+            top.set_title(f"{panel(i)} {place_text(pol.position.values)}")
+            bottom = figure.add_subplot(2, 4, i + 5)
+            draw_ellipse(bottom, pol, "xy", TOLERANCE)
+            bottom.set_title(panel(i + 4), loc="left")
+    return figure
+
+
+def all_figures(results: Results) -> dict[str, Figure]:
+    """Every figure by the name of its file; Figure 7 in four readings, since the paper does not state its force."""
+    figure_6 = sweep_figure(list(results.sweeps.values()), tolerance=TOLERANCE)
+    headline(figure_6, "Figure 6. Deflection against force at the four points")
+    figures = {"figure5.png": figure_5(results), "figure6.png": figure_6}
+    for name in ("worst", "best", "Fx", "Fy"):
+        variable, case = (f"{name}_deflection_xy", None) if name.islower() else ("deflection_xy", name)
+        figures[f"figure7-{name}.png"] = map_figure(results.maps, variable, case=case, tolerance=TOLERANCE)
+    worst = float(results.maps.worst_deflection_xy.max()) * MM
+    title = f"Figure 7. {FORCE:g} N in the worst direction of the plane, up to {worst:.2f} mm"
+    headline(figures["figure7-worst.png"], title)
+    return figures

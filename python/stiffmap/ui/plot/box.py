@@ -22,8 +22,7 @@ from stiffmap.workspace.performance.box.inside import REACH
 from stiffmap.workspace.performance.box.proof import BOX
 from stiffmap.workspace.performance.box.workspace import Workspace
 
-AROUND = 0.85
-"""Of the box's edges: how far about its centre the sections reach."""
+AROUND = 0.85  # of the box's edges: how far about its centre the sections reach
 THIN = 1e-6
 KINDS = (
     (REACH, "0.9", "out of reach"),
@@ -86,11 +85,7 @@ def edges(low: Floats, high: Floats, a: int, b: int, **look: Any) -> Rectangle:
 
 
 def paint(
-    axes: Axes,
-    u: Floats,
-    v: Floats,
-    inside: NDArray[np.bool_],
-    broken: Mapping[str, NDArray[np.bool_]],
+    axes: Axes, u: Floats, v: Floats, inside: NDArray[np.bool_], broken: Mapping[str, NDArray[np.bool_]]
 ) -> None:
     """Poses on the nodes of u and v (m), first axis u, coloured by what excludes them."""
     kind, seen = np.where(inside, 0, 1), {"inside": SKY}
@@ -121,7 +116,10 @@ def box_figure(machine: Machine, box: LargestBox, nodes: int = 80) -> Figure:
     if not planes:
         raise StiffmapError(f"{machine.name}: the largest box is a line, so there is no section to draw")
     low, high = box.corners
-    at = _tightest(box)
+    corners = box.corners.mean(axis=0) + BOX * box.edges / 2
+    _, limits = box.bounds.at(corners @ box.orientation.T)
+    room = [(limit.most - limit.value) / max(abs(limit.most), 1e-9) for limit in limits]
+    at = np.asarray(corners[int(np.argmin(np.min(room, axis=0)))] if room else corners[0])
     declared = np.allclose(box.orientation, np.eye(3))
     marks = "xyz" if declared else ("x′", "y′", "z′")
     shown = [f"{MM * e:.2f}" for e in box.edges[moves]]
@@ -148,11 +146,3 @@ def box_figure(machine: Machine, box: LargestBox, nodes: int = 80) -> Figure:
             axes.set_xlim(MM * u[0], MM * u[-1])
             axes.set_ylim(MM * v[0], MM * v[-1])
     return figure
-
-
-def _tightest(box: LargestBox) -> Floats:
-    """(3,) the corner, in the box's axes, that comes nearest to a limit, relative to the limit's size."""
-    corners = box.corners.mean(axis=0) + BOX * box.edges / 2
-    _, limits = box.bounds.at(corners @ box.orientation.T)
-    room = [(limit.most - limit.value) / max(abs(limit.most), 1e-9) for limit in limits]
-    return np.asarray(corners[int(np.argmin(np.min(room, axis=0)))] if room else corners[0])

@@ -46,12 +46,8 @@ def parallel_figure(found: ParetoSet) -> Figure:
         axes = figure.add_subplot()
         axes.plot(scaled.T, color=BLUE, alpha=0.25, linewidth=0.8)
         axes.plot(scaled[found.chosen()["compromise"]], color=VERMILLION, linewidth=1.6)
-        axes.set_xticks(
-            range(len(labels)),
-            [f"{n}\n{a:.4g}…{b:.4g}" for n, a, b in zip(labels, low, high, strict=True)],
-            rotation=60,
-            ha="right",
-        )
+        ranges = [f"{n}\n{a:.4g}…{b:.4g}" for n, a, b in zip(labels, low, high, strict=True)]
+        axes.set_xticks(range(len(labels)), ranges, rotation=60, ha="right")
         axes.set_yticks([])
     return figure
 
@@ -92,7 +88,6 @@ def _map(table: MeasuresTable, name: str) -> BoxMap | None:
 
 
 def _middle(over: BoxMap) -> Floats:
-    """(x, y) values of the plane in the middle of the box."""
     return np.asarray(over.values[:, :, len(over.z) // 2])
 
 

@@ -13,10 +13,8 @@ from stiffmap.solve.compiled import CompiledMachine, Role
 from stiffmap.solve.machine import Machine
 from stiffmap.ui.plot.skeleton import Skeleton, owners, skeleton, to_base
 
-THICK, THIN = 0.02, 0.004
-"""Of the machine's extent: most and least thickness of a link."""
-PLAIN = 0.008
-"""The same of a link of which no spring says a section."""
+THICK, THIN = 0.02, 0.004  # of the machine's extent: most and least thickness of a link
+PLAIN = 0.008  # the same of a link of which no spring says a section
 
 
 def thicknesses(machine: Machine, now: Skeleton) -> Floats:

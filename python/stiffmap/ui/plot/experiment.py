@@ -18,8 +18,7 @@ from stiffmap.ui.plot.style import AFTER, BEFORE, MM, UM, new_figure
 
 NOISE = "#d9d9d9"
 MOST_LABELS = 12
-FLAT = 0.05
-"""Share of the largest extent below which poses lie in a plane."""
+FLAT = 0.05  # share of the largest extent below which poses lie in a plane
 
 Driver = tuple[str, Floats, list[str]]
 """Label, value of each row, and names of the values where they are classes."""
@@ -124,10 +123,8 @@ def against(r: Residual, drivers: list[Driver], channels: list[int]) -> Figure:
     for column, (name, _, _) in enumerate(drivers):
         grid[-1][column].set_xlabel(name)
     aside = "; crosses: outliers" if r.set_aside.any() else ""
-    title = (
-        f"{r.experiment.name}: reading minus prediction\ngrey: two standard deviations of the noise{aside}"
-    )
-    figure.suptitle(title, fontsize=9)
+    told = "reading minus prediction\ngrey: two standard deviations of the noise"
+    figure.suptitle(f"{r.experiment.name}: {told}{aside}", fontsize=9)
     return figure
 
 
@@ -214,8 +211,7 @@ def history_drivers(e: Experiment) -> list[Driver]:
     return out
 
 
-TREND = 1e-3
-"""p-value below which residuals follow a driver, over all drivers and channels."""
+TREND = 1e-3  # p-value below which residuals follow a driver, over all drivers and channels
 
 
 def trending(d: Diagnosis) -> tuple[list[Driver], list[Driver]]:
@@ -223,12 +219,8 @@ def trending(d: Diagnosis) -> tuple[list[Driver], list[Driver]]:
     drivers = drivers_of(d.experiment)
     read = np.flatnonzero(d.experiment.axis_read)
     level = TREND / max(2 * len(drivers) * len(read), 1)
-    followed = [
-        any(
-            _follows(x, kept(d, r)[:, i]) < level for r in (d.residual_before, d.residual_after) for i in read
-        )
-        for _, x, _ in drivers
-    ]
+    left = [kept(d, r)[:, i] for r in (d.residual_before, d.residual_after) for i in read]
+    followed = [any(_follows(x, values) < level for values in left) for _, x, _ in drivers]
     both = list(zip(drivers, followed, strict=True))
     return [v for v, f in both if f], [v for v, f in both if not f]
 
@@ -256,13 +248,11 @@ def trends(d: Diagnosis, drivers: list[Driver]) -> Figure:
     # a row per driver fits an upright page; its columns are the channels
     figure = new_figure(max(6.0, 3.0 * len(axes_read)), 1.9 * len(drivers) + 0.6)
     grid = figure.subplots(len(drivers), len(axes_read), squeeze=False, sharex="row", sharey="col")
+    both = ((d.residual_before, BEFORE, "before"), (d.residual_after, AFTER, "after"))
     for row, (name, x, _) in enumerate(drivers):
         for column, axis in enumerate(axes_read):
             ax = grid[row][column]
-            for values, colour, label in (
-                (d.residual_before, BEFORE, "before"),
-                (d.residual_after, AFTER, "after"),
-            ):
+            for values, colour, label in both:
                 ax.plot(x, kept(d, values)[:, axis] * UM, ".", ms=3, color=colour, alpha=0.6, label=label)
             ax.axhline(0, color="0.5", lw=0.6)
             ax.set_xlabel(name, fontsize=9)

@@ -71,18 +71,17 @@ def _draw_shape(axes: Axes3D, part: PartLink, triangles: Ints, case: int) -> Non
     extent = np.ptp(p, axis=0).max()
     scale = 0.15 * extent / max(float(np.abs(u).max()), 1e-300)
     for nodes, colour, alpha in ((p, GREY, 0.25), (p + scale * u, BLUE, 0.8)):
-        axes.add_collection3d(
-            Poly3DCollection(1e3 * nodes[triangles[::step]], facecolor=colour, alpha=alpha, lw=0)
-        )
+        corners = 1e3 * nodes[triangles[::step]]
+        axes.add_collection3d(Poly3DCollection(corners, facecolor=colour, alpha=alpha, lw=0))
     low, size = 1e3 * p.min(axis=0), np.maximum(1e3 * np.ptp(p, axis=0), 300 * extent)
     middle = low + 1e3 * np.ptp(p, axis=0) / 2
     for axis, centre, width in zip("xyz", middle, size, strict=True):
         getattr(axes, f"set_{axis}lim")(centre - 0.55 * width, centre + 0.55 * width)
         getattr(axes, f"set_{axis}label")(f"{axis}, mm", fontsize=7, labelpad=-3)
+        # labels of a thin side would overlap
+        axes.locator_params(axis=axis, nbins=4 if width > 0.5 * size.max() else 2)
     axes.set_box_aspect(size, zoom=0.8)  # room for the labels
     axes.tick_params(labelsize=6)
-    for axis, width in zip("xyz", size, strict=True):  # labels of a thin side would overlap
-        axes.locator_params(axis=axis, nbins=4 if width > 0.5 * size.max() else 2)
     axes.set_title(
         f"case {case + 1}: {wrench_text(part.wrenches[case])}\n(displacement × {scale:.0f})", fontsize=9
     )

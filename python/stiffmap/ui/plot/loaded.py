@@ -20,8 +20,7 @@ from stiffmap.ui.plot.skeleton import Skeleton, skeleton, standing
 from stiffmap.ui.plot.style import BLUE, ORANGE, headline, leg_colours, paper
 from stiffmap.workspace.maps.inputs import place
 
-SHOWN = 0.08
-"""Of the machine's extent, how far the tool moves in the picture."""
+SHOWN = 0.08  # of the machine's extent, how far the tool moves in the picture
 MOST_BARS = 10
 FAINT = 5e-4  # share of an element that is not worth a bar
 
@@ -86,9 +85,8 @@ def loaded_shape(
         )
     rest, loaded = (skeleton(machine, s.coordinates) for s in (free, under))
     d = np.asarray(under.displacement - free.displacement)
-    return LoadedShape(
-        rest, loaded, round_factor(SHOWN * rest.extent, float(np.linalg.norm(d[:3]))), d, load[:3]
-    )
+    factor = round_factor(SHOWN * rest.extent, float(np.linalg.norm(d[:3])))
+    return LoadedShape(rest, loaded, factor, d, load[:3])
 
 
 def round_factor(wanted: float, size: float) -> float:

@@ -96,9 +96,8 @@ def measure_figures(table: MeasuresTable) -> dict[str, Figure]:
     rows = {r.measure.name: r for r in table.rows}
     space = rows.get("workspace")
     if space is not None and space.found.worst > 0:
-        out["map-workspace"] = workspace_figure(
-            table.machine, cast(Workspace, space.found.extra["workspace"])
-        )
+        found = cast(Workspace, space.found.extra["workspace"])
+        out["map-workspace"] = workspace_figure(table.machine, found)
     box = rows.get("largest_box")
     if box is not None and box.found.worst > 0:
         with suppress(StiffmapError):  # a line
@@ -199,12 +198,8 @@ def requirement_figure(table: MeasuresTable) -> Figure:
     with paper(6.4, 0.6 + 0.42 * len(rows), most=0) as figure:
         axes = figure.add_subplot()
         shares = np.nan_to_num([_share(r) for r in rows], posinf=0.0, neginf=0.0)
-        axes.barh(
-            range(len(rows)),
-            shares,
-            color=[BLUE if r.verdict == "pass" else VERMILLION for r in rows],
-            height=0.6,
-        )
+        colours = [BLUE if r.verdict == "pass" else VERMILLION for r in rows]
+        axes.barh(range(len(rows)), shares, color=colours, height=0.6)
         for i, (r, share) in enumerate(zip(rows, shares, strict=True)):
             text = f"{r.measure.factor * r.found.worst:.4g} {r.measure.shown} – {r.verdict}"
             axes.text(max(share, 1.0) * 1.02, i, text, va="center")

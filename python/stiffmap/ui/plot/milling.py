@@ -14,8 +14,7 @@ from stiffmap.ui.plot.scene import draw_skeleton, finish, on, scene_axes
 from stiffmap.ui.plot.skeleton import standing
 from stiffmap.ui.plot.style import BLACK, BLUE, COLOURS, GREEN, MM, TOLERANCE, leg_colours, length_unit, paper
 
-SHARE = 0.08
-"""Of the outline's size, that the largest error takes as it is drawn."""
+SHARE = 0.08  # of the outline's size, that the largest error takes as it is drawn
 ROUND = np.arange(1, 20) / 20.5
 """Shares of the turn of an inside corner, where the wanted wall has the tool's rounding; never the half, where opposite directions cancel."""
 
@@ -55,17 +54,13 @@ def outline_figure(found: Milled) -> Figure:
         ax = figure.subplots()
         ax.plot(*(MM * wanted[:, :2].T), color=BLACK, lw=1.0, label="wanted")
         cut = magnified(before)
-        lines = LineCollection(
-            [cut[k : k + 2] for k in range(len(cut) - 1)],
-            array=scale * np.abs(np.insert(before, corner + 1, np.nan)[1:]),
-            cmap=COLOURS,
-            linewidths=2.2,
-        )
+        pieces = [cut[k : k + 2] for k in range(len(cut) - 1)]
+        sizes = scale * np.abs(np.insert(before, corner + 1, np.nan)[1:])
+        lines = LineCollection(pieces, array=sizes, cmap=COLOURS, linewidths=2.2)
         ax.add_collection(lines)
         ax.plot(*magnified(after).T, color=GREEN, lw=1.0, ls="--", label="compensated")
-        figure.colorbar(
-            lines, ax=ax, shrink=0.7, label=f"as it is cut: size of the error across the wall, {unit}"
-        )
+        label = f"as it is cut: size of the error across the wall, {unit}"
+        figure.colorbar(lines, ax=ax, shrink=0.7, label=label)
         ax.set_aspect("equal")
         ax.autoscale_view()
         ax.set(xlabel="x of the part, mm", ylabel="y of the part, mm")

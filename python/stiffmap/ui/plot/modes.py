@@ -1,10 +1,11 @@
-"""Mode shapes drawn over the machine at rest; frames of one swing for an animation."""
+"""Pictures of vibration: mode shapes over the machine at rest and frames of one swing; stability lobes, frequency responses."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
+import xarray as xr
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d import Axes3D
@@ -15,13 +16,11 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.machine import Machine
 from stiffmap.ui.plot.skeleton import skeleton
-from stiffmap.ui.plot.style import BLUE, MM, VERMILLION, new_figure, paper_style
+from stiffmap.ui.plot.style import BLACK, BLUE, COLOURS, MM, UM, VERMILLION, legend_below, line_look, paper
 from stiffmap.workspace.performance.motion.inertia import NaturalFrequencies, natural_frequencies
 
-FRAMES = 9
-"""From one end of a swing to the other."""
-SWING = 0.08
-"""Of the machine's extent: how far the point that moves most is drawn from its place."""
+FRAMES = 9  # from one end of a swing to the other
+SWING = 0.08  # of the machine's extent: how far the point that moves most is drawn from its place
 
 
 def mode_figure(machine: Machine, position: ArrayLike, *, modes: int = 3, **options: object) -> Figure:
@@ -57,16 +56,14 @@ class _Scene:
         self.w = w = natural_frequencies(machine, position, modes=modes, **options)  # type: ignore[arg-type]
         count = int(np.isfinite(w.frequency).sum())
         if w.frequency.ndim != 1 or not count:
-            raise StiffmapError(
-                f"{machine.name}: no mode at {np.asarray(position).tolist()} m (one pose (3,))"
-            )
+            at = np.asarray(position).tolist()
+            raise StiffmapError(f"{machine.name}: no mode at {at} m (one pose (3,))")
         rest = skeleton(machine, w.coordinates)
         lines = [line for _, line in rest.bars]
         points = np.concatenate(lines)
         centre, self.half = (points.max(0) + points.min(0)) / 2, np.ptp(points, axis=0).max() / 2
         self.moving: list[list[Line3D]] = []
-        with paper_style():
-            self.figure = new_figure(3.3 * count, 3.6)
+        with paper(3.3 * count, 3.6, most=0) as self.figure:
             for i in range(count):
                 axes = self.figure.add_subplot(1, count, i + 1, projection="3d")
                 _lines(axes, lines, {"color": "0.45", "linewidth": 0.8, "linestyle": "--"})
@@ -98,3 +95,50 @@ def swung(machine: Machine, w: NaturalFrequencies, mode: int, phase: float, size
 
 def _lines(axes: Axes3D, lines: Iterable[Floats], style: dict[str, object]) -> list[Line3D]:
     return [axes.plot(*(MM * line.T), **style)[0] for line in lines]
+
+
+RPM = 60 / (2 * np.pi)
+
+
+def lobes_figure(lobes: xr.Dataset, title: str, speed: float, depth: float) -> Figure:
+    """Stable depth (mm) over the speed of the spindle (rpm); the cut of the process as a point."""
+    with paper(6.0, 4.0, f"{title}\ndamping {lobes.attrs['damping']}") as figure:
+        ax = figure.add_subplot()
+        s, d = RPM * lobes.speed.values, MM * lobes.depth.values
+        if "multiplier" in lobes:
+            mu = np.clip(lobes.multiplier.values.T, 0, 2)
+            filled = ax.pcolormesh(
+                s, d, mu, cmap=COLOURS + "_r", vmin=0.5, vmax=1.5, shading="nearest", rasterized=True
+            )
+            bar = figure.colorbar(filled, ax=ax, extend="both")
+            bar.set_label("largest multiplier, above 1: chatter")
+            if mu.min() < 1 < mu.max():
+                ax.contour(s, d, mu, levels=[1.0], colors=[BLACK], linewidths=1.4)
+                ax.plot([], [], color=BLACK, lw=1.4, label="border, semi-discretization")
+        zero = np.where(np.isfinite(lobes.limit_zero_order), MM * lobes.limit_zero_order, np.nan)
+        ax.plot(s, zero, color=VERMILLION, ls="--", lw=1, label="border, zero order")
+        at = RPM * speed, MM * depth
+        near = np.clip(at[0], s[0], s[-1]), min(at[1], d[-1])
+        beyond = "" if np.allclose(at, near) else ", beyond these axes"
+        ax.plot(*near, "o", mfc="white", mec=BLUE, mew=1.5, clip_on=False, zorder=5,
+                label=f"the process: {at[0]:.5g} rpm, {at[1]:.3g} mm{beyond}")  # fmt: skip
+        ax.margins(0)
+        ax.set_xlim(s[0], s[-1])
+        ax.set_ylim(0, d[-1])
+        ax.set(xlabel="speed of the spindle, rpm", ylabel="depth along the tool, mm")
+    return figure
+
+
+def response_figure(responses: Mapping[str, xr.DataArray]) -> Figure:
+    """Size of the receptances (µm/N) along base axes over the frequency, a panel for each axis."""
+    with paper(8.0, 3.0, "Frequency response at the tool", most=0) as figure:
+        panels = figure.subplots(1, 3, sharey=True)
+        for ax, axis in zip(panels, "xyz", strict=True):
+            for i, (label, H) in enumerate(responses.items()):
+                own = np.abs(H.sel(response=axis, force=f"f{axis}"))
+                ax.semilogy(H.frequency, UM * own, label=label, **line_look(i))
+            ax.set(title=f"along {axis}", xlabel="frequency, Hz")
+        panels[0].set_ylabel("receptance, µm/N")
+        if len(responses) > 1:
+            legend_below(figure)
+    return figure

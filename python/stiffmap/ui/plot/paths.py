@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
+from scipy.ndimage import binary_dilation
 
 from stiffmap.common.broadcasting import Floats, refused, whole_number
 from stiffmap.common.errors import StiffmapError
@@ -47,22 +47,14 @@ def _check(path: xr.Dataset) -> None:
 
 
 def _draw_branch(ax: Axes, branch: xr.Dataset, colour: str, name: str) -> None:
-    """One branch, by stability."""
     if branch.sizes["step"] < 2:
         return
     x, y = MM * branch.deflection_along.values, branch.force.values
     stable = branch.status.values == Status.CONVERGED
     ax.plot(x, np.where(stable, y, np.nan), color=colour, label=f"{name}stable")
     if not stable.all():
-        ax.plot(x, _joined(y, ~stable), color=VERMILLION, ls="--", label=f"{name}unstable")
-
-
-def _joined(values: Floats, where: NDArray[np.bool_]) -> Floats:
-    """Values where wanted and at the neighbours of wanted points, so that lines join."""
-    near = where.copy()
-    near[1:] |= where[:-1]
-    near[:-1] |= where[1:]
-    return np.where(near, values, np.nan)
+        near = binary_dilation(~stable)  # with their neighbours, so that the lines join
+        ax.plot(x, np.where(near, y, np.nan), color=VERMILLION, ls="--", label=f"{name}unstable")
 
 
 def mode_figure(

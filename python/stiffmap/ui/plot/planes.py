@@ -22,8 +22,7 @@ from stiffmap.solve.status import Status
 from stiffmap.ui.plot.style import MM, TOLERANCE
 
 AXES = ("x", "y", "z")
-FEWEST = 5
-"""Positions along each axis below which isolines would say more than was computed."""
+FEWEST = 5  # positions along each axis below which isolines would say more than was computed
 LOOK: dict[Status, tuple[str, str, str]] = {
     Status.UNREACHABLE: ("unreachable", "////", "#DDDDDD"),
     Status.SINGULAR: ("singular", "....", "#FFFFFF"),

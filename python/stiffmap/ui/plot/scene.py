@@ -18,8 +18,7 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.ui.plot.skeleton import Skeleton
 from stiffmap.ui.plot.style import BLACK, MM, ORANGE
 
-ARROW = 0.16
-"""Of the machine's extent, length of the arrow of the force."""
+ARROW = 0.16  # of the machine's extent, length of the arrow of the force
 FORCE = "#C1121F"
 ZOOM = 0.94
 MARGIN = 0.06

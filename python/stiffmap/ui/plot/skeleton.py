@@ -134,9 +134,7 @@ def held_by(core: CompiledMachine) -> set[int]:
         if c < 0 or not owner[i]:
             continue
         last.add(i)
-        while parent >= 0 and owner[parent] == owner[i]:
-            last.discard(parent)
-            parent = core.nodes[parent][0]
+        last -= {n for n in to_base(core, parent) if owner[n] == owner[i]}
     return last
 
 

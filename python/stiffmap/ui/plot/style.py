@@ -34,14 +34,9 @@ BEFORE, AFTER = "#c1432e", "#2a6f97"
 """What the machine of the file leaves of readings, and a corrected one."""
 
 SETTINGS: dict[str, Any] = {
-    "font.size": 9,
-    "axes.titlesize": 9,
-    "axes.labelsize": 9,
-    "legend.fontsize": 8,
-    "xtick.labelsize": 8,
-    "ytick.labelsize": 8,
-    "axes.linewidth": 0.6,
-    "hatch.linewidth": 0.6,
+    **dict.fromkeys(("font.size", "axes.titlesize", "axes.labelsize"), 9),
+    **dict.fromkeys(("legend.fontsize", "xtick.labelsize", "ytick.labelsize"), 8),
+    **dict.fromkeys(("axes.linewidth", "hatch.linewidth"), 0.6),
     "legend.frameon": False,
 }
 
@@ -66,8 +61,7 @@ def new_figure(width: float, height: float) -> Figure:
     return Picture(figsize=(width, height), layout="constrained")
 
 
-EDGE = 0.98
-"""Share of a picture's width that a title or a legend may take."""
+EDGE = 0.98  # share of a picture's width that a title or a legend may take
 
 
 def _renderer(figure: Figure) -> RendererBase:

@@ -103,23 +103,15 @@ def _placement(found: Placements) -> dict[str, object]:
     with np.errstate(invalid="ignore", divide="ignore"):
         ratio = np.abs(found.naive_along) / np.abs(found.best_along)
     return {
-        "at_mm": [float(1e3 * v) for v in found.best.at],
-        "turn_deg": float(np.degrees(found.best.turn)),
+        "at_mm": [float(1e3 * v) for v in found.best.at], "turn_deg": float(np.degrees(found.best.turn)),
         "largest_error_mm": 1e3 * found.best_error,
-        "naive_at_mm": [float(1e3 * v) for v in found.naive.at],
-        "naive_error_mm": 1e3 * found.naive_error,
+        "naive_at_mm": [float(1e3 * v) for v in found.naive.at], "naive_error_mm": 1e3 * found.naive_error,
         "naive_over_best": found.gain,
-        "naive_over_best_along": {
-            "median": float(np.median(ratio)),
-            "share_over_3": float((ratio > 3).mean()),
-        },
-        "worst_over_best": float(fits.max() / found.best_error),
-        "more_than_3_times_the_best": found.three_times,
-        "worst_error_mm": float(1e3 * fits.max()),
-        "tried": len(found.largest),
-        "in_reach": float(np.isfinite(found.largest).mean()),
-        "limited_by": found.limits,
-    }
+        "naive_over_best_along": {"median": float(np.median(ratio)), "share_over_3": float((ratio > 3).mean())},
+        "worst_over_best": float(fits.max() / found.best_error), "more_than_3_times_the_best": found.three_times,
+        "worst_error_mm": float(1e3 * fits.max()), "tried": len(found.largest),
+        "in_reach": float(np.isfinite(found.largest).mean()), "limited_by": found.limits,
+    }  # fmt: skip
 
 
 def _stability(found: Milled) -> dict[str, object]:
@@ -206,15 +198,11 @@ def _sheet(found: Milled) -> ReportSheet:
     ]
     lines += [*filter(None, [s["part_lies"]]), *(w.text for w in found.warnings)]
     if (f := found.feeds) is not None:
-        over = int((~f.held).sum())
-        kept = (
-            f"{over} moves are beyond the tolerance at any feed"
-            if over
-            else "the error stays within the tolerance"
-        )
-        lines.append(
-            f"Feed of each move chosen: {f.time:.1f} s of cutting instead of {f.before:.1f} s; {kept}."
-        )
+        kept = "the error stays within the tolerance"
+        if over := int((~f.held).sum()):
+            kept = f"{over} moves are beyond the tolerance at any feed"
+        times = f"{f.time:.1f} s of cutting instead of {f.before:.1f} s"
+        lines.append(f"Feed of each move chosen: {times}; {kept}.")
     if not any(w.name == "chatter" for w in found.warnings):
         lines.append(str(s["stability"]["sentence"]))
     lines += [f"Note: {n}" for n in s["notes"]]

@@ -11,12 +11,11 @@ from scipy.spatial.transform import Rotation
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.reach import assembly_modes
-from stiffmap.ui.view.moment import Moment
+from stiffmap.ui.view.moment import Moment, moves, turns
 from stiffmap.ui.view.numbers import ChangedNumbers, write
 from stiffmap.ui.view.outputs import Outputs
 from stiffmap.ui.view.panels import hint, legend
-from stiffmap.ui.view.place import moves, turns
-from stiffmap.ui.view.quantities import QUANTITIES
+from stiffmap.ui.view.plane import QUANTITIES
 from stiffmap.ui.view.state import PLANES
 
 if TYPE_CHECKING:

@@ -21,17 +21,15 @@ from stiffmap.solve.machine import Machine, load_machine
 from stiffmap.ui.plot.elements import element_links
 from stiffmap.ui.plot.loaded import round_factor
 from stiffmap.ui.plot.style import BLUE, GREEN, VERMILLION
-from stiffmap.ui.view.colours import rgb
 from stiffmap.ui.view.moment import Moment
+from stiffmap.ui.view.plane import rgb
 from stiffmap.ui.view.scene import DIAGNOSED, Scene
 
 if TYPE_CHECKING:
     from stiffmap.identification.diagnosis.report.result import Diagnosis
 
-DRAWN = 0.06
-"""Of the machine's extent, the longest arrow and the widest ribbon."""
-MOST_POINTS = 400
-"""Of a path that are solved."""
+DRAWN = 0.06  # of the machine's extent, the longest arrow and the widest ribbon
+MOST_POINTS = 400  # of a path that are solved
 BEFORE, NOW, NAMED = VERMILLION, BLUE, DIAGNOSED
 """Residuals of the machine as opened, with what was changed in the view, and with what a diagnosis named."""
 Arrows = tuple[Floats, Floats]
@@ -117,7 +115,6 @@ class Data:
         self._said: dict[str, str] = {}
 
     def __call__(self, scene: Scene, moment: Moment) -> None:
-        """Draw into a scene."""
         if self.experiment is not None:
             self._rows(scene, moment, self.experiment)
         if self.diagnosis is not None:
@@ -157,7 +154,8 @@ class Data:
             pieces = np.stack([at, at + factor * arrows], axis=1)
             scene.lines(f"/rows/{name}", pieces, colour, 0.004 * scene.extent)
             if found is not None:
-                words.append(f"{said} {which} {1e6 * rms(arrows):.3g} µm rms")
+                rms = float(np.sqrt(np.mean(np.sum(arrows**2, axis=1))))
+                words.append(f"{said} {which} {1e6 * rms:.3g} µm rms")
         text = f"{len(places)} rows, residuals (measured less predicted) × {factor:g}: {', '.join(words)}"
         self._said["Experiment"] = f"{escape(e.name)}, {text}"
         scene.points("/rows/places", places, rgb("#444444"), 0.005)
@@ -174,11 +172,8 @@ class Data:
 
     def _ribbon(self, scene: Scene, moment: Moment, path: Floats) -> None:
         wanted, cut, corrected, factor = path_errors(moment, path, DRAWN * scene.extent)
-        for name, colour, line in (
-            ("wanted", GREEN, wanted),
-            ("cut", VERMILLION, cut),
-            ("compensated", BLUE, corrected),
-        ):
+        lines = (("wanted", GREEN, wanted), ("cut", VERMILLION, cut), ("compensated", BLUE, corrected))
+        for name, colour, line in lines:
             pieces = np.stack([line[:-1], line[1:]], axis=1)
             good = np.isfinite(pieces).all(axis=(1, 2))
             scene.lines(f"/path/{name}", pieces[good], colour, 0.003 * scene.extent)
@@ -191,11 +186,6 @@ class Data:
             f"errors × {factor:g}: wanted green, as cut red (most {off[0]:.3g} µm), "
             f"compensated by one mirror step blue (most {off[1]:.3g} µm){more}"
         )
-
-
-def rms(arrows: Floats) -> float:
-    """Root mean square length (m)."""
-    return float(np.sqrt(np.mean(np.sum(arrows**2, axis=1))))
 
 
 def largest(arrows: Floats) -> float:

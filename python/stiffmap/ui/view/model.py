@@ -22,8 +22,7 @@ from stiffmap.solve.compiled import Status
 from stiffmap.solve.kinematics import inverse_kinematics
 from stiffmap.solve.machine import Machine, load_machine
 from stiffmap.solve.reach import follow
-from stiffmap.ui.view.moment import Moment
-from stiffmap.ui.view.place import moves
+from stiffmap.ui.view.moment import Moment, moves
 from stiffmap.ui.view.state import History, ViewState, checked
 
 KEPT_MACHINES = 16

@@ -1,41 +1,85 @@
-"""A machine in a state: everything that is drawn and said of it. Immutable, so that it may be worked out while a hand goes on."""
+"""A machine in a state: where it can be, and everything that is drawn and said of it. Immutable, so that it may be worked out while a
+hand goes on."""
 
 from __future__ import annotations
 
 import time
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.budget import DeflectionBudget, deflection_budget
+from stiffmap.solve.compiled import Status
+from stiffmap.solve.kinematics import inverse_kinematics
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.solution import Solution
 from stiffmap.ui.plot.loaded import SHOWN, round_factor
 from stiffmap.ui.plot.scene import box_corners
 from stiffmap.ui.plot.skeleton import Skeleton, skeleton, standing
-from stiffmap.ui.view.place import box_of, drawn_box, moves
-from stiffmap.ui.view.plane import NO_LINES, Frame, PlaneMap
-from stiffmap.ui.view.quantities import QUANTITIES
+from stiffmap.ui.view.plane import NO_LINES, QUANTITIES, Frame, PlaneMap
 from stiffmap.ui.view.state import ViewState
 from stiffmap.workspace.maps.inputs import box_nodes
 from stiffmap.workspace.performance.motion.inertia import NaturalFrequencies, natural_frequencies
 from stiffmap.workspace.vibration import frequency_response
 
+SMALL_TURN = 0.03  # rad, with which it is tried whether a machine turns
+DEFAULT_BOX = 0.25  # of the machine's length, half edge of the box of a machine that declares none
+WIDE = 0.5  # of the longest commanded edge of the box, edge of the plane along what is not commanded
+
+
+def box_of(machine: Machine) -> tuple[Floats, Floats]:
+    """Lowest and highest corner (m): the workspace of the file, else a cube about home."""
+    if machine.description.workspace is not None:
+        low, high = machine.workspace
+        return low, high
+    home = machine.description.home.p
+    half = DEFAULT_BOX * machine.compiled.length
+    return home - half, home + half
+
+
+def drawn_box(machine: Machine) -> tuple[Floats, Floats]:
+    """The box of the plane: where an axis is not commanded, wide enough to see the colours, which it does not change."""
+    low, high = (v.copy() for v in box_of(machine))
+    free = np.array(moves(machine))
+    if free.any():
+        least = WIDE * float((high - low)[free].max())
+        for i in np.flatnonzero(~free & (high - low < least)):
+            middle = machine.description.home.p[i]
+            low[i], high[i] = middle - least / 2, middle + least / 2
+    return low, high
+
+
+@lru_cache(maxsize=32)
+def turns(machine: Machine) -> tuple[bool, bool, bool]:
+    """About which axes of the tool the machine can turn near home."""
+    home = machine.description.home
+    steps = [Rotation.from_rotvec(SMALL_TURN * e).as_matrix() for e in np.eye(3)]
+    named = [f"r{a}" in machine.description.task for a in "xyz"]
+    k = inverse_kinematics(machine, home.p, np.array([home.r @ s for s in steps]))
+    good = np.asarray(k.status) == Status.CONVERGED
+    x, y, z = (bool(n and g) for n, g in zip(named, good, strict=True))
+    return x, y, z
+
+
+def moves(machine: Machine) -> tuple[bool, bool, bool]:
+    """Along which base axes the tool is commanded."""
+    x, y, z = (a in machine.description.task for a in "xyz")
+    return x, y, z
+
+
 FINE, COARSE, DEAR = 101, 51, 15
 """Poses along each edge: at rest, while something is dragged, and of quantities that need modes."""
-MODES = 40
-"""As parallel machines have dozens of modes of their bars below those that move the tool."""
-DAMPING = 0.02
-"""Modal damping ratio of every mode."""
-INSIDE = 1e-9
-"""Of the box, how far outside it a pose may lie by round-off."""
-CLOUD = 15
-"""Poses of the cloud along each commanded axis."""
+MODES = 40  # as parallel machines have dozens of modes of their bars below those that move the tool
+DAMPING = 0.02  # modal damping ratio of every mode
+INSIDE = 1e-9  # of the box, how far outside it a pose may lie by round-off
+CLOUD = 15  # poses of the cloud along each commanded axis
 
 
 @dataclass(frozen=True)
@@ -68,25 +112,19 @@ class Moment:
     def frame(self) -> Frame:
         """The rectangle across the workspace box that holds the tool."""
         low, high = drawn_box(self.machine)
-        s, p = self.state, np.array(self.state.position)
+        s, p, axes = self.state, np.array(self.state.position), np.eye(3)
         if s.plane == "free":
             n = np.array(s.normal) / np.linalg.norm(s.normal)
-            other = np.eye(3)[int(np.argmin(np.abs(n)))]
-            u = np.cross(other, n)
+            u = np.cross(axes[int(np.argmin(np.abs(n)))], n)
             u /= np.linalg.norm(u)
             v = np.cross(n, u)
-            corners = box_corners(low, high) - p
-            along = np.stack([corners @ u, corners @ v])
-            lowest, highest = along.min(axis=1), along.max(axis=1)
-            middle = (lowest + highest) / 2
-            width, height = highest - lowest
-            return Frame(p + middle[0] * u + middle[1] * v, u, v, float(width), float(height))
-        axis = "xyz".index(s.plane)
-        right, up = (i for i in range(3) if i != axis)
-        centre = (low + high) / 2
-        centre[axis] = p[axis]
-        e = np.eye(3)
-        return Frame(centre, e[right], e[up], float(high[right] - low[right]), float(high[up] - low[up]))
+        else:
+            u, v = np.delete(axes, "xyz".index(s.plane), axis=0)
+        along = box_corners(low, high) @ np.stack([u, v], axis=1)
+        lowest, highest = along.min(axis=0), along.max(axis=0)
+        right, up = (lowest + highest) / 2
+        width, height = map(float, highest - lowest)
+        return Frame(p + (right - p @ u) * u + (up - p @ v) * v, u, v, width, height)
 
     def plane(self, count: int = FINE) -> PlaneMap:
         """The plane through the tool; outside the box its poses are solved as well and hidden."""

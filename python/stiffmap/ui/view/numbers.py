@@ -34,9 +34,8 @@ class ChangedNumbers:
             ),
             keep=False,
         )
-        gui.add_button("As in the file").on_click(
-            controls.does(lambda m: m.change(self._address.value, None))
-        )
+        put_back = controls.does(lambda m: m.change(self._address.value, None))
+        gui.add_button("As in the file").on_click(put_back)
         gui.add_button("All as in the file").on_click(controls.does(lambda m: m.put(changes=())))
         self._changed = gui.add_text("Changed", "nothing", multiline=True, disabled=True)
 

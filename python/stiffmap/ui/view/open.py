@@ -27,8 +27,7 @@ if TYPE_CHECKING:
     from stiffmap.identification.diagnosis.report.result import Diagnosis
     from stiffmap.machining.toolpath import Toolpath
 
-POLL = 0.2
-"""s between two looks whether the view is closed."""
+POLL = 0.2  # s between two looks whether the view is closed
 
 
 class View(OpenView):
@@ -196,8 +195,7 @@ def _listed(value: object) -> Any:
     return value.tolist() if hasattr(value, "tolist") else list(value) if isinstance(value, tuple) else value
 
 
-EVERY = 0.4
-"""s between two looks."""
+EVERY = 0.4  # s between two looks
 Stamp = tuple[int, int] | None
 
 

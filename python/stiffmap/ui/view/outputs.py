@@ -26,22 +26,12 @@ from stiffmap.ui.plot import save
 from stiffmap.ui.plot.loaded import draw_budget
 from stiffmap.ui.plot.scene import draw_box, draw_force, draw_skeleton, finish
 from stiffmap.ui.plot.style import COLOURS, MM, ORANGE, TOLERANCE, headline, leg_colours, paper
-from stiffmap.ui.view.colours import plane_image
+from stiffmap.ui.view import panels
 from stiffmap.ui.view.data import Data
 from stiffmap.ui.view.model import ViewModel
-from stiffmap.ui.view.moment import Moment
+from stiffmap.ui.view.moment import Moment, box_of
 from stiffmap.ui.view.numbers import write
-from stiffmap.ui.view.panels import (
-    colour_bar,
-    compliance_panel,
-    efforts_panel,
-    legend,
-    shares_panel,
-    status_line,
-)
-from stiffmap.ui.view.place import box_of
-from stiffmap.ui.view.plane import PlaneMap
-from stiffmap.ui.view.quantities import QUANTITIES
+from stiffmap.ui.view.plane import QUANTITIES, PlaneMap, plane_image
 from stiffmap.ui.view.scene import Scene, look_at_machine
 from stiffmap.ui.view.serving import HERE, need_viser, silent
 from stiffmap.ui.view.state import ViewState, as_plain, permalink
@@ -49,8 +39,7 @@ from stiffmap.ui.view.state import ViewState, as_plain, permalink
 if TYPE_CHECKING:
     from viser import GuiApi, GuiButtonHandle, GuiEvent, ViserServer
 
-SHOWN = 51
-"""Poses along each edge of the plane in a picture."""
+SHOWN = 51  # poses along each edge of the plane in a picture
 STYLE = """<style>
 #said { position: fixed; z-index: 1000; left: .6em; top: .6em; width: min(24em, 45vw); max-height: 90vh; overflow: auto;
   background: rgba(255,255,255,.92); color: #111; font: 13px system-ui,sans-serif; border-radius: 4px; padding: .3em .6em; }
@@ -174,15 +163,15 @@ def draw(server: ViserServer, moment: Moment, data: Data | None = None) -> str:
         scene.lights()
     look_at_machine(server, rest)
     try:
-        shares = shares_panel(moment.shares())
+        shares = panels.shares_panel(moment.shares())
     except StiffmapError:
         shares = ""
     return (
-        f"{status_line(moment, solution, '', '')}"
-        f"<details open><summary>legend</summary>{legend(moment, rest, factor)}</details>"
-        f"{colour_bar(found, found.range, moment.state.tolerance)}"
-        f"<details open><summary>where it comes from</summary>{shares}{compliance_panel(solution)}"
-        f"{efforts_panel(moment, solution)}</details>{data.html if data is not None else ''}"
+        f"{panels.status_line(moment, solution, '', '')}"
+        f"<details open><summary>legend</summary>{panels.legend(moment, rest, factor)}</details>"
+        f"{panels.colour_bar(found, found.range, moment.state.tolerance)}"
+        f"<details open><summary>where it comes from</summary>{shares}{panels.compliance_panel(solution)}"
+        f"{panels.efforts_panel(moment, solution)}</details>{data.html if data is not None else ''}"
     )
 
 

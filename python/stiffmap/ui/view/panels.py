@@ -18,11 +18,8 @@ from stiffmap.ui.plot.planes import levels
 from stiffmap.ui.plot.scene import FORCE
 from stiffmap.ui.plot.skeleton import Skeleton
 from stiffmap.ui.plot.style import BLACK, BLUE, ORANGE, TOLERANCE, leg_colours
-from stiffmap.ui.view.colours import STATUS_COLOURS, table
-from stiffmap.ui.view.moment import Moment
-from stiffmap.ui.view.place import turns
-from stiffmap.ui.view.plane import PlaneMap
-from stiffmap.ui.view.quantities import QUANTITIES, tolerance_level
+from stiffmap.ui.view.moment import Moment, turns
+from stiffmap.ui.view.plane import QUANTITIES, STATUS_COLOURS, PlaneMap, table, tolerance_level
 from stiffmap.ui.view.scene import DARK, GHOST, GREY
 from stiffmap.workspace.performance.motion.closing import drive_table
 
@@ -31,8 +28,7 @@ Row = tuple[str, float, str, str]
 """Label, length of the bar (-1 … 1), colour, text."""
 
 
-DUST = 1e-12
-"""m and m/N, below which a deflection and a compliance are round-off."""
+DUST = 1e-12  # m and m/N, below which a deflection and a compliance are round-off
 
 
 def status_line(moment: Moment, solution: Solution, message: str, error: str) -> str:
@@ -130,13 +126,9 @@ def compliance_panel(solution: Solution) -> str:
     if not np.isfinite(c).all():
         return bars("compliance of the tool: none, there is no equilibrium", [])
     values, directions = principal(c)
+    largest = values[0] or 1.0
     rows: list[Row] = [
-        (
-            f"({', '.join(f'{x:z.2f}' for x in d)})",
-            v / values[0] if values[0] else 0.0,
-            BLUE,
-            f"{1e6 * v:.4g} µm/N",
-        )
+        (f"({', '.join(f'{x:z.2f}' for x in d)})", v / largest, BLUE, f"{1e6 * v:.4g} µm/N")
         for v, d in zip(values, directions, strict=True)
     ]
     return bars("principal directions of the tool's compliance", rows)
@@ -175,11 +167,8 @@ def probe_text(moment: Moment, point: Sequence[float]) -> str:
     value, status = map(float, moment.at(np.array(point, dtype=float)))
     q = QUANTITIES[moment.state.quantity]
     unit, factor = q.shown(value * q.factor)
-    said = (
-        f"{value * q.factor * factor:.5g} {unit}".strip()
-        if np.isfinite(value)
-        else Status(int(status)).name.lower()
-    )
+    lost = Status(int(status)).name.lower()
+    said = f"{value * q.factor * factor:.5g} {unit}".strip() if np.isfinite(value) else lost
     return f"probe at {place_text(point, '.1f')}: {said}"
 
 

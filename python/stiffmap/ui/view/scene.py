@@ -15,19 +15,16 @@ from stiffmap.ui.plot.elements import thicknesses
 from stiffmap.ui.plot.scene import ARROW, FORCE, box_edges
 from stiffmap.ui.plot.skeleton import COINCIDENT, Skeleton
 from stiffmap.ui.plot.style import BLACK, ORANGE, SKY, TOLERANCE, leg_colours
-from stiffmap.ui.view.colours import plane_image, rgb
 from stiffmap.ui.view.meshes import Meshes
-from stiffmap.ui.view.moment import Moment
-from stiffmap.ui.view.place import box_of, moves, turns
-from stiffmap.ui.view.plane import NO_LINES, PlaneMap
+from stiffmap.ui.view.moment import Moment, box_of, moves, turns
+from stiffmap.ui.view.plane import NO_LINES, PlaneMap, plane_image, rgb
 
 if TYPE_CHECKING:
     from viser import ImageHandle, LineSegmentsHandle, MeshHandle, PointCloudHandle, SceneApi, ViserServer
 
 Shape = Literal["circle", "square"]
 Units = Literal["world", "screen"]
-SURFACE = 0.12
-"""Of the extent, size of the surface at the tool."""
+SURFACE = 0.12  # of the extent, size of the surface at the tool
 GHOST, LIT, DIAGNOSED = ORANGE, "#FFD400", "#E8279B"
 GREY, DARK = "#BBBBBB", "#666666"
 
@@ -234,8 +231,7 @@ def look_at_machine(server: ViserServer, rest: Skeleton) -> None:
     server.initial_camera.up = (0.0, 0.0, 1.0)
 
 
-RINGS, SECTORS = 24, 48
-"""Of the sphere of directions in which the tool is pushed."""
+RINGS, SECTORS = 24, 48  # of the sphere of directions in which the tool is pushed
 
 
 @cache
@@ -256,15 +252,12 @@ def polar_surface(compliance: Floats, size: float) -> tuple[Floats, float]:
 
     In each direction u of a force the distance is the deflection |C u|; the longest is drawn `size` (m).
     """
-    u, _ = sphere()
-    far = np.linalg.norm(u @ compliance.T, axis=1)
-    most = float(far.max())
-    return np.asarray(u * far[:, None] * (size / most if most > 0 else 0.0)), most
+    moved, most = ellipsoid(compliance, size)
+    return np.asarray(sphere()[0] * np.linalg.norm(moved, axis=1, keepdims=True)), most
 
 
 def ellipsoid(compliance: Floats, size: float) -> tuple[Floats, float]:
     """The same of the displacements C u themselves: an ellipsoid."""
-    u, _ = sphere()
-    d = u @ compliance.T
+    d = sphere()[0] @ compliance.T
     most = float(np.linalg.norm(d, axis=1).max())
     return np.asarray(d * (size / most if most > 0 else 0.0)), most

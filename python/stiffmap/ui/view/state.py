@@ -17,11 +17,10 @@ from scipy.spatial.transform import Rotation
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import bounded
-from stiffmap.ui.view.quantities import QUANTITIES
+from stiffmap.ui.view.plane import QUANTITIES
 
 PLANES = ("x", "y", "z", "free")
-MOST_LINK, MOST_TEXT = 16_000, 200_000
-"""Characters of a permalink, and of what it says."""
+MOST_LINK, MOST_TEXT = 16_000, 200_000  # characters of a permalink, and of what it says
 MOST_STATES = 200  # that can be undone
 Vector = tuple[float, float, float]
 

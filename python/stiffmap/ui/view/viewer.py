@@ -1,9 +1,11 @@
-"""A view that is served: the model, the scene, the panels, and a worker that keeps them together."""
+"""A view that is served: the model, the scene, the panels, and a worker that keeps them together: a thread that draws the newest state;
+what came in between is never drawn."""
 
 from __future__ import annotations
 
 import threading
 import time
+from collections import deque
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
@@ -15,28 +17,17 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.solution import Solution
 from stiffmap.ui.plot.elements import element_links
-from stiffmap.ui.view.animation import Swing
-from stiffmap.ui.view.colours import colours_of
+from stiffmap.ui.view import panels
 from stiffmap.ui.view.controls import NONE, Controls
 from stiffmap.ui.view.data import Data
-from stiffmap.ui.view.hands import ProbePoint, listen, listen_to_nodes
 from stiffmap.ui.view.model import ViewModel
 from stiffmap.ui.view.moment import COARSE, FINE, Moment
+from stiffmap.ui.view.moving import ProbePoint, Swing, listen, listen_to_nodes
 from stiffmap.ui.view.numbers import write
-from stiffmap.ui.view.panels import (
-    colour_bar,
-    compliance_panel,
-    efforts_panel,
-    frequencies_panel,
-    shares_panel,
-    status_line,
-)
-from stiffmap.ui.view.plane import PlaneMap
-from stiffmap.ui.view.quantities import QUANTITIES
+from stiffmap.ui.view.plane import QUANTITIES, PlaneMap, colours_of
 from stiffmap.ui.view.scene import Scene, look_at_machine
 from stiffmap.ui.view.serving import silent
 from stiffmap.ui.view.state import ViewState
-from stiffmap.ui.view.worker import Worker
 
 if TYPE_CHECKING:
     from viser import ViserServer
@@ -130,7 +121,8 @@ class Viewer:
                 self.scene.tool(moment)
             if found is not None:
                 self._show(found, moment.state)
-            write(self.controls.status, "content", status_line(moment, s, self.model.message, self.error))
+            said = panels.status_line(moment, s, self.model.message, self.error)
+            write(self.controls.status, "content", said)
         self.server.flush()
 
     def fine(self) -> None:
@@ -171,7 +163,7 @@ class Viewer:
             self._held = found
         limits = self._held.range
         self.scene.plane(found, limits, state.tolerance, self.controls.isolines.value)
-        write(self.controls.bar, "content", colour_bar(found, limits, state.tolerance))
+        write(self.controls.bar, "content", panels.colour_bar(found, limits, state.tolerance))
 
     def redraw(self) -> None:
         """The plane is to be drawn again though the machine is the same."""
@@ -187,13 +179,13 @@ class Viewer:
         try:
             budget = moment.shares()
             self.controls.elements([n for n, _, _ in budget.ranked()])
-            parts.append(shares_panel(budget, lit))
+            parts.append(panels.shares_panel(budget, lit))
         except StiffmapError as problem:
-            parts.append(status_line(moment, s, "", str(problem)))
-        parts += [compliance_panel(s), efforts_panel(moment, s)]
+            parts.append(panels.status_line(moment, s, "", str(problem)))
+        parts += [panels.compliance_panel(s), panels.efforts_panel(moment, s)]
         w = self.swing.frequencies(moment)
         if w is not None:
-            parts.append(frequencies_panel(w.frequency.tolist(), self.controls.mode.value - 1))
+            parts.append(panels.frequencies_panel(w.frequency.tolist(), self.controls.mode.value - 1))
         if self.data is not None:
             self.data(self.scene, moment)
             parts.insert(0, self.data.html)
@@ -218,7 +210,7 @@ class Viewer:
         )
         s = self._solution
         if s is not None:
-            write(self.controls.status, "content", status_line(self.now(), s, "", self.error))
+            write(self.controls.status, "content", panels.status_line(self.now(), s, "", self.error))
 
     def renew(self) -> None:
         """The machine's file has changed: its own scene and addresses, made by the thread that draws."""
@@ -240,3 +232,68 @@ class Viewer:
         with silent():
             self.server.stop()
             time.sleep(0.01)
+
+
+YIELD = 0.002
+"""s after the first stage, in which the server's thread sends what it drew before dearer stages compute."""
+Stage = Callable[[], None]
+
+
+class Worker:
+    """Runs stages, from the quick one to the dear ones, and begins anew as soon as something is asked."""
+
+    def __init__(self, stages: list[Stage], failed: Callable[[Exception], None]) -> None:
+        self.stages, self._failed = stages, failed
+        self._wake = threading.Condition()
+        self._asked = self._done = self._finished = 0
+        self._since: float | None = None
+        self._stopped = False
+        self.latencies: deque[float] = deque(maxlen=1000)
+        """s, from an event to the end of the first stage that answers it."""
+        self._thread = threading.Thread(target=self._run, daemon=True, name="stiffmap view")
+        self._thread.start()
+
+    def ask(self) -> None:
+        """Something has changed."""
+        with self._wake:
+            self._asked += 1
+            if self._since is None:
+                self._since = time.perf_counter()
+            self._wake.notify_all()
+
+    def idle(self, seconds: float = 30.0) -> bool:
+        """Wait until all is drawn; False where that takes longer."""
+        with self._wake:
+            return self._wake.wait_for(lambda: self._finished == self._asked, seconds)
+
+    def _run(self) -> None:
+        while True:
+            with self._wake:
+                self._wake.wait_for(lambda: self._stopped or self._asked != self._done)
+                if self._stopped:
+                    return
+                self._done, since, self._since = self._asked, self._since, None
+            self._draw(since)
+            with self._wake:
+                self._finished = self._done
+                self._wake.notify_all()
+
+    def _draw(self, since: float | None) -> None:
+        for i, stage in enumerate(self.stages):
+            if i and (self._asked != self._done or self._stopped):
+                return  # what is being drawn is old already
+            try:
+                stage()
+            except Exception as problem:  # the thread lives on; the panel shows it
+                self._failed(problem)
+            if i == 0 and since is not None:
+                self.latencies.append(time.perf_counter() - since)
+                time.sleep(YIELD)
+
+    def stop(self) -> None:
+        """End the thread after what it is doing."""
+        with self._wake:
+            self._stopped = True
+            self._wake.notify_all()
+        if threading.current_thread() is not self._thread:
+            self._thread.join(timeout=5)

@@ -15,8 +15,7 @@ from stiffmap.model.description import AppliedEffect
 from stiffmap.solve.kinematics import inverse_kinematics
 from stiffmap.ui.plot.experiment import drivers_of, trending
 from stiffmap.ui.report.diagnosis.page import html
-from stiffmap.ui.report.diagnosis.pictures import figures, vectors
-from stiffmap.ui.report.diagnosis.place import lit
+from stiffmap.ui.report.diagnosis.pictures import figures, lit, vectors
 
 RECORD = (
     ("operator", "M. Weber"),

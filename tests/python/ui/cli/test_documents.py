@@ -10,8 +10,7 @@ import pytest
 
 from stiffmap.ui.cli.commands import COMMANDS
 from stiffmap.ui.paper import all_statements, compute
-from stiffmap.ui.paper.forces import force_statements
-from stiffmap.ui.paper.workspace import workspace_statements
+from stiffmap.ui.paper.forces import force_statements, workspace_statements
 
 DOCS = Path(__file__).parents[4] / "docs"
 

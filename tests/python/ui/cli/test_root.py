@@ -18,7 +18,7 @@ from stiffmap.common.errors import MissingPartError
 from stiffmap.ui.cli import main
 from stiffmap.ui.cli.app import build_app, load, styled
 from stiffmap.ui.cli.commands import COMMANDS, Command
-from stiffmap.ui.view.quantities import QUANTITIES
+from stiffmap.ui.view.plane import QUANTITIES
 
 
 def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:

@@ -16,8 +16,7 @@ import stiffmap as sm
 from stiffmap.ui.paper import Results, Statement, StatementVerdict, all_statements, compute
 from stiffmap.ui.paper.directions import over_fx, ratio_of, varied
 from stiffmap.ui.paper.machine import diagonal_limits, factors
-from stiffmap.ui.paper.statement import rounds_to
-from stiffmap.ui.paper.table import as_csv, as_markdown, as_rich, count_text
+from stiffmap.ui.paper.statement import as_csv, as_markdown, as_rich, count_text, rounds_to
 
 
 @pytest.fixture(scope="module")

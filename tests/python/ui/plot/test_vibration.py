@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 from tests.python.ui.plot.test_pictures import cut
 
-from stiffmap.ui.plot.vibration import RPM, lobes_figure
+from stiffmap.ui.plot.modes import RPM, lobes_figure
 
 
 @pytest.mark.parametrize(

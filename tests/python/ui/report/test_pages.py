@@ -14,7 +14,7 @@ from stiffmap.identification.diagnosis.report.findings import Effect
 from stiffmap.identification.diagnosis.report.sentences import measured, sentence
 from stiffmap.ui.cli import main
 from stiffmap.ui.report.diagnosis.pictures import before_after, maps
-from stiffmap.ui.report.page import write_page
+from stiffmap.ui.report.sheet import write_page
 
 
 @pytest.mark.parametrize("width", [500, 900])

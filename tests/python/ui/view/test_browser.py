@@ -14,9 +14,9 @@ from tests.python.ui.view.pages import client_of, on_screen, opened, pixels, pul
 
 import stiffmap as sm
 from stiffmap.ui.cli import main
-from stiffmap.ui.view.colours import table
 from stiffmap.ui.view.controls import DECIMALS
 from stiffmap.ui.view.open import View, model_of
+from stiffmap.ui.view.plane import table
 
 UNNAMED = """() => [...document.querySelectorAll("input:not([type=hidden]), textarea, button, [role=slider]")]
     .filter(e => !e.getAttribute("aria-label") && !e.getAttribute("aria-labelledby") && !e.labels?.length

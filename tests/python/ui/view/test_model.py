@@ -15,8 +15,8 @@ from stiffmap.solve.reach import assembly_modes
 from stiffmap.ui.plot.elements import THICK, THIN, element_links, thicknesses
 from stiffmap.ui.plot.skeleton import skeleton
 from stiffmap.ui.view.model import ViewModel, addresses, changed
+from stiffmap.ui.view.moment import moves, turns
 from stiffmap.ui.view.panels import principal
-from stiffmap.ui.view.place import moves, turns
 from stiffmap.ui.view.scene import ellipsoid, polar_surface, sphere
 
 

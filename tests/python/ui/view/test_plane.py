@@ -11,9 +11,8 @@ import stiffmap as sm
 from stiffmap.solve.status import Status
 from stiffmap.solve.worst_force import greatest
 from stiffmap.ui.plot.planes import levels
-from stiffmap.ui.view.colours import DARK, GREY, colours_of, plane_image, table
 from stiffmap.ui.view.moment import Moment
-from stiffmap.ui.view.quantities import QUANTITIES
+from stiffmap.ui.view.plane import DARK, GREY, QUANTITIES, colours_of, plane_image, table
 from stiffmap.ui.view.state import ViewState
 
 FORCE = (120.0, -80.0, -200.0)

@@ -12,10 +12,10 @@ import pytest
 from tests.python.ui.view.pages import client_of, on_screen, opened, pull, pulled, until, works
 
 import stiffmap as sm
-from stiffmap.ui.view.colours import rgb
 from stiffmap.ui.view.open import View, model_of
 from stiffmap.ui.view.outputs import write_page
 from stiffmap.ui.view.panels import hint, legend, probe_text
+from stiffmap.ui.view.plane import rgb
 
 ON_CANVAS = "p => !!document.elementFromPoint(...p)?.closest(':has(> canvas)')"
 """Whether what is seen at a place of the page is the scene, not something over it."""

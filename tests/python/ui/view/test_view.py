@@ -24,10 +24,10 @@ import stiffmap as sm
 from stiffmap.common.errors import FileError, MissingPartError, StiffmapError
 from stiffmap.model.files.shipped import find
 from stiffmap.ui.cli import main
-from stiffmap.ui.view.colours import plane_image
 from stiffmap.ui.view.data import Data, path_errors, residual_arrows, thinned
 from stiffmap.ui.view.open import View, model_of
 from stiffmap.ui.view.outputs import write_page
+from stiffmap.ui.view.plane import plane_image
 from stiffmap.ui.view.state import ViewState, permalink
 
 pytest.importorskip("viser", reason="viser is not installed (pip install stiffmap[view])")

@@ -10,7 +10,7 @@ import pytest
 
 import stiffmap as sm
 from stiffmap.ui.cli import main
-from stiffmap.ui.plot.efforts import efforts_figure
+from stiffmap.ui.plot.forces import efforts_figure
 from stiffmap.workspace.performance import circle, drive_efforts, line, load_motion, timed
 from stiffmap.workspace.performance.motion.trajectory import Path, Trajectory, at_feed, through
 

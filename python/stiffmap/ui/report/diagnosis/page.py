@@ -12,23 +12,14 @@ from stiffmap.common.fingerprints import digest
 from stiffmap.common.number_text import length_text, length_unit, place_text, vector_text
 from stiffmap.common.outputs import write_text
 from stiffmap.experiment.noise.checks import Check
+from stiffmap.identification.diagnosis.report import sentences
 from stiffmap.identification.diagnosis.report.findings import Detectability, Effect, Rest
 from stiffmap.identification.diagnosis.report.result import Diagnosis
-from stiffmap.identification.diagnosis.report.sentences import (
-    UNITS,
-    alias_words,
-    effect_text,
-    interval,
-    next_step,
-    opening,
-    separation_text,
-)
 from stiffmap.model.description.tree import joints
 from stiffmap.model.effects import registry
 from stiffmap.solve.budget import budget_where_stable
 
-SHOWN = 12
-"""Detectable effects above the fold."""
+SHOWN = 12  # detectable effects above the fold
 FIRST, FOLDED = ("place", "before_after"), ("residual_others",)
 """Pictures of the first page, and those that are folded."""
 
@@ -57,12 +48,12 @@ def html(d: Diagnosis, *, date: str | None = None, inputs: Iterable[str | PathLi
         rows=len(d.experiment),
         quantity=d.experiment.quantity,
         axes=", ".join(d.experiment.axes),
-        opening=opening(d),
-        next=next_step(d),
+        opening=sentences.opening(d),
+        next=sentences.next_step(d),
         lines=[in_shop_words(line) for line in d.lines()[1:]],  # the headline has the verdict
         effects=[_effect(e) for e in d.effects],
         rivals=[
-            ("; ".join(map(effect_text, other)), separation_text(s))
+            ("; ".join(map(sentences.effect_text, other)), sentences.separation_text(s))
             for other, s in zip(d.alternatives, d.separations, strict=True)
         ],
         first=[pictures[n] for n in FIRST if n in pictures],
@@ -79,7 +70,9 @@ def html(d: Diagnosis, *, date: str | None = None, inputs: Iterable[str | PathLi
             (a, in_axis_units(a, d.before.per_axis[a]), in_axis_units(a, v))
             for a, v in d.after.per_axis.items()
         ],
-        folds=_folds(d),
+        folds="Not held out."
+        if d.held_out is None
+        else f"{d.held_out.folds} folds by {d.held_out.by}, each predicted by the machine that the others make in the same way.",
         noise=_noise(d),
         fit=f"Lack of fit: p-value {p_text(d.noise.lack_of_fit_before)} before, "
         f"{p_text(d.noise.lack_of_fit_after)} after. "
@@ -128,8 +121,8 @@ def _effect(e: Effect) -> dict[str, object]:
     legs = f", leg {', '.join(e.legs)}" if e.legs else ""
     return {
         "name": f"{registry.get(e.kind).title}: {in_shop_words(e.element)}{legs}",
-        "rows": [(n.replace("_", " "), *interval(*v)) for n, v in e.parameters.items()],
-        "same": "; ".join(alias_words(a) for a in e.aliases),
+        "rows": [(n.replace("_", " "), *sentences.interval(*v)) for n, v in e.parameters.items()],
+        "same": "; ".join(sentences.alias_words(a) for a in e.aliases),
         "definition": in_shop_words(e.definition),
         "evidence": f"The odds for it, over all places together, are e^{e.evidence['ln_odds']:.0f} to 1; it is "
         f"{100 * e.evidence['share']:.0f} % of the squares, and the same everywhere to {100 * e.evidence['same_everywhere']:.0f} %.",
@@ -150,22 +143,11 @@ def _budget(d: Diagnosis) -> dict[str, object] | None:
         return None
     whole = float(np.linalg.norm(found.displacement[:3]))
     unit, factor, decimals = length_unit(whole)
-    return {
-        "at": vector_text(1e3 * p, 4),
-        "force": vector_text(force[:3], 4),
-        "size": length_text(whole),
-        "unit": unit,
-        "rows": [
-            (in_shop_words(n), f"{factor * whole * s:.{decimals}f}", 100 * s)
-            for n, s, _ in budget_rows(found)
-        ],
-    }
-
-
-def _folds(d: Diagnosis) -> str:
-    if d.held_out is None:
-        return "Not held out."
-    return f"{d.held_out.folds} folds by {d.held_out.by}, each predicted by the machine that the others make in the same way."
+    rows = [
+        (in_shop_words(n), f"{factor * whole * s:.{decimals}f}", 100 * s) for n, s, _ in budget_rows(found)
+    ]
+    at, pull = vector_text(1e3 * p, 4), vector_text(force[:3], 4)
+    return {"at": at, "force": pull, "size": length_text(whole), "unit": unit, "rows": rows}
 
 
 def _noise(d: Diagnosis) -> list[tuple[str, ...]]:
@@ -189,7 +171,6 @@ def _at(p: Rest) -> str:
 
 
 def _seen(d: Diagnosis) -> list[tuple[str, str, str]]:
-    """What could have been found, the easiest first."""
     turning = {n for n, j in joints(d.declared.description).items() if j.kind != "prismatic"}
     return [row for _, row in sorted((_one_seen(x, turning) for x in d.detectable), key=lambda pair: pair[0])]
 
@@ -210,7 +191,6 @@ def _one_seen(x: Detectability, turning: set[str]) -> tuple[float, tuple[str, st
 
 
 def _digests(d: Diagnosis) -> dict[str, str]:
-    """Of the machine and the readings as they were used."""
     e = d.experiment
     return {
         f"machine {d.declared.name}, as loaded": digest(d.declared.description),
@@ -232,7 +212,7 @@ def in_axis_units(axis: str, value: float) -> str:
 
 def in_shop_units(value: float, unit: str, digits: int = 4) -> str:
     """A number of an effect or a machine: µm, µm/N, mrad."""
-    factor, name = UNITS.get(unit, (1.0, unit))
+    factor, name = sentences.UNITS.get(unit, (1.0, unit))
     return f"{factor * value:.{digits}g} {name}".rstrip()
 
 

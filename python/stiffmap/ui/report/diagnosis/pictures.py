@@ -1,4 +1,4 @@
-"""Figures of a diagnosis, each with its units."""
+"""Figures of a diagnosis, each with its units; among them the machine with the named element lit."""
 
 from __future__ import annotations
 
@@ -12,12 +12,16 @@ from matplotlib.figure import Figure
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import percent
 from stiffmap.experiment.experiment import WRENCH, Floats
+from stiffmap.identification.diagnosis.report.findings import Effect
 from stiffmap.identification.diagnosis.report.result import Diagnosis
+from stiffmap.solve.compiled import Role
 from stiffmap.solve.machine import Machine
+from stiffmap.ui.plot.elements import nodes_of
 from stiffmap.ui.plot.experiment import arrow_figure, kept, pose_means, trending, trends, vector_cases
 from stiffmap.ui.plot.loaded import loaded_figure
+from stiffmap.ui.plot.scene import dots, draw_skeleton, finish, on, scene_axes
+from stiffmap.ui.plot.skeleton import COINCIDENT, owners, standing
 from stiffmap.ui.plot.style import AFTER, BEFORE, MM, UM, new_figure
-from stiffmap.ui.report.diagnosis.place import place_figure
 
 CAPTIONS = {
     "residual_vectors": "Mean residual (reading less prediction) of each pose as arrows, with the machine of your file and "
@@ -37,8 +41,8 @@ CAPTIONS = {
     "has no known cause.",
     "unexplained": "What no effect explains, over the workspace.",
 }
-LEAST_SHARE = 1e-5
-"""Smaller parts are not drawn."""
+LEAST_SHARE = 1e-5  # smaller parts are not drawn
+LIT, GREY = "#d62728", "0.65"
 
 
 def figures(d: Diagnosis) -> dict[str, Figure]:
@@ -109,11 +113,9 @@ def loops(d: Diagnosis) -> Figure:
     """Readings over the load that runs up and down, of the channel that moves most in noise floors."""
     e = d.experiment
     load = int(np.argmax(np.ptp(e.wrench, axis=0)))
-    size = [
-        np.nanstd(e.reading[:, i]) / d.noise.floor[c.name] if read else -1.0
-        for i, (c, read) in enumerate(zip(e.channels, e.axis_read, strict=True))
-    ]
-    channel = int(np.argmax(np.array(size)))
+    read = np.flatnonzero(e.axis_read)
+    sizes = [np.nanstd(e.reading[:, i]) / d.noise.floor[e.channels[i].name] for i in read]
+    channel = int(read[int(np.argmax(sizes))])
     scale, unit = (MM, "mm") if e.channels[channel].unit == "m" else (1e3, "mrad")
     told = (("as declared", d.residual_before, BEFORE), (d.which, d.residual_after, AFTER))
     figure = new_figure(9, 5)
@@ -128,9 +130,8 @@ def loops(d: Diagnosis) -> Figure:
         for name, values, colour in told:
             shown = y - values[here, channel] * scale
             ax.plot(x, shown, lw=1.0, color=colour, label=None if k else name)
-    ax.set(
-        xlabel=f"{WRENCH[load]}, {'N' if load < 3 else 'N·m'}", ylabel=f"{e.channels[channel].name}, {unit}"
-    )
+    of_load = "N" if load < 3 else "N·m"
+    ax.set(xlabel=f"{WRENCH[load]}, {of_load}", ylabel=f"{e.channels[channel].name}, {unit}")
     ax.legend()
     return figure
 
@@ -151,8 +152,7 @@ def _bars(figure: Figure, rows: Sequence[tuple[str, float, str, str]]) -> Axes:
     ax = figure.subplots()
     names, lengths, colours, texts = zip(*rows, strict=True) if rows else ((),) * 4
     ax.bar_label(ax.barh(names, lengths, color=colours), texts, padding=3)
-    for side in ("top", "right"):
-        ax.spines[side].set_visible(False)
+    ax.spines[["top", "right"]].set_visible(False)
     return ax
 
 
@@ -160,8 +160,7 @@ def left(d: Diagnosis) -> Figure:
     """What is left over the workspace that nobody can name, in the axis where it is largest."""
     assert d.gap is not None
     names = [c.name for c in d.experiment.channels]
-    seen = [n for n, read in zip(names, d.experiment.axis_read, strict=True) if read]
-    axis = names.index(d.unexplained[0].axis or seen[0])
+    axis = names.index(d.unexplained[0].axis or names[int(np.argmax(d.experiment.axis_read))])
     at = pose_means(d.experiment, d.experiment.position) * MM
     values = pose_means(d.experiment, kept(d, d.gap))[:, axis] * UM
     top = float(np.nanmax(np.abs(values))) or 1.0
@@ -199,15 +198,8 @@ def histogram(d: Diagnosis) -> Figure:
     width = min(12.0, max(4.0, float(np.nanpercentile(np.abs(both[0]), 99))))
     bins = np.linspace(-width, width, 61)
     for z, colour, label in zip(both, (BEFORE, AFTER), ("before", "after"), strict=True):
-        ax.hist(
-            np.clip(z[np.isfinite(z)], bins[0], bins[-1]),
-            bins.tolist(),
-            density=True,
-            histtype="step",
-            color=colour,
-            label=label,
-            lw=1.5,
-        )
+        seen = np.clip(z[np.isfinite(z)], bins[0], bins[-1])
+        ax.hist(seen, bins.tolist(), density=True, histtype="step", color=colour, label=label, lw=1.5)
     ax.plot(bins, np.exp(-(bins**2) / 2) / np.sqrt(2 * np.pi), color="0.4", ls="--", label="noise alone")
     ax.set(xlabel="residual / noise (standard deviations)", ylabel="density")
     ax.legend()
@@ -267,3 +259,41 @@ def plane_errors(d: Diagnosis) -> tuple[Floats, Floats, Floats, Floats]:
 def _errors(machine: Machine, position: Floats, wrench: Floats) -> Floats:
     solution = machine.solve(position, wrench)
     return np.where(solution.ok[..., None], solution.displacement[..., :3], np.nan)
+
+
+def place_figure(d: Diagnosis) -> Figure:
+    """The declared machine at home in grey; legs of the named effects dark, their elements red."""
+    machine = d.declared
+    shape = standing(machine)
+    figure = new_figure(4.6, 3.4)
+    ax = scene_axes(figure, shape, None)
+    legs = {leg for e in d.effects for leg in e.legs}
+    few = len(legs) < len(machine.legs)
+    colours = {leg: "0.2" if few and leg in legs else GREY for leg in ("", *machine.legs)}
+    draw_skeleton(ax, shape, colours, joints=False)
+    for e in d.effects:
+        points, pieces = lit(machine, shape.coordinates, e)
+        for ends in pieces:
+            ax.plot(*on(ax, ends), color=LIT, lw=4)
+        dots(ax, points if len(points) else shape.tcp[None], 90, color=LIT)
+    finish(ax)
+    ax.set_axis_off()
+    legs_of = (f" of leg {', '.join(e.legs)}" if e.legs else "" for e in d.effects)
+    names = (e.element.replace("actuator", "drive") + of for e, of in zip(d.effects, legs_of, strict=True))
+    figure.suptitle("; ".join(names)[:80] or machine.name, fontsize=10)
+    return figure
+
+
+def lit(machine: Machine, coordinates: Floats, e: Effect) -> tuple[Floats, list[Floats]]:
+    """Points (n, 3) and pieces (2, 3) of the element that an effect names; nothing for instruments and loads."""
+    core = machine.compiled
+    position, _ = core.frames(coordinates)
+    owner, found = owners(core), list(nodes_of(core, e.element, e.legs))
+    pieces = [
+        position[[parent, i]]
+        for i in found
+        for parent, c in (core.nodes[i],)
+        if core.names.roles[c] == Role.SPRING and parent > 0 and owner[i]
+        if np.linalg.norm(position[i] - position[parent]) > COINCIDENT
+    ]
+    return np.unique(np.round(position[found], 9), axis=0), pieces
