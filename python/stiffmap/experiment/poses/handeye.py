@@ -81,8 +81,11 @@ def find_frames(s: Sighting) -> Frames:
     return min(refined, key=lambda f: float(np.sum(np.abs(_linear(s, f)[0]))))
 
 
-def own_frame(seen: Floats, commanded: Floats) -> Floats | None:
-    """(3, 3) base axes in the instrument's, where places (n, 3) m lie far from the commanded ones, but in their pattern; else None."""
+def own_frame(seen: Floats, commanded: Floats, rotation: Floats | None = None) -> Frames | None:
+    """Where an instrument stands, if places (n, 3) m that it saw lie far from the commanded ones, but in their pattern; else None.
+
+    With the commanded orientations (n, 3, 3) the target may sit anywhere on the tool.
+    """
     good = np.flatnonzero(np.isfinite(seen).all(axis=1) & np.isfinite(commanded).all(axis=1))
     if len(good) < FEWEST:
         return None
@@ -90,11 +93,12 @@ def own_frame(seen: Floats, commanded: Floats) -> Floats | None:
     p, q = commanded[some], seen[some]
     if _middle(q - p) <= ERROR:
         return None
-    turn, one = np.tile(np.eye(3), (len(p), 1, 1)), np.zeros(len(p), dtype=np.intp)
-    s = Sighting(p, turn, q, np.full_like(turn, np.nan), one, one, tool_unknown=False)
+    turn = np.tile(np.eye(3), (len(p), 1, 1)) if rotation is None else rotation[some]
+    one = np.zeros(len(p), dtype=np.intp)
+    s = Sighting(p, turn, q, np.full_like(turn, np.nan), one, one, tool_unknown=rotation is not None)
     found = find_frames(s)
     alike = _middle(as_commanded(s, found)[0]) < SAME * _middle(p - np.median(p, axis=0))
-    return found.base_r[0] if alike else None
+    return found if alike else None
 
 
 def _middle(vectors: Floats) -> float:

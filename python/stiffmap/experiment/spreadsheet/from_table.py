@@ -118,7 +118,8 @@ def experiment_from_table(
     """
     if (machine is None) == (dh is None):
         raise StiffmapError("experiment: give either --machine or --dh")
-    drives = {} if machine is None else drives_of(load_machine(str(machine)))
+    loaded = None if machine is None else load_machine(str(machine))
+    drives = {} if loaded is None else drives_of(loaded)
     file, output = given_path(table, "table", "a spreadsheet"), given_path(folder, "folder", "a folder")
     wrote = None if instrument is None else load_instrument(instrument)
     quantity = quantity or (wrote.quantity if wrote else "deflection")
@@ -135,8 +136,15 @@ def experiment_from_table(
     drives = drives if rows is None else {f"{LEG}.{r.name}": r.slides for r in rows}
     numbered = any(h.strip("+-").isdigit() for many in chosen.values() for h in many)
     layout = Layout(has_meaning, tuple(header), numbered, which)
+
+    def declared_for(m: Meant) -> Machine:
+        if rows is None or dh is None:
+            assert loaded is not None
+            return loaded
+        return Machine(arm(rows, dh_convention, output.name, f"from {Path(dh).name}", m.middle()))
+
     understood = partial(
-        _understood, file, layout, drives, wrote, difference, quantity == "deflection", given
+        _understood, file, layout, drives, wrote, difference, quantity == "deflection", given, declared_for
     )
     m, found = _fitting(file, sheet, understood, ask)
     own = m.sheet
@@ -154,9 +162,8 @@ def experiment_from_table(
         except FileError as error:  # nothing is left behind
             raise _of_sheet(error, found, own, fresh) from None
     made = replace(made, name=output.name)
-    if rows is not None and dh is not None:
-        source = f"from {Path(dh).name}"
-        Machine(arm(rows, dh_convention, output.name, source, m.middle())).save(declared)
+    if dh is not None:
+        declared_for(m).save(declared)
     # a gauge that is not at zero has no sign
     of_loads = no_difference(made) or not_at_zero(made) or against_the_load(made)
     warnings = tuple(line for line in (of_loads, *contradictions(made)) if line)
@@ -213,11 +220,12 @@ def _understood(
     difference: str,
     deflection: bool,
     given: Answers,
+    declared: Callable[[Meant], Machine],
     name: str | None,
     ask: Ask | None,
 ) -> tuple[Meant, ImportedSheet]:
     """One sheet: `drives` (name -> whether it slides) it may command, what `wrote` it, the sign of its `difference`; rows of a
-    `deflection` need a load."""
+    `deflection` need a load; `declared`: the machine that it commands."""
     form = read_sheet(file, name, layout)
     kept = remembered(form)
     m = Meant.of_sheet(form, given if kept is None else kept.below(given))
@@ -231,7 +239,7 @@ def _understood(
         as_seen(m, difference)
     elif wrote is not None:
         as_readings(m, wrote)
-    asked(m, ask, partial(in_base_axes, m))
+    asked(m, ask, partial(in_base_axes, m, partial(declared, m)))
     oriented(m)
     if not m.placed:
         turned(m, difference)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -11,9 +11,13 @@ from stiffmap.experiment.channels import AXES
 from stiffmap.experiment.files.fields import POSE, SEEN
 from stiffmap.experiment.poses.handeye import own_frame
 from stiffmap.experiment.spreadsheet.answers import Meant
+from stiffmap.solve.kinematics import forward_kinematics
+from stiffmap.solve.machine import Machine
 
 NAMED = 5
 """Lines that a sentence names."""
+LEVER = 5.0
+"""mm from the tool's point, from which it is said where a target sits."""
 
 
 def seen_next_to_commands(m: Meant) -> None:
@@ -31,22 +35,33 @@ def seen_next_to_commands(m: Meant) -> None:
         )
 
 
-def in_base_axes(m: Meant) -> None:
+def in_base_axes(m: Meant, machine: Callable[[], Machine]) -> None:
     """Differences dx, dy, dz of places in the instrument's own frame along base axes, which the columns of the places without load show,
-    next to the commands; as they are where those are in one frame."""
-    if m.columns or not set(AXES[:3]) <= set(m.unloaded) or (commanded := commands(m)) is None:
+    next to the commands; as they are where those are in one frame. `machine`: whose joints the sheet commands."""
+    if not set(AXES[:3]) <= set(m.unloaded):
         return
-    turn = own_frame(m.metres([m.unloaded[a] for a in AXES[:3]], AXES[:3]), commanded)
-    if turn is None:
+    pose = forward_kinematics(machine(), m.coordinates()) if m.columns else None
+    commanded = commands(m) if pose is None else pose.position
+    seen = None if commanded is None else m.metres([m.unloaded[a] for a in AXES[:3]], AXES[:3])
+    if commanded is None or seen is None:
+        return
+    frame = own_frame(seen, commanded, None if pose is None else pose.rotation)
+    if frame is None:
         return
     at = [m.index(m.chosen[a][0]) for a in AXES[:3]]
     names = [m.sheet.names[i] for i in at]
-    for a, name, values in zip(AXES[:3], names, (m.metres(at, AXES[:3]) @ turn).T, strict=True):
+    for a, name, values in zip(AXES[:3], names, (m.metres(at, AXES[:3]) @ frame.base_r[0]).T, strict=True):
         m.add(f"{name}, along the base's {a[1]}", "mm", 1e3 * values, a)
     m.said.append(
         "the places without load lie elsewhere than the commands: they are in the instrument's own frame, and differences are turned "
         "from its axes into those of the base"
     )
+    lever = 1e3 * frame.tool_p[0]
+    if np.linalg.norm(lever) > LEVER:
+        x, y, z = (f"{v:.0f}" for v in lever)
+        m.said.append(
+            f"the target sits at ({x}, {y}, {z}) mm on the tool: where it turns under load, read it there ('point' in the machine's file)"
+        )
 
 
 def commands(m: Meant) -> Floats | None:
@@ -63,7 +78,7 @@ def without_lost(m: Meant, seen: Floats, commanded: Floats, names: Sequence[str]
     lost = (seen == 0.0).all(axis=1) & (commanded != 0.0).any(axis=1)
     if seen.shape[1] < 3 or not lost.any() or not seen.any():
         return seen
-    lines = [str(m.sheet.lines[i]) for i in np.flatnonzero(lost)]
+    lines = [str(m.sheet.lines[int(i)]) for i in np.flatnonzero(lost)]
     more = f" and {len(lines) - NAMED} more" if len(lines) > NAMED else ""
     which = f"line{'s' if len(lines) > 1 else ''} {', '.join(lines[:NAMED])}{more}"
     m.said.append(f"left out: {which}: {', '.join(map(repr, names))} are 0, as of a target that was not seen")

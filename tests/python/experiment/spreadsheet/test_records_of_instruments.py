@@ -303,3 +303,36 @@ def test_unloaded_gauges_that_are_no_places_are_taken_as_they_are(tmp_path: Path
     found = made(tmp_path, head + "\n" + "\n".join(rows) + "\n", "tripteron", noise=NOISE)
     np.testing.assert_allclose(found.experiment.reading[:, :3], 1e-4, atol=1e-9)
     assert not any("turned" in r for r in found.remarks)
+
+
+@pytest.mark.parametrize("lever", [(0.0, 0.0, 0.0), (0.03, -0.02, 0.08)])
+def test_the_same_of_an_arm_that_is_commanded_by_its_joints(
+    lever: tuple[float, float, float], tmp_path: Path
+) -> None:
+    machine = sm.load_machine("ur10")
+    q = np.deg2rad(
+        [
+            [20 * i, -80 + 15 * j, 80 - 20 * i, -90 + 10 * j, -90 + 30 * i, 10 * i]
+            for i in range(4)
+            for j in range(4)
+        ]
+    )
+    pose = sm.forward_kinematics(machine, q)
+    target = 1e3 * (pose.position + pose.rotation @ lever)
+    deflections = np.cos(np.arange(target.size).reshape(-1, 3))
+    axes = Rotation.from_euler("zyx", [70, -8, 3], degrees=True).as_matrix()
+    places = [p @ axes.T + (2500, 300, -120) for p in (target, target + deflections)]
+    rows = (
+        ";".join(f"{v:.7f}" for v in (*c, -50, *u, *w))
+        for c, u, w in zip(np.degrees(q), *places, strict=True)
+    )
+    head = ";".join(
+        [
+            *(f"q{k} [deg]" for k in range(1, 7)),
+            "Fz [N]",
+            *(f"{a} {s} [mm]" for s in ("unloaded", "loaded") for a in "XYZ"),
+        ]
+    )
+    found = made(tmp_path, head + "\n" + "\n".join(rows) + "\n", "ur10", noise=NOISE)
+    np.testing.assert_allclose(found.experiment.reading[:, :3], 1e-3 * deflections, atol=1e-8)
+    assert any("the target sits at (30, -20, 80) mm" in r for r in found.remarks) == any(lever)
