@@ -10,7 +10,7 @@ from scipy.stats import chi2
 from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.channels import Channel, metres
 from stiffmap.experiment.experiment import Experiment, Floats, Integers, Mask, numbered
-from stiffmap.experiment.poses.handeye import own_frame
+from stiffmap.experiment.poses.handeye import ERROR, own_frame
 
 CONTRADICTION = 1e-4
 ENOUGH = 5
@@ -114,13 +114,19 @@ def contradictions(experiment: Experiment) -> list[str]:
 
 
 def no_difference(experiment: Experiment) -> str:
-    """What to say where readings change along with the commanded places, as places that were seen do; empty where they do not."""
-    at, read = experiment.position, experiment.reading[:, :3]
+    """What to say where readings are as large as no difference is: they change along with the commanded places, as places that were
+    seen do, or are in another unit; empty where they are differences."""
+    e, at, read = experiment, experiment.position, experiment.reading[:, :3]
     same = np.ptp(read - at, axis=0) < 0.1 * np.ptp(at, axis=0)  # not where one of the two is NaN
-    if experiment.seen is not None or not (same.any() or own_frame(read, at) is not None):
+    if e.seen is not None:
         return ""
-    names = ", ".join(c.name for c, s in zip(experiment.channels, same, strict=False) if s or not same.any())
-    return f"{names} change as the commanded places do: places that were seen are no differences; --instrument tracker takes what was commanded off"
+    if same.any() or own_frame(read, at) is not None:
+        names = ", ".join(c.name for c, s in zip(e.channels, same, strict=False) if s or not same.any())
+        return f"{names} change as the commanded places do: places that were seen are no differences; --instrument tracker takes what was commanded off"
+    size = float(np.median(np.abs(read[np.isfinite(read)]))) if np.isfinite(read).any() else 0.0
+    if e.quantity != "position" or size <= ERROR:
+        return ""
+    return f"half of the readings lie {1e3 * size:.4g} mm or more from what was commanded: are they differences, and in this unit?"
 
 
 def not_at_zero(experiment: Experiment) -> str:

@@ -116,10 +116,10 @@ def as_readings(m: Meant, instrument: Instrument) -> None:
         for (reading, (own, command)), values in zip(
             at.items(), (read if apart else read - asked).T, strict=True
         ):
-            meaning, less = reading, f" less {m.sheet.header[command]}"
+            meaning, how = reading, f" less {m.sheet.names[command]}"
             if apart:
-                meaning, less = f"p{reading[-1]}", ""
-            name = f"{m.sheet.header[own]}{less} [mm]"
+                meaning, how = f"p{reading[-1]}", ", seen"
+            name = f"{m.sheet.names[own]}{how} [mm]"
             m.sheet = m.sheet.with_column(name, values)
             chosen[meaning] = [name]
             if meaning not in m.chosen:

@@ -336,3 +336,12 @@ def test_the_same_of_an_arm_that_is_commanded_by_its_joints(
     found = made(tmp_path, head + "\n" + "\n".join(rows) + "\n", "ur10", noise=NOISE)
     np.testing.assert_allclose(found.experiment.reading[:, :3], 1e-3 * deflections, atol=1e-8)
     assert any("the target sits at (30, -20, 80) mm" in r for r in found.remarks) == any(lever)
+
+
+@pytest.mark.parametrize(("unit", "warned"), [("um", False), ("mm", True)])
+def test_differences_in_a_unit_that_no_machine_is_off_by(unit: str, warned: bool, tmp_path: Path) -> None:
+    rows = "\n".join(";".join(f"{v:g}" for v in (*p, *(1e3 * e))) for p, e in zip(GRID, ERRORS, strict=True))
+    text = f"x [mm];y [mm];z [mm];dx;dy;dz\n{rows}\n"
+    units = dict.fromkeys(("dx", "dy", "dz"), unit)
+    found = made(tmp_path, text, "tripteron", quantity="position", noise=NOISE, units=units)
+    assert any("are they differences, and in this unit?" in w for w in found.warnings) == warned
