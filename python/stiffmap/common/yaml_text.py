@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import yaml
 
 from stiffmap.common.errors import FileError, StiffmapError, reading
@@ -176,6 +177,7 @@ def _text(dumper: Any, data: str) -> Any:
 
 _Dumper.add_representer(list, _list)
 _Dumper.add_representer(str, _text)
+_Dumper.add_multi_representer(np.generic, lambda dumper, data: dumper.represent_data(data.item()))
 
 
 def text_of(data: Any) -> str:

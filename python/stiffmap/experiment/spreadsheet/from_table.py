@@ -9,7 +9,7 @@ from functools import partial
 from os import PathLike
 from pathlib import Path
 
-from stiffmap.common.broadcasting import given_path, one_of
+from stiffmap.common.broadcasting import given_path, one_of, real_number
 from stiffmap.common.errors import FileError, MissingColumnError, StiffmapError
 from stiffmap.common.fingerprints import file_digest
 from stiffmap.common.outputs import new_file, putting
@@ -130,8 +130,9 @@ def experiment_from_table(
     if wrong:
         raise StiffmapError(f"record: expected one of {', '.join(sorted(RECORD))}; got '{wrong[0]}'")
     chosen = {k: v.split("|") for k, v in (columns or {}).items()}
-    sure = {READ.get(k, k): v for k, v in (noise or {}).items()}
-    given = Answers(chosen, dict(units or {}), dict(constants or {}), sure)
+    sure = {READ.get(k, k): real_number(v, f"noise: {k}") for k, v in (noise or {}).items()}
+    same = {k: real_number(v, f"constants: {k}") for k, v in (constants or {}).items()}
+    given = Answers(chosen, dict(units or {}), same, sure)
     rows = None if dh is None else read_dh(read_sheet(Path(dh)), given.units, dh_convention)
     drives = drives if rows is None else {f"{LEG}.{r.name}": r.slides for r in rows}
     numbered = any(h.strip("+-").isdigit() for many in chosen.values() for h in many)

@@ -49,9 +49,11 @@ def in_base_axes(m: Meant, machine: Callable[[], Machine]) -> None:
     if frame is None:
         return
     at = [m.index(m.chosen[a][0]) for a in AXES[:3]]
-    names = [m.sheet.names[i] for i in at]
-    for a, name, values in zip(AXES[:3], names, (m.metres(at, AXES[:3]) @ frame.base_r[0]).T, strict=True):
-        m.add(f"{name}, along the base's {a[1]}", "mm", 1e3 * values, a)
+    turned = (m.metres(at, AXES[:3]) @ frame.base_r[0]).T
+    units = [m.written_unit(i, a) for i, a in zip(at, AXES[:3], strict=True)]  # as --noise has them
+    for a, i, unit, values in zip(AXES[:3], at, units, turned, strict=True):
+        size = m.unit(i, a).size
+        m.add(f"{m.sheet.names[i]}, along the base's {a[1]}", unit, values / size, a)
     m.said.append(
         "the places without load lie elsewhere than the commands: they are in the instrument's own frame, and differences are turned "
         "from its axes into those of the base"

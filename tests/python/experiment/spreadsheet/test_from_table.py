@@ -22,7 +22,7 @@ def test_the_same_folder_as_by_the_command(tmp_path: Path) -> None:
     said = {"dx": "Uhr 1 [µm]", "dy": "Uhr 2 [µm]"}
     made = sm.experiment_from_table(
         "five-bar", tmp_path / "sheet.csv", tmp_path / "own",
-        columns=said, constants={"z": 0.0}, noise={"dx": 1.0, "dy": 1.0},
+        columns=said, constants={"z": np.float64(0.0)}, noise={"dx": 1.0, "dy": np.int64(1)},
     )  # fmt: skip
     words = [f"--map={k}={v}" for k, v in said.items()]
     command = ["experiment", "new", str(tmp_path / "sheet.csv"), "--machine", "five-bar", *words]
@@ -41,6 +41,8 @@ def test_the_same_folder_as_by_the_command(tmp_path: Path) -> None:
     ("change", "message"),
     [
         ({"columns": 3}, "columns: expected a mapping"),
+        ({"noise": {"dx": "much"}}, "noise: dx: expected a number, got text"),
+        ({"constants": {"z": None}}, "constants: z: expected a number"),
         ({"quantity": "speed"}, "quantity: expected"),
         ({"difference": "both"}, "difference: expected"),
         ({"record": {"weather": "fine"}}, "record: expected one of"),

@@ -279,17 +279,21 @@ def test_differences_from_places_far_away_are_no_places(tmp_path: Path) -> None:
     assert "change as the commanded places do" in found.warnings[0]
 
 
-@pytest.mark.parametrize("turn", [0.0, 40.0, -120.0])
-def test_loaded_and_unloaded_places_in_the_frame_of_the_instrument(turn: float, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("turn", "unit", "mm"), [(0.0, "mm", 1.0), (40.0, "m", 1e3), (-120.0, "mil", 0.0254)]
+)
+def test_loaded_and_unloaded_places_in_the_frame_of_the_instrument(
+    turn: float, unit: str, mm: float, tmp_path: Path
+) -> None:
     axes = Rotation.from_euler("zx", [turn, 0.2 * turn], degrees=True).as_matrix()
     deflections = 0.1 * np.cos(np.arange(3 * len(GRID)).reshape(-1, 3))
-    places = [(p @ axes.T) + (2500, 300, -120) for p in (GRID + ERRORS, GRID + ERRORS + deflections)]
-    rows = (";".join(f"{v:.6f}" for v in (*p, 100, *u, *w)) for p, u, w in zip(GRID, *places, strict=True))
-    head = ";".join(
-        ["x [mm];y [mm];z [mm];Fx [N]", *(f"{a} {s} [mm]" for s in ("unloaded", "loaded") for a in "XYZ")]
-    )
-    found = made(tmp_path, head + "\n" + "\n".join(rows) + "\n", "tripteron", noise=NOISE)
+    places = [((p @ axes.T) + (2500, 300, -120)) / mm for p in (GRID + ERRORS, GRID + ERRORS + deflections)]
+    rows = (";".join(f"{v:.9f}" for v in (*p, 100, *u, *w)) for p, u, w in zip(GRID, *places, strict=True))
+    names = (f"{a} {s} [{unit}]" for s in ("unloaded", "loaded") for a in "XYZ")
+    text = "\n".join([";".join(["x [mm];y [mm];z [mm];Fx [N]", *names]), *rows, ""])
+    found = made(tmp_path, text, "tripteron", noise=dict.fromkeys(NOISE, 0.05 / mm))
     np.testing.assert_allclose(found.experiment.reading[:, :3], 1e-3 * deflections, atol=2e-7)
+    np.testing.assert_allclose(found.experiment.sigma[:, :3], 5e-5)
     assert any("turned from its axes into those of the base" in r for r in found.remarks)
 
 
