@@ -15,8 +15,7 @@ from stiffmap.workspace.design.problem import DesignProblem
 from stiffmap.workspace.performance.registry import Case, Measure, get_measure
 from stiffmap.workspace.performance.requirements import Bound
 
-IMPOSSIBLE = 1e6
-"""Objective and violation of a design that cannot be built or reaches nothing."""
+IMPOSSIBLE = 1e6  # objective and violation of a design that cannot be built or reaches nothing
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,8 +85,7 @@ def violation(bound: Bound, value: float) -> float:
     return -margin / size if np.isfinite(margin) else IMPOSSIBLE
 
 
-STEP = 1e-4
-"""Of a variable's range: differences over it give slopes."""
+STEP = 1e-4  # of a variable's range: differences over it give slopes
 ROUNDS = 40
 RADII = (0.3, 0.1, 0.03, 0.03)
 """Of every variable's range: how far one run may go from the best design so far."""

@@ -16,8 +16,7 @@ from stiffmap.solve.kinematics import inverse_kinematics
 from stiffmap.solve.solution import Solution
 from stiffmap.solve.validity import Validity
 from stiffmap.workspace.maps.extremes import ALL, TurningForce, direction, even_angles
-from stiffmap.workspace.maps.fixed_order_sums import norm
-from stiffmap.workspace.maps.loading import Loading, deflections, without_failed
+from stiffmap.workspace.maps.loading import Loading, deflections, norm, without_failed
 from stiffmap.workspace.maps.plan import BEYOND, MapPlan
 from stiffmap.workspace.maps.uncertainty import Uncertain
 
@@ -145,8 +144,7 @@ class Tiles:
     """How a grid is cut: rows of all x, `height` of them at one z."""
 
     planes: int
-    rows: int
-    """Rows of a plane."""
+    rows: int  # rows of a plane
     height: int
 
     @cached_property
@@ -189,8 +187,7 @@ class Work:
     """Who solves a map: this process, about so many poses at once, or the workers of a cluster."""
 
     poses: int
-    scheduler: object = None
-    """Address of a dask scheduler, or a `distributed.Client`."""
+    scheduler: object = None  # address of a dask scheduler, or a `distributed.Client`
 
     def parts(self, plan: MapPlan) -> list[slice]:
         """All rows, in parts that are kept as soon as they are solved."""

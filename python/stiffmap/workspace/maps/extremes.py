@@ -22,9 +22,17 @@ from stiffmap.solve.labels import meaning
 from stiffmap.solve.machine import Machine, takes_machine
 from stiffmap.solve.options import LoadingKeywords, spelled_out
 from stiffmap.solve.solution import Solution
-from stiffmap.workspace.maps.fixed_order_sums import apply, dot, norm
 from stiffmap.workspace.maps.inputs import magnitude, place, plane_axes
-from stiffmap.workspace.maps.loading import Loading, at_place, describe, displaced, without_failed
+from stiffmap.workspace.maps.loading import (
+    Loading,
+    apply,
+    at_place,
+    describe,
+    displaced,
+    dot,
+    norm,
+    without_failed,
+)
 
 Parts = tuple[int, ...]
 ALL: Parts = (0, 1, 2)
@@ -34,16 +42,11 @@ ALL: Parts = (0, 1, 2)
 class DirectionSweep:
     """Equilibria of poses (p) under force directions (k)."""
 
-    angle: Floats
-    """(p, k) rad, from the plane's first axis to its second."""
-    translation: Floats
-    """(p, k, 3) m; NaN where the status is not CONVERGED."""
-    turning: Floats
-    """(p, k, 3) m/rad: change of the translation with the angle, by the loaded compliance."""
-    growing: Floats
-    """(p, k, 3) m/N: change of the translation with the force's magnitude."""
-    status: NDArray[np.uint8]
-    """(p, k)."""
+    angle: Floats  # (p, k) rad, from the plane's first axis to its second
+    translation: Floats  # (p, k, 3) m; NaN where the status is not CONVERGED
+    turning: Floats  # (p, k, 3) m/rad: change of the translation with the angle, by the loaded compliance
+    growing: Floats  # (p, k, 3) m/N: change of the translation with the force's magnitude
+    status: NDArray[np.uint8]  # (p, k)
 
     def sizes(self, parts: Parts) -> tuple[Floats, Floats]:
         """(p, k) m and m/N: norm of these components of the translation, and its change with the force; where there is no
@@ -98,14 +101,10 @@ NEWTON_STEPS = 5
 class Extreme:
     """The most extreme direction of each pose (p,); NaN where any direction failed."""
 
-    angle: Floats
-    """rad, in [-pi, pi)."""
-    value: Floats
-    """Norm of the components looked at, m."""
-    growth: Floats
-    """Change of the value with the force, m/N."""
-    status: NDArray[np.uint8]
-    """Highest status among all directions solved."""
+    angle: Floats  # rad, in [-pi, pi)
+    value: Floats  # norm of the components looked at, m
+    growth: Floats  # change of the value with the force, m/N
+    status: NDArray[np.uint8]  # highest status among all directions solved
 
 
 STEPS = 8
@@ -118,12 +117,9 @@ class TurningForce:
     """A pure force that turns in a plane, at poses (p)."""
 
     loading: Loading
-    position: Floats
-    """(p, 3) m."""
-    size: float
-    """N."""
-    axes: tuple[int, int]
-    """Base axes of the plane."""
+    position: Floats  # (p, 3) m
+    size: float  # N
+    axes: tuple[int, int]  # base axes of the plane
 
     def solve(
         self, angle: Floats, size: Floats | None = None, rows: NDArray[np.intp] | None = None

@@ -20,10 +20,9 @@ from stiffmap.solve.machine import Machine, as_machine, hint_metres
 from stiffmap.solve.options import keywords_of
 from stiffmap.workspace.maps.block import POSES_AT_ONCE, Work, blocks_of, solve_block, tiles_of, work_of
 from stiffmap.workspace.maps.files import is_zarr, partial_folder, read_dataset, write_dataset
+from stiffmap.workspace.maps.loading import track
 from stiffmap.workspace.maps.plan import MapPlan, map_plan
-from stiffmap.workspace.maps.progress import track
-from stiffmap.workspace.maps.store import Store, folder_store, memory_store
-from stiffmap.workspace.maps.zarr_map import open_zarr_map
+from stiffmap.workspace.maps.store import Store, folder_store, memory_store, open_zarr_map
 
 OTHER_FORMATS = (".csv", ".json", ".ods", ".parquet", ".txt", ".xlsx", ".yaml")
 
@@ -157,8 +156,7 @@ def _to_zarr(plan: MapPlan, out: Path, resume: bool, work: Work, progress: bool 
 
 
 SAMPLES = 8
-COPIES = 3
-"""Of a tile that are in memory at once while it is solved and written."""
+COPIES = 3  # of a tile that are in memory at once while it is solved and written
 
 
 @dataclass(frozen=True)

@@ -12,14 +12,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import Floats, names_of, whole_number
-from stiffmap.solve.labels import (
-    COMPLIANCE_UNITS,
-    COMPONENTS,
-    TWIST_UNITS,
-    WRENCH,
-    meaning,
-    status_attrs,
-)
+from stiffmap.solve.labels import COMPLIANCE_UNITS, COMPONENTS, TWIST_UNITS, WRENCH, meaning, status_attrs
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.options import LoadingKeywords, spelled_out
 from stiffmap.solve.validity import Validity
@@ -105,13 +98,10 @@ class MapPlan:
     x: Floats
     y: Floats
     z: Floats
-    wrenches: Floats
-    """(cases, 6)."""
-    cases: tuple[str, ...] | None
-    """None: a single wrench without a name, the map has no case axis."""
+    wrenches: Floats  # (cases, 6)
+    cases: tuple[str, ...] | None  # None: a single wrench without a name, the map has no case axis
     shown_plane: str
-    turning: bool
-    """Whether the force is turned in the plane."""
+    turning: bool  # whether the force is turned in the plane
     force: float
     directions: int
     tolerance: float

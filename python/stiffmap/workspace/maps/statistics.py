@@ -19,8 +19,8 @@ from stiffmap.solve.machine import Machine, as_machine
 from stiffmap.solve.options import keywords_of
 from stiffmap.solve.status import Status
 from stiffmap.workspace.maps.block import Tiles, tiles_of, work_of
+from stiffmap.workspace.maps.loading import track
 from stiffmap.workspace.maps.plan import MapPlan, Variable, map_plan
-from stiffmap.workspace.maps.progress import track
 
 NODE = ("x", "y", "z")
 DEFLECTION = re.compile(r"(worst_|best_)?deflection(_xy|_xz|_yz)?")
@@ -164,8 +164,7 @@ def cells(axis: Floats) -> Floats:
 
 
 BITS = 9
-RELATIVE_WIDTH = 2.0**-BITS
-"""Width of a bin against its lower edge, at most."""
+RELATIVE_WIDTH = 2.0**-BITS  # width of a bin against its lower edge, at most
 _SHIFT = 52 - BITS
 
 

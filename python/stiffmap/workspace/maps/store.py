@@ -1,34 +1,41 @@
-"""Where a map grows: in memory, or in a folder of plain arrays that an interrupted run leaves behind."""
+"""Where a map grows: in memory, in a folder of plain arrays that an interrupted run leaves behind, or in a Zarr folder, a chunk of every
+variable per tile, which survives being killed.
+
+While a Zarr map grows, its folder is called ``NAME.zarr.partial`` and holds a journal next to the arrays: a line for each tile whose
+chunks are complete, with their checksums. The finished folder holds the map alone, so that its bytes don't depend on interruptions,
+threads or the order of the tiles.
+"""
 
 from __future__ import annotations
 
 import json
+import shutil
+import tempfile
+import zlib
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from functools import partial, reduce
+from functools import cached_property, partial, reduce
 from operator import getitem
 from pathlib import Path
 from tokenize import TokenError
+from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.lib.format import open_memmap
 from numpy.typing import NDArray
 
 from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.json_text import parse_json
-from stiffmap.common.outputs import mapped_array, write_text
+from stiffmap.common.outputs import add_lines, mapped_array, put_folder, write_text
+from stiffmap.workspace.maps.block import Tiles, tiles_of
+from stiffmap.workspace.maps.files import write_zarr, zarr_package
 from stiffmap.workspace.maps.plan import MapPlan
 
 WORDS = {"machine_digest": "the machine's description", "stiffmap_version": "the version of stiffmap"}
 LEFT_OUT = (
-    "coordinates",
-    "title",
-    "machine_title",
-    "effects",
-    "extremes_method",
-    "turning_force",
-    "turning_force_N",
-)
+    "coordinates", "title", "machine_title", "effects", "extremes_method", "turning_force", "turning_force_N",
+)  # fmt: skip
 """What follows from another attribute."""
 LONG = 60
 
@@ -148,3 +155,140 @@ def _kept(folder: Path, name: str, dtype: str, shape: tuple[int, ...]) -> np.nda
         "(--resume)",
         file=str(path),
     )
+
+
+JOURNAL = "journal.jsonl"
+FILL = {"u1": 255, "u4": 0, "f8": np.nan}
+
+
+class ZarrMap:
+    """An unfinished map on the disk; `open_zarr_map` makes it."""
+
+    def __init__(self, plan: MapPlan, folder: Path, tiles: Tiles) -> None:
+        self.plan, self.folder, self.tiles = plan, folder, tiles
+        self.done: NDArray[np.bool_] = np.zeros(len(tiles.parts), dtype=bool)
+
+    def put(self, index: int, values: dict[str, np.ndarray]) -> None:
+        """Write a tile's chunks, then its line in the journal. FileError where the disk refuses."""
+        plane, y = self.tiles.place(index)
+        try:
+            for name, array in values.items():
+                self._arrays[name][plane, y] = array
+            line = json.dumps({"tile": index, "crc": {n: crc(self.chunk(n, index)) for n in values}})
+            add_lines(self.folder / JOURNAL, [line], flushed=False)
+        except OSError as error:
+            raise FileError(
+                f"cannot be written: {error.strerror or error}; {int(self.done.sum())} of {len(self.done)} "
+                "tiles are kept, resume=True (--resume) goes on with them",
+                file=str(self.folder),
+            ) from error
+        self.done[index] = True
+
+    def chunk(self, name: str, index: int) -> Path:
+        """File of a variable's chunk."""
+        plane, y = self.tiles.place(index)
+        tail = ["0"] * (1 + len(self._arrays[name].shape) - 3)
+        return self.folder.joinpath(name, "c", str(plane), str(y.start // self.tiles.height), *tail)
+
+    @cached_property
+    def _arrays(self) -> Any:
+        package = zarr_package()
+        # Also chunks of nothing but fill values: a chunk that is missing is one that is not done.
+        with package.config.set({"array.write_empty_chunks": True}):
+            group = package.open_group(self.folder, mode="r+", zarr_format=3)
+            return {v.name: group[v.name] for v in self.plan.variables}
+
+    def finish(self, out: Path) -> None:
+        """Put the complete map in its place."""
+        (self.folder / JOURNAL).unlink(missing_ok=True)
+        put_folder(self.folder, out)
+
+    def frame(self, folder: Path) -> None:
+        """Write the empty map: metadata and coordinates."""
+        package = zarr_package()
+        write_zarr(xr.Dataset(coords=self.plan.coords, attrs=self.plan.attrs), folder)
+        group = package.open_group(folder, mode="r+", zarr_format=3)
+        from zarr.codecs import Crc32cCodec, ZstdCodec
+
+        for v in self.plan.variables:
+            tail = self.plan.tail(v)
+            group.create_array(
+                v.name,
+                shape=(*self.plan.shape, *tail),
+                chunks=(1, self.tiles.height, self.plan.x.size, *tail),
+                dtype=v.dtype,
+                fill_value=FILL[v.dtype],
+                compressors=[ZstdCodec(level=1), Crc32cCodec()],
+                dimension_names=self.plan.dims(v),
+                attributes={k: a.tolist() if isinstance(a, np.ndarray) else a for k, a in v.attrs.items()},
+            )
+
+    def recover(self) -> None:
+        """Take up what an earlier run left.
+
+        StiffmapError where it belongs to another map, FileError for a chunk that is damaged.
+        """
+        kept = kept_attributes(self.folder / "zarr.json", "attributes")
+        refuse_another_map(self.folder, kept, self.plan.attrs)
+        self._mend_frame()
+        for scrap in self.folder.rglob("*.partial"):  # chunks that zarr had not put in their place
+            scrap.unlink()
+        lines = (self.folder / JOURNAL).read_bytes().split(b"\n")[:-1]  # the last one may have been cut off
+        for number, line in enumerate(lines, 1):
+            index, checks = self._checksums(number, line)
+            for path, value in checks.items():
+                if path.exists() and crc(path) != value:
+                    raise FileError(
+                        f"is damaged: expected checksum {value}, found {crc(path)}; delete this chunk, and "
+                        "resume=True (--resume) computes it again",
+                        file=str(path),
+                    )
+            self.done[index] = all(path.exists() for path in checks)
+
+    def _mend_frame(self) -> None:
+        """Metadata and coordinates follow from the plan: what is damaged is written again."""
+        with tempfile.TemporaryDirectory(dir=self.folder.parent, prefix=f"{self.folder.name}.") as place:
+            fresh = Path(place) / "frame"
+            self.frame(fresh)
+            for path in fresh.rglob("*"):
+                target = self.folder / path.relative_to(fresh)
+                if path.is_file() and not (target.is_file() and target.read_bytes() == path.read_bytes()):
+                    target.parent.mkdir(parents=True, exist_ok=True)
+                    shutil.copyfile(path, target)
+
+    def _checksums(self, number: int, line: bytes) -> tuple[int, dict[Path, int]]:
+        """Tile and checksums of its chunks by a line of the journal; FileError where this program did not write it."""
+        try:
+            entry = parse_json(line)
+            index, checks = entry["tile"], entry["crc"]
+            known = type(index) is int and 0 <= index < len(self.done) and isinstance(checks, dict)
+            if not known or set(checks) != {v.name for v in self.plan.variables}:
+                raise ValueError
+        except (KeyError, TypeError, ValueError) as error:
+            raise FileError(
+                "is damaged: expected a tile and the checksums of its chunks; delete this line, and resume=True "
+                "(--resume) computes its tile again",
+                file=str(self.folder / JOURNAL),
+                line=number,
+            ) from error
+        return index, {self.chunk(n, index): value for n, value in checks.items()}
+
+
+def crc(path: Path) -> int:
+    """Checksum of a file."""
+    return zlib.crc32(path.read_bytes())
+
+
+def open_zarr_map(plan: MapPlan, folder: Path, resume: bool) -> ZarrMap:
+    """The unfinished map in `folder`, new or taken up."""
+    zarr_package()
+    out = ZarrMap(plan, folder, tiles_of(plan))
+    try:
+        if resume and (folder / JOURNAL).exists():
+            out.recover()
+        else:
+            out.frame(folder)
+            write_text(folder / JOURNAL, "")
+    except OSError as error:
+        raise FileError(f"cannot be written: {error.strerror or error}", file=str(folder)) from error
+    return out

@@ -18,9 +18,8 @@ from stiffmap.solve.labels import meaning
 from stiffmap.solve.machine import Machine, hint_metres, takes_machine
 from stiffmap.solve.options import LoadingKeywords, spelled_out
 from stiffmap.solve.status import Status
-from stiffmap.workspace.maps.fixed_order_sums import dot
 from stiffmap.workspace.maps.inputs import number_list, place, unit
-from stiffmap.workspace.maps.loading import Loading, at_place, describe, displaced, without_failed
+from stiffmap.workspace.maps.loading import Loading, at_place, describe, displaced, dot, without_failed
 
 
 @takes_machine

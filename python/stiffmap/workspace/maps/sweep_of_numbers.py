@@ -24,7 +24,7 @@ from stiffmap.solve.labels import (
 )
 from stiffmap.solve.machine import Machine, takes_machine
 from stiffmap.workspace.maps.inputs import axis
-from stiffmap.workspace.maps.progress import track
+from stiffmap.workspace.maps.loading import track
 
 KEPT = ("displacement", "deflection", "compliance", "status")
 Evaluate = Callable[[Machine], Mapping[str, float] | float]

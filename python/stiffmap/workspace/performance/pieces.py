@@ -13,8 +13,7 @@ from stiffmap.model.description.elements import Element
 from stiffmap.model.description.tree import Elements, edit_all, edit_sequences
 from stiffmap.solve.machine import Machine, takes_machine
 
-LIKE = 1e-6
-"""Relative difference up to which a spring is that of a uniform beam, and a mass is in its middle."""
+LIKE = 1e-6  # relative difference up to which a spring is that of a uniform beam, and a mass is in its middle
 
 
 @takes_machine

@@ -37,16 +37,12 @@ class MeasuredResponse:
     """One measured response, as a receptance."""
 
     name: str
-    frequency: Floats
-    """(frequencies,) Hz, rising."""
-    receptance: Complex
-    """(frequencies,) m/N."""
-    coherence: Floats
-    """(frequencies,) 0 to 1; NaN where none was measured."""
+    frequency: Floats  # (frequencies,) Hz, rising
+    receptance: Complex  # (frequencies,) m/N
+    coherence: Floats  # (frequencies,) 0 to 1; NaN where none was measured
     response: str = ""
     """Where and along what it was measured, as the file says: point and direction such as 3 +z."""
-    reference: str = ""
-    """The same of the hammer."""
+    reference: str = ""  # the same of the hammer
 
     def variance(self, averages: int = 1) -> Floats:
         """(frequencies,) relative variance of the size, from the coherence of so many averages (Bendat and Piersol)."""
@@ -120,8 +116,7 @@ def _receptance(frequency: Floats, values: Complex, derivatives: int) -> Complex
 
 DataSet = dict[str, int | float | str | np.ndarray]
 """A data set of a universal file, as pyuff names its fields."""
-MOTIONS = {8: 0, 11: 1, 12: 2}
-"""Of universal files: displacement, velocity, acceleration."""
+MOTIONS = {8: 0, 11: 1, 12: 2}  # of universal files: displacement, velocity, acceleration
 WAYS = {0: "", 1: "+x", -1: "-x", 2: "+y", -2: "-y", 3: "+z", -3: "-z", 4: "+rx", 5: "+ry", 6: "+rz", -4: "-rx", -5: "-ry", -6: "-rz"}  # fmt: skip
 RESPONSE, COHERENCE = 4, 6
 UNITS, FUNCTION = 164, 58

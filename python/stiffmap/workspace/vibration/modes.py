@@ -8,12 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from stiffmap.common.broadcasting import (
-    Floats,
-    real_array,
-    thread_count,
-    whole_number,
-)
+from stiffmap.common.broadcasting import Floats, real_array, thread_count, whole_number
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.description import Cable, Joint, Spring
 from stiffmap.model.description.tree import all_elements, core_name
@@ -21,24 +16,18 @@ from stiffmap.solve.closing import loaded_poses
 from stiffmap.solve.machine import Machine
 from stiffmap.workspace.performance.motion.inertia import inertias, need_masses
 
-ASSUMED = 0.02
-"""Damping ratio of every mode of a machine that declares none."""
+ASSUMED = 0.02  # damping ratio of every mode of a machine that declares none
 
 
 @dataclass(frozen=True, eq=False)
 class Damping:
     """Damping by coordinate, and of the modes."""
 
-    viscous: Floats
-    """(coordinates,) N·s/m, N·m·s/rad."""
-    loss: Floats
-    """(coordinates,) structural loss factor of the spring or law of each."""
-    ratios: tuple[float, ...]
-    """Of the modes, lowest first, the last for all further ones; empty: none."""
-    said: str
-    """Where it comes from, in words."""
-    assumed: bool = False
-    """Whether the machine file declares none."""
+    viscous: Floats  # (coordinates,) N·s/m, N·m·s/rad
+    loss: Floats  # (coordinates,) structural loss factor of the spring or law of each
+    ratios: tuple[float, ...]  # of the modes, lowest first, the last for all further ones; empty: none
+    said: str  # where it comes from, in words
+    assumed: bool = False  # whether the machine file declares none
 
     def of_modes(self, count: int) -> Floats:
         """(count,) damping ratios."""
@@ -107,8 +96,7 @@ def _listed(ratios: tuple[float, ...]) -> str:
     return ", ".join(f"{100 * r:.3g} %" for r in ratios)
 
 
-SYMMETRIC = 1e-9
-"""Part of a tangent that is not symmetric, relative, up to which it is round-off."""
+SYMMETRIC = 1e-9  # part of a tangent that is not symmetric, relative, up to which it is round-off
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,8 +20,7 @@ from stiffmap.workspace.vibration.modes import SYMMETRIC, TipModes, tip_modes
 Complex = NDArray[np.complex128]
 WORST_BASIS = 1e8
 """Condition of the eigenvectors from which on (critically damped pairs) each frequency is solved by itself."""
-BLOCK = 64
-"""Poses of one call of a thread."""
+BLOCK = 64  # poses of one call of a thread
 
 
 def receptance(modes: TipModes, frequency: Floats, threads: int | None = None) -> Complex:

@@ -59,8 +59,7 @@ SPELLINGS = {
     "**": "^",
     "inch": "in",
 }
-UNREADABLE = "\ufffd"
-"""What a reader of UTF-8 makes of µ and ² in another encoding."""
+UNREADABLE = "\ufffd"  # what a reader of UTF-8 makes of µ and ² in another encoding
 LONGEST = 80  # characters
 TOKEN = re.compile(r"\s*([A-Za-z_]+(?:'s)?|\^?-?\d+|[*/()])")
 

@@ -24,7 +24,7 @@ from stiffmap.model.link.linkfile import load_link
 from stiffmap.model.link.readers import read_field
 from stiffmap.model.urdf.importing import import_urdf
 from stiffmap.workspace.maps import block
-from stiffmap.workspace.maps.zarr_map import ZarrMap
+from stiffmap.workspace.maps.store import ZarrMap
 
 ROOT = Path(__file__).parents[4]
 MACHINES = ROOT / "python/stiffmap/model/machines"

@@ -23,7 +23,7 @@ import stiffmap as sm
 from stiffmap.workspace.maps import block
 from stiffmap.workspace.maps.files import read_dataset
 from stiffmap.workspace.maps.statistics import RELATIVE_WIDTH, Histogram
-from stiffmap.workspace.maps.zarr_map import ZarrMap
+from stiffmap.workspace.maps.store import ZarrMap
 
 pytest.importorskip("zarr")
 AXIS = np.linspace(-0.2, 0.3, 12)
@@ -74,7 +74,7 @@ JOB = """
     import numpy as np
     import stiffmap as sm
     from stiffmap.workspace.maps import block
-    from stiffmap.workspace.maps.zarr_map import ZarrMap
+    from stiffmap.workspace.maps.store import ZarrMap
     block.TILE_POSES = 24
     real = ZarrMap.put
     def slow(self, index, values):

@@ -22,8 +22,7 @@ from stiffmap.workspace.performance.box.box_search import BoxSearch
 from stiffmap.workspace.performance.box.proof import judge_on
 from stiffmap.workspace.performance.limits.limits import Bounds
 
-WORK = 100_000
-"""Cells and poses at most; when they are used up, the bounds stay as far apart as they are."""
+WORK = 100_000  # cells and poses at most; when they are used up, the bounds stay as far apart as they are
 
 
 @short_repr

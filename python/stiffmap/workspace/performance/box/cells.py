@@ -10,10 +10,8 @@ from numpy.typing import NDArray
 from stiffmap.common.broadcasting import Floats
 from stiffmap.workspace.performance.box.proof import Judge
 
-FIRST = 4
-"""Cells along each edge at first."""
-HALVED = 0.5
-"""Axes with this share of the largest curvature, or more, are halved too."""
+FIRST = 4  # cells along each edge at first
+HALVED = 0.5  # axes with this share of the largest curvature, or more, are halved too
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,10 +19,8 @@ class Shrunk:
     """The largest cube about a centre, up to the one asked for, that was decided to keep all limits."""
 
     edge: float
-    broken: Floats
-    """(k, 3) positions that break a limit, in the cube's own coordinates."""
-    names: tuple[str, ...]
-    """Limits that stopped it, or that came nearest to."""
+    broken: Floats  # (k, 3) positions that break a limit, in the cube's own coordinates
+    names: tuple[str, ...]  # limits that stopped it, or that came nearest to
     cells: int
 
 

@@ -21,13 +21,10 @@ from stiffmap.workspace.performance.motion.closing import (
 )
 from stiffmap.workspace.performance.motion.velocity import distances, transmission_of
 
-NEIGHBOURS = 8
-"""Of every pose: from those that close, it is tried next."""
-TURN = 0.5
-"""m, rad: most that a coordinate may change on the way to a neighbour at the border."""
+NEIGHBOURS = 8  # of every pose: from those that close, it is tried next
+TURN = 0.5  # m, rad: most that a coordinate may change on the way to a neighbour at the border
 STEPS = (0.03, 0.1, 0.3, 0.6, 0.9)
-SAME = 1e-2
-"""m, rad: coordinates that are the same; those of stretched legs are known by half their digits."""
+SAME = 1e-2  # m, rad: coordinates that are the same; those of stretched legs are known by half their digits
 REACH = "reach"
 SINGULAR = "singularity"
 

@@ -17,31 +17,24 @@ from stiffmap.workspace.performance.limits.limits import Bounds, factor_limits
 from stiffmap.workspace.performance.motion.closing import kernel_starts, revolute_drives
 from stiffmap.workspace.performance.motion.zonotopes import corners
 
-BOX = np.array(list(product((-1.0, 1.0), repeat=3)))
-"""(8, 3) corners of a cell, in half lengths."""
+BOX = np.array(list(product((-1.0, 1.0), repeat=3)))  # (8, 3) corners of a cell, in half lengths
 
 
 @dataclass(frozen=True, eq=False)
 class ProvenCells:
     """What was proven of cells of positions (n)."""
 
-    inside: NDArray[np.bool_]
-    """Every pose of the cell closes and keeps all limits."""
-    broken: NDArray[np.bool_]
-    """Some pose of it does not."""
-    where: Floats
-    """(n, 3) that pose, from the centre, along the cell's axes."""
-    limit: NDArray[np.int64]
-    """Index into `names` of the limit nearest to its bound, or beyond."""
+    inside: NDArray[np.bool_]  # every pose of the cell closes and keeps all limits
+    broken: NDArray[np.bool_]  # some pose of it does not
+    where: Floats  # (n, 3) that pose, from the centre, along the cell's axes
+    limit: NDArray[np.int64]  # index into `names` of the limit nearest to its bound, or beyond
     names: tuple[str, ...]
-    bend: Floats
-    """(n, 3) share of each axis in the curvature; NaN: unknown."""
+    bend: Floats  # (n, 3) share of each axis in the curvature; NaN: unknown
 
 
 Judge = Callable[[Floats, Floats, Floats], ProvenCells]
 """Of cells with centres (n, 3) m, half lengths (n, 3) m along the columns of axes (3, 3)."""
-PER_TASK = 500
-"""Cells of one task on a cluster; twice as many at least, or they are decided here."""
+PER_TASK = 500  # cells of one task on a cluster; twice as many at least, or they are decided here
 
 
 def judge_cells(bounds: Bounds) -> Judge:
@@ -79,8 +72,7 @@ def _some_cells(bounds: Bounds, cells: tuple[Floats, Floats, Floats]) -> ProvenC
     return enclose(bounds, *cells)
 
 
-SAFETY = 2.0
-"""On second derivatives, which are second differences between the nodes of each cell."""
+SAFETY = 2.0  # on second derivatives, which are second differences between the nodes of each cell
 _NODES = np.array(list(product((-1.0, 0.0, 1.0), repeat=3)))
 _MIDDLE = 13
 

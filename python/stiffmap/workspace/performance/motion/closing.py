@@ -87,31 +87,24 @@ def weighted(machine: Machine, jacobian: Floats, length: float, part: str) -> Fl
     return out[..., PARTS[part], :]
 
 
-CHUNK = 16_384
-"""Poses that are solved at once."""
+CHUNK = 16_384  # poses that are solved at once
 
 
 @dataclass(frozen=True, eq=False)
 class DriveKinematics:
     """First-order kinematics of the rigid machine; NaN where the pose is UNREACHABLE or SINGULAR."""
 
-    jacobian: Floats
-    """(..., 6, drives): TCP twist (base axes) per unit rate of each drive."""
-    coordinates: Floats
-    """(..., coordinates) all coordinates, springs at zero."""
-    actuators: Floats
-    """(..., drives) m or rad."""
-    position: Floats
-    """(..., 3) m, TCP; where the task leaves a component open, the closure's answer."""
-    rotation: Floats
-    """(..., 3, 3)."""
+    jacobian: Floats  # (..., 6, drives): TCP twist (base axes) per unit rate of each drive
+    coordinates: Floats  # (..., coordinates) all coordinates, springs at zero
+    actuators: Floats  # (..., drives) m or rad
+    position: Floats  # (..., 3) m, TCP; where the task leaves a component open, the closure's answer
+    rotation: Floats  # (..., 3, 3)
     free_twist: Floats
     """(..., 6) with all drives held, the motion of the platform at a SINGULAR pose; else NaN."""
     sharing: Floats
     """(..., drives, drives) takes any rates to the nearest that go together, transposed the efforts that a motion needs
     to the drives' shares; the identity unless drives outnumber the freedoms."""
-    together: NDArray[np.int32]
-    """(...) dimension of the rates of drives that go together."""
+    together: NDArray[np.int32]  # (...) dimension of the rates of drives that go together
     pivot: Floats
     """(...) smallest relative pivot of the loops' elimination: 0 at a pose where passive joints lose rank."""
     status: NDArray[np.uint8]
@@ -175,8 +168,7 @@ def kernel_starts(
     return out
 
 
-STEPS = 24
-"""Halvings between two samples, to say where and when."""
+STEPS = 24  # halvings between two samples, to say where and when
 
 
 def refuse_failed(machine: Machine, k: DriveKinematics, time: Floats | None, position: Floats) -> None:

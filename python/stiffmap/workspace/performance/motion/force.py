@@ -23,8 +23,7 @@ from stiffmap.workspace.performance.motion.closing import (
     drive_values,
     weighted,
 )
-from stiffmap.workspace.performance.motion.inertia import rest_efforts
-from stiffmap.workspace.performance.motion.tensions import PUSHES, as_tensions, held, in_cables
+from stiffmap.workspace.performance.motion.inertia import PUSHES, as_tensions, held, in_cables, rest_efforts
 from stiffmap.workspace.performance.motion.velocity import of_motions, singular_values
 from stiffmap.workspace.performance.motion.zonotopes import (
     Polygon,

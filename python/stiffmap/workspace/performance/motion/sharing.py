@@ -18,8 +18,7 @@ from stiffmap.solve.machine import Machine
 KINDS = ("least_norm", "stiffness")
 STRIDE = 5e-3
 """Of the machine's length: how far the tool is from one closure to the next where rates are differences."""
-FLAT = 1e-9
-"""Singular values, relative to the largest, below which the tool has no motion."""
+FLAT = 1e-9  # singular values, relative to the largest, below which the tool has no motion
 
 
 def drive_weights(machine: Machine, sharing: str) -> Floats:
@@ -101,11 +100,7 @@ def sides(j: Floats, rank: int) -> tuple[Floats, Floats]:
 
 
 def followed(
-    machine: Machine,
-    coordinates: Floats,
-    twist: Floats,
-    twist_rate: Floats,
-    threads: int | None,
+    machine: Machine, coordinates: Floats, twist: Floats, twist_rate: Floats, threads: int | None
 ) -> tuple[Floats, Floats]:
     """Rates and accelerations (n, drives) of a redundant machine at closed coordinates (n, coordinates) as its tool moves.
 

@@ -19,8 +19,15 @@ from stiffmap.common.number_text import place_text
 from stiffmap.solve.machine import Machine
 from stiffmap.workspace.maps.inputs import plane_axes
 from stiffmap.workspace.performance.motion.closing import drive_kinematics, drive_values, refuse_failed
-from stiffmap.workspace.performance.motion.inertia import friction_efforts, need_masses, rigid_dynamics
-from stiffmap.workspace.performance.motion.tensions import PUSHES, held, in_cables, inertia_columns
+from stiffmap.workspace.performance.motion.inertia import (
+    PUSHES,
+    friction_efforts,
+    held,
+    in_cables,
+    inertia_columns,
+    need_masses,
+    rigid_dynamics,
+)
 
 
 @dataclass(frozen=True, eq=False)

@@ -91,8 +91,7 @@ def transmission_of(
         )  # fmt: skip
 
 
-APART = 0.1
-"""The loops lose rank at type 2 as well, but not that much faster than the tool runs away."""
+APART = 0.1  # the loops lose rank at type 2 as well, but not that much faster than the tool runs away
 
 
 def distances(v: VelocityTransmission, pivot: Floats) -> Floats:

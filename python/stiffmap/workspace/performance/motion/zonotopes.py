@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.short import short_repr
 
-SOUND = 1e-8
-"""Least determinant of a scaled normal matrix that is inverted as it is."""
+SOUND = 1e-8  # least determinant of a scaled normal matrix that is inverted as it is
 
 
 def corners(n: int) -> Floats:
