@@ -34,12 +34,8 @@ def judge(design: DesignProblem, x: Floats) -> Judged:
     try:
         values = values_of(design, design.quick_machine(x))
     except StiffmapError as error:
-        return Judged(
-            np.full(len(design.model.objectives), IMPOSSIBLE),
-            np.full(len(design.constraints), IMPOSSIBLE),
-            {},
-            str(error),
-        )
+        f, g = (np.full(len(of), IMPOSSIBLE) for of in (design.model.objectives, design.constraints))
+        return Judged(f, g, {}, str(error))
     objectives = np.array([_minimised(get_measure(n), values[n]) for n in design.model.objectives])
     violations = np.array([violation(bound, values[n]) for n, bound in design.constraints])
     return Judged(objectives, violations, values)
@@ -54,21 +50,10 @@ def values_of(design: DesignProblem, machine: Machine) -> dict[str, float]:
         low, high = middle - half, middle + half
     nodes = design.model.search.nodes
     case = Case(
-        machine,
-        low,
-        high,
-        task.force or 100.0,
-        task.plane,
-        transmission=task.transmission,
-        proportions=task.proportions,
-        nodes=nodes,
-        coarse=nodes,
-        quick=True,
-        threads=1,
-        toolpath=design.toolpath,
-        clearance=task.clearance,
+        machine, low, high, task.force or 100.0, task.plane, transmission=task.transmission, proportions=task.proportions,
+        nodes=nodes, coarse=nodes, quick=True, threads=1, toolpath=design.toolpath, clearance=task.clearance,
         deflection=task.deflection,
-    )
+    )  # fmt: skip
     return {n: get_measure(n).compute(case).worst for n in design.measures}
 
 

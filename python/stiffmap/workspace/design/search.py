@@ -124,25 +124,18 @@ class ParetoSet:
     def dataset(self) -> xr.Dataset:
         """Dimensions (design, variable), (design, measure), (design, constraint); SI, worst values."""
         names = list(self.judged[0].values)
+        design, model = self.design, self.design.model
+        values = np.array([[j.values[n] for n in names] for j in self.judged])
+        violations = np.array([j.violations for j in self.judged])
+        data = {
+            "x": (("design", "variable"), self.x),
+            "value": (("design", "measure"), values),
+            "violation": (("design", "constraint"), violations),
+        }
+        constraints = [n for n, _ in design.constraints]
+        coords = {"variable": list(design.variables), "measure": names, "constraint": constraints}
         return xr.Dataset(
-            {
-                "x": (("design", "variable"), self.x),
-                "value": (
-                    ("design", "measure"),
-                    np.array([[j.values[n] for n in names] for j in self.judged]),
-                ),
-                "violation": (("design", "constraint"), np.array([j.violations for j in self.judged])),
-            },
-            coords={
-                "variable": list(self.design.variables),
-                "measure": names,
-                "constraint": [n for n, _ in self.design.constraints],
-            },
-            attrs={
-                "design": self.design.model.name,
-                "seed": self.design.model.search.seed,
-                "evaluated": self.evaluated,
-            },
+            data, coords, {"design": model.name, "seed": model.search.seed, "evaluated": self.evaluated}
         )
 
     def chosen(self) -> dict[str, int]:
@@ -273,13 +266,8 @@ def _algorithm(problem: DesignProblem, generations: int) -> Algorithm:
         from pymoo.util.ref_dirs import get_reference_directions
     search, low_high = problem.model.search, problem.bounds
     goals = len(problem.model.objectives)
-    task = Problem(
-        n_var=len(problem.variables),
-        n_obj=goals,
-        n_ieq_constr=len(problem.constraints),
-        xl=low_high[0],
-        xu=low_high[1],
-    )
+    counts = {"n_var": len(problem.variables), "n_obj": goals, "n_ieq_constr": len(problem.constraints)}
+    task = Problem(**counts, xl=low_high[0], xu=low_high[1])
     if search.method == "nsga2":
         algorithm = NSGA2(pop_size=search.population)
     elif search.method == "nsga3":

@@ -78,13 +78,8 @@ def direction_sweep_of(s: Solution, angle: Floats, size: Floats, axes: tuple[int
     """Equilibria (p, k) that have been solved for forces of those sizes (N) and angles."""
     along, across = direction(angle, axes), direction(angle + np.pi / 2, axes)
     c = s.compliance[..., :3, :3]
-    return DirectionSweep(
-        angle=angle,
-        translation=without_failed(s.displacement[..., :3], s.status),
-        turning=size[..., None] * apply(c, across),
-        growing=apply(c, along),
-        status=s.status,
-    )
+    moved = without_failed(s.displacement[..., :3], s.status)
+    return DirectionSweep(angle, moved, size[..., None] * apply(c, across), apply(c, along), s.status)
 
 
 def even_angles(count: int) -> Floats:
@@ -254,12 +249,9 @@ def polar(
     turning = TurningForce(loading, p[None], force, axes)
     d = without_failed(s.displacement, s.status)[0]
     data = displaced("angle", d, s.status[0], s.flags[0], plane) | _extremes(turning, plane, swept)
+    turned = meaning("rad", f"direction of the force, from {plane[0]} towards {plane[1]}")
     coords = at_place(p) | {
-        "angle": (
-            "angle",
-            angle,
-            meaning("rad", f"direction of the force, from {plane[0]} towards {plane[1]}"),
-        ),
+        "angle": ("angle", angle, turned),
         "force": ((), force, meaning("N", "magnitude of the force")),
     }
     call = {"function": "polar", "position": p, "force": force, "plane": plane, "directions": directions}

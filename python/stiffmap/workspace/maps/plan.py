@@ -56,16 +56,12 @@ def load_variables(case: tuple[str, ...], plane: str, compliance: bool) -> list[
 
 def deviation_variables(case: tuple[str, ...], plane: str, turning: bool) -> list[Variable]:
     """Standard deviations of the load cases and of the worst direction."""
-    what = "standard deviation of "
+    what, share = "standard deviation of ", "share of a number in the variance of the deflection"
     loads = ("deflection", f"deflection_{plane}")
     out = [
         Variable("displacement_std", (*case, "component"), meaning(TWIST_UNITS, f"{what}displacement")),
         *(Variable(f"{n}_std", case, meaning("m", f"{what}{n}")) for n in loads),
-        Variable(
-            "variance_share",
-            (*case, "parameter"),
-            meaning("1", "share of a number in the variance of the deflection"),
-        ),
+        Variable("variance_share", (*case, "parameter"), meaning("1", share)),
     ]
     return out + [Variable(f"worst_{n}_std", (), meaning("m", f"{what}worst_{n}")) for n in loads if turning]
 
@@ -234,18 +230,11 @@ def map_plan(
     grid = grid_of(machine, {"x": x, "y": y, "z": z}, points)
     wrenches, names = wrench_cases(wrench, None if cases is None else names_of(cases, "cases"))
     directions = whole_number(directions, "directions", 3)
+    x, y, z = (axis(grid[a], a) for a in "xyz")
     return MapPlan(
-        loading=loading,
-        x=axis(grid["x"], "x"),
-        y=axis(grid["y"], "y"),
-        z=axis(grid["z"], "z"),
-        wrenches=wrenches,
-        cases=names,
-        shown_plane="xy" if plane is None else "".join("xyz"[i] for i in plane_axes(plane)),
-        turning=plane is not None,
-        force=0.0 if plane is None else plane_force(wrenches, force),
-        directions=directions,
-        tolerance=magnitude(tolerance, "tolerance", "m"),
-        compliance=compliance,
+        loading, x, y, z, wrenches, names,
+        shown_plane="xy" if plane is None else "".join("xyz"[i] for i in plane_axes(plane)), turning=plane is not None,
+        force=0.0 if plane is None else plane_force(wrenches, force), directions=directions,
+        tolerance=magnitude(tolerance, "tolerance", "m"), compliance=compliance,
         uncertain=uncertain_numbers(machine) if uncertainty else None,
-    )
+    )  # fmt: skip

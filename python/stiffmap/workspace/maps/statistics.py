@@ -76,16 +76,11 @@ def map_statistics(
     out: dict[str, object] = {}
     for name, one in found.items():
         out |= one.variables(name, wanted)
-    out["status_count"] = (
-        ("z", *plan.case, "status"),
-        counts if plan.case else counts[:, 0],
-        meaning("1", "poses of each status"),
-    )
+    counted = counts if plan.case else counts[:, 0]
+    out["status_count"] = (("z", *plan.case, "status"), counted, meaning("1", "poses of each status"))
     coords = {k: v for k, v in plan.coords.items() if k not in ("component", "parameter")}
     coords |= {"node": xr.Variable("node", np.array(NODE)), "percentile": xr.Variable("percentile", wanted)}
-    coords["status"] = xr.Variable(
-        "status", np.array([int(s) for s in Status], dtype=np.uint8), status_attrs("poses")
-    )
+    coords["status"] = xr.Variable("status", np.array(list(Status), dtype=np.uint8), status_attrs("poses"))
     bound = f"at most {100 * RELATIVE_WIDTH:.2g} % above the exact value, never below it"
     return xr.Dataset(out, coords, plan.attrs | {"tolerance_m": plan.tolerance, "percentile_bound": bound})
 

@@ -40,8 +40,9 @@ LEFT_OUT = (
 LONG = 60
 
 
-def kept_attributes(path: Path, *keys: str) -> dict[str, object]:
-    """Attributes of an unfinished map in a JSON file, under these keys; FileError where it is damaged."""
+def refuse_another_map(wanted: Mapping[str, object], path: Path, *keys: str) -> None:
+    """StiffmapError, by what differs, where an unfinished map is not the one wanted: its attributes are in a JSON file, under
+    these keys. FileError where the file is damaged."""
     try:
         kept = reduce(getitem, keys, parse_json(path.read_bytes()))
         if not isinstance(kept, dict) or not isinstance(parse_json(kept["call"]), dict):
@@ -52,23 +53,13 @@ def kept_attributes(path: Path, *keys: str) -> dict[str, object]:
             "these are: start again without resume (--resume)",
             file=str(path),
         ) from error
-    return kept
-
-
-def refuse_another_map(folder: Path, kept: Mapping[str, object], wanted: Mapping[str, object]) -> None:
-    """StiffmapError, by what differs, where an unfinished map in `folder` is not the one wanted."""
-    found = difference(kept, wanted)
-    if found:
-        raise StiffmapError(
-            f"{folder}: holds part of another map: {found}; delete it, or choose another file"
-        )
-
-
-def difference(kept: Mapping[str, object], wanted: Mapping[str, object]) -> str:
-    """What differs between the attributes of two maps, in words; empty: nothing."""
     old, new = _flat(kept), _flat(wanted)
     names = [n for n in {**old, **new} if old.get(n) != new.get(n)]
-    return "; ".join(f"{WORDS.get(n, n)} {_both(old.get(n), new.get(n))}" for n in names)
+    if names:
+        found = "; ".join(f"{WORDS.get(n, n)} {_both(old.get(n), new.get(n))}" for n in names)
+        raise StiffmapError(
+            f"{path.parent}: holds part of another map: {found}; delete it, or choose another file"
+        )
 
 
 def _flat(attrs: Mapping[str, object]) -> dict[str, object]:
@@ -127,7 +118,7 @@ def folder_store(plan: MapPlan, folder: Path, resume: bool) -> Store:
     """A map that lives in a folder; taken up again where an earlier run of the same call left it."""
     key = folder / "key.json"
     if resume and key.exists():
-        refuse_another_map(folder, kept_attributes(key), plan.attrs)
+        refuse_another_map(plan.attrs, key)
         return _store(plan, partial(_kept, folder))
     key.unlink(missing_ok=True)
     store = _store(plan, lambda name, dtype, shape: mapped_array(folder / f"{name}.npy", dtype, shape))
@@ -228,8 +219,7 @@ class ZarrMap:
 
         StiffmapError where it belongs to another map, FileError for a chunk that is damaged.
         """
-        kept = kept_attributes(self.folder / "zarr.json", "attributes")
-        refuse_another_map(self.folder, kept, self.plan.attrs)
+        refuse_another_map(self.plan.attrs, self.folder / "zarr.json", "attributes")
         self._mend_frame()
         for scrap in self.folder.rglob("*.partial"):  # chunks that zarr had not put in their place
             scrap.unlink()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from typing import Unpack
+from typing import Any, Unpack
 
 import numpy as np
 import xarray as xr
@@ -87,14 +87,9 @@ Critical = dict[str, float | Floats]
 """A critical point of a path: its numbers, its mode and its coordinates, by name."""
 UNITS = {"force": "N", "displacement": "m", "arc": "m"}
 ENDS = (
-    "the limit was reached",
-    "the commanded pose is out of reach",
-    "singular without load",
-    "no further equilibrium was found",
-    "the largest number of points was listed",
-    "the force fell to zero",
-    "not followed",
-)
+    "the limit was reached", "the commanded pose is out of reach", "singular without load", "no further equilibrium was found",
+    "the largest number of points was listed", "the force fell to zero", "not followed",
+)  # fmt: skip
 """In the order of the core's reasons why a branch ends."""
 
 
@@ -105,17 +100,11 @@ def load_path(
     machine, options = loading.machine, loading.options
     one_of(options.point, machine.points, "point")
     turned = machine.compiled.home_rotation if options.rotation is None else options.rotation
+    how: dict[str, Any] = {"control": control, "limit": limit, "steps": steps, "cross": cross}
     flags, *branches = machine.compiled.path(
-        position,
-        np.ascontiguousarray(turned, dtype=float),
-        direction,
-        point=options.point,
-        gravity=np.array(loading.acting_gravity()),
-        control=control,
-        limit=limit,
-        steps=steps,
-        cross=cross,
-    )
+        position, np.ascontiguousarray(turned, dtype=float), direction, point=options.point,
+        gravity=np.array(loading.acting_gravity()), **how,
+    )  # fmt: skip
     (end, points, critical), (crossing_end, crossing, crossing_critical) = branches
     hint_metres(machine, position, not points)
     forks = sum(not c["limit"] for c in critical)
@@ -123,7 +112,6 @@ def load_path(
         raise StiffmapError(
             f"cross: the path has {forks} bifurcations, got {cross} (end of the path: {ENDS[end]})"
         )
-    how: dict[str, object] = {"control": control, "limit": limit, "steps": steps, "cross": cross}
     both = points + crossing
     d = np.array([p["displacement"] for p in both], dtype=float).reshape(-1, 6)
     unstable = np.array([p["unstable"] for p in both], dtype=float)

@@ -89,9 +89,7 @@ def design_sweep(
             problems[index] = str(problem)
             continue
         here = made.description.home.p if given is None else given
-        s = made.solve(
-            here, wrench, rotation=rotation, point=point, gravity=gravity, method=method, threads=threads
-        )
+        s = made.solve(here, wrench, rotation=rotation, point=point, gravity=gravity, method=method, threads=threads)  # fmt: skip
         cells[index] = {
             "displacement": s.displacement,
             "compliance": s.compliance,
@@ -156,11 +154,8 @@ def _dataset(
     words = np.full(shape, "", dtype=object)
     for index, text in problems.items():
         words[index] = text
-    data["problem"] = (
-        outer,
-        words.astype(str),
-        meaning("", "why there is no such machine; empty where there is"),
-    )
+    why = meaning("", "why there is no such machine; empty where there is")
+    data["problem"] = (outer, words.astype(str), why)
     table = {str(a): str(u) for a, u in machine.numbers()["unit"].items()}
     coords = {dims[a]: (dims[a], v, {"address": a, "units": _unit(table, a)}) for a, v in axes.items()}
     labels = {"component": list(COMPONENTS), "wrench_component": list(WRENCH)}

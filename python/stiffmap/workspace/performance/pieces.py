@@ -107,18 +107,13 @@ def _pieces(offset: Offset, body: Body, spring: Spring, count: int) -> list[Elem
         inertia[axis, axis] = max(inertia[axis, axis] - spread, 0.0)
     rows = Pose.of(rotation=inertia / count).rotation
     springs = tuple(map(tuple, small.tolist()))
+    middle = tuple((-step / 2).tolist())
     out: list[Element] = []
     for k in range(1, count + 1):
         end = "" if k == count else f"_{k}"
         out += [
             replace(offset, name=offset.name + end, nominal=move),
-            replace(
-                body,
-                name=body.name + end,
-                mass=body.mass / count,
-                com=tuple((-step / 2).tolist()),
-                inertia=rows,
-            ),
+            replace(body, name=body.name + end, mass=body.mass / count, com=middle, inertia=rows),
             replace(spring, name=spring.name + end, compliance=springs),
         ]
     return out

@@ -173,12 +173,8 @@ def over_poses(positions: Floats, values: Floats, better: str, note: str = "", *
     """Worst and best pose of a map; a failed pose (NaN) makes the worst NaN and is said to be so."""
     good = np.isfinite(values)
     if not good.any():
-        return Found(
-            float("nan"),
-            note=note or "no pose of the box is within reach",
-            positions=positions,
-            values=values,
-        )
+        note = note or "no pose of the box is within reach"
+        return Found(float("nan"), note=note, positions=positions, values=values)
     sign = 1.0 if better == "high" else -1.0
     score = np.where(good, sign * values, -np.inf)
     best = int(np.argmax(score))

@@ -11,9 +11,8 @@ from scipy.spatial import cKDTree
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.workspace.maps.inputs import box_nodes
-from stiffmap.workspace.performance.box.cells import shrink
 from stiffmap.workspace.performance.box.inside import REACH
-from stiffmap.workspace.performance.box.proof import BOX, Judge, judge_cells
+from stiffmap.workspace.performance.box.proof import BOX, Judge, judge_cells, shrink
 from stiffmap.workspace.performance.limits.limits import Bounds
 
 SAMPLES = 9  # nodes along each edge of the region where poses that break a limit are looked for first
@@ -36,15 +35,8 @@ class BoxSearch:
     """Works in coordinates of the box's axes divided by its proportions: boxes are then cubes."""
 
     def __init__(
-        self,
-        bounds: Bounds,
-        shape: Floats,
-        axes: Floats,
-        region: Floats,
-        gap: float,
-        work: int,
-        judge: Judge | None = None,
-    ) -> None:
+        self, bounds: Bounds, shape: Floats, axes: Floats, region: Floats, gap: float, work: int, judge: Judge | None = None
+    ) -> None:  # fmt: skip
         self.shape, self.axes, self.gap, self.work = shape, axes, gap, work
         self.low, self.high = region / shape
         self.size = float((self.high - self.low).max())

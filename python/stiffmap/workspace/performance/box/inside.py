@@ -145,12 +145,8 @@ class Inside:
         return drive_kinematics(b.machine, p, b.rotation, start=start, only_start=True, threads=b.threads)
 
     def _judge(
-        self,
-        out: JudgedPoses,
-        rows: NDArray[np.int64],
-        k: DriveKinematics,
-        sound: NDArray[np.bool_] | None = None,
-    ) -> None:
+        self, out: JudgedPoses, rows: NDArray[np.int64], k: DriveKinematics, sound: NDArray[np.bool_] | None = None
+    ) -> None:  # fmt: skip
         """Poses of these numbers, whose kinematics are at hand; those that are not sound count as not reached."""
         closed = k.status == Status.CONVERGED
         if sound is not None:

@@ -16,9 +16,8 @@ from stiffmap.model.files.load import Source
 from stiffmap.solve.machine import Machine, as_machine
 from stiffmap.solve.options import keywords_of
 from stiffmap.workspace.maps.inputs import read_region
-from stiffmap.workspace.performance.box.cells import halved
 from stiffmap.workspace.performance.box.inside import Inside, JudgedPoses
-from stiffmap.workspace.performance.box.proof import Judge, judge_on
+from stiffmap.workspace.performance.box.proof import Judge, halved, judge_on
 from stiffmap.workspace.performance.limits.limits import Bounds
 
 CELLS = {3: 24, 2: 120, 1: 1000}  # along each edge, by the number of axes

@@ -100,16 +100,9 @@ def friction_efforts(machine: Machine, rates: Floats, sense: Floats | None = Non
 
 
 def rigid_dynamics(
-    machine: Machine,
-    coordinates: Floats,
-    twist: Floats,
-    twist_rate: Floats,
-    wrench: Floats,
-    gravity: ArrayLike | None,
-    threads: int | None = None,
-    *,
-    sharing: str = "least_norm",
-) -> dict[str, Floats]:
+    machine: Machine, coordinates: Floats, twist: Floats, twist_rate: Floats, wrench: Floats, gravity: ArrayLike | None,
+    threads: int | None = None, *, sharing: str = "least_norm",
+) -> dict[str, Floats]:  # fmt: skip
     """The core's inverse dynamics at closed coordinates (n, coordinates) and tip motions (n, 6); see `drive_weights`."""
     rates = accelerations = np.zeros((0, len(machine.actuators)))
     if machine.compiled.redundancy and (np.any(twist) or np.any(twist_rate)):
@@ -124,13 +117,8 @@ def rigid_dynamics(
 
 
 def rest_efforts(
-    machine: Machine,
-    k: DriveKinematics,
-    *,
-    gravity: ArrayLike | None,
-    velocity: ArrayLike | None,
-    sharing: str = "least_norm",
-) -> Floats:
+    machine: Machine, k: DriveKinematics, *, gravity: ArrayLike | None, velocity: ArrayLike | None, sharing: str = "least_norm"
+) -> Floats:  # fmt: skip
     """(..., drives) efforts at rest under gravity, or at a constant velocity with friction."""
     shape, drives = k.status.shape, k.actuators.shape[-1]
     g = machine.compiled.gravity(gravity)

@@ -124,13 +124,9 @@ def through(points: ArrayLike, samples: int = 401) -> Path:
 
 def run_along(path: Path, time: Floats, rate: Floats, square: Floats, bend: Floats) -> Trajectory:
     """At each sample of a path the time (s), ds/dt, its square and d²s/dt²; no force on the tool."""
-    return Trajectory(
-        time=time,
-        position=path.position,
-        velocity=path.first * rate[:, None],
-        acceleration=path.second * square[:, None] + path.first * bend[:, None],
-        force=np.zeros_like(path.position),
-    )
+    velocity = path.first * rate[:, None]
+    acceleration = path.second * square[:, None] + path.first * bend[:, None]
+    return Trajectory(time, path.position, velocity, acceleration, np.zeros_like(path.position))
 
 
 def timed(path: Path, duration: float) -> Trajectory:
@@ -189,10 +185,7 @@ def fastest(
     h = in_cables(machine, "a time-optimal run")
     a, b, c, rate = _terms(machine, k.coordinates, path, gravity, force, threads)
     speeds = drive_values(machine, "speed", None, "m/s or rad/s")
-    least, most = (
-        friction_efforts(machine, np.sign(rate) * 1e-12),
-        friction_efforts(machine, np.sign(rate) * speeds),
-    )
+    least, most = (friction_efforts(machine, np.sign(rate) * size) for size in (1e-12, speeds))
     # the speed is not known yet: friction counts where it hinders, at its largest, and where it helps, at its least
     if h is not None:
         moved = inertia_columns(h, k.rotation) @ np.stack([path.first, path.second], axis=-1)
@@ -215,13 +208,8 @@ def fastest(
 
 
 def _terms(
-    machine: Machine,
-    coordinates: Floats,
-    path: Path,
-    gravity: ArrayLike | None,
-    force: Floats,
-    threads: int | None,
-) -> tuple[Floats, Floats, Floats, Floats]:
+    machine: Machine, coordinates: Floats, path: Path, gravity: ArrayLike | None, force: Floats, threads: int | None
+) -> tuple[Floats, Floats, Floats, Floats]:  # fmt: skip
     """efforts = a u + b x + c along the path, and drive rates per path speed, each (n, drives)."""
     zero = np.zeros_like(path.first)
     first, second = np.hstack([path.first, zero]), np.hstack([path.second, zero])

@@ -96,14 +96,10 @@ def section_polygon(
     points = _crossings(half, room, 2 * n)
     vertices, outer, best = _ordered(points)
     bad = np.asarray(~np.isfinite(rows).all(axis=(-2, -1)))
-    return Polygon(
-        vertices=np.where(bad[..., None, None], np.nan, vertices),
-        inner=np.where(bad, np.nan, inner),
-        outer=np.where(bad, np.nan, outer),
-        outer_direction=np.where(bad, np.nan, best),
-        inner_direction=np.where(bad, np.nan, np.arctan2(toward[..., 1], toward[..., 0])),
-        status=status,
-    )
+    vertices = np.where(bad[..., None, None], np.nan, vertices)
+    weakest = np.arctan2(toward[..., 1], toward[..., 0])
+    inner, outer, best, weakest = (np.where(bad, np.nan, v) for v in (inner, outer, best, weakest))
+    return Polygon(vertices, inner, outer, best, weakest, status)
 
 
 def inner_radius(rows: Floats, limits: Floats, bias: Floats | float = 0.0) -> Floats:
