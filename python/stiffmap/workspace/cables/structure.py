@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from stiffmap.common.broadcasting import Floats, wrench_array
+from stiffmap.common.broadcasting import Floats, refused, wrench_array
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.description import Body, Cable, Offset, Pose
 from stiffmap.model.description.machine import TASK
@@ -160,9 +160,7 @@ def limits(h: Hanging, lowest: ArrayLike, highest: ArrayLike | None) -> tuple[Fl
     low = _per_cable(h, lowest, "lowest")
     high = h.most if highest is None else _per_cable(h, highest, "highest")
     if not (low < high).all() or (low < 0).any():
-        raise StiffmapError(
-            f"lowest, highest: expected 0 <= lowest < highest in N, got {low.tolist()} and {high.tolist()}"
-        )
+        raise refused("lowest, highest", "0 <= lowest < highest in N", f"{low.tolist()} and {high.tolist()}")
     return low, high
 
 

@@ -64,9 +64,8 @@ def robustness(design: DesignProblem, x: Floats, *, draws: int = DRAWS) -> Robus
     met = sum(all(violation(b, one[n]) <= 0 for n, b in design.constraints) for one in drawn)
     spread = np.std(np.array([[one[n] for n in names] for one in drawn]), axis=0, ddof=1)
     first_order = {n: float(np.linalg.norm(slopes[n])) for n in names}
-    return Robustness(
-        places, first_order, dict(zip(names, map(float, spread), strict=True)), met / draws, draws
-    )
+    deviations = dict(zip(names, map(float, spread), strict=True))
+    return Robustness(places, first_order, deviations, met / draws, draws)
 
 
 def _own_elements(data: Any) -> Any:

@@ -99,9 +99,8 @@ def refine(design: DesignProblem, x: Floats, weights: Floats, *, keep: bool = Fa
         key = full.tobytes()
         if key not in known:
             found = known[key] = judge(design, full)
-            good = (found.violations <= np.where(slides, -TIGHT, 0.0)).all() and (
-                found.objectives < IMPOSSIBLE
-            ).all()
+            kept = (found.violations <= np.where(slides, -TIGHT, 0.0)).all()
+            good = kept and (found.objectives < IMPOSSIBLE).all()
             good &= not keep or bool((found.objectives <= first.objectives).all())
             if good and (best is None or goal_of(found) < goal_of(best)):
                 best, best_at = found, full

@@ -95,16 +95,14 @@ class Evaluations:
 
 def fingerprint(design: DesignProblem) -> str:
     """Of everything that the answers depend on: the files as read, those that they name, code."""
+    model, data = design.model.model_dump(), design.document.data
+    files = (
+        named_files(model, Path(design.file).parent),
+        named_files(data, Path(design.machine_file).parent),
+    )
+    beside = [file_digest(find(name)) for name in design.model.beside if near(name, design.file) == name]
     return digest(
-        design.model.model_dump(),
-        design.document.data,
-        design.requirements,
-        design.constraints,
-        named_files(design.model.model_dump(), Path(design.file).parent),
-        named_files(design.document.data, Path(design.machine_file).parent),
-        [file_digest(find(name)) for name in design.model.beside if near(name, design.file) == name],
-        design.toolpath,
-        code(),
+        model, data, design.requirements, design.constraints, *files, beside, design.toolpath, code()
     )[:16]
 
 
@@ -134,18 +132,16 @@ class ParetoSet:
         }
         constraints = [n for n, _ in design.constraints]
         coords = {"variable": list(design.variables), "measure": names, "constraint": constraints}
-        return xr.Dataset(
-            data, coords, {"design": model.name, "seed": model.search.seed, "evaluated": self.evaluated}
-        )
+        attrs = {"design": model.name, "seed": model.search.seed, "evaluated": self.evaluated}
+        return xr.Dataset(data, coords, attrs)
 
     def chosen(self) -> dict[str, int]:
         """The best of each objective, and the one nearest to all of them at once."""
         f = np.array([j.objectives for j in self.judged])
         out = {f"best-{n}": int(np.argmin(f[:, i])) for i, n in enumerate(self.design.model.objectives)}
         span = np.ptp(f, axis=0)
-        out["compromise"] = int(
-            np.argmin(np.linalg.norm((f - f.min(axis=0)) / np.where(span > 0, span, 1), axis=1))
-        )
+        away = (f - f.min(axis=0)) / np.where(span > 0, span, 1)
+        out["compromise"] = int(np.argmin(np.linalg.norm(away, axis=1)))
         return out
 
 

@@ -248,7 +248,12 @@ def polar(
     swept = direction_sweep_of(s, angle[None], np.full((1, directions), force), axes)
     turning = TurningForce(loading, p[None], force, axes)
     d = without_failed(s.displacement, s.status)[0]
-    data = displaced("angle", d, s.status[0], s.flags[0], plane) | _extremes(turning, plane, swept)
+    data = displaced("angle", d, s.status[0], s.flags[0], plane)
+    for suffix, _, worst, best in turning.extremes(swept, plane):
+        for word, size, e in (("worst", "largest", worst), ("best", "smallest", best)):
+            what = f"{size} deflection over the force directions of the {plane} plane"
+            data[f"{word}_deflection{suffix}"] = ((), e.value[0], meaning("m", what))
+            data[f"{word}_direction{suffix}"] = ((), e.angle[0], meaning("rad", "direction of that force"))
     turned = meaning("rad", f"direction of the force, from {plane[0]} towards {plane[1]}")
     coords = at_place(p) | {
         "angle": ("angle", angle, turned),
@@ -256,13 +261,3 @@ def polar(
     }
     call = {"function": "polar", "position": p, "force": force, "plane": plane, "directions": directions}
     return xr.Dataset(data, coords, describe(loading, "polar diagram", call))
-
-
-def _extremes(force: TurningForce, plane: str, swept: DirectionSweep) -> dict[str, object]:
-    out: dict[str, object] = {}
-    for suffix, _, worst, best in force.extremes(swept, plane):
-        for word, size, e in (("worst", "largest", worst), ("best", "smallest", best)):
-            what = f"{size} deflection over the force directions of the {plane} plane"
-            out[f"{word}_deflection{suffix}"] = ((), e.value[0], meaning("m", what))
-            out[f"{word}_direction{suffix}"] = ((), e.angle[0], meaning("rad", "direction of that force"))
-    return out

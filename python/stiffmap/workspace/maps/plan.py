@@ -86,6 +86,16 @@ EXTREMES = (
 )
 
 
+TILE_POSES = 65536
+"""Poses of a tile. It decides the bytes of a Zarr map, so it depends on nothing but the grid."""
+
+
+def blocks_of(rows: slice, width: int, poses: int) -> list[slice]:
+    """Rows cut so that a block has about `poses` poses."""
+    step = max(1, poses // width)
+    return [slice(i, min(i + step, rows.stop)) for i in range(rows.start, rows.stop, step)]
+
+
 @dataclass(frozen=True)
 class MapPlan:
     """Grid, loads and options of one map."""
@@ -118,6 +128,23 @@ class MapPlan:
     def rows(self) -> int:
         """Rows of the grid, each of all x at one z and y."""
         return self.z.size * self.y.size
+
+    @cached_property
+    def tile_height(self) -> int:
+        """Rows of a tile: all x of a part of one z-plane, which is solved, written and done again on its own."""
+        return max(1, min(self.y.size, TILE_POSES // self.x.size))
+
+    @cached_property
+    def tiles(self) -> list[slice]:
+        """Rows of every tile, counted over the whole map."""
+        planes = [slice(first, first + self.y.size) for first in range(0, self.rows, self.y.size)]
+        return [tile for plane in planes for tile in blocks_of(plane, 1, self.tile_height)]
+
+    def place(self, tile: int) -> tuple[int, slice]:
+        """Plane and rows of it (indices of z and y)."""
+        rows = self.tiles[tile]
+        plane, first = divmod(rows.start, self.y.size)
+        return plane, slice(first, first + rows.stop - rows.start)
 
     def positions(self, rows: slice) -> Floats:
         """TCP positions (rows * x, 3) of some rows."""

@@ -28,8 +28,7 @@ from numpy.typing import NDArray
 from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.json_text import parse_json
 from stiffmap.common.outputs import add_lines, mapped_array, put_folder, write_text
-from stiffmap.workspace.maps.block import Tiles, tiles_of
-from stiffmap.workspace.maps.files import write_zarr, zarr_package
+from stiffmap.workspace.maps.files import onto_disk, write_zarr, zarr_package
 from stiffmap.workspace.maps.plan import MapPlan
 
 WORDS = {"machine_digest": "the machine's description", "stiffmap_version": "the version of stiffmap"}
@@ -155,31 +154,26 @@ FILL = {"u1": 255, "u4": 0, "f8": np.nan}
 class ZarrMap:
     """An unfinished map on the disk; `open_zarr_map` makes it."""
 
-    def __init__(self, plan: MapPlan, folder: Path, tiles: Tiles) -> None:
-        self.plan, self.folder, self.tiles = plan, folder, tiles
-        self.done: NDArray[np.bool_] = np.zeros(len(tiles.parts), dtype=bool)
+    def __init__(self, plan: MapPlan, folder: Path) -> None:
+        self.plan, self.folder = plan, folder
+        self.done: NDArray[np.bool_] = np.zeros(len(plan.tiles), dtype=bool)
 
     def put(self, index: int, values: dict[str, np.ndarray]) -> None:
         """Write a tile's chunks, then its line in the journal. FileError where the disk refuses."""
-        plane, y = self.tiles.place(index)
-        try:
+        plane, y = self.plan.place(index)
+        kept = f"; {int(self.done.sum())} of {len(self.done)} tiles are kept, resume=True (--resume) goes on with them"
+        with onto_disk(self.folder, kept):
             for name, array in values.items():
                 self._arrays[name][plane, y] = array
             line = json.dumps({"tile": index, "crc": {n: crc(self.chunk(n, index)) for n in values}})
             add_lines(self.folder / JOURNAL, [line], flushed=False)
-        except OSError as error:
-            raise FileError(
-                f"cannot be written: {error.strerror or error}; {int(self.done.sum())} of {len(self.done)} "
-                "tiles are kept, resume=True (--resume) goes on with them",
-                file=str(self.folder),
-            ) from error
         self.done[index] = True
 
     def chunk(self, name: str, index: int) -> Path:
         """File of a variable's chunk."""
-        plane, y = self.tiles.place(index)
+        plane, y = self.plan.place(index)
         tail = ["0"] * (1 + len(self._arrays[name].shape) - 3)
-        return self.folder.joinpath(name, "c", str(plane), str(y.start // self.tiles.height), *tail)
+        return self.folder.joinpath(name, "c", str(plane), str(y.start // self.plan.tile_height), *tail)
 
     @cached_property
     def _arrays(self) -> Any:
@@ -204,15 +198,10 @@ class ZarrMap:
         for v in self.plan.variables:
             tail = self.plan.tail(v)
             group.create_array(
-                v.name,
-                shape=(*self.plan.shape, *tail),
-                chunks=(1, self.tiles.height, self.plan.x.size, *tail),
-                dtype=v.dtype,
-                fill_value=FILL[v.dtype],
-                compressors=[ZstdCodec(level=1), Crc32cCodec()],
-                dimension_names=self.plan.dims(v),
+                v.name, shape=(*self.plan.shape, *tail), chunks=(1, self.plan.tile_height, self.plan.x.size, *tail), dtype=v.dtype,
+                fill_value=FILL[v.dtype], compressors=[ZstdCodec(level=1), Crc32cCodec()], dimension_names=self.plan.dims(v),
                 attributes={k: a.tolist() if isinstance(a, np.ndarray) else a for k, a in v.attrs.items()},
-            )
+            )  # fmt: skip
 
     def recover(self) -> None:
         """Take up what an earlier run left.
@@ -272,13 +261,11 @@ def crc(path: Path) -> int:
 def open_zarr_map(plan: MapPlan, folder: Path, resume: bool) -> ZarrMap:
     """The unfinished map in `folder`, new or taken up."""
     zarr_package()
-    out = ZarrMap(plan, folder, tiles_of(plan))
-    try:
+    out = ZarrMap(plan, folder)
+    with onto_disk(folder):
         if resume and (folder / JOURNAL).exists():
             out.recover()
         else:
             out.frame(folder)
             write_text(folder / JOURNAL, "")
-    except OSError as error:
-        raise FileError(f"cannot be written: {error.strerror or error}", file=str(folder)) from error
     return out

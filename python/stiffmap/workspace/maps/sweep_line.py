@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from stiffmap.common.broadcasting import Floats, one_of, real_number, whole_number
+from stiffmap.common.broadcasting import Floats, one_of, real_number, refused, whole_number
 from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.compiled import Role
 from stiffmap.solve.compiled.machine import PATH_CONTROLS as CONTROLS
@@ -144,8 +144,8 @@ def check_control(control: str, limit: float | None, steps: int, load_type: obje
     """The limit as a number; StiffmapError where the options do not fit together."""
     one_of(control, CONTROLS, "control")
     if limit is None or not np.isfinite(real_number(limit, "limit")) or limit == 0:
-        raise StiffmapError(
-            f"limit: expected a number other than 0 ({UNITS[control]} for control {control!r}), got {limit!r}"
+        raise refused(
+            "limit", f"a number other than 0 ({UNITS[control]} for control {control!r})", repr(limit)
         )
     whole_number(steps, "steps", 1, what="a positive number")
     if load_type != "dead":

@@ -103,9 +103,8 @@ def design_sweep(
                 f"evaluate: expected results of the same names and shapes for every machine, got {same[0]} after {same[1]}"
             )
     if not cells:
-        raise StiffmapError(
-            f"numbers: no machine can be made of them; the first: {next(iter(problems.values()))}"
-        )
+        first = next(iter(problems.values()))
+        raise StiffmapError(f"numbers: no machine can be made of them; the first: {first}")
     return _dataset(machine, axes, cells, problems)
 
 
@@ -135,21 +134,19 @@ def _dataset(
     outer = tuple(dims.values())
     first = next(iter(cells.values()))
     poses = batch_dims(first["status"].ndim)
-    tails: dict[str, Sequence[str]] = {
-        "displacement": (*poses, "component"),
-        "deflection": poses,
-        "compliance": (*poses, "component", "wrench_component"),
-        "status": poses,
+    known: dict[str, tuple[Sequence[str], dict[str, object]]] = {
+        "displacement": ((*poses, "component"), meaning(TWIST_UNITS, "displacement")),
+        "deflection": (poses, meaning("m", "deflection")),
+        "compliance": ((*poses, "component", "wrench_component"), meaning(COMPLIANCE_UNITS, "compliance")),
+        "status": (poses, status_attrs("the pose")),
     }
-    units = {"displacement": TWIST_UNITS, "deflection": "m", "compliance": COMPLIANCE_UNITS}
     data: dict[str, object] = {}
     for name, sample in first.items():
         fill = int(Status.UNREACHABLE) if name == "status" else np.nan
         values = np.full(shape + sample.shape, fill, dtype=sample.dtype)
         for index, cell in cells.items():
             values[index] = cell[name]
-        attrs = status_attrs("the pose") if name == "status" else meaning(units.get(name, ""), name)
-        tail = tails.get(name, tuple(f"{name}_{i}" for i in range(sample.ndim)))
+        tail, attrs = known.get(name) or ([f"{name}_{i}" for i in range(sample.ndim)], meaning("", name))
         data[name] = ((*outer, *tail), values, attrs)
     words = np.full(shape, "", dtype=object)
     for index, text in problems.items():

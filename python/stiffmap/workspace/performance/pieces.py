@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -27,10 +28,7 @@ def in_pieces(machine: Machine, pieces: int) -> Machine:
     """
     count = whole_number(pieces, "pieces", 1, what="a number from 1 on")
     found: list[str] = []
-
-    def divide(elements: Elements) -> Elements:
-        return _divided(elements, count, found)
-
+    divide = partial(_divided, count=count, found=found)
     divided = edit_all(machine.description, lambda elements, name: edit_sequences(elements, divide))
     if not found:
         raise StiffmapError(

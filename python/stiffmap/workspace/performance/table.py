@@ -75,10 +75,7 @@ class MeasuresTable:
     notes: tuple[str, ...]
 
     def __getitem__(self, name: str) -> MeasureRow:
-        for row in self.rows:
-            if row.measure.name == name:
-                return row
-        raise KeyError(name)
+        return {row.measure.name: row for row in self.rows}[name]
 
     @property
     def passed(self) -> bool:

@@ -96,9 +96,8 @@ class _Fit:
     def criterion(self, t: Floats) -> float:
         """Bayesian information criterion, the level of the noise being free down to its floor."""
         r, n = self.solved(t)[1], 2 * self.H.size
-        return float(
-            n * np.log(max((r**2).sum(), self.least) / n) + (len(t) + len(self.H) * len(t)) * np.log(n)
-        )
+        misfit, free = max((r**2).sum(), self.least), len(t) + len(self.H) * len(t)
+        return float(n * np.log(misfit / n) + free * np.log(n))
 
     def with_one_more(self, t: Floats) -> Floats | None:
         """Poles with one more, fitted, at the most promising place where all stay within their bounds; None: nowhere."""

@@ -172,18 +172,12 @@ def frequency_response(
     if worst > SYMMETRIC:
         attrs["unsymmetric"] = worst
         attrs["symmetrised"] = "the symmetric part of the loaded stiffness was taken"
-    return xr.DataArray(
-        values.reshape(*batch, *values.shape[1:]),
-        dims=(*poses, "frequency", "response", "force"),
-        coords={
-            "frequency": ("frequency", f, {"units": "Hz"}),
-            "response": list(MOTION),
-            "force": list(WRENCH),
-            "status": (poses, found.status.reshape(batch)),
-        },
-        name=kind,
-        attrs=attrs,
-    )
+    dims = (*poses, "frequency", "response", "force")
+    coords = {
+        "frequency": ("frequency", f, {"units": "Hz"}), "response": list(MOTION), "force": list(WRENCH),
+        "status": (poses, found.status.reshape(batch)),
+    }  # fmt: skip
+    return xr.DataArray(values.reshape(*batch, *values.shape[1:]), coords, dims, kind, attrs)
 
 
 def frequency_axis(frequencies: ArrayLike) -> Floats:

@@ -67,9 +67,8 @@ class Inside:
         """Judges poses (n, 3): each begins at a neighbour that closed, the first ones at the middle of the workspace;
         or all of them at the nearest one of poses that are known."""
         n, size = len(position), len(self.bounds.machine.compiled.names.coordinates)
-        out = JudgedPoses(
-            position, np.zeros(n, dtype=bool), np.zeros(n, dtype=bool), np.full((n, size), np.nan), {}
-        )
+        closed, inside = np.zeros((2, n), dtype=bool)
+        out = JudgedPoses(position, closed, inside, np.full((n, size), np.nan), {})
         if known is not None:
             if known.closed.any():
                 nearest = cKDTree(known.position[known.closed]).query(position)[1]

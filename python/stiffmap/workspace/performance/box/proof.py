@@ -5,9 +5,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import partial
 from itertools import product
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,7 @@ from stiffmap.common.broadcasting import Floats, thread_count
 from stiffmap.common.tasks import workers
 from stiffmap.workspace.performance.limits.limits import Bounds, factor_limits
 from stiffmap.workspace.performance.motion.closing import kernel_starts, revolute_drives
-from stiffmap.workspace.performance.motion.zonotopes import corners
+from stiffmap.workspace.performance.motion.many_drives import corners
 
 BOX = np.array(list(product((-1.0, 1.0), repeat=3)))  # (8, 3) corners of a cell, in half lengths
 
@@ -58,9 +59,10 @@ def judge_on(bounds: Bounds, scheduler: object = None) -> Iterator[Judge]:
                 return enclose(bounds, centre, half, axes)
             bounds.counter[0] += n
             parts = [slice(k, k + PER_TASK) for k in range(0, n, PER_TASK)]
-            found = hands.in_order((centre[k], half[k], axes) for k in parts)
-            arrays = ("inside", "broken", "where", "limit", "bend")
-            return replace(found[0], **{n: np.concatenate([getattr(c, n) for c in found]) for n in arrays})
+            found: list[ProvenCells] = hands.in_order((centre[k], half[k], axes) for k in parts)
+            arrays = (f.name for f in fields(ProvenCells) if f.name != "names")
+            joined: Any = {n: np.concatenate([getattr(cells, n) for cells in found]) for n in arrays}
+            return replace(found[0], **joined)
 
         yield judge
 

@@ -14,8 +14,8 @@ from stiffmap.workspace.performance.motion.closing import drive_values
 from stiffmap.workspace.performance.motion.efforts import acceleration_of
 from stiffmap.workspace.performance.motion.force import accuracy_of
 from stiffmap.workspace.performance.motion.inertia import PUSHES, held, in_cables, rest_efforts
+from stiffmap.workspace.performance.motion.many_drives import inner_radius
 from stiffmap.workspace.performance.motion.velocity import distances
-from stiffmap.workspace.performance.motion.zonotopes import inner_radius
 from stiffmap.workspace.performance.registry import Case, Found, Measure, over_poses
 
 TYPES = (

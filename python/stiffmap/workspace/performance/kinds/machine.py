@@ -47,9 +47,8 @@ def edge(case: Case) -> Found:
         case.machine, case.proportions, tolerance=case.gap, scheduler=case.scheduler, **case.limits
     )
     if b.edge == 0:
-        return Found(
-            0.0, note=f"no pose was found inside; broken: {', '.join(b.limited_by)}", extra={"box": b}
-        )
+        note = f"no pose was found inside; broken: {', '.join(b.limited_by)}"
+        return Found(0.0, note=note, extra={"box": b})
     note = f"no box of {1e3 * b.edge_upper:.2f} mm; limited by {', '.join(b.limited_by) or 'nothing found'}; {b.guarantee}"
     return Found(b.edge, b.centre, b.edge, b.centre, note, extra={"box": b})
 

@@ -26,7 +26,7 @@ from stiffmap.workspace.performance.motion.closing import (
     kernel_starts,
     weighted,
 )
-from stiffmap.workspace.performance.motion.zonotopes import inverse_rows, worst_corner
+from stiffmap.workspace.performance.motion.many_drives import inverse_rows, worst_corner
 
 UNLIMITED = 1e299
 

@@ -17,7 +17,7 @@ from stiffmap.solve.closing import commanded
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.status import Status
 from stiffmap.workspace.maps.inputs import magnitude
-from stiffmap.workspace.performance.motion.sharing import FLAT, drive_weights, motions
+from stiffmap.workspace.performance.motion.many_drives import FLAT, drive_weights, motions
 
 PARTS = {"all": slice(0, 6), "translation": slice(0, 3), "rotation": slice(3, 6)}
 
@@ -136,18 +136,15 @@ def drive_kinematics(
     shape = batch(p.shape[:-1], r.shape[:-2])
     flat_p, flat_r = rows(p, shape, (3,)), rows(r, shape, (3, 3))
     compiled, size = machine.compiled, len(machine.compiled.names.coordinates)
-    begin: Floats | None = None
-    if start is not None:
-        begin = rows(trailing(start, (size,), "start", "coordinates"), shape, (size,))
+    begin = None if start is None else rows(trailing(start, (size,), "start", "coordinates"), shape, (size,))
     if only_start and begin is None:
         raise StiffmapError("only_start: needs start, coordinates of neighbouring poses")
     out = compiled.rates(
         flat_p, flat_r, begin, weights=drive_weights(machine, sharing), patient=patient, only=only_start,
         threads=thread_count(threads),
     )  # fmt: skip
-    drives = list(compiled.drives)
     shaped = {k: v.reshape(shape + v.shape[1:]) for k, v in out.items()}
-    return DriveKinematics(actuators=shaped["coordinates"][..., drives], **shaped)
+    return DriveKinematics(actuators=shaped["coordinates"][..., list(compiled.drives)], **shaped)
 
 
 def kernel_starts(
@@ -194,9 +191,8 @@ def _between(machine: Machine, k: DriveKinematics, position: Floats, i: int) -> 
     for _ in range(STEPS):
         middle = (low + high) / 2
         there = drive_kinematics(machine, a + middle * (b - a), k.rotation[i - 1], start=start)
-        jacobian, together = (
-            np.stack([getattr(k, name)[i - 1], getattr(there, name)]) for name in ("jacobian", "together")
-        )
+        jacobian = np.stack([k.jacobian[i - 1], there.jacobian])
+        together = np.stack([k.together[i - 1], there.together])
         if there.status != Status.CONVERGED or _crossed(machine, jacobian, together)[1]:
             high = middle
         else:

@@ -29,8 +29,8 @@ from stiffmap.workspace.performance.motion.inertia import (
     rest_efforts,
     rigid_dynamics,
 )
+from stiffmap.workspace.performance.motion.many_drives import inner_radius, inverse_rows
 from stiffmap.workspace.performance.motion.trajectory import Trajectory
-from stiffmap.workspace.performance.motion.zonotopes import inner_radius, inverse_rows
 
 IMPOSSIBLE = 1e-6  # relative part of a motion that the machine cannot do: above it, the trajectory is refused
 

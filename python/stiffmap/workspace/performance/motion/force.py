@@ -24,8 +24,7 @@ from stiffmap.workspace.performance.motion.closing import (
     weighted,
 )
 from stiffmap.workspace.performance.motion.inertia import PUSHES, as_tensions, held, in_cables, rest_efforts
-from stiffmap.workspace.performance.motion.velocity import of_motions, singular_values
-from stiffmap.workspace.performance.motion.zonotopes import (
+from stiffmap.workspace.performance.motion.many_drives import (
     Polygon,
     corners,
     farthest_vertex,
@@ -33,6 +32,7 @@ from stiffmap.workspace.performance.motion.zonotopes import (
     section_polygon,
     worst_corner,
 )
+from stiffmap.workspace.performance.motion.velocity import of_motions, singular_values
 
 
 @short_repr

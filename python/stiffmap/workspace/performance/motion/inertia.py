@@ -22,8 +22,7 @@ from stiffmap.solve.labels import OverPoses
 from stiffmap.solve.machine import Machine, takes_machine
 from stiffmap.workspace.cables.structure import Hanging, hanging, lines, matrix, nearest, scaled, weight
 from stiffmap.workspace.performance.motion.closing import DriveKinematics, declared, revolute_drives
-from stiffmap.workspace.performance.motion.sharing import drive_weights, followed, sides
-from stiffmap.workspace.performance.motion.zonotopes import inverse_rows
+from stiffmap.workspace.performance.motion.many_drives import drive_weights, followed, inverse_rows, sides
 
 
 def movers(compiled: CompiledMachine, node: int) -> Iterator[tuple[int, int]]:
@@ -65,11 +64,9 @@ def need_masses(machine: Machine, what: str) -> None:
             f"{machine.name}: {what} needs masses, and the machine file declares no body; "
             f"add 'body' elements to the legs {', '.join(machine.legs)} and the platform"
         )
-    empty = [name for name, _, mass in bodies if mass <= 0]
+    empty = ", ".join(name for name, _, mass in bodies if mass <= 0)
     if empty:
-        raise StiffmapError(
-            f"{machine.name}: {what} needs masses; these bodies have none: {', '.join(empty)}"
-        )
+        raise StiffmapError(f"{machine.name}: {what} needs masses; these bodies have none: {empty}")
 
 
 SLOW = 1e-4

@@ -22,13 +22,15 @@ from stiffmap.workspace.performance.motion.closing import (
     drive_limits,
     weighted,
 )
-from stiffmap.workspace.performance.motion.sharing import facets, motions, sides
-from stiffmap.workspace.performance.motion.zonotopes import (
+from stiffmap.workspace.performance.motion.many_drives import (
     Polygon,
+    facets,
     farthest_vertex,
     inverse_rows,
+    motions,
     rows_limit,
     section_polygon,
+    sides,
 )
 
 
