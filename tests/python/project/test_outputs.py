@@ -24,8 +24,11 @@ ELSEWHERE = {
         "mkdir",
         "to_zarr",
     },  # the folder in which a map grows; a folder that is renamed
-    "stiffmap.workspace.maps.store": {"open_memmap"},  # takes up what `mapped_array` made
-    "stiffmap.workspace.maps.zarr_map": {"copyfile", "mkdir"},  # chunks and frame of a map that grows
+    "stiffmap.workspace.maps.store": {
+        "open_memmap",
+        "copyfile",
+        "mkdir",
+    },  # arrays, chunks and frame of a map
     "stiffmap.model.link.solve": {"write_text"},  # a temporary folder, for another program
     "stiffmap.ui.report.sheet": {"savefig"},  # into memory
 }

@@ -161,7 +161,7 @@ def test_speeds_of_an_arm_of_seven_axes(arm: Arm) -> None:
     rng = np.random.default_rng(4)
     seen = min(fastest_along(d / np.linalg.norm(d)) for d in rng.normal(size=(200, 6)))
     assert v.cube_min <= seen * (1 + 1e-9)
-    from stiffmap.workspace.performance.motion.sharing import facets
+    from stiffmap.workspace.performance.motion.many_drives import facets
 
     normals, distance = facets(unit[:, None] * j / m.compiled.length, 6)
     weakest = normals[np.argmin(distance)]

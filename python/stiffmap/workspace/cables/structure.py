@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from stiffmap.common.broadcasting import Floats, wrench_array
+from stiffmap.common.broadcasting import Floats, refused, wrench_array
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.description import Body, Cable, Offset, Pose
 from stiffmap.model.description.machine import TASK
@@ -20,23 +20,15 @@ from stiffmap.solve.machine import Machine, takes_machine
 class Hanging:
     """The platform of a machine without legs, seen from its tcp: n cables, its weight."""
 
-    anchor: Floats
-    """(n, 3) m, base axes."""
-    guide: Floats
-    """(n, 3)."""
-    radius: Floats
-    """(n,) m."""
-    at: Floats
-    """(n, 3) m, tcp axes."""
-    most: Floats
-    """(n,) N, largest tensions; infinite where none is declared."""
+    anchor: Floats  # (n, 3) m, base axes
+    guide: Floats  # (n, 3)
+    radius: Floats  # (n,) m
+    at: Floats  # (n, 3) m, tcp axes
+    most: Floats  # (n,) N, largest tensions; infinite where none is declared
     mass: float
-    com: Floats
-    """(3,) m, tcp axes."""
-    rows: tuple[int, ...]
-    """Components of a wrench that no guide takes."""
-    length: float
-    """m, turns moments into forces: the mean arm of the cables, where they have any."""
+    com: Floats  # (3,) m, tcp axes
+    rows: tuple[int, ...]  # components of a wrench that no guide takes
+    length: float  # m, turns moments into forces: the mean arm of the cables, where they have any
 
 
 def hanging(machine: Machine) -> Hanging:
@@ -116,8 +108,7 @@ def weight(h: Hanging, rotation: Floats, gravity: Floats) -> Floats:
 
 
 MOST_STEPS = 100
-BALANCED = 1e-9
-"""Residual that is none, of the largest force."""
+BALANCED = 1e-9  # residual that is none, of the largest force
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,9 +160,7 @@ def limits(h: Hanging, lowest: ArrayLike, highest: ArrayLike | None) -> tuple[Fl
     low = _per_cable(h, lowest, "lowest")
     high = h.most if highest is None else _per_cable(h, highest, "highest")
     if not (low < high).all() or (low < 0).any():
-        raise StiffmapError(
-            f"lowest, highest: expected 0 <= lowest < highest in N, got {low.tolist()} and {high.tolist()}"
-        )
+        raise refused("lowest, highest", "0 <= lowest < highest in N", f"{low.tolist()} and {high.tolist()}")
     return low, high
 
 

@@ -67,11 +67,8 @@ def _key(at: object, step: str | int | tuple[str, str], place: str) -> str | int
         sort, name = step
         if isinstance(at, dict) and sort in at and isinstance(at[sort], dict | list):
             raise StiffmapError(f"'{place}': write {sort}.{name}, not {sort}[{name}]")
-        found = (
-            [i for i, e in enumerate(at) if isinstance(e, dict) and str(e.get(sort)) == name]
-            if isinstance(at, list)
-            else []
-        )
+        row = at if isinstance(at, list) else []
+        found = [i for i, e in enumerate(row) if isinstance(e, dict) and str(e.get(sort)) == name]
         if len(found) != 1:
             known = ", ".join(_elements(at)) or "none"
             raise StiffmapError(

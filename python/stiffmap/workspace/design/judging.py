@@ -15,8 +15,7 @@ from stiffmap.workspace.design.problem import DesignProblem
 from stiffmap.workspace.performance.registry import Case, Measure, get_measure
 from stiffmap.workspace.performance.requirements import Bound
 
-IMPOSSIBLE = 1e6
-"""Objective and violation of a design that cannot be built or reaches nothing."""
+IMPOSSIBLE = 1e6  # objective and violation of a design that cannot be built or reaches nothing
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,12 +34,8 @@ def judge(design: DesignProblem, x: Floats) -> Judged:
     try:
         values = values_of(design, design.quick_machine(x))
     except StiffmapError as error:
-        return Judged(
-            np.full(len(design.model.objectives), IMPOSSIBLE),
-            np.full(len(design.constraints), IMPOSSIBLE),
-            {},
-            str(error),
-        )
+        f, g = (np.full(len(of), IMPOSSIBLE) for of in (design.model.objectives, design.constraints))
+        return Judged(f, g, {}, str(error))
     objectives = np.array([_minimised(get_measure(n), values[n]) for n in design.model.objectives])
     violations = np.array([violation(bound, values[n]) for n, bound in design.constraints])
     return Judged(objectives, violations, values)
@@ -55,21 +50,10 @@ def values_of(design: DesignProblem, machine: Machine) -> dict[str, float]:
         low, high = middle - half, middle + half
     nodes = design.model.search.nodes
     case = Case(
-        machine,
-        low,
-        high,
-        task.force or 100.0,
-        task.plane,
-        transmission=task.transmission,
-        proportions=task.proportions,
-        nodes=nodes,
-        coarse=nodes,
-        quick=True,
-        threads=1,
-        toolpath=design.toolpath,
-        clearance=task.clearance,
+        machine, low, high, task.force or 100.0, task.plane, transmission=task.transmission, proportions=task.proportions,
+        nodes=nodes, coarse=nodes, quick=True, threads=1, toolpath=design.toolpath, clearance=task.clearance,
         deflection=task.deflection,
-    )
+    )  # fmt: skip
     return {n: get_measure(n).compute(case).worst for n in design.measures}
 
 
@@ -86,8 +70,7 @@ def violation(bound: Bound, value: float) -> float:
     return -margin / size if np.isfinite(margin) else IMPOSSIBLE
 
 
-STEP = 1e-4
-"""Of a variable's range: differences over it give slopes."""
+STEP = 1e-4  # of a variable's range: differences over it give slopes
 ROUNDS = 40
 RADII = (0.3, 0.1, 0.03, 0.03)
 """Of every variable's range: how far one run may go from the best design so far."""
@@ -116,9 +99,8 @@ def refine(design: DesignProblem, x: Floats, weights: Floats, *, keep: bool = Fa
         key = full.tobytes()
         if key not in known:
             found = known[key] = judge(design, full)
-            good = (found.violations <= np.where(slides, -TIGHT, 0.0)).all() and (
-                found.objectives < IMPOSSIBLE
-            ).all()
+            kept = (found.violations <= np.where(slides, -TIGHT, 0.0)).all()
+            good = kept and (found.objectives < IMPOSSIBLE).all()
             good &= not keep or bool((found.objectives <= first.objectives).all())
             if good and (best is None or goal_of(found) < goal_of(best)):
                 best, best_at = found, full

@@ -37,8 +37,7 @@ from stiffmap.workspace.performance.requirements import (
     load_requirements,
 )
 
-START_NODES = 3
-"""Of a machine that is asked for a few hundred poses once."""
+START_NODES = 3  # of a machine that is asked for a few hundred poses once
 
 
 class VariableModel(FileModel):

@@ -95,16 +95,14 @@ class Evaluations:
 
 def fingerprint(design: DesignProblem) -> str:
     """Of everything that the answers depend on: the files as read, those that they name, code."""
+    model, data = design.model.model_dump(), design.document.data
+    files = (
+        named_files(model, Path(design.file).parent),
+        named_files(data, Path(design.machine_file).parent),
+    )
+    beside = [file_digest(find(name)) for name in design.model.beside if near(name, design.file) == name]
     return digest(
-        design.model.model_dump(),
-        design.document.data,
-        design.requirements,
-        design.constraints,
-        named_files(design.model.model_dump(), Path(design.file).parent),
-        named_files(design.document.data, Path(design.machine_file).parent),
-        [file_digest(find(name)) for name in design.model.beside if near(name, design.file) == name],
-        design.toolpath,
-        code(),
+        model, data, design.requirements, design.constraints, *files, beside, design.toolpath, code()
     )[:16]
 
 
@@ -124,35 +122,26 @@ class ParetoSet:
     def dataset(self) -> xr.Dataset:
         """Dimensions (design, variable), (design, measure), (design, constraint); SI, worst values."""
         names = list(self.judged[0].values)
-        return xr.Dataset(
-            {
-                "x": (("design", "variable"), self.x),
-                "value": (
-                    ("design", "measure"),
-                    np.array([[j.values[n] for n in names] for j in self.judged]),
-                ),
-                "violation": (("design", "constraint"), np.array([j.violations for j in self.judged])),
-            },
-            coords={
-                "variable": list(self.design.variables),
-                "measure": names,
-                "constraint": [n for n, _ in self.design.constraints],
-            },
-            attrs={
-                "design": self.design.model.name,
-                "seed": self.design.model.search.seed,
-                "evaluated": self.evaluated,
-            },
-        )
+        design, model = self.design, self.design.model
+        values = np.array([[j.values[n] for n in names] for j in self.judged])
+        violations = np.array([j.violations for j in self.judged])
+        data = {
+            "x": (("design", "variable"), self.x),
+            "value": (("design", "measure"), values),
+            "violation": (("design", "constraint"), violations),
+        }
+        constraints = [n for n, _ in design.constraints]
+        coords = {"variable": list(design.variables), "measure": names, "constraint": constraints}
+        attrs = {"design": model.name, "seed": model.search.seed, "evaluated": self.evaluated}
+        return xr.Dataset(data, coords, attrs)
 
     def chosen(self) -> dict[str, int]:
         """The best of each objective, and the one nearest to all of them at once."""
         f = np.array([j.objectives for j in self.judged])
         out = {f"best-{n}": int(np.argmin(f[:, i])) for i, n in enumerate(self.design.model.objectives)}
         span = np.ptp(f, axis=0)
-        out["compromise"] = int(
-            np.argmin(np.linalg.norm((f - f.min(axis=0)) / np.where(span > 0, span, 1), axis=1))
-        )
+        away = (f - f.min(axis=0)) / np.where(span > 0, span, 1)
+        out["compromise"] = int(np.argmin(np.linalg.norm(away, axis=1)))
         return out
 
 
@@ -273,13 +262,8 @@ def _algorithm(problem: DesignProblem, generations: int) -> Algorithm:
         from pymoo.util.ref_dirs import get_reference_directions
     search, low_high = problem.model.search, problem.bounds
     goals = len(problem.model.objectives)
-    task = Problem(
-        n_var=len(problem.variables),
-        n_obj=goals,
-        n_ieq_constr=len(problem.constraints),
-        xl=low_high[0],
-        xu=low_high[1],
-    )
+    counts = {"n_var": len(problem.variables), "n_obj": goals, "n_ieq_constr": len(problem.constraints)}
+    task = Problem(**counts, xl=low_high[0], xu=low_high[1])
     if search.method == "nsga2":
         algorithm = NSGA2(pop_size=search.population)
     elif search.method == "nsga3":

@@ -8,11 +8,5 @@ from stiffmap.workspace.maps.sweep_of_numbers import design_sweep
 from stiffmap.workspace.maps.uncertainty import uncertainty_ranking
 
 __all__ = [
-    "design_sweep",
-    "error_map",
-    "map_estimate",
-    "map_statistics",
-    "polar",
-    "sweep",
-    "uncertainty_ranking",
-]
+    "design_sweep", "error_map", "map_estimate", "map_statistics", "polar", "sweep", "uncertainty_ranking",
+]  # fmt: skip

@@ -1,11 +1,9 @@
-"""One block of a map's rows, and a map in tiles: parts of one z-plane that are solved, written and done again on their own, here or
-on a cluster."""
+"""One block of a map's rows, and who solves all of them: this process block by block, or the workers of a cluster tile by tile."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,9 +14,8 @@ from stiffmap.solve.kinematics import inverse_kinematics
 from stiffmap.solve.solution import Solution
 from stiffmap.solve.validity import Validity
 from stiffmap.workspace.maps.extremes import ALL, TurningForce, direction, even_angles
-from stiffmap.workspace.maps.fixed_order_sums import norm
-from stiffmap.workspace.maps.loading import Loading, deflections, without_failed
-from stiffmap.workspace.maps.plan import BEYOND, MapPlan
+from stiffmap.workspace.maps.loading import Loading, deflections, norm, without_failed
+from stiffmap.workspace.maps.plan import BEYOND, MapPlan, blocks_of
 from stiffmap.workspace.maps.uncertainty import Uncertain
 
 
@@ -135,43 +132,7 @@ def deviation(j: Floats, d: Floats, parts: tuple[int, ...], covariance: Floats) 
     return np.sqrt(np.maximum(shares.sum(axis=-1), 0.0)), shares
 
 
-TILE_POSES = 65536
-"""Poses of a tile. It decides the bytes of a Zarr map, so it depends on nothing but the grid."""
 POSES_AT_ONCE = 1024
-
-
-@dataclass(frozen=True)
-class Tiles:
-    """How a grid is cut: rows of all x, `height` of them at one z."""
-
-    planes: int
-    rows: int
-    """Rows of a plane."""
-    height: int
-
-    @cached_property
-    def parts(self) -> list[slice]:
-        """Rows of every tile, counted over the whole map."""
-        planes = [slice(z * self.rows, (z + 1) * self.rows) for z in range(self.planes)]
-        return [part for plane in planes for part in blocks_of(plane, 1, self.height)]
-
-    def place(self, index: int) -> tuple[int, slice]:
-        """Plane and rows of it (indices of z and y)."""
-        part = self.parts[index]
-        plane, first = divmod(part.start, self.rows)
-        return plane, slice(first, first + part.stop - part.start)
-
-
-def tiles_of(plan: MapPlan) -> Tiles:
-    """The tiles of a map."""
-    height = max(1, min(plan.y.size, TILE_POSES // plan.x.size))
-    return Tiles(plan.z.size, plan.y.size, height)
-
-
-def blocks_of(rows: slice, width: int, poses: int) -> list[slice]:
-    """Rows cut so that a block has about `poses` poses."""
-    step = max(1, poses // width)
-    return [slice(i, min(i + step, rows.stop)) for i in range(rows.start, rows.stop, step)]
 
 
 def solve_rows(plan: MapPlan, rows: slice, poses: int = POSES_AT_ONCE) -> dict[str, np.ndarray]:
@@ -189,28 +150,23 @@ class Work:
     """Who solves a map: this process, about so many poses at once, or the workers of a cluster."""
 
     poses: int
-    scheduler: object = None
-    """Address of a dask scheduler, or a `distributed.Client`."""
+    scheduler: object = None  # address of a dask scheduler, or a `distributed.Client`
 
     def parts(self, plan: MapPlan) -> list[slice]:
         """All rows, in parts that are kept as soon as they are solved."""
         if self.scheduler is None:
             return blocks_of(slice(0, plan.rows), plan.x.size, self.poses)
-        return tiles_of(plan).parts
+        return plan.tiles
 
     def solved(self, plan: MapPlan, parts: Sequence[slice]) -> Iterator[tuple[int, dict[str, np.ndarray]]]:
         """Number and values of each part: in order here, as they come from a cluster."""
         if self.scheduler is None:
             yield from ((i, solve_rows(plan, rows, self.poses)) for i, rows in enumerate(parts))
             return
-        with workers(_solve, plan, scheduler=self.scheduler) as cluster:
-            yield from cluster.as_done((rows.start, rows.stop) for rows in parts)
+        with workers(solve_rows, plan, scheduler=self.scheduler) as cluster:
+            yield from cluster.as_done(parts)
 
 
 def work_of(chunk: int | None, scheduler: object) -> Work:
     """By the arguments `chunk` and `scheduler` of `stiffmap.error_map`."""
     return Work(POSES_AT_ONCE if chunk is None else whole_number(chunk, "chunk", 1), scheduler)
-
-
-def _solve(plan: MapPlan, rows: tuple[int, int]) -> dict[str, np.ndarray]:
-    return solve_rows(plan, slice(*rows))

@@ -22,9 +22,17 @@ from stiffmap.solve.labels import meaning
 from stiffmap.solve.machine import Machine, takes_machine
 from stiffmap.solve.options import LoadingKeywords, spelled_out
 from stiffmap.solve.solution import Solution
-from stiffmap.workspace.maps.fixed_order_sums import apply, dot, norm
 from stiffmap.workspace.maps.inputs import magnitude, place, plane_axes
-from stiffmap.workspace.maps.loading import Loading, at_place, describe, displaced, without_failed
+from stiffmap.workspace.maps.loading import (
+    Loading,
+    apply,
+    at_place,
+    describe,
+    displaced,
+    dot,
+    norm,
+    without_failed,
+)
 
 Parts = tuple[int, ...]
 ALL: Parts = (0, 1, 2)
@@ -34,16 +42,11 @@ ALL: Parts = (0, 1, 2)
 class DirectionSweep:
     """Equilibria of poses (p) under force directions (k)."""
 
-    angle: Floats
-    """(p, k) rad, from the plane's first axis to its second."""
-    translation: Floats
-    """(p, k, 3) m; NaN where the status is not CONVERGED."""
-    turning: Floats
-    """(p, k, 3) m/rad: change of the translation with the angle, by the loaded compliance."""
-    growing: Floats
-    """(p, k, 3) m/N: change of the translation with the force's magnitude."""
-    status: NDArray[np.uint8]
-    """(p, k)."""
+    angle: Floats  # (p, k) rad, from the plane's first axis to its second
+    translation: Floats  # (p, k, 3) m; NaN where the status is not CONVERGED
+    turning: Floats  # (p, k, 3) m/rad: change of the translation with the angle, by the loaded compliance
+    growing: Floats  # (p, k, 3) m/N: change of the translation with the force's magnitude
+    status: NDArray[np.uint8]  # (p, k)
 
     def sizes(self, parts: Parts) -> tuple[Floats, Floats]:
         """(p, k) m and m/N: norm of these components of the translation, and its change with the force; where there is no
@@ -75,13 +78,8 @@ def direction_sweep_of(s: Solution, angle: Floats, size: Floats, axes: tuple[int
     """Equilibria (p, k) that have been solved for forces of those sizes (N) and angles."""
     along, across = direction(angle, axes), direction(angle + np.pi / 2, axes)
     c = s.compliance[..., :3, :3]
-    return DirectionSweep(
-        angle=angle,
-        translation=without_failed(s.displacement[..., :3], s.status),
-        turning=size[..., None] * apply(c, across),
-        growing=apply(c, along),
-        status=s.status,
-    )
+    moved = without_failed(s.displacement[..., :3], s.status)
+    return DirectionSweep(angle, moved, size[..., None] * apply(c, across), apply(c, along), s.status)
 
 
 def even_angles(count: int) -> Floats:
@@ -98,14 +96,10 @@ NEWTON_STEPS = 5
 class Extreme:
     """The most extreme direction of each pose (p,); NaN where any direction failed."""
 
-    angle: Floats
-    """rad, in [-pi, pi)."""
-    value: Floats
-    """Norm of the components looked at, m."""
-    growth: Floats
-    """Change of the value with the force, m/N."""
-    status: NDArray[np.uint8]
-    """Highest status among all directions solved."""
+    angle: Floats  # rad, in [-pi, pi)
+    value: Floats  # norm of the components looked at, m
+    growth: Floats  # change of the value with the force, m/N
+    status: NDArray[np.uint8]  # highest status among all directions solved
 
 
 STEPS = 8
@@ -118,12 +112,9 @@ class TurningForce:
     """A pure force that turns in a plane, at poses (p)."""
 
     loading: Loading
-    position: Floats
-    """(p, 3) m."""
-    size: float
-    """N."""
-    axes: tuple[int, int]
-    """Base axes of the plane."""
+    position: Floats  # (p, 3) m
+    size: float  # N
+    axes: tuple[int, int]  # base axes of the plane
 
     def solve(
         self, angle: Floats, size: Floats | None = None, rows: NDArray[np.intp] | None = None
@@ -257,24 +248,16 @@ def polar(
     swept = direction_sweep_of(s, angle[None], np.full((1, directions), force), axes)
     turning = TurningForce(loading, p[None], force, axes)
     d = without_failed(s.displacement, s.status)[0]
-    data = displaced("angle", d, s.status[0], s.flags[0], plane) | _extremes(turning, plane, swept)
+    data = displaced("angle", d, s.status[0], s.flags[0], plane)
+    for suffix, _, worst, best in turning.extremes(swept, plane):
+        for word, size, e in (("worst", "largest", worst), ("best", "smallest", best)):
+            what = f"{size} deflection over the force directions of the {plane} plane"
+            data[f"{word}_deflection{suffix}"] = ((), e.value[0], meaning("m", what))
+            data[f"{word}_direction{suffix}"] = ((), e.angle[0], meaning("rad", "direction of that force"))
+    turned = meaning("rad", f"direction of the force, from {plane[0]} towards {plane[1]}")
     coords = at_place(p) | {
-        "angle": (
-            "angle",
-            angle,
-            meaning("rad", f"direction of the force, from {plane[0]} towards {plane[1]}"),
-        ),
+        "angle": ("angle", angle, turned),
         "force": ((), force, meaning("N", "magnitude of the force")),
     }
     call = {"function": "polar", "position": p, "force": force, "plane": plane, "directions": directions}
     return xr.Dataset(data, coords, describe(loading, "polar diagram", call))
-
-
-def _extremes(force: TurningForce, plane: str, swept: DirectionSweep) -> dict[str, object]:
-    out: dict[str, object] = {}
-    for suffix, _, worst, best in force.extremes(swept, plane):
-        for word, size, e in (("worst", "largest", worst), ("best", "smallest", best)):
-            what = f"{size} deflection over the force directions of the {plane} plane"
-            out[f"{word}_deflection{suffix}"] = ((), e.value[0], meaning("m", what))
-            out[f"{word}_direction{suffix}"] = ((), e.angle[0], meaning("rad", "direction of that force"))
-    return out

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
 from types import ModuleType
@@ -22,7 +22,7 @@ def is_zarr(path: Path) -> bool:
     return path.suffix == ".zarr"
 
 
-def write_dataset(ds: xr.Dataset, path: str | os.PathLike[str]) -> Path:
+def write_dataset(ds: xr.Dataset, path: str | PathLike[str]) -> Path:
     """Write a Dataset; what was at `path` is replaced only when the new file is complete.
 
     Raises FileError where `path` cannot be written.
@@ -30,8 +30,11 @@ def write_dataset(ds: xr.Dataset, path: str | os.PathLike[str]) -> Path:
     target = Path(path)
     needs_space(target, ds.nbytes, "the map")
     if is_zarr(target):
-        with only_job(target):
-            _write_zarr(ds, target)
+        zarr_package()
+        fresh = target.with_name(f".{target.name}.writing")
+        with only_job(target), onto_disk(target):
+            write_zarr(ds, fresh)
+            put_folder(fresh, target)
         return target
     with writing(target) as fresh:
         try:
@@ -41,17 +44,16 @@ def write_dataset(ds: xr.Dataset, path: str | os.PathLike[str]) -> Path:
     return target
 
 
-def _write_zarr(ds: xr.Dataset, target: Path) -> None:
-    fresh = target.with_name(f".{target.name}.writing")
-    zarr_package()
+@contextmanager
+def onto_disk(path: Path, more: str = "") -> Iterator[None]:
+    """FileError where the disk refuses what is written to `path`, with more that is to be said."""
     try:
-        write_zarr(ds, fresh)
-        put_folder(fresh, target)
+        yield
     except OSError as error:
-        raise FileError(f"cannot be written: {error.strerror or error}", file=str(target)) from error
+        raise FileError(f"cannot be written: {error.strerror or error}{more}", file=str(path)) from error
 
 
-def read_dataset(path: str | os.PathLike[str]) -> xr.Dataset:
+def read_dataset(path: str | PathLike[str]) -> xr.Dataset:
     """Open a written Dataset; values are read when they are used."""
     target = Path(path)
     if not is_zarr(target):
@@ -85,10 +87,8 @@ def partial_folder(path: Path) -> Path:
     if path.is_dir() and not is_zarr(path):
         raise FileError("cannot be written: it is a folder", file=str(path))
     folder = path.with_name(f"{path.name}.partial")
-    try:
+    with onto_disk(path):
         folder.mkdir(exist_ok=True)
-    except OSError as error:
-        raise FileError(f"cannot be written: {error.strerror}", file=str(path)) from error
     return folder
 
 

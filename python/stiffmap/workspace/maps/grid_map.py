@@ -12,18 +12,17 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from stiffmap.common.errors import FileError, StiffmapError
+from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs import bytes_text, needs_space, only_job
 from stiffmap.model.files.load import Source
 from stiffmap.solve.compiled import Status
 from stiffmap.solve.machine import Machine, as_machine, hint_metres
 from stiffmap.solve.options import keywords_of
-from stiffmap.workspace.maps.block import POSES_AT_ONCE, Work, blocks_of, solve_block, tiles_of, work_of
-from stiffmap.workspace.maps.files import is_zarr, partial_folder, read_dataset, write_dataset
-from stiffmap.workspace.maps.plan import MapPlan, map_plan
-from stiffmap.workspace.maps.progress import track
-from stiffmap.workspace.maps.store import Store, folder_store, memory_store
-from stiffmap.workspace.maps.zarr_map import open_zarr_map
+from stiffmap.workspace.maps.block import POSES_AT_ONCE, Work, solve_block, work_of
+from stiffmap.workspace.maps.files import is_zarr, onto_disk, partial_folder, read_dataset, write_dataset
+from stiffmap.workspace.maps.loading import track
+from stiffmap.workspace.maps.plan import MapPlan, blocks_of, map_plan
+from stiffmap.workspace.maps.store import Store, folder_store, memory_store, open_zarr_map
 
 OTHER_FORMATS = (".csv", ".json", ".ods", ".parquet", ".txt", ".xlsx", ".yaml")
 
@@ -134,13 +133,8 @@ def _fill(plan: MapPlan, store: Store, work: Work, progress: bool | None) -> Non
 
 def _to_netcdf(plan: MapPlan, out: Path, resume: bool, work: Work, progress: bool | None) -> None:
     folder = partial_folder(out)
-    try:
+    with onto_disk(out, f"; a map of {plan.rows * plan.x.size} poses"):
         store = folder_store(plan, folder, resume)
-    except OSError as error:
-        raise FileError(
-            f"cannot be written: {error.strerror or error}; a map of {plan.rows * plan.x.size} poses",
-            file=str(out),
-        ) from error
     needs_space(out, sum(a.nbytes for a in store.arrays.values()), "the finished map")
     _fill(plan, store, work, progress)
     write_dataset(plan.dataset(store.arrays), out)
@@ -150,15 +144,14 @@ def _to_netcdf(plan: MapPlan, out: Path, resume: bool, work: Work, progress: boo
 def _to_zarr(plan: MapPlan, out: Path, resume: bool, work: Work, progress: bool | None) -> None:
     store = open_zarr_map(plan, partial_folder(out), resume)
     missing = np.flatnonzero(~store.done).tolist()
-    parts = [store.tiles.parts[i] for i in missing]
+    parts = [plan.tiles[i] for i in missing]
     for number, values in track(work.solved(plan, parts), len(parts), "map", progress):
         store.put(missing[number], values)
     store.finish(out)
 
 
 SAMPLES = 8
-COPIES = 3
-"""Of a tile that are in memory at once while it is solved and written."""
+COPIES = 3  # of a tile that are in memory at once while it is solved and written
 
 
 @dataclass(frozen=True)
@@ -193,7 +186,7 @@ def map_estimate(machine: Machine | str | PathLike[str], **call: Any) -> MapEsti
     poses = plan.rows * plan.x.size
     each = int(sum(np.dtype(v.dtype).itemsize * int(np.prod(plan.tail(v))) for v in plan.variables))
     per_pose = _times(plan)
-    tile = tiles_of(plan).height * plan.x.size
+    tile = plan.tile_height * plan.x.size
     return MapEstimate(
         poses=poses,
         seconds=float(poses * np.mean(per_pose)),

@@ -105,8 +105,7 @@ def plane_force(wrenches: Floats, force: float | None) -> float:
     return largest
 
 
-POINTS = 51
-"""Along each edge of a plane."""
+POINTS = 51  # along each edge of a plane
 
 
 def grid_of(

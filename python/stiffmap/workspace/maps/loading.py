@@ -1,10 +1,11 @@
-"""How every pose of a map is solved, and what a result says of that."""
+"""What maps share: how every pose is solved, what a result says of that, sums that do not depend on the batch, bars of progress."""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from dataclasses import replace
-from typing import Unpack
+from typing import TypeVar, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +20,6 @@ from stiffmap.solve.options import LoadingKeywords, options_of
 from stiffmap.solve.solution import Solution
 from stiffmap.solve.solving import Call, solve_varied
 from stiffmap.solve.status import Status
-from stiffmap.workspace.maps.fixed_order_sums import norm
 from stiffmap.workspace.maps.inputs import plane_axes
 
 
@@ -122,3 +122,36 @@ def describe(loading: Loading, title: str, call: dict[str, object]) -> dict[str,
 def machine_digest(machine: Machine) -> str:
     """Fingerprint of everything that a machine is made of, link files and users' kinds of effects among it."""
     return digest(machine.description, code()[1:] if machine.description.effects else [])[:16]
+
+
+def dot(a: Floats, b: Floats) -> Floats:
+    """Scalar product over the last axis, leading axes broadcast; summed in a fixed order, whatever batch a number is in."""
+    out = a[..., 0] * b[..., 0]
+    for k in range(1, max(a.shape[-1], b.shape[-1])):
+        out = out + a[..., k] * b[..., k]
+    return np.asarray(out)
+
+
+def apply(matrix: Floats, vector: Floats) -> Floats:
+    """Matrix (..., m, n) times vector (..., n)."""
+    return dot(matrix, vector[..., None, :])
+
+
+def norm(vector: Floats) -> Floats:
+    """Euclidean norm over the last axis."""
+    return np.asarray(np.sqrt(dot(vector, vector)))
+
+
+T = TypeVar("T")
+
+
+def track(items: Iterable[T], total: int, what: str, show: bool | None) -> Iterable[T]:
+    """The items, with a bar on standard error where wanted; None: where that is a terminal."""
+    if show is False:
+        return items
+    from rich import progress
+    from rich.console import Console
+
+    console = Console(stderr=True)
+    hidden = show is None and not console.is_terminal
+    return progress.track(items, what, total, console=console, transient=True, disable=hidden)

@@ -12,14 +12,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import Floats, names_of, whole_number
-from stiffmap.solve.labels import (
-    COMPLIANCE_UNITS,
-    COMPONENTS,
-    TWIST_UNITS,
-    WRENCH,
-    meaning,
-    status_attrs,
-)
+from stiffmap.solve.labels import COMPLIANCE_UNITS, COMPONENTS, TWIST_UNITS, WRENCH, meaning, status_attrs
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.options import LoadingKeywords, spelled_out
 from stiffmap.solve.validity import Validity
@@ -63,16 +56,12 @@ def load_variables(case: tuple[str, ...], plane: str, compliance: bool) -> list[
 
 def deviation_variables(case: tuple[str, ...], plane: str, turning: bool) -> list[Variable]:
     """Standard deviations of the load cases and of the worst direction."""
-    what = "standard deviation of "
+    what, share = "standard deviation of ", "share of a number in the variance of the deflection"
     loads = ("deflection", f"deflection_{plane}")
     out = [
         Variable("displacement_std", (*case, "component"), meaning(TWIST_UNITS, f"{what}displacement")),
         *(Variable(f"{n}_std", case, meaning("m", f"{what}{n}")) for n in loads),
-        Variable(
-            "variance_share",
-            (*case, "parameter"),
-            meaning("1", "share of a number in the variance of the deflection"),
-        ),
+        Variable("variance_share", (*case, "parameter"), meaning("1", share)),
     ]
     return out + [Variable(f"worst_{n}_std", (), meaning("m", f"{what}worst_{n}")) for n in loads if turning]
 
@@ -97,6 +86,16 @@ EXTREMES = (
 )
 
 
+TILE_POSES = 65536
+"""Poses of a tile. It decides the bytes of a Zarr map, so it depends on nothing but the grid."""
+
+
+def blocks_of(rows: slice, width: int, poses: int) -> list[slice]:
+    """Rows cut so that a block has about `poses` poses."""
+    step = max(1, poses // width)
+    return [slice(i, min(i + step, rows.stop)) for i in range(rows.start, rows.stop, step)]
+
+
 @dataclass(frozen=True)
 class MapPlan:
     """Grid, loads and options of one map."""
@@ -105,13 +104,10 @@ class MapPlan:
     x: Floats
     y: Floats
     z: Floats
-    wrenches: Floats
-    """(cases, 6)."""
-    cases: tuple[str, ...] | None
-    """None: a single wrench without a name, the map has no case axis."""
+    wrenches: Floats  # (cases, 6)
+    cases: tuple[str, ...] | None  # None: a single wrench without a name, the map has no case axis
     shown_plane: str
-    turning: bool
-    """Whether the force is turned in the plane."""
+    turning: bool  # whether the force is turned in the plane
     force: float
     directions: int
     tolerance: float
@@ -132,6 +128,23 @@ class MapPlan:
     def rows(self) -> int:
         """Rows of the grid, each of all x at one z and y."""
         return self.z.size * self.y.size
+
+    @cached_property
+    def tile_height(self) -> int:
+        """Rows of a tile: all x of a part of one z-plane, which is solved, written and done again on its own."""
+        return max(1, min(self.y.size, TILE_POSES // self.x.size))
+
+    @cached_property
+    def tiles(self) -> list[slice]:
+        """Rows of every tile, counted over the whole map."""
+        planes = [slice(first, first + self.y.size) for first in range(0, self.rows, self.y.size)]
+        return [tile for plane in planes for tile in blocks_of(plane, 1, self.tile_height)]
+
+    def place(self, tile: int) -> tuple[int, slice]:
+        """Plane and rows of it (indices of z and y)."""
+        rows = self.tiles[tile]
+        plane, first = divmod(rows.start, self.y.size)
+        return plane, slice(first, first + rows.stop - rows.start)
 
     def positions(self, rows: slice) -> Floats:
         """TCP positions (rows * x, 3) of some rows."""
@@ -244,18 +257,11 @@ def map_plan(
     grid = grid_of(machine, {"x": x, "y": y, "z": z}, points)
     wrenches, names = wrench_cases(wrench, None if cases is None else names_of(cases, "cases"))
     directions = whole_number(directions, "directions", 3)
+    x, y, z = (axis(grid[a], a) for a in "xyz")
     return MapPlan(
-        loading=loading,
-        x=axis(grid["x"], "x"),
-        y=axis(grid["y"], "y"),
-        z=axis(grid["z"], "z"),
-        wrenches=wrenches,
-        cases=names,
-        shown_plane="xy" if plane is None else "".join("xyz"[i] for i in plane_axes(plane)),
-        turning=plane is not None,
-        force=0.0 if plane is None else plane_force(wrenches, force),
-        directions=directions,
-        tolerance=magnitude(tolerance, "tolerance", "m"),
-        compliance=compliance,
+        loading, x, y, z, wrenches, names,
+        shown_plane="xy" if plane is None else "".join("xyz"[i] for i in plane_axes(plane)), turning=plane is not None,
+        force=0.0 if plane is None else plane_force(wrenches, force), directions=directions,
+        tolerance=magnitude(tolerance, "tolerance", "m"), compliance=compliance,
         uncertain=uncertain_numbers(machine) if uncertainty else None,
-    )
+    )  # fmt: skip

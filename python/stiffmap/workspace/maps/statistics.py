@@ -18,9 +18,9 @@ from stiffmap.solve.labels import meaning, status_attrs
 from stiffmap.solve.machine import Machine, as_machine
 from stiffmap.solve.options import keywords_of
 from stiffmap.solve.status import Status
-from stiffmap.workspace.maps.block import Tiles, tiles_of, work_of
+from stiffmap.workspace.maps.block import work_of
+from stiffmap.workspace.maps.loading import track
 from stiffmap.workspace.maps.plan import MapPlan, Variable, map_plan
-from stiffmap.workspace.maps.progress import track
 
 NODE = ("x", "y", "z")
 DEFLECTION = re.compile(r"(worst_|best_)?deflection(_xy|_xz|_yz)?")
@@ -64,28 +64,23 @@ def map_statistics(
     if wanted.ndim != 1 or wanted.size == 0 or not ((wanted >= 0) & (wanted <= 100)).all():
         raise StiffmapError(f"percentiles: expected numbers from 0 to 100, got {wanted.tolist()}")
     plan = map_plan(as_machine(machine), **call)
-    tiles, work = tiles_of(plan), work_of(chunk, scheduler)
-    found = {v.name: _Deflection(plan, tiles, v) for v in plan.variables if DEFLECTION.fullmatch(v.name)}
+    work = work_of(chunk, scheduler)
+    found = {v.name: _Deflection(plan, v) for v in plan.variables if DEFLECTION.fullmatch(v.name)}
     counts = np.zeros((plan.z.size, len(plan.wrenches), len(Status)), dtype=np.int64)
-    for index, values in track(work.solved(plan, tiles.parts), len(tiles.parts), "map", progress):
+    for index, values in track(work.solved(plan, plan.tiles), len(plan.tiles), "map", progress):
         for name, one in found.items():
             one.add(index, values[name])
-        plane, _ = tiles.place(index)
+        plane, _ = plan.place(index)
         status = values["status"].reshape(-1, len(plan.wrenches))
         counts[plane] += np.stack([(status == s).sum(0) for s in Status], axis=-1)
     out: dict[str, object] = {}
     for name, one in found.items():
         out |= one.variables(name, wanted)
-    out["status_count"] = (
-        ("z", *plan.case, "status"),
-        counts if plan.case else counts[:, 0],
-        meaning("1", "poses of each status"),
-    )
+    counted = counts if plan.case else counts[:, 0]
+    out["status_count"] = (("z", *plan.case, "status"), counted, meaning("1", "poses of each status"))
     coords = {k: v for k, v in plan.coords.items() if k not in ("component", "parameter")}
     coords |= {"node": xr.Variable("node", np.array(NODE)), "percentile": xr.Variable("percentile", wanted)}
-    coords["status"] = xr.Variable(
-        "status", np.array([int(s) for s in Status], dtype=np.uint8), status_attrs("poses")
-    )
+    coords["status"] = xr.Variable("status", np.array(list(Status), dtype=np.uint8), status_attrs("poses"))
     bound = f"at most {100 * RELATIVE_WIDTH:.2g} % above the exact value, never below it"
     return xr.Dataset(out, coords, plan.attrs | {"tolerance_m": plan.tolerance, "percentile_bound": bound})
 
@@ -93,9 +88,9 @@ def map_statistics(
 class _Deflection:
     """What is kept of one deflection while the tiles pass by, in any order."""
 
-    def __init__(self, plan: MapPlan, tiles: Tiles, variable: Variable) -> None:
+    def __init__(self, plan: MapPlan, variable: Variable) -> None:
         nz, ny, nx = plan.shape
-        self.plan, self.tiles, self.case = plan, tiles, variable.dims
+        self.plan, self.case = plan, variable.dims
         self.cases = cases = len(plan.wrenches) if variable.dims else 1
         self.most = np.full((nz, cases), np.nan)
         self.place = np.zeros((nz, cases), dtype=np.int64)
@@ -105,7 +100,7 @@ class _Deflection:
 
     def add(self, index: int, values: Floats) -> None:
         """Values (rows, x[, case]) of a tile."""
-        plane, y = self.tiles.place(index)
+        plane, y = self.plan.place(index)
         a = values.reshape(y.stop - y.start, self.plan.x.size, self.cases)
         self.column[y] = np.fmax(self.column[y], a)
         widths = cells(self.plan.x)
@@ -164,8 +159,7 @@ def cells(axis: Floats) -> Floats:
 
 
 BITS = 9
-RELATIVE_WIDTH = 2.0**-BITS
-"""Width of a bin against its lower edge, at most."""
+RELATIVE_WIDTH = 2.0**-BITS  # width of a bin against its lower edge, at most
 _SHIFT = 52 - BITS
 
 
@@ -201,12 +195,11 @@ def statistics_rows(ds: xr.Dataset, plane: str) -> list[dict[str, Any]]:
         for force in ("worst", "best", *map(str, ds.case.values)):
             name = f"{force}_deflection_{plane}" if force in ("worst", "best") else f"deflection_{plane}"
             one = here if force in ("worst", "best") else here.sel(case=force)
-            percentiles = zip(
-                ds.percentile.values.tolist(), one[f"{name}_percentile"].values.tolist(), strict=True
-            )
+            each = (values.values.tolist() for values in (ds.percentile, one[f"{name}_percentile"]))
+            percentiles = dict(zip(*each, strict=True))
             rows.append(
                 {"z": float(z), "force": force, "max": float(one[f"{name}_max"]),
-                 "at": one[f"{name}_max_position"].values.tolist(), "percentiles": dict(percentiles),
+                 "at": one[f"{name}_max_position"].values.tolist(), "percentiles": percentiles,
                  "share_within": float(one[f"{name}_within"])}
             )  # fmt: skip
     return rows

@@ -1,40 +1,47 @@
-"""Where a map grows: in memory, or in a folder of plain arrays that an interrupted run leaves behind."""
+"""Where a map grows: in memory, in a folder of plain arrays that an interrupted run leaves behind, or in a Zarr folder, a chunk of every
+variable per tile, which survives being killed.
+
+While a Zarr map grows, its folder is called ``NAME.zarr.partial`` and holds a journal next to the arrays: a line for each tile whose
+chunks are complete, with their checksums. The finished folder holds the map alone, so that its bytes don't depend on interruptions,
+threads or the order of the tiles.
+"""
 
 from __future__ import annotations
 
 import json
+import shutil
+import tempfile
+import zlib
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from functools import partial, reduce
+from functools import cached_property, partial, reduce
 from operator import getitem
 from pathlib import Path
 from tokenize import TokenError
+from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.lib.format import open_memmap
 from numpy.typing import NDArray
 
 from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.json_text import parse_json
-from stiffmap.common.outputs import mapped_array, write_text
+from stiffmap.common.outputs import add_lines, mapped_array, put_folder, write_text
+from stiffmap.workspace.maps.files import onto_disk, write_zarr, zarr_package
 from stiffmap.workspace.maps.plan import MapPlan
 
 WORDS = {"machine_digest": "the machine's description", "stiffmap_version": "the version of stiffmap"}
 LEFT_OUT = (
-    "coordinates",
-    "title",
-    "machine_title",
-    "effects",
-    "extremes_method",
-    "turning_force",
-    "turning_force_N",
-)
+    "coordinates", "title", "machine_title", "effects", "extremes_method", "turning_force", "turning_force_N",
+)  # fmt: skip
 """What follows from another attribute."""
 LONG = 60
 
 
-def kept_attributes(path: Path, *keys: str) -> dict[str, object]:
-    """Attributes of an unfinished map in a JSON file, under these keys; FileError where it is damaged."""
+def refuse_another_map(wanted: Mapping[str, object], path: Path, *keys: str) -> None:
+    """StiffmapError, by what differs, where an unfinished map is not the one wanted: its attributes are in a JSON file, under
+    these keys. FileError where the file is damaged."""
     try:
         kept = reduce(getitem, keys, parse_json(path.read_bytes()))
         if not isinstance(kept, dict) or not isinstance(parse_json(kept["call"]), dict):
@@ -45,23 +52,13 @@ def kept_attributes(path: Path, *keys: str) -> dict[str, object]:
             "these are: start again without resume (--resume)",
             file=str(path),
         ) from error
-    return kept
-
-
-def refuse_another_map(folder: Path, kept: Mapping[str, object], wanted: Mapping[str, object]) -> None:
-    """StiffmapError, by what differs, where an unfinished map in `folder` is not the one wanted."""
-    found = difference(kept, wanted)
-    if found:
-        raise StiffmapError(
-            f"{folder}: holds part of another map: {found}; delete it, or choose another file"
-        )
-
-
-def difference(kept: Mapping[str, object], wanted: Mapping[str, object]) -> str:
-    """What differs between the attributes of two maps, in words; empty: nothing."""
     old, new = _flat(kept), _flat(wanted)
     names = [n for n in {**old, **new} if old.get(n) != new.get(n)]
-    return "; ".join(f"{WORDS.get(n, n)} {_both(old.get(n), new.get(n))}" for n in names)
+    if names:
+        found = "; ".join(f"{WORDS.get(n, n)} {_both(old.get(n), new.get(n))}" for n in names)
+        raise StiffmapError(
+            f"{path.parent}: holds part of another map: {found}; delete it, or choose another file"
+        )
 
 
 def _flat(attrs: Mapping[str, object]) -> dict[str, object]:
@@ -120,7 +117,7 @@ def folder_store(plan: MapPlan, folder: Path, resume: bool) -> Store:
     """A map that lives in a folder; taken up again where an earlier run of the same call left it."""
     key = folder / "key.json"
     if resume and key.exists():
-        refuse_another_map(folder, kept_attributes(key), plan.attrs)
+        refuse_another_map(plan.attrs, key)
         return _store(plan, partial(_kept, folder))
     key.unlink(missing_ok=True)
     store = _store(plan, lambda name, dtype, shape: mapped_array(folder / f"{name}.npy", dtype, shape))
@@ -148,3 +145,127 @@ def _kept(folder: Path, name: str, dtype: str, shape: tuple[int, ...]) -> np.nda
         "(--resume)",
         file=str(path),
     )
+
+
+JOURNAL = "journal.jsonl"
+FILL = {"u1": 255, "u4": 0, "f8": np.nan}
+
+
+class ZarrMap:
+    """An unfinished map on the disk; `open_zarr_map` makes it."""
+
+    def __init__(self, plan: MapPlan, folder: Path) -> None:
+        self.plan, self.folder = plan, folder
+        self.done: NDArray[np.bool_] = np.zeros(len(plan.tiles), dtype=bool)
+
+    def put(self, index: int, values: dict[str, np.ndarray]) -> None:
+        """Write a tile's chunks, then its line in the journal. FileError where the disk refuses."""
+        plane, y = self.plan.place(index)
+        kept = f"; {int(self.done.sum())} of {len(self.done)} tiles are kept, resume=True (--resume) goes on with them"
+        with onto_disk(self.folder, kept):
+            for name, array in values.items():
+                self._arrays[name][plane, y] = array
+            line = json.dumps({"tile": index, "crc": {n: crc(self.chunk(n, index)) for n in values}})
+            add_lines(self.folder / JOURNAL, [line], flushed=False)
+        self.done[index] = True
+
+    def chunk(self, name: str, index: int) -> Path:
+        """File of a variable's chunk."""
+        plane, y = self.plan.place(index)
+        tail = ["0"] * (1 + len(self._arrays[name].shape) - 3)
+        return self.folder.joinpath(name, "c", str(plane), str(y.start // self.plan.tile_height), *tail)
+
+    @cached_property
+    def _arrays(self) -> Any:
+        package = zarr_package()
+        # Also chunks of nothing but fill values: a chunk that is missing is one that is not done.
+        with package.config.set({"array.write_empty_chunks": True}):
+            group = package.open_group(self.folder, mode="r+", zarr_format=3)
+            return {v.name: group[v.name] for v in self.plan.variables}
+
+    def finish(self, out: Path) -> None:
+        """Put the complete map in its place."""
+        (self.folder / JOURNAL).unlink(missing_ok=True)
+        put_folder(self.folder, out)
+
+    def frame(self, folder: Path) -> None:
+        """Write the empty map: metadata and coordinates."""
+        package = zarr_package()
+        write_zarr(xr.Dataset(coords=self.plan.coords, attrs=self.plan.attrs), folder)
+        group = package.open_group(folder, mode="r+", zarr_format=3)
+        from zarr.codecs import Crc32cCodec, ZstdCodec
+
+        for v in self.plan.variables:
+            tail = self.plan.tail(v)
+            group.create_array(
+                v.name, shape=(*self.plan.shape, *tail), chunks=(1, self.plan.tile_height, self.plan.x.size, *tail), dtype=v.dtype,
+                fill_value=FILL[v.dtype], compressors=[ZstdCodec(level=1), Crc32cCodec()], dimension_names=self.plan.dims(v),
+                attributes={k: a.tolist() if isinstance(a, np.ndarray) else a for k, a in v.attrs.items()},
+            )  # fmt: skip
+
+    def recover(self) -> None:
+        """Take up what an earlier run left.
+
+        StiffmapError where it belongs to another map, FileError for a chunk that is damaged.
+        """
+        refuse_another_map(self.plan.attrs, self.folder / "zarr.json", "attributes")
+        self._mend_frame()
+        for scrap in self.folder.rglob("*.partial"):  # chunks that zarr had not put in their place
+            scrap.unlink()
+        lines = (self.folder / JOURNAL).read_bytes().split(b"\n")[:-1]  # the last one may have been cut off
+        for number, line in enumerate(lines, 1):
+            index, checks = self._checksums(number, line)
+            for path, value in checks.items():
+                if path.exists() and crc(path) != value:
+                    raise FileError(
+                        f"is damaged: expected checksum {value}, found {crc(path)}; delete this chunk, and "
+                        "resume=True (--resume) computes it again",
+                        file=str(path),
+                    )
+            self.done[index] = all(path.exists() for path in checks)
+
+    def _mend_frame(self) -> None:
+        """Metadata and coordinates follow from the plan: what is damaged is written again."""
+        with tempfile.TemporaryDirectory(dir=self.folder.parent, prefix=f"{self.folder.name}.") as place:
+            fresh = Path(place) / "frame"
+            self.frame(fresh)
+            for path in fresh.rglob("*"):
+                target = self.folder / path.relative_to(fresh)
+                if path.is_file() and not (target.is_file() and target.read_bytes() == path.read_bytes()):
+                    target.parent.mkdir(parents=True, exist_ok=True)
+                    shutil.copyfile(path, target)
+
+    def _checksums(self, number: int, line: bytes) -> tuple[int, dict[Path, int]]:
+        """Tile and checksums of its chunks by a line of the journal; FileError where this program did not write it."""
+        try:
+            entry = parse_json(line)
+            index, checks = entry["tile"], entry["crc"]
+            known = type(index) is int and 0 <= index < len(self.done) and isinstance(checks, dict)
+            if not known or set(checks) != {v.name for v in self.plan.variables}:
+                raise ValueError
+        except (KeyError, TypeError, ValueError) as error:
+            raise FileError(
+                "is damaged: expected a tile and the checksums of its chunks; delete this line, and resume=True "
+                "(--resume) computes its tile again",
+                file=str(self.folder / JOURNAL),
+                line=number,
+            ) from error
+        return index, {self.chunk(n, index): value for n, value in checks.items()}
+
+
+def crc(path: Path) -> int:
+    """Checksum of a file."""
+    return zlib.crc32(path.read_bytes())
+
+
+def open_zarr_map(plan: MapPlan, folder: Path, resume: bool) -> ZarrMap:
+    """The unfinished map in `folder`, new or taken up."""
+    zarr_package()
+    out = ZarrMap(plan, folder)
+    with onto_disk(folder):
+        if resume and (folder / JOURNAL).exists():
+            out.recover()
+        else:
+            out.frame(folder)
+            write_text(folder / JOURNAL, "")
+    return out

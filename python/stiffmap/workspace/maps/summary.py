@@ -131,9 +131,5 @@ def _worst(ds: xr.Dataset) -> tuple[float, str, list[float], Floats] | None:
     angle = float(ds.worst_direction.sel({a: there[a] for a in "xyz"}))
     wrench = np.zeros(6)
     wrench[["xyz".index(a) for a in plane]] = force * np.cos(angle), force * np.sin(angle)
-    return (
-        float(there),
-        f"{vector_text(wrench[:3], 3)} N, the worst direction in the {plane} plane",
-        p,
-        wrench,
-    )
+    load = f"{vector_text(wrench[:3], 3)} N, the worst direction in the {plane} plane"
+    return float(there), load, p, wrench

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from typing import Unpack
+from typing import Any, Unpack
 
 import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from stiffmap.common.broadcasting import Floats, one_of, real_number, whole_number
+from stiffmap.common.broadcasting import Floats, one_of, real_number, refused, whole_number
 from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.compiled import Role
 from stiffmap.solve.compiled.machine import PATH_CONTROLS as CONTROLS
@@ -18,9 +18,8 @@ from stiffmap.solve.labels import meaning
 from stiffmap.solve.machine import Machine, hint_metres, takes_machine
 from stiffmap.solve.options import LoadingKeywords, spelled_out
 from stiffmap.solve.status import Status
-from stiffmap.workspace.maps.fixed_order_sums import dot
 from stiffmap.workspace.maps.inputs import number_list, place, unit
-from stiffmap.workspace.maps.loading import Loading, at_place, describe, displaced, without_failed
+from stiffmap.workspace.maps.loading import Loading, at_place, describe, displaced, dot, without_failed
 
 
 @takes_machine
@@ -88,14 +87,9 @@ Critical = dict[str, float | Floats]
 """A critical point of a path: its numbers, its mode and its coordinates, by name."""
 UNITS = {"force": "N", "displacement": "m", "arc": "m"}
 ENDS = (
-    "the limit was reached",
-    "the commanded pose is out of reach",
-    "singular without load",
-    "no further equilibrium was found",
-    "the largest number of points was listed",
-    "the force fell to zero",
-    "not followed",
-)
+    "the limit was reached", "the commanded pose is out of reach", "singular without load", "no further equilibrium was found",
+    "the largest number of points was listed", "the force fell to zero", "not followed",
+)  # fmt: skip
 """In the order of the core's reasons why a branch ends."""
 
 
@@ -106,17 +100,11 @@ def load_path(
     machine, options = loading.machine, loading.options
     one_of(options.point, machine.points, "point")
     turned = machine.compiled.home_rotation if options.rotation is None else options.rotation
+    how: dict[str, Any] = {"control": control, "limit": limit, "steps": steps, "cross": cross}
     flags, *branches = machine.compiled.path(
-        position,
-        np.ascontiguousarray(turned, dtype=float),
-        direction,
-        point=options.point,
-        gravity=np.array(loading.acting_gravity()),
-        control=control,
-        limit=limit,
-        steps=steps,
-        cross=cross,
-    )
+        position, np.ascontiguousarray(turned, dtype=float), direction, point=options.point,
+        gravity=np.array(loading.acting_gravity()), **how,
+    )  # fmt: skip
     (end, points, critical), (crossing_end, crossing, crossing_critical) = branches
     hint_metres(machine, position, not points)
     forks = sum(not c["limit"] for c in critical)
@@ -124,7 +112,6 @@ def load_path(
         raise StiffmapError(
             f"cross: the path has {forks} bifurcations, got {cross} (end of the path: {ENDS[end]})"
         )
-    how: dict[str, object] = {"control": control, "limit": limit, "steps": steps, "cross": cross}
     both = points + crossing
     d = np.array([p["displacement"] for p in both], dtype=float).reshape(-1, 6)
     unstable = np.array([p["unstable"] for p in both], dtype=float)
@@ -157,8 +144,8 @@ def check_control(control: str, limit: float | None, steps: int, load_type: obje
     """The limit as a number; StiffmapError where the options do not fit together."""
     one_of(control, CONTROLS, "control")
     if limit is None or not np.isfinite(real_number(limit, "limit")) or limit == 0:
-        raise StiffmapError(
-            f"limit: expected a number other than 0 ({UNITS[control]} for control {control!r}), got {limit!r}"
+        raise refused(
+            "limit", f"a number other than 0 ({UNITS[control]} for control {control!r})", repr(limit)
         )
     whole_number(steps, "steps", 1, what="a positive number")
     if load_type != "dead":

@@ -24,7 +24,7 @@ from stiffmap.solve.labels import (
 )
 from stiffmap.solve.machine import Machine, takes_machine
 from stiffmap.workspace.maps.inputs import axis
-from stiffmap.workspace.maps.progress import track
+from stiffmap.workspace.maps.loading import track
 
 KEPT = ("displacement", "deflection", "compliance", "status")
 Evaluate = Callable[[Machine], Mapping[str, float] | float]
@@ -89,9 +89,7 @@ def design_sweep(
             problems[index] = str(problem)
             continue
         here = made.description.home.p if given is None else given
-        s = made.solve(
-            here, wrench, rotation=rotation, point=point, gravity=gravity, method=method, threads=threads
-        )
+        s = made.solve(here, wrench, rotation=rotation, point=point, gravity=gravity, method=method, threads=threads)  # fmt: skip
         cells[index] = {
             "displacement": s.displacement,
             "compliance": s.compliance,
@@ -105,9 +103,8 @@ def design_sweep(
                 f"evaluate: expected results of the same names and shapes for every machine, got {same[0]} after {same[1]}"
             )
     if not cells:
-        raise StiffmapError(
-            f"numbers: no machine can be made of them; the first: {next(iter(problems.values()))}"
-        )
+        first = next(iter(problems.values()))
+        raise StiffmapError(f"numbers: no machine can be made of them; the first: {first}")
     return _dataset(machine, axes, cells, problems)
 
 
@@ -137,30 +134,25 @@ def _dataset(
     outer = tuple(dims.values())
     first = next(iter(cells.values()))
     poses = batch_dims(first["status"].ndim)
-    tails: dict[str, Sequence[str]] = {
-        "displacement": (*poses, "component"),
-        "deflection": poses,
-        "compliance": (*poses, "component", "wrench_component"),
-        "status": poses,
+    known: dict[str, tuple[Sequence[str], dict[str, object]]] = {
+        "displacement": ((*poses, "component"), meaning(TWIST_UNITS, "displacement")),
+        "deflection": (poses, meaning("m", "deflection")),
+        "compliance": ((*poses, "component", "wrench_component"), meaning(COMPLIANCE_UNITS, "compliance")),
+        "status": (poses, status_attrs("the pose")),
     }
-    units = {"displacement": TWIST_UNITS, "deflection": "m", "compliance": COMPLIANCE_UNITS}
     data: dict[str, object] = {}
     for name, sample in first.items():
         fill = int(Status.UNREACHABLE) if name == "status" else np.nan
         values = np.full(shape + sample.shape, fill, dtype=sample.dtype)
         for index, cell in cells.items():
             values[index] = cell[name]
-        attrs = status_attrs("the pose") if name == "status" else meaning(units.get(name, ""), name)
-        tail = tails.get(name, tuple(f"{name}_{i}" for i in range(sample.ndim)))
+        tail, attrs = known.get(name) or ([f"{name}_{i}" for i in range(sample.ndim)], meaning("", name))
         data[name] = ((*outer, *tail), values, attrs)
     words = np.full(shape, "", dtype=object)
     for index, text in problems.items():
         words[index] = text
-    data["problem"] = (
-        outer,
-        words.astype(str),
-        meaning("", "why there is no such machine; empty where there is"),
-    )
+    why = meaning("", "why there is no such machine; empty where there is")
+    data["problem"] = (outer, words.astype(str), why)
     table = {str(a): str(u) for a, u in machine.numbers()["unit"].items()}
     coords = {dims[a]: (dims[a], v, {"address": a, "units": _unit(table, a)}) for a, v in axes.items()}
     labels = {"component": list(COMPONENTS), "wrench_component": list(WRENCH)}

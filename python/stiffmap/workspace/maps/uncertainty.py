@@ -34,12 +34,9 @@ class Uncertain:
     """What is uncertain about a machine (P numbers), and the machines with one of them moved."""
 
     names: tuple[str, ...]
-    covariance: Floats
-    """(P, P) SI."""
-    steps: Floats
-    """(P,) SI."""
-    machines: tuple[Machine, ...]
-    """(2P,): each number down, then up, by its step."""
+    covariance: Floats  # (P, P) SI
+    steps: Floats  # (P,) SI
+    machines: tuple[Machine, ...]  # (2P,): each number down, then up, by its step
     left_out: tuple[str, ...]
     """Uncertain numbers that a description does not keep apart, or that no map depends on."""
 
@@ -51,8 +48,7 @@ class _Number:
     name: str
     keys: tuple[str, ...]
     deviation: float
-    size: float
-    """Typical size (SI); 0: the deviation itself."""
+    size: float  # typical size (SI); 0: the deviation itself
 
     @property
     def step(self) -> float:

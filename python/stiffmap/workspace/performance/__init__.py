@@ -14,23 +14,7 @@ from stiffmap.workspace.performance.requirements import load_requirements
 from stiffmap.workspace.performance.table import MeasuresTable, measures
 
 __all__ = [
-    "MeasuresTable",
-    "accuracy_transmission",
-    "circle",
-    "drive_efforts",
-    "fastest",
-    "force_transmission",
-    "in_pieces",
-    "largest_box",
-    "line",
-    "load_motion",
-    "load_requirements",
-    "measures",
-    "natural_frequencies",
-    "through",
-    "timed",
-    "velocity_section",
-    "velocity_transmission",
-    "workspace_volume",
-    "worst_deflection",
-]
+    "MeasuresTable", "accuracy_transmission", "circle", "drive_efforts", "fastest", "force_transmission",
+    "in_pieces", "largest_box", "line", "load_motion", "load_requirements", "measures", "natural_frequencies",
+    "through", "timed", "velocity_section", "velocity_transmission", "workspace_volume", "worst_deflection",
+]  # fmt: skip

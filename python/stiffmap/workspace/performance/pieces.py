@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -13,8 +14,7 @@ from stiffmap.model.description.elements import Element
 from stiffmap.model.description.tree import Elements, edit_all, edit_sequences
 from stiffmap.solve.machine import Machine, takes_machine
 
-LIKE = 1e-6
-"""Relative difference up to which a spring is that of a uniform beam, and a mass is in its middle."""
+LIKE = 1e-6  # relative difference up to which a spring is that of a uniform beam, and a mass is in its middle
 
 
 @takes_machine
@@ -28,10 +28,7 @@ def in_pieces(machine: Machine, pieces: int) -> Machine:
     """
     count = whole_number(pieces, "pieces", 1, what="a number from 1 on")
     found: list[str] = []
-
-    def divide(elements: Elements) -> Elements:
-        return _divided(elements, count, found)
-
+    divide = partial(_divided, count=count, found=found)
     divided = edit_all(machine.description, lambda elements, name: edit_sequences(elements, divide))
     if not found:
         raise StiffmapError(
@@ -108,18 +105,13 @@ def _pieces(offset: Offset, body: Body, spring: Spring, count: int) -> list[Elem
         inertia[axis, axis] = max(inertia[axis, axis] - spread, 0.0)
     rows = Pose.of(rotation=inertia / count).rotation
     springs = tuple(map(tuple, small.tolist()))
+    middle = tuple((-step / 2).tolist())
     out: list[Element] = []
     for k in range(1, count + 1):
         end = "" if k == count else f"_{k}"
         out += [
             replace(offset, name=offset.name + end, nominal=move),
-            replace(
-                body,
-                name=body.name + end,
-                mass=body.mass / count,
-                com=tuple((-step / 2).tolist()),
-                inertia=rows,
-            ),
+            replace(body, name=body.name + end, mass=body.mass / count, com=middle, inertia=rows),
             replace(spring, name=spring.name + end, compliance=springs),
         ]
     return out

@@ -23,9 +23,9 @@ from stiffmap.workspace.performance.motion.closing import (
     drive_kinematics,
     kernel_starts,
 )
+from stiffmap.workspace.performance.motion.many_drives import inverse_rows
 from stiffmap.workspace.performance.motion.motion_files import Motion
 from stiffmap.workspace.performance.motion.velocity import VelocityTransmission, transmission_of
-from stiffmap.workspace.performance.motion.zonotopes import inverse_rows
 
 
 @dataclass(eq=False)
@@ -173,23 +173,17 @@ def over_poses(positions: Floats, values: Floats, better: str, note: str = "", *
     """Worst and best pose of a map; a failed pose (NaN) makes the worst NaN and is said to be so."""
     good = np.isfinite(values)
     if not good.any():
-        return Found(
-            float("nan"),
-            note=note or "no pose of the box is within reach",
-            positions=positions,
-            values=values,
-        )
+        note = note or "no pose of the box is within reach"
+        return Found(float("nan"), note=note, positions=positions, values=values)
     sign = 1.0 if better == "high" else -1.0
     score = np.where(good, sign * values, -np.inf)
-    best = int(np.argmax(score))
-    if good.all():
-        worst = int(np.argmin(score))
-        at, value = positions[worst], float(values[worst])
-    else:
-        first = int(np.argmin(good))
-        at, value = positions[first], float("nan")
-        note = note or f"{int((~good).sum())} of {len(good)} poses fail"
-    return Found(value, at, float(values[best]), positions[best], note, positions, values, dict(extra))
+    best, failed = int(np.argmax(score)), int((~good).sum())
+    worst = int(np.argmin(good if failed else score))
+    value = float("nan") if failed else float(values[worst])
+    note = note or (f"{failed} of {len(good)} poses fail" if failed else "")
+    return Found(
+        value, positions[worst], float(values[best]), positions[best], note, positions, values, extra
+    )
 
 
 @lru_cache
@@ -201,7 +195,7 @@ def all_measures() -> tuple[Measure, ...]:
 
 def get_measure(name: str) -> Measure:
     """By name; StiffmapError lists those that exist."""
-    for m in all_measures():
-        if m.name == name:
-            return m
-    raise StiffmapError(f"unknown measure '{name}'; known: {', '.join(m.name for m in all_measures())}")
+    known = {m.name: m for m in all_measures()}
+    if name not in known:
+        raise StiffmapError(f"unknown measure '{name}'; known: {', '.join(known)}")
+    return known[name]

@@ -78,12 +78,8 @@ class Bound:
 
     def margin(self, value: float) -> float:
         """How far inside the value is (negative: outside), in its own unit."""
-        sides = []
-        if self.at_least is not None:
-            sides.append(value - self.at_least)
-        if self.at_most is not None:
-            sides.append(self.at_most - value)
-        return min(sides)
+        sides = ((self.at_least, value), (value, self.at_most))
+        return min(high - low for low, high in sides if low is not None and high is not None)
 
     def text(self, factor: float) -> str:
         """``≥ 500`` and the like, in the unit of which SI's has so many."""
@@ -117,10 +113,10 @@ class Requirements:
     @property
     def transmission(self) -> tuple[float, float]:
         """Range of the transmission factors within which a pose counts; the paper's where the task names none."""
-        least, most = self.bound("transmission_min"), self.bound("transmission_max")
+        least, most = (self.bound(f"transmission_{end}") or Bound() for end in ("min", "max"))
         return (
-            least.at_least if least and least.at_least is not None else 0.5,
-            most.at_most if most and most.at_most is not None else 2.0,
+            0.5 if least.at_least is None else least.at_least,
+            2.0 if most.at_most is None else most.at_most,
         )
 
     @property

@@ -52,6 +52,16 @@ class MeasureRow:
             return "unknown"
         return "pass" if self.margin >= 0 else "fail"
 
+    def as_plain(self) -> dict[str, object]:
+        """The row as plain data, SI."""
+        m, f, bound = self.measure, self.found, self.bound or Bound()
+        worst_at, best_at = (None if at is None else list(at) for at in (f.worst_at, f.best_at))
+        return {
+            "name": m.name, "title": m.title, "unit": m.unit, "worst": f.worst, "worst_at": worst_at, "best": f.best,
+            "best_at": best_at, "at_least": bound.at_least, "at_most": bound.at_most, "margin": self.margin,
+            "verdict": self.verdict, "note": self.reason or f.note,
+        }  # fmt: skip
+
 
 @short_repr
 @dataclass(frozen=True, eq=False)
@@ -65,10 +75,7 @@ class MeasuresTable:
     notes: tuple[str, ...]
 
     def __getitem__(self, name: str) -> MeasureRow:
-        for row in self.rows:
-            if row.measure.name == name:
-                return row
-        raise KeyError(name)
+        return {row.measure.name: row for row in self.rows}[name]
 
     @property
     def passed(self) -> bool:
@@ -85,23 +92,7 @@ class MeasuresTable:
             "requirements": self.requirements.name,
             "passed": self.passed,
             "notes": list(self.notes),
-            "measures": [
-                {
-                    "name": r.measure.name,
-                    "title": r.measure.title,
-                    "unit": r.measure.unit,
-                    "worst": r.found.worst,
-                    "worst_at": None if r.found.worst_at is None else list(r.found.worst_at),
-                    "best": r.found.best,
-                    "best_at": None if r.found.best_at is None else list(r.found.best_at),
-                    "at_least": r.bound.at_least if r.bound else None,
-                    "at_most": r.bound.at_most if r.bound else None,
-                    "margin": r.margin,
-                    "verdict": r.verdict,
-                    "note": r.reason or r.found.note,
-                }
-                for r in self.rows
-            ],
+            "measures": [row.as_plain() for row in self.rows],
         }
 
 

@@ -16,29 +16,21 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.workspace.vibration.files import MeasuredResponse
 from stiffmap.workspace.vibration.response import Complex
 
-MOST = 12
-"""Modes in a band."""
-PEAKS = 3
-"""Places that are tried for a further mode before there is none."""
-GAIN = 20.0
-"""Fall of the information criterion that a mode is worth at least."""
-RATIOS = (1e-4, 0.3)
-"""Damping ratios of a mode; beyond them it is background."""
-BEYOND = 1.5
-"""Factor by which poles may lie outside the band; those are background."""
-FLOOR = 1e-4
-"""Noise at least, as a share of the response."""
+MOST = 12  # modes in a band
+PEAKS = 3  # places that are tried for a further mode before there is none
+GAIN = 20.0  # fall of the information criterion that a mode is worth at least
+RATIOS = (1e-4, 0.3)  # damping ratios of a mode; beyond them it is background
+BEYOND = 1.5  # factor by which poles may lie outside the band; those are background
+FLOOR = 1e-4  # noise at least, as a share of the response
 
 
 @dataclass(frozen=True, eq=False)
 class ExtractedModes:
     """Modes (n) that responses (m) share, lowest first, SI; `u_` are standard uncertainties."""
 
-    frequency: Floats
-    """(n,) Hz, undamped."""
+    frequency: Floats  # (n,) Hz, undamped
     u_frequency: Floats
-    ratio: Floats
-    """(n,) damping ratio."""
+    ratio: Floats  # (n,) damping ratio
     u_ratio: Floats
     flexibility: Floats
     """(n, m) m/N: residue by the square of the angular frequency, the share of the mode in the static flexibility."""
@@ -104,9 +96,8 @@ class _Fit:
     def criterion(self, t: Floats) -> float:
         """Bayesian information criterion, the level of the noise being free down to its floor."""
         r, n = self.solved(t)[1], 2 * self.H.size
-        return float(
-            n * np.log(max((r**2).sum(), self.least) / n) + (len(t) + len(self.H) * len(t)) * np.log(n)
-        )
+        misfit, free = max((r**2).sum(), self.least), len(t) + len(self.H) * len(t)
+        return float(n * np.log(misfit / n) + free * np.log(n))
 
     def with_one_more(self, t: Floats) -> Floats | None:
         """Poles with one more, fitted, at the most promising place where all stay within their bounds; None: nowhere."""

@@ -37,16 +37,12 @@ class MeasuredResponse:
     """One measured response, as a receptance."""
 
     name: str
-    frequency: Floats
-    """(frequencies,) Hz, rising."""
-    receptance: Complex
-    """(frequencies,) m/N."""
-    coherence: Floats
-    """(frequencies,) 0 to 1; NaN where none was measured."""
+    frequency: Floats  # (frequencies,) Hz, rising
+    receptance: Complex  # (frequencies,) m/N
+    coherence: Floats  # (frequencies,) 0 to 1; NaN where none was measured
     response: str = ""
     """Where and along what it was measured, as the file says: point and direction such as 3 +z."""
-    reference: str = ""
-    """The same of the hammer."""
+    reference: str = ""  # the same of the hammer
 
     def variance(self, averages: int = 1) -> Floats:
         """(frequencies,) relative variance of the size, from the coherence of so many averages (Bendat and Piersol)."""
@@ -120,15 +116,14 @@ def _receptance(frequency: Floats, values: Complex, derivatives: int) -> Complex
 
 DataSet = dict[str, int | float | str | np.ndarray]
 """A data set of a universal file, as pyuff names its fields."""
-MOTIONS = {8: 0, 11: 1, 12: 2}
-"""Of universal files: displacement, velocity, acceleration."""
+MOTIONS = {8: 0, 11: 1, 12: 2}  # of universal files: displacement, velocity, acceleration
 WAYS = {0: "", 1: "+x", -1: "-x", 2: "+y", -2: "-y", 3: "+z", -3: "-z", 4: "+rx", 5: "+ry", 6: "+rz", -4: "-rx", -5: "-ry", -6: "-rz"}  # fmt: skip
 RESPONSE, COHERENCE = 4, 6
 UNITS, FUNCTION = 164, 58
 MARK = re.compile(rb"    -1 *(?=[\r\n]|\Z)")
 """Before and after each data set; not a whole line, as one may follow binary numbers."""
 UNKNOWN, FORCES, FREQUENCY = (0, 1), (9, 13), 18
-WANTED = "expected displacement, velocity or acceleration (types 8, 11, 12) by force"
+WANTED = "displacement, velocity or acceleration (types 8, 11, 12) by force"
 QUANTITIES = {
     0: "an unknown quantity", 1: "a general one", 8: "a displacement", 9: "a reaction force", 11: "a velocity",
     12: "an acceleration", 13: "a force", 15: "a pressure", 17: "a time", 18: "a frequency", 19: "a speed of rotation",
@@ -186,9 +181,8 @@ def _coherence(ends: list[tuple[str, str]], given: list[DataSet]) -> list[DataSe
     of = {e: [c for c in given if _ends(c) == e] for e in ends}
     for e, found in of.items():
         if len(found) not in (0, 1, ends.count(e)):
-            raise StiffmapError(
-                f"{' by '.join(e)}: found {len(found)} coherences of {ends.count(e)} responses"
-            )
+            where = " by ".join(e)
+            raise StiffmapError(f"{where}: found {len(found)} coherences of {ends.count(e)} responses")
     return [of[e][ends[:k].count(e) % len(of[e])] if of[e] else None for k, e in enumerate(ends)]
 
 
@@ -196,9 +190,9 @@ def _hertz(s: DataSet) -> float:
     """Hz of one unit of the abscissa."""
     kind, label = int(s.get("abscissa_spec_data_type") or 0), _label(s, "abscissa")
     if kind not in (*UNKNOWN, FREQUENCY):
-        raise StiffmapError(f"expected frequencies along the abscissa (type 18); found {_quantity(kind)}")
+        raise _unlike("frequencies along the abscissa (type 18)", _quantity(kind))
     if label and label.lower() not in FREQUENCIES:
-        raise StiffmapError(f"expected frequencies in Hz, kHz, rad/s or rpm; found {label!r}")
+        raise _unlike("frequencies in Hz, kHz, rad/s or rpm", repr(label))
     return FREQUENCIES[label.lower()] if label else 1.0
 
 
@@ -209,11 +203,9 @@ def _in_si(s: DataSet, base: DataSet) -> tuple[float, int]:
     """
     kind, by = int(s.get("ordinate_spec_data_type") or 0), int(s.get("orddenom_spec_data_type") or 0)
     if by not in (*UNKNOWN, *FORCES):
-        raise StiffmapError(
-            f"expected a response divided by a force (types 9, 13); found one by {_quantity(by)}"
-        )
+        raise _unlike("a response divided by a force (types 9, 13)", f"one by {_quantity(by)}")
     if kind not in (*UNKNOWN, *MOTIONS):
-        raise StiffmapError(f"{WANTED}; found {_quantity(kind)}")
+        raise _unlike(WANTED, _quantity(kind))
     turns, moment = (abs(int(s[key])) > 3 for key in ("rsp_dir", "ref_dir"))
     length = 1 - turns - moment
     above, below = _unit_of(s, "ordinate"), _unit_of(s, "orddenom")
@@ -223,18 +215,14 @@ def _in_si(s: DataSet, base: DataSet) -> tuple[float, int]:
         size = _base(base, "force") * (_base(base, "length") if moment else 1.0)
         below = ResponseUnit(size, int(moment), 1)
     if above is None:
-        raise StiffmapError(f"{WANTED}; found {_quantity(kind)} without a unit")
+        raise _unlike(WANTED, f"{_quantity(kind)} without a unit")
     if above.force == 0 and below is None:
-        raise StiffmapError(
-            "expected the force that the response is divided by, as type 13 or with its unit; found neither"
-        )
+        raise _unlike("the force that the response is divided by, as type 13 or with its unit", "neither")
     whole = above.over(below) if below is not None and above.force == 0 else above  # else its label has both
     found = _derivatives(whole, length)
     if found is None or MOTIONS.get(kind, found) != found:
         wanted = _quantity(kind) if kind in MOTIONS else "displacement, velocity or acceleration"
-        raise StiffmapError(
-            f"expected the unit of {wanted} by force, such as {EXAMPLES}; found {_written(s)}"
-        )
+        raise _unlike(f"the unit of {wanted} by force, such as {EXAMPLES}", _written(s))
     return whole.size, found
 
 
@@ -243,7 +231,7 @@ def _unit_of(s: DataSet, axis: str) -> ResponseUnit | None:
     label = _label(s, axis)
     unit = response_unit(label) if label else None
     if label and unit is None:
-        raise StiffmapError(f"expected a unit that is known, such as {EXAMPLES}; found {label!r}")
+        raise _unlike(f"a unit that is known, such as {EXAMPLES}", repr(label))
     return unit
 
 
@@ -254,6 +242,10 @@ def _label(s: DataSet, axis: str) -> str:
         return own.strip("[]")
     inside = re.fullmatch(r".*[^)\]]\s*[(\[]([^()\[\]]+)[)\]]", name)
     return inside[1].strip() if inside else ""
+
+
+def _unlike(expected: str, found: str) -> StiffmapError:
+    return StiffmapError(f"expected {expected}; found {found}")
 
 
 def _written(s: DataSet) -> str:

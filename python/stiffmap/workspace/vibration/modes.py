@@ -8,12 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from stiffmap.common.broadcasting import (
-    Floats,
-    real_array,
-    thread_count,
-    whole_number,
-)
+from stiffmap.common.broadcasting import Floats, real_array, refused, thread_count, whole_number
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.description import Cable, Joint, Spring
 from stiffmap.model.description.tree import all_elements, core_name
@@ -21,24 +16,18 @@ from stiffmap.solve.closing import loaded_poses
 from stiffmap.solve.machine import Machine
 from stiffmap.workspace.performance.motion.inertia import inertias, need_masses
 
-ASSUMED = 0.02
-"""Damping ratio of every mode of a machine that declares none."""
+ASSUMED = 0.02  # damping ratio of every mode of a machine that declares none
 
 
 @dataclass(frozen=True, eq=False)
 class Damping:
     """Damping by coordinate, and of the modes."""
 
-    viscous: Floats
-    """(coordinates,) N·s/m, N·m·s/rad."""
-    loss: Floats
-    """(coordinates,) structural loss factor of the spring or law of each."""
-    ratios: tuple[float, ...]
-    """Of the modes, lowest first, the last for all further ones; empty: none."""
-    said: str
-    """Where it comes from, in words."""
-    assumed: bool = False
-    """Whether the machine file declares none."""
+    viscous: Floats  # (coordinates,) N·s/m, N·m·s/rad
+    loss: Floats  # (coordinates,) structural loss factor of the spring or law of each
+    ratios: tuple[float, ...]  # of the modes, lowest first, the last for all further ones; empty: none
+    said: str  # where it comes from, in words
+    assumed: bool = False  # whether the machine file declares none
 
     def of_modes(self, count: int) -> Floats:
         """(count,) damping ratios."""
@@ -53,26 +42,18 @@ def damping_of(machine: Machine, given: ArrayLike | None = None) -> Damping:
     Raises StiffmapError for ratios below 0, or 1 and above (per cent were meant).
     """
     viscous, loss = coordinate_damping(machine)
-    own = machine.description.modal_damping
-    parts: list[str] = []
-    assumed = given is None and not (own or np.any(viscous) or np.any(loss))
-    if np.any(viscous):
-        parts.append(f"dampers at {int(np.count_nonzero(viscous))} coordinates")
-    if np.any(loss):
-        parts.append(f"loss factors at {int(np.count_nonzero(loss))} coordinates")
-    if given is not None:
-        ratios = _ratios(given)
-        parts.insert(0, f"modal ratios {_listed(ratios)}, as given")
-    elif own:
-        ratios = own
-        parts.insert(0, f"modal ratios {_listed(ratios)}, declared")
-    elif parts:
-        ratios = ()
-        parts.append("declared; no modal ratios")
+    counts = {"dampers": np.count_nonzero(viscous), "loss factors": np.count_nonzero(loss)}
+    parts = [f"{what} at {n} coordinates" for what, n in counts.items() if n]
+    ratios = machine.description.modal_damping if given is None else _ratios(given)
+    if not (ratios or parts):
+        said = f"assumed: {100 * ASSUMED:g} % of every mode, since the machine file declares none"
+        return Damping(viscous, loss, (ASSUMED,), said, assumed=True)
+    if ratios:
+        listed = ", ".join(f"{100 * r:.3g} %" for r in ratios)
+        parts.insert(0, f"modal ratios {listed}, {'declared' if given is None else 'as given'}")
     else:
-        ratios = (ASSUMED,)
-        parts.append(f"assumed: {100 * ASSUMED:g} % of every mode, since the machine file declares none")
-    return Damping(viscous, loss, ratios, "; ".join(parts), assumed)
+        parts.append("declared; no modal ratios")
+    return Damping(viscous, loss, ratios, "; ".join(parts))
 
 
 def coordinate_damping(machine: Machine) -> tuple[Floats, Floats]:
@@ -97,18 +78,12 @@ def coordinate_damping(machine: Machine) -> tuple[Floats, Floats]:
 def _ratios(given: ArrayLike) -> tuple[float, ...]:
     out = np.atleast_1d(real_array(given, "damping", "damping ratios, 0.02 for 2 %"))
     if out.ndim != 1 or not out.size or not ((out >= 0) & (out < 1)).all():
-        raise StiffmapError(
-            f"damping: expected one damping ratio or a list of them, from 0 to below 1 (0.02 is 2 %), got {given!r}"
-        )
+        what = "one damping ratio or a list of them, from 0 to below 1 (0.02 is 2 %)"
+        raise refused("damping", what, repr(given))
     return tuple(float(v) for v in out)
 
 
-def _listed(ratios: tuple[float, ...]) -> str:
-    return ", ".join(f"{100 * r:.3g} %" for r in ratios)
-
-
-SYMMETRIC = 1e-9
-"""Part of a tangent that is not symmetric, relative, up to which it is round-off."""
+SYMMETRIC = 1e-9  # part of a tangent that is not symmetric, relative, up to which it is round-off
 
 
 @dataclass(frozen=True, eq=False)

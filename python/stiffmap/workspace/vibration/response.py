@@ -20,8 +20,7 @@ from stiffmap.workspace.vibration.modes import SYMMETRIC, TipModes, tip_modes
 Complex = NDArray[np.complex128]
 WORST_BASIS = 1e8
 """Condition of the eigenvectors from which on (critically damped pairs) each frequency is solved by itself."""
-BLOCK = 64
-"""Poses of one call of a thread."""
+BLOCK = 64  # poses of one call of a thread
 
 
 def receptance(modes: TipModes, frequency: Floats, threads: int | None = None) -> Complex:
@@ -173,18 +172,12 @@ def frequency_response(
     if worst > SYMMETRIC:
         attrs["unsymmetric"] = worst
         attrs["symmetrised"] = "the symmetric part of the loaded stiffness was taken"
-    return xr.DataArray(
-        values.reshape(*batch, *values.shape[1:]),
-        dims=(*poses, "frequency", "response", "force"),
-        coords={
-            "frequency": ("frequency", f, {"units": "Hz"}),
-            "response": list(MOTION),
-            "force": list(WRENCH),
-            "status": (poses, found.status.reshape(batch)),
-        },
-        name=kind,
-        attrs=attrs,
-    )
+    dims = (*poses, "frequency", "response", "force")
+    coords = {
+        "frequency": ("frequency", f, {"units": "Hz"}), "response": list(MOTION), "force": list(WRENCH),
+        "status": (poses, found.status.reshape(batch)),
+    }  # fmt: skip
+    return xr.DataArray(values.reshape(*batch, *values.shape[1:]), coords, dims, kind, attrs)
 
 
 def frequency_axis(frequencies: ArrayLike) -> Floats:

@@ -48,19 +48,9 @@ FREQUENCIES = {
 }  # fmt: skip
 """In Hz, by their names in small letters."""
 SPELLINGS = {
-    "µ": "u",
-    "μ": "u",
-    "·": "*",
-    "×": "*",
-    ".": "*",
-    "²": "^2",
-    "⁻¹": "^-1",
-    "⁻²": "^-2",
-    "**": "^",
-    "inch": "in",
-}
-UNREADABLE = "\ufffd"
-"""What a reader of UTF-8 makes of µ and ² in another encoding."""
+    "µ": "u", "μ": "u", "·": "*", "×": "*", ".": "*", "²": "^2", "⁻¹": "^-1", "⁻²": "^-2", "**": "^", "inch": "in",
+}  # fmt: skip
+UNREADABLE = "\ufffd"  # what a reader of UTF-8 makes of µ and ² in another encoding
 LONGEST = 80  # characters
 TOKEN = re.compile(r"\s*([A-Za-z_]+(?:'s)?|\^?-?\d+|[*/()])")
 

@@ -23,8 +23,8 @@ from stiffmap.machining.toolpath import load_path, outline_text, sampled
 from stiffmap.model.link.linkfile import load_link
 from stiffmap.model.link.readers import read_field
 from stiffmap.model.urdf.importing import import_urdf
-from stiffmap.workspace.maps import block
-from stiffmap.workspace.maps.zarr_map import ZarrMap
+from stiffmap.workspace.maps import plan
+from stiffmap.workspace.maps.store import ZarrMap
 
 ROOT = Path(__file__).parents[4]
 MACHINES = ROOT / "python/stiffmap/model/machines"
@@ -130,11 +130,11 @@ def _zarr_call() -> tuple[tuple[sm.Machine], dict[str, Any]]:
 
 @contextmanager
 def _tiles_of_one_row() -> Iterator[None]:
-    usual, block.TILE_POSES = block.TILE_POSES, 2
+    usual, plan.TILE_POSES = plan.TILE_POSES, 2
     try:
         yield
     finally:
-        block.TILE_POSES = usual
+        plan.TILE_POSES = usual
 
 
 class PowerCut(Exception):

@@ -8,8 +8,8 @@ import pytest
 import stiffmap as sm
 from stiffmap.ui.plot.design import comparison_figure
 from stiffmap.workspace.design import load_design
+from stiffmap.workspace.design.chosen import robustness
 from stiffmap.workspace.design.judging import judge, refine
-from stiffmap.workspace.design.robustness import robustness
 
 MACHINE = """
 name: bar

@@ -20,10 +20,10 @@ import pytest
 import xarray as xr
 
 import stiffmap as sm
-from stiffmap.workspace.maps import block
+from stiffmap.workspace.maps import plan
 from stiffmap.workspace.maps.files import read_dataset
 from stiffmap.workspace.maps.statistics import RELATIVE_WIDTH, Histogram
-from stiffmap.workspace.maps.zarr_map import ZarrMap
+from stiffmap.workspace.maps.store import ZarrMap
 
 pytest.importorskip("zarr")
 AXIS = np.linspace(-0.2, 0.3, 12)
@@ -39,7 +39,7 @@ DEEP = "[" * 100_000
 
 @pytest.fixture(autouse=True)
 def _small_tiles(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(block, "TILE_POSES", 24)
+    monkeypatch.setattr(plan, "TILE_POSES", 24)
 
 
 def tree(folder: Path) -> dict[str, bytes]:
@@ -51,7 +51,7 @@ def whole(machine: sm.Machine, tmp_path_factory: pytest.TempPathFactory) -> dict
     """Bytes of an uninterrupted run."""
     out = tmp_path_factory.mktemp("whole") / "m.zarr"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(block, "TILE_POSES", 24)
+        patch.setattr(plan, "TILE_POSES", 24)
         sm.error_map(machine, **CALL, out=out, threads=1).close()
     return tree(out)
 
@@ -73,9 +73,9 @@ JOB = """
     import sys, time
     import numpy as np
     import stiffmap as sm
-    from stiffmap.workspace.maps import block
-    from stiffmap.workspace.maps.zarr_map import ZarrMap
-    block.TILE_POSES = 24
+    from stiffmap.workspace.maps import plan
+    from stiffmap.workspace.maps.store import ZarrMap
+    plan.TILE_POSES = 24
     real = ZarrMap.put
     def slow(self, index, values):
         print(index, flush=True)

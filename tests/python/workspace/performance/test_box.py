@@ -11,8 +11,7 @@ import stiffmap as sm
 from stiffmap.model.files.shipped import find
 from stiffmap.workspace.performance.box.box import best_orientation
 from stiffmap.workspace.performance.box.box_search import BoxSearch
-from stiffmap.workspace.performance.box.cells import shrink
-from stiffmap.workspace.performance.box.proof import enclose, judge_cells, sample
+from stiffmap.workspace.performance.box.proof import enclose, judge_cells, sample, shrink
 from stiffmap.workspace.performance.limits.bars import segment_distance
 from stiffmap.workspace.performance.limits.limits import Bounds, Limit
 from stiffmap.workspace.performance.motion.closing import drive_kinematics

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import stiffmap as sm
-from stiffmap.workspace.performance.kinds.transmission import TYPES
+from stiffmap.workspace.performance.kinds.drives import TYPES
 from stiffmap.workspace.performance.motion.closing import drive_kinematics
 from stiffmap.workspace.performance.motion.velocity import distances
 

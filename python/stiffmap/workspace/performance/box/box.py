@@ -22,8 +22,7 @@ from stiffmap.workspace.performance.box.box_search import BoxSearch
 from stiffmap.workspace.performance.box.proof import judge_on
 from stiffmap.workspace.performance.limits.limits import Bounds
 
-WORK = 100_000
-"""Cells and poses at most; when they are used up, the bounds stay as far apart as they are."""
+WORK = 100_000  # cells and poses at most; when they are used up, the bounds stay as far apart as they are
 
 
 @short_repr
@@ -185,10 +184,8 @@ def best_orientation(bounds: Bounds, shape: Floats, region: Floats, gap: float) 
 
     def minus_edge(vector: Floats) -> float:
         axes = Rotation.from_rotvec(vector).as_matrix()
-        search = BoxSearch(
-            replace(bounds, counter=[0]), shape, axes, turned(region, axes), 1e-3 * size, 10**9
-        )
-        return -search.estimate()[1]
+        alone = replace(bounds, counter=[0])
+        return -BoxSearch(alone, shape, axes, turned(region, axes), 1e-3 * size, 10**9).estimate()[1]
 
     rng = np.random.default_rng(0)
     starts = np.concatenate([np.zeros((1, 3)), rng.uniform(-np.pi / 4, np.pi / 4, (STARTS - 1, 3))])

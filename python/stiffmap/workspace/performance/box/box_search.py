@@ -11,26 +11,21 @@ from scipy.spatial import cKDTree
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.workspace.maps.inputs import box_nodes
-from stiffmap.workspace.performance.box.cells import shrink
 from stiffmap.workspace.performance.box.inside import REACH
-from stiffmap.workspace.performance.box.proof import BOX, Judge, judge_cells
+from stiffmap.workspace.performance.box.proof import BOX, Judge, judge_cells, shrink
 from stiffmap.workspace.performance.limits.limits import Bounds
 
-SAMPLES = 9
-"""Nodes along each edge of the region where poses that break a limit are looked for first."""
+SAMPLES = 9  # nodes along each edge of the region where poses that break a limit are looked for first
 ROUNDS = 60
-STEP = 2e-3
-"""Spacing of the differences that give slopes at a corner, times the region's size."""
-AGAIN = 8
-"""Most times that the cube moves away from poses that the proof found broken."""
+STEP = 2e-3  # spacing of the differences that give slopes at a corner, times the region's size
+AGAIN = 8  # most times that the cube moves away from poses that the proof found broken
 SETTLED = 8
 """Most times that a climbed cube is climbed again because a limit is broken on its surface, between its corners."""
 LESS = 1e-3
 """A third of what is taken off a cube whose proof took too many cells; three times as much each time."""
 CROSS = np.concatenate([np.zeros((1, 3)), np.eye(3), -np.eye(3)])
 FACES = np.array([v for v in product((-1.0, 0.0, 1.0), repeat=3) if any(v)])
-NEAR = 0.05
-"""Of half the edge: points that are nearer to each other count as one."""
+NEAR = 0.05  # of half the edge: points that are nearer to each other count as one
 SURFACE = np.array([v for v in product(np.linspace(-1, 1, 25), repeat=3) if np.abs(v).max() == 1])
 MOST_CELLS = 8000
 TRIED = 24
@@ -40,15 +35,8 @@ class BoxSearch:
     """Works in coordinates of the box's axes divided by its proportions: boxes are then cubes."""
 
     def __init__(
-        self,
-        bounds: Bounds,
-        shape: Floats,
-        axes: Floats,
-        region: Floats,
-        gap: float,
-        work: int,
-        judge: Judge | None = None,
-    ) -> None:
+        self, bounds: Bounds, shape: Floats, axes: Floats, region: Floats, gap: float, work: int, judge: Judge | None = None
+    ) -> None:  # fmt: skip
         self.shape, self.axes, self.gap, self.work = shape, axes, gap, work
         self.low, self.high = region / shape
         self.size = float((self.high - self.low).max())

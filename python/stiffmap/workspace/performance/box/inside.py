@@ -21,13 +21,10 @@ from stiffmap.workspace.performance.motion.closing import (
 )
 from stiffmap.workspace.performance.motion.velocity import distances, transmission_of
 
-NEIGHBOURS = 8
-"""Of every pose: from those that close, it is tried next."""
-TURN = 0.5
-"""m, rad: most that a coordinate may change on the way to a neighbour at the border."""
+NEIGHBOURS = 8  # of every pose: from those that close, it is tried next
+TURN = 0.5  # m, rad: most that a coordinate may change on the way to a neighbour at the border
 STEPS = (0.03, 0.1, 0.3, 0.6, 0.9)
-SAME = 1e-2
-"""m, rad: coordinates that are the same; those of stretched legs are known by half their digits."""
+SAME = 1e-2  # m, rad: coordinates that are the same; those of stretched legs are known by half their digits
 REACH = "reach"
 SINGULAR = "singularity"
 
@@ -70,9 +67,8 @@ class Inside:
         """Judges poses (n, 3): each begins at a neighbour that closed, the first ones at the middle of the workspace;
         or all of them at the nearest one of poses that are known."""
         n, size = len(position), len(self.bounds.machine.compiled.names.coordinates)
-        out = JudgedPoses(
-            position, np.zeros(n, dtype=bool), np.zeros(n, dtype=bool), np.full((n, size), np.nan), {}
-        )
+        closed, inside = np.zeros((2, n), dtype=bool)
+        out = JudgedPoses(position, closed, inside, np.full((n, size), np.nan), {})
         if known is not None:
             if known.closed.any():
                 nearest = cKDTree(known.position[known.closed]).query(position)[1]
@@ -148,12 +144,8 @@ class Inside:
         return drive_kinematics(b.machine, p, b.rotation, start=start, only_start=True, threads=b.threads)
 
     def _judge(
-        self,
-        out: JudgedPoses,
-        rows: NDArray[np.int64],
-        k: DriveKinematics,
-        sound: NDArray[np.bool_] | None = None,
-    ) -> None:
+        self, out: JudgedPoses, rows: NDArray[np.int64], k: DriveKinematics, sound: NDArray[np.bool_] | None = None
+    ) -> None:  # fmt: skip
         """Poses of these numbers, whose kinematics are at hand; those that are not sound count as not reached."""
         closed = k.status == Status.CONVERGED
         if sound is not None:

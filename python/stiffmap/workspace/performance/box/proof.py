@@ -1,12 +1,14 @@
-"""Who decides cells: this process, or the workers of a cluster."""
+"""Whether cells of positions keep all limits, inside as well as on their borders, decided by this process or the workers of a cluster; how
+much of a cube does."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import partial
 from itertools import product
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,33 +17,26 @@ from stiffmap.common.broadcasting import Floats, thread_count
 from stiffmap.common.tasks import workers
 from stiffmap.workspace.performance.limits.limits import Bounds, factor_limits
 from stiffmap.workspace.performance.motion.closing import kernel_starts, revolute_drives
-from stiffmap.workspace.performance.motion.zonotopes import corners
+from stiffmap.workspace.performance.motion.many_drives import corners
 
-BOX = np.array(list(product((-1.0, 1.0), repeat=3)))
-"""(8, 3) corners of a cell, in half lengths."""
+BOX = np.array(list(product((-1.0, 1.0), repeat=3)))  # (8, 3) corners of a cell, in half lengths
 
 
 @dataclass(frozen=True, eq=False)
 class ProvenCells:
     """What was proven of cells of positions (n)."""
 
-    inside: NDArray[np.bool_]
-    """Every pose of the cell closes and keeps all limits."""
-    broken: NDArray[np.bool_]
-    """Some pose of it does not."""
-    where: Floats
-    """(n, 3) that pose, from the centre, along the cell's axes."""
-    limit: NDArray[np.int64]
-    """Index into `names` of the limit nearest to its bound, or beyond."""
+    inside: NDArray[np.bool_]  # every pose of the cell closes and keeps all limits
+    broken: NDArray[np.bool_]  # some pose of it does not
+    where: Floats  # (n, 3) that pose, from the centre, along the cell's axes
+    limit: NDArray[np.int64]  # index into `names` of the limit nearest to its bound, or beyond
     names: tuple[str, ...]
-    bend: Floats
-    """(n, 3) share of each axis in the curvature; NaN: unknown."""
+    bend: Floats  # (n, 3) share of each axis in the curvature; NaN: unknown
 
 
 Judge = Callable[[Floats, Floats, Floats], ProvenCells]
 """Of cells with centres (n, 3) m, half lengths (n, 3) m along the columns of axes (3, 3)."""
-PER_TASK = 500
-"""Cells of one task on a cluster; twice as many at least, or they are decided here."""
+PER_TASK = 500  # cells of one task on a cluster; twice as many at least, or they are decided here
 
 
 def judge_cells(bounds: Bounds) -> Judge:
@@ -64,12 +59,10 @@ def judge_on(bounds: Bounds, scheduler: object = None) -> Iterator[Judge]:
                 return enclose(bounds, centre, half, axes)
             bounds.counter[0] += n
             parts = [slice(k, k + PER_TASK) for k in range(0, n, PER_TASK)]
-            found = hands.in_order((centre[k], half[k], axes) for k in parts)
-            inside, broken, where, limit, bend = (
-                np.concatenate([getattr(cells, name) for cells in found])
-                for name in ("inside", "broken", "where", "limit", "bend")
-            )
-            return ProvenCells(inside, broken, where, limit, found[0].names, bend)
+            found: list[ProvenCells] = hands.in_order((centre[k], half[k], axes) for k in parts)
+            arrays = (f.name for f in fields(ProvenCells) if f.name != "names")
+            joined: Any = {n: np.concatenate([getattr(cells, n) for cells in found]) for n in arrays}
+            return replace(found[0], **joined)
 
         yield judge
 
@@ -79,8 +72,7 @@ def _some_cells(bounds: Bounds, cells: tuple[Floats, Floats, Floats]) -> ProvenC
     return enclose(bounds, *cells)
 
 
-SAFETY = 2.0
-"""On second derivatives, which are second differences between the nodes of each cell."""
+SAFETY = 2.0  # on second derivatives, which are second differences between the nodes of each cell
 _NODES = np.array(list(product((-1.0, 0.0, 1.0), repeat=3)))
 _MIDDLE = 13
 
@@ -217,3 +209,79 @@ def _largest(a: Floats) -> Floats:
     """(...) largest singular value."""
     gram = np.swapaxes(a, -1, -2) @ a
     return np.asarray(np.sqrt(np.maximum(np.linalg.eigvalsh(gram)[..., -1], 0.0)))
+
+
+FIRST = 4  # cells along each edge at first
+HALVED = 0.5  # axes with this share of the largest curvature, or more, are halved too
+
+
+@dataclass(frozen=True, eq=False)
+class Shrunk:
+    """The largest cube about a centre, up to the one asked for, that was decided to keep all limits."""
+
+    edge: float
+    broken: Floats  # (k, 3) positions that break a limit, in the cube's own coordinates
+    names: tuple[str, ...]  # limits that stopped it, or that came nearest to
+    cells: int
+
+
+def shrink(
+    judge: Judge, axes: Floats, shape: Floats, centre: Floats, edge: float, least: float, gap: float, work: int
+) -> Shrunk:  # fmt: skip
+    """Cells are halved until decided; an undecided one of a size near `gap`, or a point that breaks a
+    limit, shrinks the cube about its centre instead. Coordinates along `axes`, divided by `shape`.
+
+    Gives up (edge 0) below `least`, or when more than `work` cells were asked for.
+    """
+    step = np.arange(FIRST) / FIRST
+    low = np.stack(np.meshgrid(step, step, step, indexing="ij"), axis=-1).reshape(-1, 3)
+    low = centre - edge / 2 + edge * low
+    high = low + edge / FIRST
+    broken = [np.zeros((0, 3))]
+    names: dict[str, int] = {}
+    last, count, back = "", 0, 0.1 * gap
+    while len(low):
+        if count + len(low) > work or edge <= least:
+            return Shrunk(0.0, np.concatenate(broken), tuple(names) or (last,), count)
+        middle, half = (low + high) / 2, (high - low) / 2
+        found = judge((middle * shape) @ axes.T, half * shape, axes)
+        count += len(low)
+        outside = found.broken
+        if outside.any():
+            points = (middle + found.where / shape)[outside]
+            broken.append(points)
+            for i in np.unique(found.limit[outside]):
+                names[found.names[i]] = 1
+            edge = min(edge, 2 * float(np.abs(points - centre).max(axis=1).min()) - back)
+            back *= 3  # a face that sticks out is left in few steps
+        left = ~found.inside
+        last = found.names[int(found.limit[left][0])] if left.any() else last
+        low, high, bend = low[left], high[left], found.bend[left]
+        size = (high - low).max(axis=1) if len(low) else np.zeros(0)
+        tiny = size < 0.05 * gap
+        if tiny.any():
+            near = np.maximum(np.maximum(low - centre, centre - high).max(axis=1), 0.0)[tiny]
+            edge = min(edge, 2 * float(near.min()))
+            names[last] = 1
+        low, high = np.maximum(low, centre - edge / 2), np.minimum(high, centre + edge / 2)
+        kept = (high - low > 1e-15).all(axis=1)
+        low, high = halved(low[kept], high[kept], bend[kept])
+    return Shrunk(edge, np.concatenate(broken), tuple(names) or ((last,) if last else ()), count)
+
+
+def halved(low: Floats, high: Floats, bend: Floats) -> tuple[Floats, Floats]:
+    """Each cell cut in two along the axes that curve most; along the longest where that is not known."""
+    size = high - low
+    longest = np.maximum(size.max(axis=1, keepdims=True), 1e-300)
+    weight = np.where(np.isfinite(bend).all(axis=1, keepdims=True), bend * size / longest, size)
+    # an axis along which nothing curves is cut as well when it is far longer than the others
+    weight = weight + 1e-3 * size / longest * weight.max(axis=1, keepdims=True)
+    weight = np.where(weight.max(axis=1, keepdims=True) > 0, weight, size)
+    cut: NDArray[np.bool_] = np.greater_equal(weight, HALVED * weight.max(axis=1, keepdims=True))
+    for axis in range(3):
+        chosen, n = np.flatnonzero(cut[:, axis]), len(low)
+        middle = (low[chosen, axis] + high[chosen, axis]) / 2
+        low, high = (np.concatenate([a, a[chosen]]) for a in (low, high))
+        cut = np.concatenate([cut, cut[chosen]])
+        high[chosen, axis] = low[n:, axis] = middle
+    return low, high

@@ -16,17 +16,13 @@ from stiffmap.model.files.load import Source
 from stiffmap.solve.machine import Machine, as_machine
 from stiffmap.solve.options import keywords_of
 from stiffmap.workspace.maps.inputs import read_region
-from stiffmap.workspace.performance.box.cells import halved
 from stiffmap.workspace.performance.box.inside import Inside, JudgedPoses
-from stiffmap.workspace.performance.box.proof import Judge, judge_on
+from stiffmap.workspace.performance.box.proof import Judge, halved, judge_on
 from stiffmap.workspace.performance.limits.limits import Bounds
 
-CELLS = {3: 24, 2: 120, 1: 1000}
-"""Along each edge, by the number of axes."""
-FIRST = {3: 7, 2: 20, 1: 50}
-"""The same while the workspace's extent is looked for."""
-GROWN = 4
-"""Most times that a region is made larger because the workspace reaches its border."""
+CELLS = {3: 24, 2: 120, 1: 1000}  # along each edge, by the number of axes
+FIRST = {3: 7, 2: 20, 1: 50}  # the same while the workspace's extent is looked for
+GROWN = 4  # most times that a region is made larger because the workspace reaches its border
 
 
 @short_repr

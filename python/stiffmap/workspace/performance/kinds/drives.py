@@ -1,6 +1,11 @@
-"""What the tool does within what the machine file declares of its drives: speed, force, acceleration, accuracy."""
+"""What the tool does per speed and effort of the drives (§3, equations (1) and (2)): velocity transmission, singular values of the Jacobian
+(Figure 1a) and the sphere inscribed in the image of the cube (Figure 1b); how near the box comes to a singularity, and of which type; speed,
+force, acceleration and accuracy within what the machine file declares of its drives."""
 
 from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -8,10 +13,38 @@ from stiffmap.workspace.maps.inputs import plane_axes
 from stiffmap.workspace.performance.motion.closing import drive_values
 from stiffmap.workspace.performance.motion.efforts import acceleration_of
 from stiffmap.workspace.performance.motion.force import accuracy_of
-from stiffmap.workspace.performance.motion.inertia import rest_efforts
-from stiffmap.workspace.performance.motion.tensions import PUSHES, held, in_cables
-from stiffmap.workspace.performance.motion.zonotopes import inner_radius
+from stiffmap.workspace.performance.motion.inertia import PUSHES, held, in_cables, rest_efforts
+from stiffmap.workspace.performance.motion.many_drives import inner_radius
+from stiffmap.workspace.performance.motion.velocity import distances
 from stiffmap.workspace.performance.registry import Case, Found, Measure, over_poses
+
+TYPES = (
+    "type 1: a drive stops moving the tool",
+    "type 2: the tool runs away from its drives",
+    "constraint: with the drives held, the machine moves as no drive moves it",
+)
+
+
+def transmission(case: Case, factor: str, better: str) -> Found:
+    """Over all poses of the box, one field of `VelocityTransmission`."""
+    v = case.factors
+    return over_poses(case.positions, getattr(v, factor), better, length=v.length)
+
+
+def factor_measure(name: str, title: str, factor: str, better: str, order: int) -> Measure:
+    """The measure of one field."""
+    return Measure(name, title, "", better, partial(transmission, factor=factor, better=better), order=order)
+
+
+def singularity(case: Case) -> Found:
+    """Over all poses of the box, the smallest of `distances`; the note says which one."""
+    table = distances(case.factors, case.kinematics.pivot)
+    nearest = table.min(axis=0)
+    found = over_poses(case.positions, nearest, "high")
+    if not np.isfinite(found.worst):
+        return found
+    which = TYPES[int(np.argmin(table[:, int(np.argmin(nearest))]))]
+    return replace(found, note=f"nearest is {which}")
 
 
 def velocity(case: Case) -> Found:
@@ -48,12 +81,13 @@ def accuracy(case: Case) -> Found:
 
 
 MEASURES = (
-    Measure(
-        "velocity", "speed in every direction of the plane", "m/s", "high", velocity, "m/min", 60.0, order=20
-    ),
+    factor_measure("transmission_min", "smallest velocity transmission factor", "sphere_min", "high", 10),
+    factor_measure("transmission_max", "largest velocity transmission factor", "sphere_max", "low", 11),
+    factor_measure("condition", "condition number of the Jacobian", "condition", "low", 12),
+    factor_measure("cube_min", "speed in every direction per drive speed (cube)", "cube_min", "high", 13),
+    Measure("singularity", "distance from singularities (0: singular)", "", "high", singularity, order=15),
+    Measure("velocity", "speed in every direction of the plane", "m/s", "high", velocity, "m/min", 60.0, order=20),
     Measure("force", "force held in every direction of the plane", "N", "high", force, "N", order=21),
-    Measure(
-        "acceleration", "acceleration in every direction", "m/s^2", "high", acceleration, "m/s²", order=41
-    ),
+    Measure("acceleration", "acceleration in every direction", "m/s^2", "high", acceleration, "m/s²", order=41),
     Measure("accuracy", "tool error in the plane from encoders", "m", "low", accuracy, "mm", 1e3, order=22),
-)
+)  # fmt: skip

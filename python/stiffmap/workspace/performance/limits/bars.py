@@ -11,8 +11,7 @@ from stiffmap.solve.compiled.names import Role
 from stiffmap.solve.machine import Machine
 from stiffmap.workspace.performance.motion.inertia import movers
 
-SHORT = 0.02
-"""Of the machine's characteristic length: joints nearer than that are one."""
+SHORT = 0.02  # of the machine's characteristic length: joints nearer than that are one
 
 
 class Bars:

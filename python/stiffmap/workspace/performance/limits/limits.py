@@ -26,7 +26,7 @@ from stiffmap.workspace.performance.motion.closing import (
     kernel_starts,
     weighted,
 )
-from stiffmap.workspace.performance.motion.zonotopes import inverse_rows, worst_corner
+from stiffmap.workspace.performance.motion.many_drives import inverse_rows, worst_corner
 
 UNLIMITED = 1e299
 
@@ -36,11 +36,9 @@ class Limit:
     """One bound ``value <= most`` at poses (n,), of a smooth array."""
 
     name: str
-    value: Floats
-    """(n,)"""
+    value: Floats  # (n,)
     most: float
-    array: Floats
-    """(n, a) the smooth array, in the unit of `value`: |change of value| <= |change of array|."""
+    array: Floats  # (n, a) the smooth array, in the unit of `value`: |change of value| <= |change of array|
     left: Floats
     """(n, a): a lower estimate of the value at a neighbour is left·(array there), the value being convex."""
 
@@ -51,8 +49,7 @@ def factor_limits(factors: str, transmission: tuple[float, float]) -> tuple[str,
     return f"{sort} below {transmission[0]:g}", f"{sort} above {transmission[1]:g}"
 
 
-KNOWN = 4000
-"""Closed poses that are kept as starts, about."""
+KNOWN = 4000  # closed poses that are kept as starts, about
 
 
 @dataclass(frozen=True)
@@ -71,8 +68,7 @@ class Bounds:
     clearance: float | None = None
     deflection: tuple[float, str | None, float] | None = None
     """N, plane, m: force in its worst direction there, and the largest deflection."""
-    rotation: ArrayLike | None = None
-    """(3, 3); None: as at home."""
+    rotation: ArrayLike | None = None  # (3, 3); None: as at home
     threads: int | None = None
     transmission: tuple[float, float] | None = None
 

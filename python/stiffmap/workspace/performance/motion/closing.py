@@ -17,7 +17,7 @@ from stiffmap.solve.closing import commanded
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.status import Status
 from stiffmap.workspace.maps.inputs import magnitude
-from stiffmap.workspace.performance.motion.sharing import FLAT, drive_weights, motions
+from stiffmap.workspace.performance.motion.many_drives import FLAT, drive_weights, motions
 
 PARTS = {"all": slice(0, 6), "translation": slice(0, 3), "rotation": slice(3, 6)}
 
@@ -87,31 +87,24 @@ def weighted(machine: Machine, jacobian: Floats, length: float, part: str) -> Fl
     return out[..., PARTS[part], :]
 
 
-CHUNK = 16_384
-"""Poses that are solved at once."""
+CHUNK = 16_384  # poses that are solved at once
 
 
 @dataclass(frozen=True, eq=False)
 class DriveKinematics:
     """First-order kinematics of the rigid machine; NaN where the pose is UNREACHABLE or SINGULAR."""
 
-    jacobian: Floats
-    """(..., 6, drives): TCP twist (base axes) per unit rate of each drive."""
-    coordinates: Floats
-    """(..., coordinates) all coordinates, springs at zero."""
-    actuators: Floats
-    """(..., drives) m or rad."""
-    position: Floats
-    """(..., 3) m, TCP; where the task leaves a component open, the closure's answer."""
-    rotation: Floats
-    """(..., 3, 3)."""
+    jacobian: Floats  # (..., 6, drives): TCP twist (base axes) per unit rate of each drive
+    coordinates: Floats  # (..., coordinates) all coordinates, springs at zero
+    actuators: Floats  # (..., drives) m or rad
+    position: Floats  # (..., 3) m, TCP; where the task leaves a component open, the closure's answer
+    rotation: Floats  # (..., 3, 3)
     free_twist: Floats
     """(..., 6) with all drives held, the motion of the platform at a SINGULAR pose; else NaN."""
     sharing: Floats
     """(..., drives, drives) takes any rates to the nearest that go together, transposed the efforts that a motion needs
     to the drives' shares; the identity unless drives outnumber the freedoms."""
-    together: NDArray[np.int32]
-    """(...) dimension of the rates of drives that go together."""
+    together: NDArray[np.int32]  # (...) dimension of the rates of drives that go together
     pivot: Floats
     """(...) smallest relative pivot of the loops' elimination: 0 at a pose where passive joints lose rank."""
     status: NDArray[np.uint8]
@@ -143,18 +136,15 @@ def drive_kinematics(
     shape = batch(p.shape[:-1], r.shape[:-2])
     flat_p, flat_r = rows(p, shape, (3,)), rows(r, shape, (3, 3))
     compiled, size = machine.compiled, len(machine.compiled.names.coordinates)
-    begin: Floats | None = None
-    if start is not None:
-        begin = rows(trailing(start, (size,), "start", "coordinates"), shape, (size,))
+    begin = None if start is None else rows(trailing(start, (size,), "start", "coordinates"), shape, (size,))
     if only_start and begin is None:
         raise StiffmapError("only_start: needs start, coordinates of neighbouring poses")
     out = compiled.rates(
         flat_p, flat_r, begin, weights=drive_weights(machine, sharing), patient=patient, only=only_start,
         threads=thread_count(threads),
     )  # fmt: skip
-    drives = list(compiled.drives)
     shaped = {k: v.reshape(shape + v.shape[1:]) for k, v in out.items()}
-    return DriveKinematics(actuators=shaped["coordinates"][..., drives], **shaped)
+    return DriveKinematics(actuators=shaped["coordinates"][..., list(compiled.drives)], **shaped)
 
 
 def kernel_starts(
@@ -175,8 +165,7 @@ def kernel_starts(
     return out
 
 
-STEPS = 24
-"""Halvings between two samples, to say where and when."""
+STEPS = 24  # halvings between two samples, to say where and when
 
 
 def refuse_failed(machine: Machine, k: DriveKinematics, time: Floats | None, position: Floats) -> None:
@@ -202,9 +191,8 @@ def _between(machine: Machine, k: DriveKinematics, position: Floats, i: int) -> 
     for _ in range(STEPS):
         middle = (low + high) / 2
         there = drive_kinematics(machine, a + middle * (b - a), k.rotation[i - 1], start=start)
-        jacobian, together = (
-            np.stack([getattr(k, name)[i - 1], getattr(there, name)]) for name in ("jacobian", "together")
-        )
+        jacobian = np.stack([k.jacobian[i - 1], there.jacobian])
+        together = np.stack([k.together[i - 1], there.together])
         if there.status != Status.CONVERGED or _crossed(machine, jacobian, together)[1]:
             high = middle
         else:

@@ -20,22 +20,19 @@ from stiffmap.workspace.performance.motion.closing import (
     revolute_drives,
 )
 from stiffmap.workspace.performance.motion.inertia import (
+    as_tensions,
+    held,
+    in_cables,
+    inertia_columns,
     motion_friction,
     need_masses,
     rest_efforts,
     rigid_dynamics,
 )
-from stiffmap.workspace.performance.motion.tensions import (
-    as_tensions,
-    held,
-    in_cables,
-    inertia_columns,
-)
+from stiffmap.workspace.performance.motion.many_drives import inner_radius, inverse_rows
 from stiffmap.workspace.performance.motion.trajectory import Trajectory
-from stiffmap.workspace.performance.motion.zonotopes import inner_radius, inverse_rows
 
-IMPOSSIBLE = 1e-6
-"""Relative part of a motion that the machine cannot do: above it, the trajectory is refused."""
+IMPOSSIBLE = 1e-6  # relative part of a motion that the machine cannot do: above it, the trajectory is refused
 
 
 @takes_machine

@@ -23,10 +23,8 @@ from stiffmap.workspace.performance.motion.closing import (
     drive_values,
     weighted,
 )
-from stiffmap.workspace.performance.motion.inertia import rest_efforts
-from stiffmap.workspace.performance.motion.tensions import PUSHES, as_tensions, held, in_cables
-from stiffmap.workspace.performance.motion.velocity import of_motions, singular_values
-from stiffmap.workspace.performance.motion.zonotopes import (
+from stiffmap.workspace.performance.motion.inertia import PUSHES, as_tensions, held, in_cables, rest_efforts
+from stiffmap.workspace.performance.motion.many_drives import (
     Polygon,
     corners,
     farthest_vertex,
@@ -34,6 +32,7 @@ from stiffmap.workspace.performance.motion.zonotopes import (
     section_polygon,
     worst_corner,
 )
+from stiffmap.workspace.performance.motion.velocity import of_motions, singular_values
 
 
 @short_repr
@@ -89,16 +88,11 @@ def accuracy_of(
     """The same from kinematics that are at hand, first order."""
     e = drive_values(machine, "encoder_error", errors, "m or rad", "errors")
     j = k.jacobian * e
+    parts = (slice(0, 3), slice(3, 6), list(plane_axes(plane)))
+    translation, rotation, in_plane = (farthest_vertex(j[..., rows, :]) for rows in parts)
     return AccuracyTransmission(
-        translation=farthest_vertex(j[..., :3, :]),
-        rotation=farthest_vertex(j[..., 3:, :]),
-        plane=farthest_vertex(j[..., list(plane_axes(plane)), :]),
-        components=np.abs(j).sum(axis=-1),
-        corner=worst_corner(j[..., :3, :]),
-        nonlinear=None,
-        errors=e,
-        status=k.status,
-    )
+        translation, rotation, in_plane, components=np.abs(j).sum(axis=-1), corner=worst_corner(j[..., :3, :]), nonlinear=None, errors=e, status=k.status
+    )  # fmt: skip
 
 
 def _by_closing(machine: Machine, k: DriveKinematics, errors: Floats, threads: int | None) -> Floats:
@@ -176,12 +170,5 @@ def force_transmission(
         j = weighted(machine, k.jacobian, characteristic_length(machine, length), "all")
         s, last = of_motions(machine, k, singular_values(j))
         least, largest = 1 / s[..., 0], 1 / last
-    return ForceTransmission(
-        sphere_min=least,
-        sphere_max=largest,
-        force_min=inner_radius(*found),
-        plane=section_polygon(rows[..., list(plane_axes(plane))], room, k.status, offset),
-        bias=bias,
-        limits=most,
-        status=k.status,
-    )
+    section = section_polygon(rows[..., list(plane_axes(plane))], room, k.status, offset)
+    return ForceTransmission(least, largest, inner_radius(*found), section, bias, most, k.status)

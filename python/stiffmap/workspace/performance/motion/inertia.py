@@ -1,4 +1,5 @@
-"""Masses of a machine, the efforts that they ask of the drives, and its natural frequencies (docs/theory.md D4-D7)."""
+"""Masses of a machine, the efforts that they ask of the drives, and its natural frequencies (docs/theory.md D4-D7); what cables hold, since
+they pull and never push: forces and motions within their largest tensions (theory B7)."""
 
 from __future__ import annotations
 
@@ -13,13 +14,15 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.common.short import short_repr
 from stiffmap.model.description import Body
 from stiffmap.model.description.tree import all_elements, core_name
+from stiffmap.model.link.transport import skew
 from stiffmap.solve.closing import loaded_poses
 from stiffmap.solve.compiled.machine import CompiledMachine
 from stiffmap.solve.compiled.names import Role
 from stiffmap.solve.labels import OverPoses
 from stiffmap.solve.machine import Machine, takes_machine
+from stiffmap.workspace.cables.structure import Hanging, hanging, lines, matrix, nearest, scaled, weight
 from stiffmap.workspace.performance.motion.closing import DriveKinematics, declared, revolute_drives
-from stiffmap.workspace.performance.motion.sharing import drive_weights, followed
+from stiffmap.workspace.performance.motion.many_drives import drive_weights, followed, inverse_rows, sides
 
 
 def movers(compiled: CompiledMachine, node: int) -> Iterator[tuple[int, int]]:
@@ -61,11 +64,9 @@ def need_masses(machine: Machine, what: str) -> None:
             f"{machine.name}: {what} needs masses, and the machine file declares no body; "
             f"add 'body' elements to the legs {', '.join(machine.legs)} and the platform"
         )
-    empty = [name for name, _, mass in bodies if mass <= 0]
+    empty = ", ".join(name for name, _, mass in bodies if mass <= 0)
     if empty:
-        raise StiffmapError(
-            f"{machine.name}: {what} needs masses; these bodies have none: {', '.join(empty)}"
-        )
+        raise StiffmapError(f"{machine.name}: {what} needs masses; these bodies have none: {empty}")
 
 
 SLOW = 1e-4
@@ -96,16 +97,9 @@ def friction_efforts(machine: Machine, rates: Floats, sense: Floats | None = Non
 
 
 def rigid_dynamics(
-    machine: Machine,
-    coordinates: Floats,
-    twist: Floats,
-    twist_rate: Floats,
-    wrench: Floats,
-    gravity: ArrayLike | None,
-    threads: int | None = None,
-    *,
-    sharing: str = "least_norm",
-) -> dict[str, Floats]:
+    machine: Machine, coordinates: Floats, twist: Floats, twist_rate: Floats, wrench: Floats, gravity: ArrayLike | None,
+    threads: int | None = None, *, sharing: str = "least_norm",
+) -> dict[str, Floats]:  # fmt: skip
     """The core's inverse dynamics at closed coordinates (n, coordinates) and tip motions (n, 6); see `drive_weights`."""
     rates = accelerations = np.zeros((0, len(machine.actuators)))
     if machine.compiled.redundancy and (np.any(twist) or np.any(twist_rate)):
@@ -120,13 +114,8 @@ def rigid_dynamics(
 
 
 def rest_efforts(
-    machine: Machine,
-    k: DriveKinematics,
-    *,
-    gravity: ArrayLike | None,
-    velocity: ArrayLike | None,
-    sharing: str = "least_norm",
-) -> Floats:
+    machine: Machine, k: DriveKinematics, *, gravity: ArrayLike | None, velocity: ArrayLike | None, sharing: str = "least_norm"
+) -> Floats:  # fmt: skip
     """(..., drives) efforts at rest under gravity, or at a constant velocity with friction."""
     shape, drives = k.status.shape, k.actuators.shape[-1]
     g = machine.compiled.gravity(gravity)
@@ -199,3 +188,67 @@ def natural_frequencies(
         shape=(w0[..., None] * out["shape"]).reshape(*shape, *out["shape"].shape[1:]),
         **found,
     )
+
+
+Held = tuple[Floats, Floats, Floats]
+"""Rows (..., f, c), limits (..., f), offsets (..., f): what is held is all v with |rows v + offsets| <= limits."""
+PUSHES = np.vstack([np.eye(3), np.zeros((3, 3))])  # (6, 3) wrenches at the tcp of unit forces on it
+
+
+def in_cables(machine: Machine, what: str) -> Hanging | None:
+    """The platform of a machine in cables alone; None where there are no cables.
+
+    StiffmapError for a machine with both cables and legs, of which `what` is not known.
+    """
+    if not machine.compiled.names.cables:
+        return None
+    if machine.description.legs:
+        raise StiffmapError(
+            f"{machine.name}: {what} is not known of a machine with both cables and legs, only of one that hangs in cables alone"
+        )
+    return hanging(machine)
+
+
+def held(
+    machine: Machine, h: Hanging, k: DriveKinematics, columns: Floats, most: Floats, gravity: ArrayLike | None
+) -> Held:
+    """Coordinates v of a wrench, columns (..., 6, c) times v, that tensions from 0 to `most` (cables,) N hold at poses
+    next to the weight. The tensions' wrenches fill a zonotope, whose facets are the rows."""
+    if len(most) < len(h.rows):
+        raise StiffmapError(
+            f"{machine.name}: {len(most)} cables for {len(h.rows)} freedoms hold no force in every direction"
+        )
+    load = weight(h, k.rotation, machine.compiled.gravity(gravity))
+    wanted, _ = scaled(h, columns, load)
+    a, load = scaled(h, matrix(*lines(h, k.position, k.rotation)), load)
+    normals, distance = sides(a * (most / 2), len(h.rows))
+    offset = np.einsum("...fr,...r->...f", normals, load + (a * (most / 2)).sum(axis=-1))
+    return normals @ wanted, distance, offset
+
+
+def inertia_columns(h: Hanging, rotation: Floats) -> Floats:
+    """(..., 6, 3) wrenches at the tcp that unit accelerations ask for, orientation kept."""
+    turning = skew(np.einsum("...ij,j->...i", rotation, h.com))
+    linear = np.broadcast_to(np.eye(3), turning.shape)
+    return np.asarray(h.mass * np.concatenate([linear, turning], axis=-2))
+
+
+def as_tensions(
+    machine: Machine, h: Hanging, k: DriveKinematics, effort: Floats, most: Floats, sharing: str
+) -> Floats:
+    """(..., cables) efforts of winches, minus the tensions, that do to the platform what these efforts do; of all tensions
+    from 0 to `most` those of the least sum of squares (`stiffness`: of squares over the cables' stiffness at home).
+    NaN where there are none."""
+    back = inverse_rows(k.jacobian)
+    asked = np.einsum("...nr,...n->...r", back, effort)
+    a, b = scaled(h, matrix(*lines(h, k.position, k.rotation)), asked)
+    weights = drive_weights(machine, sharing)
+    root = np.sqrt(weights) if weights.size else np.ones(len(most))
+    shape = b.shape[:-1]
+    bad = ~np.isfinite(b).all(axis=-1).reshape(-1)
+    flat_a = np.nan_to_num((a * root).reshape(-1, *a.shape[-2:]))
+    flat_b = np.nan_to_num(b.reshape(-1, b.shape[-1]))
+    none = np.zeros(len(most))
+    t, ok, _ = nearest(flat_a, flat_b, none, most / root, none)
+    t = np.where((ok & ~bad)[:, None], t * root, np.nan)
+    return np.asarray(-t.reshape(*shape, len(most)))

@@ -32,8 +32,7 @@ from stiffmap.workspace.performance.motion.trajectory import (
 )
 from stiffmap.workspace.performance.quantities import Force, Length, Speed, Time, under
 
-LEAST_ROWS = 6
-"""Of a table over time: its spline of degree 5 wants that many."""
+LEAST_ROWS = 6  # of a table over time: its spline of degree 5 wants that many
 
 
 class LineModel(FileModel):

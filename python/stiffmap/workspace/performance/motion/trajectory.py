@@ -13,14 +13,21 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 
-from stiffmap.common.broadcasting import Floats, real_array
+from stiffmap.common.broadcasting import Floats, real_array, refused
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import place_text
 from stiffmap.solve.machine import Machine
 from stiffmap.workspace.maps.inputs import plane_axes
 from stiffmap.workspace.performance.motion.closing import drive_kinematics, drive_values, refuse_failed
-from stiffmap.workspace.performance.motion.inertia import friction_efforts, need_masses, rigid_dynamics
-from stiffmap.workspace.performance.motion.tensions import PUSHES, held, in_cables, inertia_columns
+from stiffmap.workspace.performance.motion.inertia import (
+    PUSHES,
+    friction_efforts,
+    held,
+    in_cables,
+    inertia_columns,
+    need_masses,
+    rigid_dynamics,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,9 +64,7 @@ class Trajectory:
         for name in ("position", "velocity", "acceleration", "force"):
             value = getattr(self, name)
             if value.shape != (n, 3) or not np.isfinite(value).all():
-                raise StiffmapError(
-                    f"trajectory: expected finite {name} of shape ({n}, 3), got {value.shape}"
-                )
+                raise refused("trajectory", f"finite {name} of shape ({n}, 3)", str(value.shape))
         if n < 2 or not (np.diff(self.time) > 0).all():
             raise StiffmapError("trajectory: expected two or more times that increase")
 
@@ -105,9 +110,8 @@ def through(points: ArrayLike, samples: int = 401) -> Path:
         raise StiffmapError(f"path: expected two or more finite points (k, 3) in m, got shape {p.shape}")
     steps = np.linalg.norm(np.diff(p, axis=0), axis=1)
     if not (steps > 0).all():
-        raise StiffmapError(
-            f"path: points {int(np.argmin(steps)) + 1} and {int(np.argmin(steps)) + 2} coincide"
-        )
+        i = int(np.argmin(steps))
+        raise StiffmapError(f"path: points {i + 1} and {i + 2} coincide")
     if len(p) == 2:
         return line(p[0], p[1], samples)
     spline = CubicSpline(way_along(p) / steps.sum(), p)
@@ -117,13 +121,9 @@ def through(points: ArrayLike, samples: int = 401) -> Path:
 
 def run_along(path: Path, time: Floats, rate: Floats, square: Floats, bend: Floats) -> Trajectory:
     """At each sample of a path the time (s), ds/dt, its square and d²s/dt²; no force on the tool."""
-    return Trajectory(
-        time=time,
-        position=path.position,
-        velocity=path.first * rate[:, None],
-        acceleration=path.second * square[:, None] + path.first * bend[:, None],
-        force=np.zeros_like(path.position),
-    )
+    velocity = path.first * rate[:, None]
+    acceleration = path.second * square[:, None] + path.first * bend[:, None]
+    return Trajectory(time, path.position, velocity, acceleration, np.zeros_like(path.position))
 
 
 def timed(path: Path, duration: float) -> Trajectory:
@@ -182,10 +182,7 @@ def fastest(
     h = in_cables(machine, "a time-optimal run")
     a, b, c, rate = _terms(machine, k.coordinates, path, gravity, force, threads)
     speeds = drive_values(machine, "speed", None, "m/s or rad/s")
-    least, most = (
-        friction_efforts(machine, np.sign(rate) * 1e-12),
-        friction_efforts(machine, np.sign(rate) * speeds),
-    )
+    least, most = (friction_efforts(machine, np.sign(rate) * size) for size in (1e-12, speeds))
     # the speed is not known yet: friction counts where it hinders, at its largest, and where it helps, at its least
     if h is not None:
         moved = inertia_columns(h, k.rotation) @ np.stack([path.first, path.second], axis=-1)
@@ -198,23 +195,24 @@ def fastest(
     with np.errstate(divide="ignore"):
         top = ((speeds / np.abs(rate)) ** 2).min(axis=1)
         top = np.minimum(top, (speed / np.linalg.norm(path.first, axis=1)) ** 2)
-    if ((low > 0) | (high < 0)).any():
-        i = int(np.argmax(((low > 0) | (high < 0)).any(axis=1)))
-        raise StiffmapError(
-            f"{machine.name}: its drives cannot hold the load at {place_text(path.position[i], '.1f')} of the path"
-        )
-    x = _passes(np.diff(path.s), a, b, low, high, np.minimum(top, FASTEST))
-    return _run(path, x)
+    over = ((low > 0) | (high < 0)).any(axis=1)
+    if over.any():
+        place = place_text(path.position[int(np.argmax(over))], ".1f")
+        raise StiffmapError(f"{machine.name}: its drives cannot hold the load at {place} of the path")
+    step = np.diff(path.s)
+    x = _passes(step, a, b, low, high, np.minimum(top, FASTEST))
+    root = np.sqrt(x)
+    spans = 2 * step / (root[1:] + root[:-1])
+    if not np.isfinite(spans).all():
+        place = place_text(path.position[int(np.argmax(~np.isfinite(spans)))], ".1f")
+        raise StiffmapError(f"the drives cannot move the tool along the path at {place}")
+    u = np.append(np.diff(x) / (2 * step), 0.0)
+    return run_along(path, np.concatenate([[0.0], np.cumsum(spans)]), root, x, u)
 
 
 def _terms(
-    machine: Machine,
-    coordinates: Floats,
-    path: Path,
-    gravity: ArrayLike | None,
-    force: Floats,
-    threads: int | None,
-) -> tuple[Floats, Floats, Floats, Floats]:
+    machine: Machine, coordinates: Floats, path: Path, gravity: ArrayLike | None, force: Floats, threads: int | None
+) -> tuple[Floats, Floats, Floats, Floats]:  # fmt: skip
     """efforts = a u + b x + c along the path, and drive rates per path speed, each (n, drives)."""
     zero = np.zeros_like(path.first)
     first, second = np.hstack([path.first, zero]), np.hstack([path.second, zero])
@@ -270,17 +268,3 @@ def _passes(step: Floats, a: Floats, b: Floats, low: Floats, high: Floats, top: 
         _, most = _range(x[i], a[i], b[i], low[i], high[i])
         x[i + 1] = min(max(x[i] + 2 * step[i] * most, 0.0), controllable[i + 1])
     return x
-
-
-def _run(path: Path, x: Floats) -> Trajectory:
-    """Times, velocities and accelerations of the squared speeds x."""
-    step = np.diff(path.s)
-    root = np.sqrt(x)
-    spans = 2 * step / (root[1:] + root[:-1])
-    if not np.isfinite(spans).all():
-        i = int(np.argmax(~np.isfinite(spans)))
-        raise StiffmapError(
-            f"the drives cannot move the tool along the path at {place_text(path.position[i], '.1f')}"
-        )
-    u = np.append(np.diff(x) / (2 * step), 0.0)
-    return run_along(path, np.concatenate([[0.0], np.cumsum(spans)]), root, x, u)

@@ -22,13 +22,15 @@ from stiffmap.workspace.performance.motion.closing import (
     drive_limits,
     weighted,
 )
-from stiffmap.workspace.performance.motion.sharing import facets, motions, sides
-from stiffmap.workspace.performance.motion.zonotopes import (
+from stiffmap.workspace.performance.motion.many_drives import (
     Polygon,
+    facets,
     farthest_vertex,
     inverse_rows,
+    motions,
     rows_limit,
     section_polygon,
+    sides,
 )
 
 
@@ -91,8 +93,7 @@ def transmission_of(
         )  # fmt: skip
 
 
-APART = 0.1
-"""The loops lose rank at type 2 as well, but not that much faster than the tool runs away."""
+APART = 0.1  # the loops lose rank at type 2 as well, but not that much faster than the tool runs away
 
 
 def distances(v: VelocityTransmission, pivot: Floats) -> Floats:

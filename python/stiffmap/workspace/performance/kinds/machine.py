@@ -1,15 +1,26 @@
-"""Size of the workspace in the orientation of the case: its volume, and the first edge of the largest box of the required shape in it, equation (3)."""
+"""What the machine is in the orientation of the case: its masses, their first frequency, the ground that it stands over, the volume of its
+workspace, and the first edge of the largest box of the required shape in it, equation (3)."""
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
+from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.status import Status
+from stiffmap.workspace.maps.inputs import box_nodes
 from stiffmap.workspace.performance.box.box import largest_box
 from stiffmap.workspace.performance.box.workspace import workspace_volume
 from stiffmap.workspace.performance.limits.limits import Bounds
-from stiffmap.workspace.performance.registry import Case, Found, Measure
+from stiffmap.workspace.performance.motion.closing import drive_kinematics
+from stiffmap.workspace.performance.motion.inertia import (
+    moving_mass,
+    natural_frequencies,
+    need_masses,
+    total_mass,
+)
+from stiffmap.workspace.performance.registry import Case, Found, Measure, over_poses
 
 CELLS, QUICK = 12, 6
 
@@ -36,9 +47,8 @@ def edge(case: Case) -> Found:
         case.machine, case.proportions, tolerance=case.gap, scheduler=case.scheduler, **case.limits
     )
     if b.edge == 0:
-        return Found(
-            0.0, note=f"no pose was found inside; broken: {', '.join(b.limited_by)}", extra={"box": b}
-        )
+        note = f"no pose was found inside; broken: {', '.join(b.limited_by)}"
+        return Found(0.0, note=note, extra={"box": b})
     note = f"no box of {1e3 * b.edge_upper:.2f} mm; limited by {', '.join(b.limited_by) or 'nothing found'}; {b.guarantee}"
     return Found(b.edge, b.centre, b.edge, b.centre, note, extra={"box": b})
 
@@ -60,7 +70,44 @@ def concentric(case: Case) -> Found:
     return Found(float(edge), centre, note="about the centre, nodes only")
 
 
+def mass(case: Case) -> Found:
+    """All bodies that joints move."""
+    need_masses(case.machine, "mass")
+    return Found(moving_mass(case.machine), note=f"all bodies: {total_mass(case.machine):.4g} kg")
+
+
+def frequency(case: Case) -> Found:
+    """Over a coarse grid of the box, unloaded, drives held."""
+    w = natural_frequencies(
+        case.machine, case.coarse_positions, rotation=case.rotation, gravity=case.gravity, modes=1, threads=case.threads
+    )  # fmt: skip
+    return over_poses(case.coarse_positions, w.frequency[:, 0], "high")
+
+
+def footprint(case: Case) -> Found:
+    """Area in the base's xy plane of the frames of all bodies and joints."""
+    if case.quick:
+        k, corner = case.kinematics, _corners(case.positions)
+    else:
+        p = box_nodes(case.low, case.high, 2)
+        k = drive_kinematics(case.machine, p, case.rotation, threads=case.threads)
+        corner = _corners(p)
+    coordinates, status = k.coordinates[corner], k.status[corner]
+    if (status != Status.CONVERGED).any():
+        return Found(float("nan"), note="a corner of the box is not within reach")
+    points = np.concatenate([case.machine.compiled.frames(x)[0][1:] for x in coordinates])
+    size = np.ptp(points, axis=0)
+    return Found(float(size[0] * size[1]), note=f"{1e3 * size[0]:.0f} x {1e3 * size[1]:.0f} mm")
+
+
+def _corners(p: Floats) -> NDArray[np.bool_]:
+    return np.asarray(((p == p.min(axis=0)) | (p == p.max(axis=0))).all(axis=1))
+
+
 MEASURES = (
     Measure("largest_box", "edge of the largest box", "m", "high", edge, "mm", 1e3, order=5, apart=True),
     Measure("workspace", "volume of the workspace", "m^3", "high", volume, "m³", order=6, apart=True),
+    Measure("mass", "moving mass", "kg", "low", mass, "kg", order=40),
+    Measure("frequency", "first natural frequency", "Hz", "high", frequency, "Hz", order=42),
+    Measure("footprint", "ground that the machine stands over", "m^2", "low", footprint, "m²", order=43),
 )

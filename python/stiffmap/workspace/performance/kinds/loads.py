@@ -1,4 +1,5 @@
-"""Deflection of the loaded machine in a plane, force in its worst direction there."""
+"""Under load: the deflection in a plane, force in its worst direction there; what a given toolpath asks of the machine (§6: stiffness in
+the working direction; equation (4))."""
 
 from __future__ import annotations
 
@@ -7,23 +8,25 @@ from dataclasses import replace
 import numpy as np
 
 from stiffmap.common.broadcasting import Floats
+from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import vector_text
 from stiffmap.solve.budget import budget_where_stable, in_shares
 from stiffmap.solve.status import Status
 from stiffmap.workspace.maps.inputs import plane_axes
 from stiffmap.workspace.performance.limits.deflection import TURNS, worst_deflection
+from stiffmap.workspace.performance.motion.closing import drive_values
+from stiffmap.workspace.performance.motion.efforts import drive_efforts
 from stiffmap.workspace.performance.registry import Case, Found, Measure, over_poses
 
-SHARE = 0.8
-"""Of the largest deflection by the unloaded compliance: nodes above it are loaded at once."""
+SHARE = 0.8  # of the largest deflection by the unloaded compliance: nodes above it are loaded at once
 MARGIN = 1.1
 """On the largest ratio seen of loaded to unloaded: nodes that may exceed the worst by it are loaded too."""
 
 
-def compute(case: Case) -> Found:
+def deflection(case: Case) -> Found:
     """Over the box: a coarse grid of equilibria, then a search about its worst node."""
     if case.quick:
-        return quick(case)
+        return quick_deflection(case)
     d = worst_deflection(
         case.machine, box=np.stack([case.low, case.high]), force=case.force, plane=case.plane,
         nodes=case.coarse, turns=TURNS, rotation=case.rotation, gravity=case.gravity, threads=case.threads,
@@ -40,7 +43,7 @@ def compute(case: Case) -> Found:
     return replace(found, worst=d.value, worst_at=d.position)
 
 
-def quick(case: Case) -> Found:
+def quick_deflection(case: Case) -> Found:
     """At the nodes, each force along the direction in which the unloaded machine is weakest: the loaded
     equilibrium wherever the unloaded compliance does not rule out that it is the worst."""
     axes = list(plane_axes(case.plane))
@@ -79,4 +82,41 @@ def weakest(block: Floats) -> tuple[Floats, Floats]:
     return np.linalg.norm((block @ vector[..., None])[..., 0], axis=1), vector
 
 
-MEASURE = Measure("deflection", "deflection in the plane", "m", "low", compute, "mm", 1e3, order=30)
+MOST, QUICK = 201, 25  # samples of a toolpath
+
+
+def path_compliance(case: Case) -> Found:
+    """Along the path, at the equilibrium under the path's own force: u'Cu, u the direction of the force."""
+    position, force = case.path(QUICK if case.quick else MOST)
+    size = np.linalg.norm(force, axis=1)
+    if not (size > 0).any():
+        raise StiffmapError("needs a force along the toolpath: give force in the motion file")
+    position, force, unit = position[size > 0], force[size > 0], force[size > 0] / size[size > 0, None]
+    s = case.machine.solve(
+        position, np.hstack([force, np.zeros_like(force)]), rotation=case.rotation, gravity=case.gravity,
+        threads=case.threads,
+    )  # fmt: skip
+    along = np.einsum("ni,nij,nj->n", unit, s.compliance[:, :3, :3], unit)
+    return over_poses(position, np.where(s.status == Status.CONVERGED, along, np.nan), "low")
+
+
+def path_effort(case: Case) -> Found:
+    """Inverse dynamics along the motion, forces on the tool included."""
+    motion = case.motion
+    most = drive_values(case.machine, "force", None, "N or N·m")
+    run = motion.trajectory(case.machine, gravity=case.gravity)
+    e = drive_efforts(case.machine, run, gravity=case.gravity)
+    share = np.abs(e["effort"].values) / most
+    when, drive = np.unravel_index(int(np.argmax(share)), share.shape)
+    note = f"{case.machine.actuators[drive]}: {abs(float(e['effort'].values[when, drive])):.4g} at {run.time[when]:.3g} s"
+    return Found(
+        float(share.max()), run.position[when], note=note, positions=run.position, values=share.max(axis=1),
+        extra={"share": share, "drives": case.machine.actuators, "time": run.time},
+    )  # fmt: skip
+
+
+MEASURES = (
+    Measure("deflection", "deflection in the plane", "m", "low", deflection, "mm", 1e3, order=30),
+    Measure("path_compliance", "compliance along the force of the toolpath", "m/N", "low", path_compliance, "µm/N", 1e6, order=31),
+    Measure("path_effort", "share of the drives' efforts along the toolpath", "", "low", path_effort, order=44),
+)  # fmt: skip
