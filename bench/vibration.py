@@ -11,8 +11,7 @@ import time
 import numpy as np
 
 import stiffmap as sm
-from stiffmap.machining.chatter.cut import milling_process, multiplier_map
-from stiffmap.machining.chatter.modes import mode_rows
+from stiffmap.machining.chatter.cut import milling_process, mode_rows, multiplier_map
 
 MODES = ([(922, 0.011, 0.03993, "x")], [(922, 0.011, 0.03993, "x"), (922, 0.011, 0.03993, "y")])
 

@@ -27,8 +27,7 @@ import numpy as np
 
 import stiffmap as sm
 from stiffmap import Flag, Status
-from stiffmap.common.one_thread import on_one_thread
-from stiffmap.common.tasks import workers
+from stiffmap.common.tasks import on_one_thread, workers
 
 from .alter import slopes, with_one_effect
 from .cartesian.structure import Unsupported

@@ -27,15 +27,9 @@ MOST_THREADS = 4096
 
 
 KINDS = {
-    "b": "truth values",
-    "c": "complex numbers",
-    "m": "spans of time",
-    "M": "dates",
-    "U": "text",
-    "S": "bytes",
-    "T": "text",
+    "b": "truth values", "c": "complex numbers", "m": "spans of time", "M": "dates", "U": "text", "S": "bytes", "T": "text",
     "V": "records",
-}
+}  # fmt: skip
 """Kinds of numpy's types that are no real numbers."""
 
 

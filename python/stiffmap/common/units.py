@@ -10,12 +10,8 @@ from functools import lru_cache
 from typing import NamedTuple
 
 LENGTHS = {
-    "m": Fraction(1),
-    "cm": Fraction(1, 100),
-    "mm": Fraction(1, 1000),
-    "um": Fraction(1, 10**6),
-    "in": Fraction(254, 10**4),
-}
+    "m": Fraction(1), "cm": Fraction(1, 100), "mm": Fraction(1, 1000), "um": Fraction(1, 10**6), "in": Fraction(254, 10**4),
+}  # fmt: skip
 SYNONYMS = {"inch": "in", "µm": "um", "μm": "um", "µrad": "urad", "Nm": "N*m", "Nmm": "N*mm"}
 """Other ways to write a unit."""
 FORCES = {"N": Fraction(1), "kN": Fraction(1000), "MN": Fraction(10**6)}
@@ -23,14 +19,9 @@ MASSES = {"kg": Fraction(1), "g": Fraction(1, 1000), "t": Fraction(1000)}
 MOMENTS = {"N*m": Fraction(1), "N*mm": Fraction(1, 1000), "kN*m": Fraction(1000)}
 STRESSES = {"Pa": Fraction(1), "MPa": Fraction(10**6), "GPa": Fraction(10**9), "N/mm2": Fraction(10**6)}
 PLANE_ANGLES: dict[str, Fraction | float] = {
-    "rad": Fraction(1),
-    "mrad": Fraction(1, 1000),
-    "urad": Fraction(1, 10**6),
-    "deg": math.pi / 180,
-    "°": math.pi / 180,
-    "arcmin": math.pi / 10800,
-    "arcsec": math.pi / 648000,
-}
+    "rad": Fraction(1), "mrad": Fraction(1, 1000), "urad": Fraction(1, 10**6), "deg": math.pi / 180, "°": math.pi / 180,
+    "arcmin": math.pi / 10800, "arcsec": math.pi / 648000,
+}  # fmt: skip
 SIZES: dict[str, Fraction | float] = {**LENGTHS, **FORCES, **MASSES, **MOMENTS, **STRESSES, **PLANE_ANGLES}
 TIMES = {"s": Fraction(1), "min": Fraction(60)}
 QUANTITIES = {"m": "length", "N": "force", "N*m": "moment", "rad": "angle"}

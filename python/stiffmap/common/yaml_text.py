@@ -113,13 +113,12 @@ def _text_keys(
     node: Any, path: KeyPath, lines: dict[KeyPath, int], file: str, above: tuple[int, ...]
 ) -> None:
     """Record lines, make every key text, and refuse repeated keys and self-containing anchors."""
-    lines.setdefault(path, node.start_mark.line + 1)
+    line = node.start_mark.line + 1
+    lines.setdefault(path, line)
     if id(node) in above:
-        raise FileError("an anchor contains itself", file=file, line=node.start_mark.line + 1)
+        raise FileError("an anchor contains itself", file=file, line=line)
     if node.tag not in _PLAIN:
-        raise FileError(
-            f"expected plain data, found the tag {node.tag}", file=file, line=node.start_mark.line + 1
-        )
+        raise FileError(f"expected plain data, found the tag {node.tag}", file=file, line=line)
     above = (*above, id(node))
     if isinstance(node, yaml.SequenceNode):
         for i, item in enumerate(node.value):
@@ -232,8 +231,5 @@ def _check_events(events: Any, file: str) -> None:
                 f"expected at most {DEEPEST} levels inside each other, found more", file=file, line=line
             )
         if count > MOST_VALUES:
-            raise FileError(
-                f"expected at most {MOST_VALUES} values with all anchors written out, found more",
-                file=file,
-                line=line,
-            )
+            what = f"expected at most {MOST_VALUES} values with all anchors written out, found more"
+            raise FileError(what, file=file, line=line)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from stiffmap.common.html import table, titled
+from stiffmap.common.short import table, titled
 
 
 def experiment_html(e: Any) -> str:

@@ -11,10 +11,9 @@ from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import Floats, real_array
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.html import table, titled
 from stiffmap.common.json_text import plain
 from stiffmap.common.number_text import percents
-from stiffmap.common.short import short_repr
+from stiffmap.common.short import short_repr, table, titled
 from stiffmap.model.description import Cable
 from stiffmap.model.description.machine import in_words, source_of
 from stiffmap.model.description.tree import joint_of, joints

@@ -15,9 +15,9 @@ from stiffmap.common.arguments import checked
 from stiffmap.common.broadcasting import Floats, instance_of
 from stiffmap.common.errors import StiffmapError, frames_of_this_package
 from stiffmap.common.from_above import from_above
-from stiffmap.common.html import machine_html
 from stiffmap.common.kept import Kept
 from stiffmap.common.open_view import OpenView
+from stiffmap.common.short import machine_html
 from stiffmap.model.addresses import Listed, listed
 from stiffmap.model.description import MachineDescription
 from stiffmap.model.effects import add_effect

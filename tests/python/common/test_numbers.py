@@ -19,12 +19,12 @@ from stiffmap.common.number_text import (
     number_in,
     percent,
     percents,
+    read_value,
     vector_text,
     with_uncertainty,
 )
 from stiffmap.common.tables.cells import Cells
 from stiffmap.common.tables.sheet import read_sheet
-from stiffmap.common.value_units import read_value
 from stiffmap.ui.cli import main
 from stiffmap.ui.view.state import ViewState, from_permalink, permalink
 

@@ -12,7 +12,7 @@ import pytest
 import stiffmap as sm
 from stiffmap.common.errors import FileError
 from stiffmap.common.tables.lines import Spelling, is_finite
-from stiffmap.common.tables.poses import read_pose_table
+from stiffmap.common.tables.named import read_pose_table
 from stiffmap.common.tables.sheet import read_sheet
 from stiffmap.experiment.files.table import read_table
 from stiffmap.machining.process import load_process

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import stiffmap as sm
-from stiffmap.common.html import MOST_ROWS, table
+from stiffmap.common.short import MOST_ROWS, table
 from stiffmap.model.effects import kinds
 from stiffmap.model.effects.registry import SYNONYMS, found_by
 from stiffmap.ui.cli import main

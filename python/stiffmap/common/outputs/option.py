@@ -7,8 +7,7 @@ from typing import Any
 
 import typer
 
-from stiffmap.common.outputs.alone import reserved
-from stiffmap.common.outputs.keeping import check_replaceable
+from stiffmap.common.outputs.keeping import check_replaceable, reserved
 
 
 def written(help: str, default: object = None, *names: str) -> Any:

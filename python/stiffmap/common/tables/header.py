@@ -1,4 +1,5 @@
-"""The header of a table: one line, or several with groups, units in a line of their own, merged cells, a leading #."""
+"""The header of a table: one line, or several with groups, units in a line of their own, merged cells, a leading #; and what the name
+of a column stands for, in the words of workshops in several languages."""
 
 from __future__ import annotations
 
@@ -9,9 +10,9 @@ from contextlib import suppress
 from itertools import pairwise, zip_longest
 
 from stiffmap.common.errors import FileError, StiffmapError
+from stiffmap.common.number_text import terms
 from stiffmap.common.tables.lines import COMMENTS
 from stiffmap.common.units import TIMES, name_and_unit, unit_of
-from stiffmap.common.value_units import terms
 
 Line = tuple[int, list[str]]
 MOST_LINES = 4
@@ -225,3 +226,34 @@ def split_unit(header: str) -> tuple[str, str]:
     found = (pattern.fullmatch(header) for pattern in BEHIND)
     match = next((m for m in found if m and unit_of(m[2]) and not unit_of(header)), None)
     return (match[1].strip(), match[2].strip()) if match else (header.strip(), "")
+
+
+FORCE = "force|kraft|last|load|effort|charge|forza|carico|fuerza|carga"
+MOMENT = "moment|torque|drehmoment|momento|couple"
+DEFLECTION = (
+    "defl|deflection|displ?\\.?|displacement|déplacement|flèche|verschiebung|verlagerung|verformung|durchbiegung|"
+    "spostamento|freccia|desplazamiento|deflexión|flecha"
+)
+COMMANDED = "target|cmd|nom|nominal|command|commanded|ref|desired|soll"
+MEASURED = "act|actual|meas|measured|achieved|attained|ist"
+PATTERNS: tuple[tuple[str, str], ...] = (
+    ("id", r"#|id|nr\.?|no\.?|lfd\.? ?nr\.?|number|nummer|row|zeile|punkt|messpunkt|point|messpunkt nr\.?|point no\.?|punto"),
+    ("temperature", r"t|temp|temperature|temperatur"),
+    ("order", r"order|reihenfolge|sequence"),
+    ("setup", r"set-?up|aufbau|aufspannung"),
+    ("branch", r"branch|richtung der last|loading"),
+    *((f"f{a}", rf"f ?_?{a}|({FORCE})[ _.]?(in |en |f[ _]?)?{a}|{a} ?({FORCE})") for a in "xyz"),
+    *((f"m{a}", rf"m ?_?{a}|({MOMENT})[ _.]?(in |en |m[ _]?)?{a}") for a in "xyz"),
+    *((f"u_d{a}", rf"(u|±|sigma|std|uncertainty) ?_?d?{a}") for a in "xyz"),
+    *((f"d{a}", rf"(d|delta|δ|{DEFLECTION}|abweichung|error|dev|(dial )?gau?ge|dial|indicator|(mess)?uhr|reading|auslenkung|weg|dehnung)[ _.]?(in |en |[dδ][ _]?)?{a}|{a} ?_?(dif|diff|difference|dev|deviation|err|error|abweichung)|{a}[ _-]?({DEFLECTION}|dial|gau?ge|uhr|reading)") for a in "xyz"),
+    *((f"p{a}", rf"p_?{a}") for a in "xyz"),
+    ("ll", r"l|ll|(measured |gemessene )?(length|länge|laenge)|(draw[ -]?)?wire( ?length)?|(cable|string|ball-?bar|bar) ?length|seil(zug)?(länge)?|distance|abstand"),
+    *((f"r{a}", rf"r ?_?{a}|rotation ?_?{a}") for a in "xyz"),
+    *((a, rf"{a}|pos\.?[ _-]?{a}|{a}[ _-]?pos\.?|position ?_?{a}|(pose|punkt|messpunkt|tcp|ort|lage|koordinate|coordinate) ?_?{a}|{a}[ _-]?(t|{COMMANDED})|({COMMANDED})[ _-]?{a}") for a in "xyz"),
+)  # fmt: skip
+
+
+def meaning_of(name: str) -> str:
+    """``x``, ``fz``, ``dx``, ``temperature``, ``id`` and the like, of a name without its unit; empty for what is none of them."""
+    plain = re.sub(r"\s+", " ", name.strip().lower())
+    return next((m for m, pattern in PATTERNS if re.fullmatch(pattern, plain)), "")

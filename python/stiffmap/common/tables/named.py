@@ -1,7 +1,10 @@
-"""Tables whose columns have known names, each with its unit, for all commands that take points, forces or frequencies.
+"""Tables whose columns have known names, each with its unit, for all commands that take points, forces or frequencies; tables of poses
+among them, one convention for all commands.
 
 ``x [mm]``, ``x (mm)``, ``x in mm`` or ``x_mm``; order and case are free, a column of names of rows is left out, and all that
-`read_sheet` understands is read: groups, units in a line of their own or in the cells, lines above the header.
+`read_sheet` understands is read: groups, units in a line of their own or in the cells, lines above the header. Of poses x, y, z are the
+commanded TCP, rx, ry, rz its rotation vector from home, fx … mz the wrench on the tool, t the time, feed the speed along the path;
+docs/machine_files.md lists the columns.
 """
 
 from __future__ import annotations
@@ -17,13 +20,12 @@ import numpy as np
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError, StiffmapError
-from stiffmap.common.tables.header import split_unit
+from stiffmap.common.number_text import read_value
+from stiffmap.common.tables.header import meaning_of, split_unit
 from stiffmap.common.tables.lines import Spelling, finite_number, number
-from stiffmap.common.tables.meaning import meaning_of
 from stiffmap.common.tables.sheet import Layout, read_sheet
 from stiffmap.common.tables.table import Table
 from stiffmap.common.units import QUANTITIES, unit_of
-from stiffmap.common.value_units import read_value
 
 TURNING = {"rpm": math.pi / 30, "1/min": math.pi / 30, "rad/s": 1.0}
 PER = re.compile(r"_(?:per_)?(min|s|tooth)$")
@@ -176,3 +178,59 @@ def size_in(unit: str, si: str) -> float:
         if spelled is None or spelled.mass:
             raise
         return spelled.size
+
+
+LOADS = {**dict.fromkeys(("fx", "fy", "fz"), "N"), **dict.fromkeys(("mx", "my", "mz"), "N*m")}
+COLUMNS = {
+    **dict.fromkeys("xyz", "m"), **dict.fromkeys(("rx", "ry", "rz"), "rad"), **LOADS, "t": "s", "feed": "m/s",
+}  # fmt: skip
+"""Name of a column of poses -> SI unit."""
+USUAL = {"m": "mm", "m/s": "mm/min", "rad": "deg"}
+KNOWN = Known(COLUMNS, {n: f"{n} [{USUAL.get(si, si)}]" for n, si in COLUMNS.items()}, {"time": "t"})
+
+
+class PoseTable(NamedTable):
+    """Columns (n,) in SI by name, and the line of each row in the file."""
+
+    @property
+    def position(self) -> Floats:
+        """(n, 3) m."""
+        return self.block("xyz")
+
+    @property
+    def wrench(self) -> Floats:
+        """(n, 6) N, N·m; zero where there is no column."""
+        return self.block([*LOADS])
+
+    @property
+    def loaded(self) -> bool:
+        """Whether a column is a force or a moment."""
+        return not LOADS.keys().isdisjoint(self.values)
+
+    def rotation(self, home: Floats) -> Floats | None:
+        """(n, 3, 3) commanded orientations, turned from `home` about base axes; None: as at home."""
+        if not {"rx", "ry", "rz"} & set(self.values):
+            return None
+        from scipy.spatial.transform import Rotation
+
+        turns: Floats = Rotation.from_rotvec(self.block(("rx", "ry", "rz"))).as_matrix()
+        return turns @ home
+
+
+def read_pose_table(place: Path, *, at_home: Floats | None = None) -> PoseTable:
+    """The table of a CSV file.
+
+    `at_home` (3,) m stands in for x, y or z that have no column, along which a planar machine is not commanded; None: all three
+    are wanted. Raises FileError naming file, line, column, what was expected and what was found.
+    """
+    table = PoseTable(**vars(read_named(place, KNOWN)))
+    missing = [c for c in "xyz" if c not in table.values]
+    if missing and (at_home is None or len(missing) == 3):
+        table.fail(
+            f"no column {', '.join(missing)}; expected x [mm], y [mm], z [mm] and perhaps "
+            "t [s], feed [mm/min], fx [N], fy [N], fz [N]"
+        )
+    for c in missing:
+        assert at_home is not None  # refused before
+        table.values[c] = np.full(len(table.lines), at_home["xyz".index(c)])
+    return table

@@ -169,11 +169,8 @@ def _checked(header: Sequence[str], file: str, line: int) -> list[str]:
 def _names(first: Sequence[str], given: Sequence[str], file: str, line: int) -> list[str]:
     """Names of columns that a person says, or their numbers."""
     if len(given) > len(first):
-        raise FileError(
-            f"--header: expected at most {len(first)} names, one for each column; found {len(given)}",
-            file=file,
-            line=line,
-        )
+        what = f"--header: expected at most {len(first)} names, one for each column; found {len(given)}"
+        raise FileError(what, file=file, line=line)
     names = [*given, *[""] * (len(first) - len(given))]
     return [n.strip() or f"column {i}" for i, n in enumerate(names, 1)]
 
@@ -294,11 +291,8 @@ def _data(
             aside.append(f"row {n}, '{last}', is no reading")
         elif not any(is_finite(c, spelling) for c in cells):
             if _begins_table(cells, names, len(header), spelling, layout):
-                raise FileError(
-                    "another table begins here: say --table 1 for the one above, --table 2 for this one",
-                    file=file,
-                    line=n,
-                )
+                what = "another table begins here: say --table 1 for the one above, --table 2 for this one"
+                raise FileError(what, file=file, line=n)
             again = [c.strip() for c in cells[:2]] == list(header[:2])
             aside.append(f"row {n} {'repeats the header' if again else f'is a remark: {first[:40]}'}")
         else:

@@ -131,11 +131,8 @@ def _lines(rows: Iterable[Sequence[object]], path: Path) -> list[tuple[int, list
         if all(v is None for v in row):
             continue
         if n - (out[-1][0] if out else 0) > LONGEST_GAP:
-            raise FileError(
-                f"expected a table without gaps; found cells behind more than {LONGEST_GAP} blank lines",
-                file=str(path),
-                line=n,
-            )
+            what = f"expected a table without gaps; found cells behind more than {LONGEST_GAP} blank lines"
+            raise FileError(what, file=str(path), line=n)
         cells += len(row)
         if cells > MOST_CELLS:
             raise FileError(f"expected at most {MOST_CELLS} cells; found more", file=str(path), line=n)

@@ -7,13 +7,14 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import CancelledError, ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, wraps
 from itertools import islice
 from multiprocessing import get_context
-from typing import Any
+from typing import Any, ParamSpec, TypeVar
+
+from threadpoolctl import threadpool_limits
 
 from stiffmap.common.errors import StiffmapError, needed
-from stiffmap.common.one_thread import on_one_thread
 
 Function = Callable[[Any, Any], Any]
 """A task: of what all share, and of its own item. It stands in a module, so that others can import it."""
@@ -24,6 +25,20 @@ PATIENCE = 60
 """s to wait for a worker where all are lost."""
 RETRIES = 5
 """Times that a task is given out anew when the worker that had it is lost."""
+P = ParamSpec("P")
+T = TypeVar("T")
+
+
+def on_one_thread(function: Callable[P, T]) -> Callable[P, T]:
+    """The function with numpy's and scipy's matrix products on one thread; threads of the core stay as they are. A fit's matrices are
+    small, and threads of BLAS would mostly wait for each other."""
+
+    @wraps(function)
+    def limited(*args: P.args, **kwargs: P.kwargs) -> T:
+        with threadpool_limits(limits=1, user_api="blas"):
+            return function(*args, **kwargs)
+
+    return limited
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.tables.header import split_unit
-from stiffmap.common.tables.meaning import meaning_of
+from stiffmap.common.tables.header import meaning_of, split_unit
 from stiffmap.common.units import TIMES, unit_of
 from stiffmap.experiment.channels import AXES
 from stiffmap.experiment.files.fields import SEEN

@@ -10,7 +10,7 @@ import numpy as np
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError, StiffmapError
-from stiffmap.common.tables.meaning import COMMANDED, MEASURED
+from stiffmap.common.tables.header import COMMANDED, MEASURED
 from stiffmap.common.yaml_text import read
 from stiffmap.experiment.files.fields import READ, SEEN, quantity_of
 from stiffmap.experiment.poses.handeye import own_frame

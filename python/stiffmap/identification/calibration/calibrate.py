@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from stiffmap.common.broadcasting import names_of, whole_number
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.one_thread import on_one_thread
+from stiffmap.common.tasks import on_one_thread
 from stiffmap.experiment.calls import as_experiment
 from stiffmap.experiment.comparison.limitations import refuse
 from stiffmap.experiment.experiment import Experiment, Floats

@@ -9,7 +9,7 @@ from os import PathLike
 
 from stiffmap.common.broadcasting import names_of, whole_number
 from stiffmap.common.number_text import within
-from stiffmap.common.one_thread import on_one_thread
+from stiffmap.common.tasks import on_one_thread
 from stiffmap.experiment.calls import as_experiment
 from stiffmap.experiment.comparison.limitations import refuse
 from stiffmap.experiment.experiment import Experiment

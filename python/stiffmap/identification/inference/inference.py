@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.one_thread import on_one_thread
+from stiffmap.common.tasks import on_one_thread
 from stiffmap.experiment.experiment import Experiment, Floats, Mask
 from stiffmap.experiment.noise.level import Noise
 from stiffmap.experiment.noise.outliers import without_suspects

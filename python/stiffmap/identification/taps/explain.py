@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.one_thread import on_one_thread
+from stiffmap.common.tasks import on_one_thread
 from stiffmap.experiment import Experiment
 from stiffmap.identification.inference.constants import MOST_EFFECTS, ODDS
 from stiffmap.identification.inference.optimum import Optimum

@@ -15,8 +15,14 @@ from stiffmap.common.broadcasting import Floats, one_of, real_array, whole_numbe
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.rotations import as_rotations
 from stiffmap.common.tasks import workers
-from stiffmap.machining.chatter.cut import cut_axes, milling_process, multiplier_map
-from stiffmap.machining.chatter.modes import ToolModes, mode_rows, modes_of_machine
+from stiffmap.machining.chatter.cut import (
+    ToolModes,
+    cut_axes,
+    milling_process,
+    mode_rows,
+    modes_of_machine,
+    multiplier_map,
+)
 from stiffmap.machining.chatter.zero_order import (
     FEED,
     TOOL,

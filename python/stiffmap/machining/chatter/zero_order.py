@@ -13,8 +13,14 @@ from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError, frames_of_this_package
-from stiffmap.machining.chatter.cut import cut_axes, mean_chips, milling_process, spindle_speed
-from stiffmap.machining.chatter.modes import ToolModes, mode_rows
+from stiffmap.machining.chatter.cut import (
+    ToolModes,
+    cut_axes,
+    mean_chips,
+    milling_process,
+    mode_rows,
+    spindle_speed,
+)
 from stiffmap.machining.process.description import Process
 from stiffmap.machining.process.load import GivenProcess
 

@@ -199,7 +199,7 @@ def _plan(
     rotation: ArrayLike | None,
     actuators: ArrayLike | None,
     wrench: ArrayLike | None,
-    approach: ArrayLike | None,
+    approach: Floats | None,
     gravity: ArrayLike | None,
     point: str,
 ) -> Experiment:
@@ -217,7 +217,6 @@ def _plan(
         must_take(machine, p, r)
         at = inverse_kinematics(machine, p, r)
     names, n = machine.compiled.names, len(at.position)
-    way = None if approach is None else trailing(approach, (3,), "approach", "directions")
     return Experiment(
         name="commands",
         machine=machine.name,
@@ -231,7 +230,7 @@ def _plan(
         joints=at.coordinates[:, list(names.joints.values())],
         joint_names=tuple(names.joints),
         load_point=point,
-        approach=None if way is None else _each(way, n, "approach"),
+        approach=None if approach is None else _each(approach, n, "approach"),
         gravity=None if gravity is None else tuple(machine.compiled.gravity(gravity).tolist()),
     )
 

@@ -17,12 +17,11 @@ from stiffmap.machining.milling.placement import Placements, placements
 from stiffmap.machining.milling.redundancy import Redundancy
 from stiffmap.machining.milling.redundancy import redundancy as best_turns
 from stiffmap.machining.milling.setting import Setting, setting
-from stiffmap.machining.milling.speed import other_side
 from stiffmap.machining.process.description import Process
 from stiffmap.machining.process.load import GivenProcess, as_process
-from stiffmap.machining.toolpath import Placement, Toolpath, box, load_path, sampled
+from stiffmap.machining.toolpath import Toolpath, box, load_path, sampled
 from stiffmap.machining.toolpath.engagement import part_side
-from stiffmap.machining.toolpath.entry import entered_at, outline_of, turned_round
+from stiffmap.machining.toolpath.outlines import entered_at, outline_of, turned_round
 from stiffmap.solve.machine import Machine
 from stiffmap.workspace.maps.inputs import magnitude
 
@@ -46,13 +45,7 @@ class Entry:
 class Choices:
     """A path on a machine, and what was chosen on the way to it."""
 
-    path: Toolpath
-    process: Process
-    place: Placement
-    stock: Floats | None
-    """(2, 3) m."""
-    angle: Floats | None
-    """(points,) rad: turn of the tool; None: that of the path, else as at home."""
+    job: Setting
     placement: Placements | None = None
     entry: Entry | None = None
     redundancy: Redundancy | None = None
@@ -126,9 +119,8 @@ def choices(
         here = best_entry(job(p, now)) if isinstance(entry, str) else Entry(entry)
         p = entered_at(p, here.way)
         turns = turned(p)
-    return Choices(
-        p, cut, p.placed(origin, turn), block, angle if turns is None else turns.angle, tried, here, turns
-    )
+    last = angle if turns is None else turns.angle
+    return Choices(job(p if last is None else replace(p, turn=None), last), tried, here, turns)
 
 
 def best_entry(job: Setting) -> Entry:
@@ -157,3 +149,9 @@ def part_lies(job: Setting) -> str | None:
         f"Seen from the spindle the outline is travelled {'counter-clockwise' if area > 0 else 'clockwise'}; in a {side} cut the part "
         f"lies {words[0]} it. If it lies {words[1]}, exchange climb and conventional in the process file (`side` of `cut`)."
     )
+
+
+def other_side(process: Process) -> Process:
+    """Conventional for climb and the other way round; a slot stays what it is."""
+    side = {"climb": "conventional", "conventional": "climb", "slot": "slot"}[process.cut.side]
+    return replace(process, cut=replace(process.cut, side=side))

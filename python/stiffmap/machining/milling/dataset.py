@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 from stiffmap.common.broadcasting import Floats
 from stiffmap.machining.milling.equilibrium import Equilibrium
 from stiffmap.machining.milling.limits import drive_speeds
+from stiffmap.machining.milling.program import Run
 from stiffmap.machining.milling.setting import Setting
-from stiffmap.machining.milling.verify import Run
 from stiffmap.solve.status import Status
 
 

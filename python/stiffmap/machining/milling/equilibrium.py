@@ -39,7 +39,6 @@ class Plant:
     def __init__(self, job: Setting, machine: Machine | None = None) -> None:
         """`machine`: None, or another than the job's, that follows its commands."""
         self.job, self.machine = job, machine or job.machine
-        self.heavy = bool(np.any(self.machine.compiled.gravity(None)))
 
     @cached_property
     def groups(self) -> list[tuple[Machine, NDArray[np.int64]]]:
@@ -76,16 +75,13 @@ class Plant:
             here = np.flatnonzero(np.isin(mine, members)) if len(self.groups) > 1 else np.arange(n)
             if not here.size:
                 continue
+            u, load, turns = np.nan_to_num(command[here], nan=1e3), wrench[here], self.job.turns(mine[here])
             s = machine.solve(
-                np.nan_to_num(command[here], nan=1e3),
-                np.nan_to_num(wrench[here]),
-                rotation=self._turns(mine[here]),
-                stiffness=full,
-                threads=self.job.threads,
+                u, np.nan_to_num(load), rotation=turns, stiffness=full, threads=self.job.threads
             )
             ok = s.ok & np.isfinite(command[here]).all(axis=1)
             # along what the machine does not command the tool stays where it was
-            stays = missed(machine, np.nan_to_num(command[here], nan=1e3), self._turns(mine[here]))[:, :3]
+            stays = missed(machine, u, turns)[:, :3]
             moved[here] = np.where(ok[:, None], s.displacement[:, :3] + stays, np.nan)
             status[here], flags[here] = s.status, s.flags
             if full:
@@ -98,11 +94,6 @@ class Plant:
             moved += bending * np.einsum("mij,mj->mi", across, force)
             c += bending * across
         return Stand(moved, c, status, flags, effort, turned)
-
-    def _turns(self, rows: NDArray[np.int64]) -> Floats:
-        """One orientation where all are the same: the kernels need not check each."""
-        r = self.job.rotation
-        return r[0] if r.strides[0] == 0 else r[rows]
 
 
 STEPS, INNER, INVERSE = 30, 40, 40

@@ -15,14 +15,12 @@ from stiffmap.machining.milling.choices import Choices, choices
 from stiffmap.machining.milling.dataset import along, dataset_of, verdict
 from stiffmap.machining.milling.equilibrium import Equilibrium, Plant, commanded, equilibrium
 from stiffmap.machining.milling.limits import Warned, must_reach, warned
-from stiffmap.machining.milling.program import WITHIN, Program, program
-from stiffmap.machining.milling.setting import Setting, setting
-from stiffmap.machining.milling.speed import Feeds, best_feeds
-from stiffmap.machining.milling.stability import PathStability, path_stability
-from stiffmap.machining.milling.verify import Run, run
+from stiffmap.machining.milling.program import WITHIN, Program, Run, program, run
+from stiffmap.machining.milling.setting import Setting
+from stiffmap.machining.milling.speed import Feeds, PathStability, best_feeds, path_stability
 from stiffmap.machining.process.force import cutting_force
 from stiffmap.machining.process.load import GivenProcess
-from stiffmap.machining.toolpath import Toolpath, sampled
+from stiffmap.machining.toolpath import Toolpath
 from stiffmap.solve.machine import Machine, as_machine
 from stiffmap.solve.options import keywords_of
 from stiffmap.solve.status import Status
@@ -82,30 +80,16 @@ def mill_job(
     whole_number(passes, "passes", 1)
     magnitude(within, "within", "m")
     made_of = choices(machine, path, process, step=step, thickness=thickness, threads=threads, **chosen)
-    p, cut, where, box, angle = made_of.path, made_of.process, made_of.place, made_of.stock, made_of.angle
-    if angle is not None:
-        p = replace(p, turn=None)
-
-    def job_of(path: Toolpath) -> Setting:
-        return setting(
-            machine, path, cut, sampled(path, step), where, stock=box, thickness=thickness, angle=angle,
-            threads=threads,
-        )  # fmt: skip
-
-    job = job_of(p)
+    job = made_of.job
     must_reach(job)
     best = best_feeds(job) if feeds else None
     if best is not None:
-        job = job_of(replace(p, feed=best.feed))
+        job = job.fed(best.feed)
     plant = Plant(job)
     before = equilibrium(plant, job.position)
     command, left, mirror = commanded(plant, before)
-    made = program(
-        job,
-        np.where(np.isfinite(command), command, job.position),
-        within,
-        None if best is None else best.feed,
-    )
+    goals = np.where(np.isfinite(command), command, job.position)
+    made = program(job, goals, within, None if best is None else best.feed)
     after = run(job, made, step=step)
     mirrored = equilibrium(plant, np.where(np.isfinite(mirror), mirror, job.position))
     ds = dataset_of(job, before, command, left, after, mirrored)
@@ -122,7 +106,7 @@ def mill_job(
         ds["multiplier"].attrs["said"] = stability.sentence(job.process.spindle)
     ds.attrs |= {"program": made.text, "verdict": verdict(ds)}
     if made_of.placement is not None:
-        ds.attrs["placement"] = made_of.placement.words(cut.tolerance)
+        ds.attrs["placement"] = made_of.placement.words(job.process.tolerance)
     if made_of.entry is not None:
         ds.attrs["entry"] = made_of.entry.way
     warnings = warned(job, ds)

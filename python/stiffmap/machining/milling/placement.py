@@ -39,17 +39,24 @@ class Placements:
     """(n,) m, across the wall, before compensation; infinite where a point of the path has no answer or breaks a limit."""
     best: Placement
     """Refined, and proven at all points of the path."""
-    best_error: float
-    """m, at that placement; force and deflection solved together."""
     naive: Placement
     """The part's middle in the middle of the workspace, not turned."""
-    naive_error: float
     limits: str
     """What keeps the error from being smaller."""
     naive_along: Floats
     """(k,) m, errors across the wall over the part at the naive placement."""
     best_along: Floats
-    """(k,) m, the same at the best one."""
+    """(k,) m, the same at the best one; force and deflection solved together."""
+
+    @property
+    def best_error(self) -> float:
+        """m, the largest at the best placement."""
+        return float(np.abs(self.best_along).max())
+
+    @property
+    def naive_error(self) -> float:
+        """m, the largest at the naive placement."""
+        return float(np.abs(self.naive_along).max())
 
     @property
     def gain(self) -> float:
@@ -112,19 +119,9 @@ def placements(
     with workers(PlacementSearch.refined, search, scheduler=scheduler) as hands:
         tried = hands.in_order((at[i], float(turn[i])) for i in order if np.isfinite(largest[i]))
     tried.append((search.exact(naive), naive))
-    error, best = min(tried, key=lambda t: t[0])
-    return Placements(
-        at,
-        turn,
-        largest,
-        best,
-        error,
-        naive,
-        tried[-1][0],
-        search.what_limits(best),
-        search.errors(naive),
-        search.errors(best),
-    )
+    best = min(tried, key=lambda t: t[0])[1]
+    along = search.errors(naive), search.errors(best)
+    return Placements(at, turn, largest, best, naive, search.what_limits(best), *along)
 
 
 class PlacementSearch:
@@ -177,12 +174,8 @@ class PlacementSearch:
         position = np.einsum("nij,mj->nmi", r, self.points.position) + at[:, None]
         force = np.einsum("nij,mj->nmi", r, self.force)
         off = np.einsum("nij,mj->nmi", r, self.job.off)
-        s = self.machine.solve(
-            position,
-            np.concatenate([force, np.zeros_like(force)], axis=-1),
-            rotation=self.job.rotation[0] if self.job.rotation.strides[0] == 0 else self.job.rotation,
-            threads=self.threads,
-        )
+        wrench = np.concatenate([force, np.zeros_like(force)], axis=-1)
+        s = self.machine.solve(position, wrench, rotation=self.job.turns(), threads=self.threads)
         slope = np.einsum("nij,mj->nmi", r, self.slope)
         bent = np.matmul(s.compliance[..., :3, :3], slope[..., None])[..., 0]
         loop = 1 - np.einsum("nmi,nmi->nm", off, bent)  # 1 + kp/k
@@ -216,13 +209,8 @@ class PlacementSearch:
         a, b = self._extent(np.array([turn]))
         first, last = np.minimum(self.low - a[0], at), np.maximum(self.high - b[0], at)
         bounds = np.array([[*first, -np.pi], [*last, np.pi]]) / scale
-        found = minimize(
-            cost,
-            np.array([*at, turn]) / scale,
-            method="L-BFGS-B",
-            bounds=bounds.T,
-            options={"maxiter": 12, "eps": 1e-4},
-        )
+        begun, options = np.array([*at, turn]) / scale, {"maxiter": 12, "eps": 1e-4}
+        found = minimize(cost, begun, method="L-BFGS-B", bounds=bounds.T, options=options)
         places = [Placement(at, turn), Placement(found.x[:3] * scale[:3], float(found.x[3]))]
         errors = [self.exact(p) for p in places]
         best = int(np.argmin(errors))

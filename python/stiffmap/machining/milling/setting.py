@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError, StiffmapError
-from stiffmap.machining.process.description import Process
-from stiffmap.machining.process.mean import mean_force, widened
+from stiffmap.machining.process.description import Process, mean_force, widened
 from stiffmap.machining.toolpath import Placement, Points, Toolpath, engagement
 from stiffmap.machining.toolpath.engagement import Engagement, part_side
 from stiffmap.solve.machine import Machine
@@ -69,6 +69,17 @@ class Setting:
         """(m, 2, 3) directions that change the cut: off the wall, and along the tool to its holder."""
         return np.stack([self.off, self.tool], axis=1)
 
+    def fed(self, feed: Floats) -> Setting:
+        """The job with other feeds (moves,) m/s of its path."""
+        path, points = replace(self.path, feed=feed), replace(self.points, feed=feed[self.points.move])
+        feed, faster = _speeds(path, self.process, points)
+        return replace(self, path=path, points=points, feed=feed, faster=faster)
+
+    def turns(self, rows: NDArray[np.int64] | None = None) -> Floats:
+        """Orientations of some points, None: all; one (3, 3) where all are the same: the kernels need not check each."""
+        r = self.rotation
+        return r[0] if r.strides[0] == 0 else r if rows is None else r[rows]
+
     def across(self, error: Floats) -> Floats:
         """(m,) m across the wall, positive where material stays, of errors (m, 3) m; 0 where there is no wall."""
         return np.where(self.engaged.wall, (error * self.off).sum(axis=1), 0.0)
@@ -117,7 +128,7 @@ def setting(
     """A job; `angle` (m,) rad turns the tool of an arm about its axis. Raises StiffmapError for what does not go together."""
     if angle is not None and np.shape(angle) != (len(points),):
         raise StiffmapError(f"angle: expected {len(points)} turns of the tool (rad), one for each point")
-    faster = _faster(path, process, points)
+    speeds = _speeds(path, process, points)
     if angle is None and path.turn is not None:
         if len(machine.actuators) < 6:
             raise FileError(
@@ -138,15 +149,14 @@ def setting(
         -part_side(process) * place.vectors(points.normal),
         tool,
         orientations(machine, tool, angle),
-        np.where(np.isfinite(points.feed), points.feed, process.feed),
-        faster,
+        *speeds,
         angle,
         threads=threads,
     )
 
 
-def _faster(path: Toolpath, process: Process, points: Points) -> Floats:
-    """(m,) feed per revolution as a multiple of the process's own. Raises FileError for what cuts nothing, or too thick a chip."""
+def _speeds(path: Toolpath, process: Process, points: Points) -> tuple[Floats, Floats]:
+    """`feed` and `faster` of a job. Raises FileError for what cuts nothing, or too thick a chip."""
     for wrong, message in (
         (points.spindle == 0, "the spindle is off in a cut: expected M3 and S above zero before it"),
         (points.spindle < 0, "the spindle turns counter-clockwise (M4): the process is for a clockwise one"),
@@ -161,12 +171,9 @@ def _faster(path: Toolpath, process: Process, points: Points) -> Floats:
     thick = faster * process.chip
     if process.tool.teeth and (thick > process.tool.diameter / 2).any():
         at = int(np.argmax(thick))
-        raise FileError(
-            f"the chip is too thick: {1e3 * thick[at]:.4g} mm per tooth with this feed and spindle speed",
-            file=path.name,
-            line=int(path.line[points.move[at]]),
-        )
-    return faster
+        what = f"the chip is too thick: {1e3 * thick[at]:.4g} mm per tooth with this feed and spindle speed"
+        raise FileError(what, file=path.name, line=int(path.line[points.move[at]]))
+    return feed, faster
 
 
 def orientations(machine: Machine, tool: Floats, angle: Floats | None) -> Floats:

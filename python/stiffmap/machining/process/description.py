@@ -1,11 +1,20 @@
-"""What a process is: tool, law of the cutting force, speeds and engagement. Frozen, SI."""
+"""What a process is: tool, law of the cutting force, speeds and engagement, frozen, SI; and its mean force over a revolution, in closed
+form and for many engagements at once (theory.md, M1 to M6).
+
+Axes: along the feed, to its left seen against the tool (normal), and along the tool from holder to tip. Forces act
+on the tool. A tooth at the angle phi, counted with the rotation from the normal, cuts a chip c sin(phi).
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import acos, pi
 
+import numpy as np
+from numpy.typing import ArrayLike
+
+from stiffmap.common.broadcasting import Floats
 from stiffmap.common.short import short_repr
 
 SIDES = ("climb", "conventional", "slot")
@@ -128,3 +137,114 @@ class Process:
     def arc(self) -> float:
         """rad, engaged arc of the tool."""
         return acos(max(-1.0, 1 - 2 * self.cut.radial / self.tool.diameter))
+
+
+def with_coefficients(process: Process) -> Process:
+    """The process with a law of chips and edges: Kienzle's by its secant at the mean chip thickness, and said so (M2)."""
+    law = process.law
+    if not isinstance(law, Kienzle):
+        return process
+    mm = 1e-3
+    k = law.kc11 * (process.mean_chip / mm) ** -law.mc
+    note = (
+        f"Kienzle's law is taken by its secant at the mean chip thickness, {1e3 * process.mean_chip:.4g} mm: "
+        f"{k / 1e6:.4g} N/mm²"
+    )
+    return replace(
+        process,
+        law=EndMill(k, law.radial * k, law.axial * k),
+        note=note,
+        uncertainty={"Ktc": process.uncertainty.get("kc11", 0.0) / law.kc11 * k},
+    )
+
+
+def densities(process: Process) -> tuple[Floats, Floats]:
+    """(3,) and (3,) N per m of depth and rad of arc: constant part, and part that grows with sin(phi); tangential, radial, axial."""
+    p = with_coefficients(process)
+    law, tool = p.law, p.tool
+    if isinstance(law, Trimming):
+        way = np.array([1.0, law.radial, 0.0])
+        return tool.diameter / 2 * law.rubbing * way, law.specific_energy * p.feed / p.spindle * way
+    assert isinstance(law, EndMill)
+    rate = tool.teeth / (2 * pi)
+    edge = np.array([law.Kte, law.Kre, law.Kae])
+    return rate * edge, rate * p.chip * np.array([law.Ktc, law.Krc, law.Kac])
+
+
+def widened(process: Process, radial: ArrayLike, curvature: ArrayLike = 0.0) -> Floats:
+    """m: width of a straight cut with the same engaged arc as on a curved path (M5), from 0 to the diameter.
+
+    curvature: 1/m of the path of the tool's centre, positive where the part lies outside the curve (inside corner).
+    """
+    ae = np.asarray(radial, dtype=float)
+    r = process.tool.diameter / 2
+    return np.clip(ae * (1 + np.asarray(curvature) * (r - ae / 2)), 0.0, 2 * r)
+
+
+def engaged(process: Process, width: Floats) -> tuple[Floats, Floats]:
+    """rad: first and last angle of the engaged arc for a straight cut of this width (m)."""
+    arc = np.arccos(np.clip(1 - 2 * width / process.tool.diameter, -1.0, 1.0))
+    zero, half = np.zeros_like(arc), np.full_like(arc, pi)
+    if process.cut.side == "climb":
+        return half - arc, half
+    return (zero, arc) if process.cut.side == "conventional" else (half - half, half)
+
+
+def own_arc(process: Process) -> tuple[float, float]:
+    """rad: first and last angle of the engaged arc of the process's own cut."""
+    first, last = engaged(process, widened(process, process.cut.radial))
+    return float(first), float(last)
+
+
+def mean_force(process: Process, width: ArrayLike, axial: ArrayLike, faster: ArrayLike = 1.0) -> Floats:
+    """(..., 3) N, mean force for straight cuts of this width and depth (m); of a slot the width does not count.
+
+    faster: (...) feed per revolution as a multiple of the process's own.
+    """
+    w, a, more = np.broadcast_arrays(width, axial, faster)
+    edge, each = densities(process)
+    chip = [more * k for k in each]
+    f, t = engaged(process, w)
+    cos, sin = np.cos(t) - np.cos(f), np.sin(t) - np.sin(f)
+    square = (np.sin(t) ** 2 - np.sin(f) ** 2) / 2
+    twice = (t - f) / 2 - (np.sin(2 * t) - np.sin(2 * f)) / 4
+    force = np.stack(
+        [
+            -edge[0] * sin - chip[0] * square + edge[1] * cos - chip[1] * twice,
+            -edge[0] * cos + chip[0] * twice - edge[1] * sin - chip[1] * square,
+            edge[2] * (t - f) - chip[2] * cos,
+        ],
+        axis=-1,
+    )
+    return np.asarray(np.maximum(a, 0.0)[..., None] * force)
+
+
+SHALLOWEST = 1e-9
+"""m: below this width the slope is that at this width (it grows without bound as the arc vanishes)."""
+
+
+def slopes(process: Process, width: ArrayLike, axial: ArrayLike) -> tuple[Floats, Floats]:
+    """(..., 3) N/m and (..., 3) N/m: of the mean force by width and by depth."""
+    w, a = np.broadcast_arrays(np.asarray(width, float), np.asarray(axial, float))
+    by_depth = mean_force(process, w, np.ones_like(a)) * (a > 0)[..., None]
+    if process.cut.side == "slot":
+        return np.zeros_like(by_depth), by_depth
+    edge, chip = densities(process)
+    d = process.tool.diameter
+    inside = (w > 0) & (w < d)
+    safe = np.clip(w, min(SHALLOWEST, d / 4), d * (1 - 1e-12))
+    f, t = engaged(process, safe)
+    phi = f if process.cut.side == "climb" else t
+    s, c = np.sin(phi), np.cos(phi)
+    tangential, radial, along = (edge[i] + chip[i] * s for i in range(3))
+    arc = 1 / np.sqrt(safe * (d - safe))  # of the arc by the width
+    at = np.stack([-tangential * c - radial * s, tangential * s - radial * c, along], axis=-1)
+    return (np.where(inside, arc, 0.0) * np.maximum(a, 0.0))[..., None] * at, by_depth
+
+
+def tangential_force(process: Process, width: ArrayLike, axial: ArrayLike) -> Floats:
+    """N, mean tangential force at the rim: torque over radius."""
+    w, a = np.broadcast_arrays(np.asarray(width, float), np.asarray(axial, float))
+    edge, chip = densities(process)
+    f, t = engaged(process, w)
+    return np.asarray(np.maximum(a, 0.0) * (edge[0] * (t - f) - chip[0] * (np.cos(t) - np.cos(f))))

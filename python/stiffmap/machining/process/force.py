@@ -11,9 +11,16 @@ import numpy as np
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.short import short_repr
-from stiffmap.machining.process.description import EndMill, Process
+from stiffmap.machining.process.description import (
+    EndMill,
+    Process,
+    mean_force,
+    own_arc,
+    slopes,
+    tangential_force,
+    with_coefficients,
+)
 from stiffmap.machining.process.load import GivenProcess, as_process
-from stiffmap.machining.process.mean import mean_force, own_arc, slopes, tangential_force, with_coefficients
 
 STEPS = 720
 """Angles of a revolution, about; the nearest multiple of the teeth is taken."""
@@ -70,11 +77,12 @@ def chip_thickness(p: Process, phi: Floats, inside: Floats) -> Floats:
     return np.asarray(np.maximum(np.min(before, axis=0), 0.0))
 
 
+NAMES = ("Ktc", "Kte", "Krc", "Kre", "Kac", "Kae")
 ARC_NODES, HEIGHT_NODES = 160, 8
 
 
 def mean_basis_with_runout(process: Process) -> Floats:
-    """(3, 6) N per unit of Ktc Kte Krc Kre Kac Kae: the mean where run-out may lift teeth out of the cut, by quadrature
+    """(3, 6) N per unit of `NAMES`: the mean where run-out may lift teeth out of the cut, by quadrature
     over angle and height; the law itself does not count."""
     p = process
     node, weight = gauss(ARC_NODES)
@@ -89,14 +97,6 @@ def mean_basis_with_runout(process: Process) -> Floats:
     zero = np.zeros_like(s)
     ways = ((-c, s, zero), (-s, -c, zero), (zero, zero, zero + 1))
     return np.array([[(part * way[i]).sum() for way in ways for part in parts] for i in range(3)])
-
-
-def mean_with_runout(process: Process) -> Floats:
-    """(3,) N: the mean where run-out may lift teeth out of the cut."""
-    p = with_coefficients(process)
-    assert isinstance(p.law, EndMill)
-    values = np.array([vars(p.law)[n] for n in ("Ktc", "Kte", "Krc", "Kre", "Kac", "Kae")])
-    return np.asarray(mean_basis_with_runout(p) @ values)
 
 
 def leaves_cut(process: Process) -> bool:
@@ -161,7 +161,9 @@ def cutting_force(process: GivenProcess) -> CuttingForce:
     """
     p = with_coefficients(as_process(process))
     lifted = leaves_cut(p)
-    mean = mean_with_runout(p) if lifted else mean_force(p, p.cut.radial, p.cut.axial)
+    mean = mean_force(p, p.cut.radial, p.cut.axial)
+    if lifted:
+        mean = mean_basis_with_runout(p) @ np.array([vars(p.law)[n] for n in NAMES])
     angle, force = revolution(p)
     n = max(p.tool.teeth, 1)
     spectrum = 2 * np.abs(np.fft.rfft(force, axis=0)) / len(angle)

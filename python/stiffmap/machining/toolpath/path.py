@@ -85,6 +85,13 @@ class Toolpath:
         moving = (self.kind == Kind.ARC) | (across > 1e-9 + 1e-3 * along)
         return np.asarray((self.kind != Kind.RAPID) & moving & (self.length > 0))
 
+    def cutting(self) -> Integers:
+        """Numbers of the moves that cut. Raises StiffmapError where none does."""
+        found = np.flatnonzero(self.cuts)
+        if not found.size:
+            raise StiffmapError(f"{self.name}: no move cuts (moves at a feed across the tool)")
+        return found
+
     def turn_at(self, move: Integers, share: Floats) -> Floats | None:
         """(m,) rad at shares (m,) of the moves (m,): even over each move, as axes are driven."""
         if self.turn is None:

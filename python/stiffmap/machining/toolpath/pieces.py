@@ -77,15 +77,13 @@ def arc_pieces(
         if arc is not None and near and not _uneven(turn, i, j):
             out.append(arc)
         elif j - i <= 2:
-            lines = arc is None or abs(arc.sweep) > WIDEST or bool(_uneven(turn, i, j))
-            if lines or arc is None or j - i < 2:
+            if arc is None or abs(arc.sweep) > WIDEST or _uneven(turn, i, j) or j - i < 2:
                 out += line_pieces(points[i : j + 1], within, turn[i : j + 1])
             else:  # one circle, but not one rise: an arc to the middle and one from it
                 share = _angles(points[i : j + 1], arc, normal)[1] / arc.sweep
-                out.append(
-                    MovedPiece(arc.kind, points[middle], arc.centre, share * arc.sweep, float(turn[middle]))
-                )
-                out.append(arc._replace(sweep=(1 - share) * arc.sweep))
+                sweeps = share * arc.sweep, (1 - share) * arc.sweep
+                out.append(arc._replace(end=points[middle], sweep=sweeps[0], turn=float(turn[middle])))
+                out.append(arc._replace(sweep=sweeps[1]))
         else:
             middle += (middle - i) % 2  # both halves keep an even number of intervals
             stack += [(middle, j), (i, middle)]

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.value_units import read_value
+from stiffmap.common.number_text import read_value
 from stiffmap.model.description import AppliedEffect, MachineDescription
 from stiffmap.model.effects import registry
 from stiffmap.model.effects.apply import place_of

@@ -8,7 +8,7 @@ import numpy as np
 
 from stiffmap.common.broadcasting import random_numbers
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.html import table, titled
+from stiffmap.common.short import table, titled
 from stiffmap.model.link.estimate import Evidence, SpringEstimate, critical_multiple
 from stiffmap.model.link.noise import FieldNoise
 from stiffmap.model.link.regression import constrain, structure

@@ -12,7 +12,7 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import length_text
 from stiffmap.common.outputs import write_rows
 from stiffmap.common.outputs.option import written
-from stiffmap.common.tables.poses import PoseTable, read_pose_table
+from stiffmap.common.tables.named import PoseTable, read_pose_table
 from stiffmap.solve.labels import WRENCH
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.mobility import free_motions

@@ -18,7 +18,7 @@ from stiffmap.machining.milling.job import Milled
 from stiffmap.machining.milling.limits import outside
 from stiffmap.machining.milling.placement import Placements
 from stiffmap.machining.milling.redundancy import IDLE
-from stiffmap.machining.milling.stability import PathStability
+from stiffmap.machining.milling.speed import PathStability
 from stiffmap.machining.process import cutting_force
 from stiffmap.machining.process.force import force_uncertainty
 from stiffmap.solve.kinematics import inverse_kinematics
@@ -85,7 +85,7 @@ def _chosen(c: Choices) -> dict[str, object]:
     """What was asked for; mm."""
     out: dict[str, object] = {}
     if c.placement is not None:
-        out["placement"] = {"words": c.placement.words(c.process.tolerance), **_placement(c.placement)}
+        out["placement"] = {"words": c.placement.words(c.job.process.tolerance), **_placement(c.placement)}
     if (e := c.entry) is not None:
         steps = {"step_there_mm": e.step, "step_as_given_mm": e.given}
         out["entry"] = {"way_mm": 1e3 * e.way, **{k: 1e3 * v for k, v in steps.items() if v is not None}}

@@ -10,7 +10,7 @@ from typing import Annotated
 from pydantic import BeforeValidator
 
 from stiffmap.common.errors import FileError, StiffmapError
-from stiffmap.common.value_units import read_value
+from stiffmap.common.number_text import read_value
 from stiffmap.common.yaml_text import Document
 from stiffmap.model.files.report import key_text
 

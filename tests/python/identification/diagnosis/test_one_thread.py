@@ -6,7 +6,7 @@ import numpy as np
 from threadpoolctl import threadpool_info, threadpool_limits
 
 import stiffmap as sm
-from stiffmap.common.one_thread import on_one_thread
+from stiffmap.common.tasks import on_one_thread
 from stiffmap.experiment import random_plan, simulate
 
 

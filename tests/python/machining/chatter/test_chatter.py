@@ -10,9 +10,15 @@ import pytest
 import xarray as xr
 
 import stiffmap as sm
-from stiffmap.machining.chatter.cut import chips, cut_axes, milling_process, multiplier_map
+from stiffmap.machining.chatter.cut import (
+    chips,
+    cut_axes,
+    milling_process,
+    mode_rows,
+    modes_of_machine,
+    multiplier_map,
+)
 from stiffmap.machining.chatter.lobes import border, pockets
-from stiffmap.machining.chatter.modes import mode_rows, modes_of_machine
 from stiffmap.machining.chatter.zero_order import at_periods, coupling_depth, limits
 from stiffmap.solve.compiled import multipliers
 from stiffmap.ui.cli import main

@@ -13,15 +13,15 @@ from tests.python.machining.milling.gantry import gantry
 import stiffmap as sm
 from stiffmap.common.errors import StiffmapError
 from stiffmap.machining.milling import mill, mill_job
-from stiffmap.machining.milling.choices import choices, part_lies
+from stiffmap.machining.milling.choices import choices, other_side, part_lies
 from stiffmap.machining.milling.equilibrium import Plant, equilibrium
 from stiffmap.machining.milling.limits import drive_speeds, fastest
 from stiffmap.machining.milling.placement import PlacementSearch, placements
 from stiffmap.machining.milling.redundancy import Steps, best_sequence, redundancy
 from stiffmap.machining.milling.setting import Setting, setting
-from stiffmap.machining.milling.speed import best_feeds, other_side
+from stiffmap.machining.milling.speed import best_feeds
 from stiffmap.machining.toolpath import outline, path_of, sampled
-from stiffmap.machining.toolpath.entry import turned_round
+from stiffmap.machining.toolpath.outlines import turned_round
 from stiffmap.solve.kinematics import forward_kinematics, inverse_kinematics
 from stiffmap.solve.machine import Machine
 
@@ -69,10 +69,10 @@ def test_where_the_part_lies_is_said(
         c = choices(
             gantry(), name, process, turn=turn, reverse=reverse, step=0.01, thickness=None, threads=1
         )  # fmt: skip
-        job = setting(gantry(), c.path, c.process, sampled(c.path, 0.01), c.place)
+        job = c.job
         said = part_lies(job)
         assert said is not None
-        assert f"is travelled {other if reverse else way}; in a {c.process.cut.side} cut" in said
+        assert f"is travelled {other if reverse else way}; in a {job.process.cut.side} cut" in said
         (here,) = {climb} if process is PROCESS else places - {climb}
         assert f"the part lies {here} it. If it lies {(places - {here}).pop()}, exchange" in said
         reach = np.linalg.norm((job.position - job.off)[:, :2] - job.place.at[:2], axis=1).min()

@@ -12,8 +12,7 @@ from tests.python.machining.milling.gantry import gantry
 import stiffmap as sm
 from stiffmap.machining.milling import mill_job, sizes
 from stiffmap.machining.milling.equilibrium import Plant, equilibrium
-from stiffmap.machining.milling.program import program
-from stiffmap.machining.milling.verify import run
+from stiffmap.machining.milling.program import program, run
 from stiffmap.machining.process.description import EndMill
 from stiffmap.machining.toolpath import Kind, outline, path_of
 from stiffmap.machining.toolpath.gcode.load import load_gcode

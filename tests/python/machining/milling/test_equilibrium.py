@@ -12,8 +12,7 @@ from tests.python.machining.milling.gantry import gantry
 
 import stiffmap as sm
 from stiffmap.machining.milling import mill_job
-from stiffmap.machining.process.description import Cut, EndMill
-from stiffmap.machining.process.mean import mean_force, widened
+from stiffmap.machining.process.description import Cut, EndMill, mean_force, widened
 from stiffmap.machining.toolpath import outline, path_of
 from stiffmap.solve.status import Status
 

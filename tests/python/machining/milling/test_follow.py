@@ -9,7 +9,7 @@ import pytest
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.machining.compensation import compensate
-from stiffmap.machining.milling import mill_job, stability
+from stiffmap.machining.milling import mill_job, speed
 from stiffmap.machining.milling.placement import placements
 from stiffmap.machining.process import load_process
 from stiffmap.machining.toolpath import Toolpath, path_of
@@ -58,8 +58,8 @@ def test_a_tilt_and_a_turn_that_are_missed() -> None:
 
 @pytest.mark.parametrize("name", ["five-bar", "travelling-column", "hybrid"])
 def test_paths_within_the_task_are_followed(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(stability, "PLACES", 1)  # of chatter, which is not asked for here
-    monkeypatch.setattr(stability, "SPEEDS", 3)
+    monkeypatch.setattr(speed, "PLACES", 1)  # of chatter, which is not asked for here
+    monkeypatch.setattr(speed, "SPEEDS", 3)
     m = load_machine(name)
     found = mill_job(m, _path((0.02, 0, 0)), CUT)
     assert np.abs(found.dataset.error_normal_after).max() < 0.1 * np.abs(found.dataset.error_normal).max()

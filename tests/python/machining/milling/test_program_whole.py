@@ -15,13 +15,12 @@ from tests.python.machining.toolpath.controller import UNKNOWN, Controller
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.machining.milling import mill_job
-from stiffmap.machining.milling.program import program
+from stiffmap.machining.milling.program import program, run
 from stiffmap.machining.milling.setting import setting
-from stiffmap.machining.milling.verify import run
 from stiffmap.machining.process import load_process
 from stiffmap.machining.toolpath import load_path, outline, sampled
-from stiffmap.machining.toolpath.entry import entered_at, fresh_text, turned_round
 from stiffmap.machining.toolpath.gcode.load import load_gcode
+from stiffmap.machining.toolpath.outlines import entered_at, fresh_text, turned_round
 from stiffmap.machining.toolpath.path import Toolpath
 
 HEAD = "G21 G90 G17 S18000 M3\n"

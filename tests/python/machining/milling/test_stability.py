@@ -81,7 +81,7 @@ def test_without_masses_it_is_not_judged():
 
 
 def test_no_stable_speed_asks_for_less_depth():
-    from stiffmap.machining.milling.stability import PathStability
+    from stiffmap.machining.milling.speed import PathStability
 
     s = PathStability(np.zeros(2), np.array([1.2, 0.9]), np.linspace(50, 150, 5), np.full(5, 1.3), "")
     assert not s.offered.size and "take less depth" in s.sentence(100.0)

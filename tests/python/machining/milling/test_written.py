@@ -15,8 +15,8 @@ from stiffmap.machining.milling.choices import best_entry
 from stiffmap.machining.milling.equilibrium import Plant, equilibrium
 from stiffmap.machining.milling.setting import setting
 from stiffmap.machining.toolpath import box, load_path, outline, sampled
-from stiffmap.machining.toolpath.entry import entered_at
 from stiffmap.machining.toolpath.gcode.load import load_gcode
+from stiffmap.machining.toolpath.outlines import entered_at
 
 ARM = Path(__file__).parents[4] / "examples/ur10-spindle.yaml"
 TEXT = """G21 G90 G17

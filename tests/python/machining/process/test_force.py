@@ -10,9 +10,15 @@ import pytest
 from tests.python.machining.process.closed_form import by_quadrature, process, slot
 
 import stiffmap as sm
-from stiffmap.machining.process.description import EndMill, Trimming
+from stiffmap.machining.process.description import (
+    EndMill,
+    Trimming,
+    mean_force,
+    slopes,
+    tangential_force,
+    widened,
+)
 from stiffmap.machining.process.force import force_uncertainty, revolution
-from stiffmap.machining.process.mean import mean_force, slopes, tangential_force, widened
 
 
 @pytest.mark.parametrize("teeth", [1, 2, 3, 4])

@@ -11,7 +11,7 @@ import pytest
 import stiffmap as sm
 from stiffmap.machining.milling import mill_job
 from stiffmap.machining.process import load_process
-from stiffmap.machining.process.mean import widened
+from stiffmap.machining.process.description import widened
 from stiffmap.machining.toolpath import engagement, load_path, path_of, sampled
 from stiffmap.machining.toolpath.path import Toolpath
 

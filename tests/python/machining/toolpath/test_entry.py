@@ -7,8 +7,8 @@ import pytest
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.machining.toolpath import Kind, Toolpath, outline, path_of, sampled
-from stiffmap.machining.toolpath.entry import entered_at, fresh_text, turned_round
 from stiffmap.machining.toolpath.gcode.load import load_gcode
+from stiffmap.machining.toolpath.outlines import entered_at, fresh_text, turned_round
 
 NAMES = ["washbasin", "bathtub", "rectangle", "circle", "pocket"]
 

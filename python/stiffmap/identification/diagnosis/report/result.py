@@ -13,10 +13,9 @@ import numpy as np
 
 from stiffmap.common.errors import FileError, reading
 from stiffmap.common.from_above import from_above
-from stiffmap.common.html import titled
 from stiffmap.common.json_text import json_text, parse_json, plain
 from stiffmap.common.number_text import percent, with_uncertainty
-from stiffmap.common.short import short_repr
+from stiffmap.common.short import short_repr, titled
 from stiffmap.experiment.comparison.summary import Summary
 from stiffmap.experiment.experiment import Experiment, Floats, Mask
 from stiffmap.experiment.noise.checks import Check

@@ -12,12 +12,10 @@ from scipy.optimize import least_squares, minimize_scalar
 from scipy.stats import t as student
 
 from stiffmap.common.broadcasting import Floats
-from stiffmap.machining.process.description import EndMill, Process
-from stiffmap.machining.process.force import gauss, mean_basis_with_runout, revolution
+from stiffmap.machining.process.description import EndMill, Process, mean_force, own_arc
+from stiffmap.machining.process.force import NAMES, gauss, mean_basis_with_runout, revolution
 from stiffmap.machining.process.identify.table import ForceTable, Signals
-from stiffmap.machining.process.mean import mean_force, own_arc
 
-NAMES = ("Ktc", "Kte", "Krc", "Kre", "Kac", "Kae")
 REFERENCE = 1e-3
 """m: chip at which a pressure with an exponent is stated."""
 BOUNDS = (-1.5, 0.98)
