@@ -9,6 +9,7 @@ import numpy as np
 import stiffmap as sm
 from stiffmap.experiment import Experiment, Predictor, random_plan
 from stiffmap.experiment.experiment import Floats
+from stiffmap.identification.candidates.plan import plan_of
 from stiffmap.identification.numbers import unknowns
 from stiffmap.identification.numbers.sensitivity import predicted
 
@@ -59,3 +60,19 @@ def test_a_spring_is_named_though_numbers_far_beyond_tolerance_would_show_the_sa
     data = drawn(machine, spring(machine, 1700.0, (0.15, -0.05, 0.54)), plan, 0.5, 0.0)
     d = sm.diagnose(machine, data)
     assert [e.kind for e in d.effects] == ["external_spring"]
+
+
+def test_no_spring_is_tried_that_pulls_harder_than_a_tool_bears() -> None:
+    machine, plan = positions("orthoglide-revised", 6, 3)
+    springs = [
+        v
+        for v in plan_of(Predictor(machine, plan)).variants
+        if v.candidate.kind == "external_spring" and v.candidate.element == "tcp"
+    ]
+    for v in springs:
+        (stiffness,) = v.candidate.linear
+        shape = dict(v.shape)
+        away = np.linalg.norm(plan.position - [shape[f"anchor_{a}"] for a in "xyz"], axis=1)
+        pull = v.most * stiffness.scale * np.abs(away - shape["length"])
+        np.testing.assert_allclose(pull.max(), 1e4, rtol=1e-3)
+    assert len(springs) == 28

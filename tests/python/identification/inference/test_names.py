@@ -30,7 +30,7 @@ from stiffmap.model.description import AppliedEffect
 DATA = Path(__file__).parents[3] / "data/experiments"
 
 
-def place(name: str, column: np.ndarray, free: np.ndarray) -> Place:
+def place(name: str, column: np.ndarray, free: np.ndarray, most: float = np.inf) -> Place:
     """One direction that is a candidate of its own."""
     scale = effects.get("compliance").parameter("scale")
     candidate = Candidate(
@@ -41,7 +41,7 @@ def place(name: str, column: np.ndarray, free: np.ndarray) -> Place:
     )
     lines = (free @ column)[None]
     variant: Any = SimpleNamespace(
-        lines=lambda use: lines[:, use], candidate=candidate, shape=(), sign=np.ones(1)
+        lines=lambda use: lines[:, use], candidate=candidate, shape=(), sign=np.ones(1), most=most
     )
     return Place(candidate, (Shape(variant, (column / np.linalg.norm(column))[:, None], 0),))
 
@@ -92,6 +92,25 @@ def test_an_effect_that_bends_is_found_with_its_own_strength(bend: float) -> Non
     strength = one.by_posterior(best.fit) if bend > 100 else one
     line = strength.rotated(c) @ strength.values
     assert np.sign(line @ c.residual) * np.linalg.norm(line) == pytest.approx(30.0, abs=3.0)
+
+
+def test_no_machine_is_asked_for_what_none_can_have() -> None:
+    """As a spring that shows by its stiffness alone, and would tear the tool away."""
+    c = setting(2, (0.0, 30.0, 0.0))
+    limited: Any = c.places[1].shapes[0].variant
+    strength = 30.0 / np.linalg.norm(limited.lines(slice(None)))
+    asked: list[float] = []
+
+    def predict(chosen: Any) -> np.ndarray:
+        asked.extend(float(np.abs(s.values).max()) for s in chosen if s.variant is limited)
+        return np.sum([s.rotated(c) @ s.values for s in chosen], axis=0)
+
+    limited.most = 2.0 * strength
+    assert [s.variant for s in searched(c, predict).best.chosen] == [limited]
+    limited.most = 0.5 * strength
+    asked.clear()
+    assert limited not in [s.variant for s in searched(c, predict).best.chosen]
+    assert max(asked, default=0.0) <= limited.most
 
 
 def test_what_shows_the_same_is_an_equivalent():
@@ -283,7 +302,11 @@ def test_a_number_is_no_effect_that_contains_a_named_one():
         (
             Shape(
                 SimpleNamespace(
-                    lines=lambda use: lines[:, use], candidate=candidate, shape=(), sign=np.ones(1)
+                    lines=lambda use: lines[:, use],
+                    candidate=candidate,
+                    shape=(),
+                    sign=np.ones(1),
+                    most=np.inf,
                 ),
                 both,
                 0,

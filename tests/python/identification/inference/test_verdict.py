@@ -33,7 +33,7 @@ def flat(seed: int, strengths: np.ndarray, poses: int = 8) -> tuple[Any, Any, An
     residual = c.free.T @ (strengths + rng.normal(size=READINGS))
     c = replace(c, residual=residual, zero=np.zeros((len(c), len(c))), experiment=experiment)
     u = c.free.T @ FLAT
-    variant: Any = SimpleNamespace(lines=lambda use: FLAT[None][:, use])
+    variant: Any = SimpleNamespace(lines=lambda use: FLAT[None][:, use], most=np.inf)
     shape = Shape(variant, (u / np.linalg.norm(u))[:, None], 0)
     none: Any = None
     part = Part("effect", "effect", factor=shape.directions * np.sqrt(len(c)))
