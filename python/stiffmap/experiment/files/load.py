@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
@@ -19,13 +20,13 @@ from stiffmap.experiment.experiment import ASKED, AXES, WRENCH, Experiment, Floa
 from stiffmap.experiment.files import columns as read_columns
 from stiffmap.experiment.files.fields import POSE, SEEN, SEEN_QUATERNION, SEEN_TURNED, absolute, known, read
 from stiffmap.experiment.files.schema import ExperimentFile, file_model
-from stiffmap.experiment.files.table import read_table
-from stiffmap.experiment.files.units import ANGLES, Units
+from stiffmap.experiment.files.table import ANGLES, Units, read_table
 from stiffmap.experiment.readings import kinds
 from stiffmap.model.files.report import validated
 
 SAME = ("point", "unloaded", "frame", "tool", "title", "reference_temperature")
 """Keys of the file that an `Experiment` has as they are."""
+Parts = Sequence[tuple[tuple[str, ...], Floats | None]]
 
 
 def load_experiment(path: str | PathLike[str]) -> Experiment:
@@ -103,16 +104,19 @@ def _readings(
     of_kinds = {
         k.name: table.si(k.absolute, blank=True) for k in kinds() if k.absolute and k.absolute in table
     }
-    _above_zero(table, of_kinds)
-    _promise(reading, channels, table, seen, seen_rotation, of_kinds)
+    for kind in (k for k in kinds() if k.positive and k.name in of_kinds):
+        expected = f"column '{kind.absolute}': expected {kind.title} above zero"
+        found = [f"{expected}; found {v:g} m" for v in of_kinds[kind.name]]
+        table.check(~(of_kinds[kind.name] <= 0.0), found.__getitem__)
+    single = (((name,), values) for name, values in of_kinds.items())
+    _promise(reading, channels, table, [(AXES[:3], seen), (AXES[3:], seen_rotation), *single])
     if not np.isfinite(reading).any():
         if empty := [c for c in (*read(), *absolute()) if c in table]:
             raise FileError(
                 f"expected a reading in one row or more of {', '.join(empty)}; found none", file=table.file
             )
         raise MissingColumnError(
-            f"missing column: no reading ({', '.join((*read(), *absolute()))}, joints)",
-            file=table.file,
+            f"missing column: no reading ({', '.join((*read(), *absolute()))}, joints)", file=table.file
         )
     _fits(model.quantity, table)
     sigma = read_columns.sigma(model, table, units, channels)
@@ -199,27 +203,10 @@ def _fits(quantity: str, table: Table) -> None:
             table.fail(f"column '{column}': {title} is no {quantity}")
 
 
-def _above_zero(table: Table, absolute: dict[str, Floats]) -> None:
-    """FileError for a reading that has the wrong sign."""
-    for kind in (k for k in kinds() if k.positive and k.name in absolute):
-        values = absolute[kind.name]
-        expected = f"column '{kind.absolute}': expected {kind.title} above zero"
-        table.check(~(values <= 0.0), [f"{expected}; found {v:g} m" for v in values].__getitem__)
-
-
-def _promise(
-    reading: Floats,
-    channels: tuple[Channel, ...],
-    table: Table,
-    seen: Floats | None,
-    seen_rotation: Floats | None,
-    absolute: dict[str, Floats],
-) -> None:
-    """Marks what absolute columns will read once poses are known; FileError where both forms are given."""
+def _promise(reading: Floats, channels: tuple[Channel, ...], table: Table, parts: Parts) -> None:
+    """Marks what absolute columns, next to their readings, will read once poses are known; FileError where both forms are given."""
     at = {c.name: i for i, c in enumerate(channels)}
-    parts: list[tuple[Floats | None, tuple[str, ...]]] = [(seen, AXES[:3]), (seen_rotation, AXES[3:])]
-    parts += [(values, (name,)) for name, values in absolute.items()]
-    for values, names in parts:
+    for names, values in parts:
         if values is None:
             continue
         if twice := table.one_of(names):

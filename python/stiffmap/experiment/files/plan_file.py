@@ -14,8 +14,7 @@ from stiffmap.experiment.experiment import Experiment
 from stiffmap.experiment.files.fields import EULER, PLAN, TURNED2
 from stiffmap.experiment.files.load import rows_of
 from stiffmap.experiment.files.schema import ExperimentFile, ExperimentUnitsModel
-from stiffmap.experiment.files.table import read_table
-from stiffmap.experiment.files.units import Units
+from stiffmap.experiment.files.table import Units, read_table
 from stiffmap.experiment.virtual.plans import unread
 from stiffmap.solve.machine import Machine
 

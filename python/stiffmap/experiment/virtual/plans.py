@@ -21,7 +21,7 @@ from stiffmap.common.broadcasting import (
 from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.channels import AXES, AXIS_CHANNELS, Channel
 from stiffmap.experiment.experiment import Experiment, Floats
-from stiffmap.experiment.readings.library.distance import READING
+from stiffmap.experiment.readings.library.distance_and_height import DISTANCE
 from stiffmap.solve.kinematics import forward_kinematics, inverse_kinematics
 from stiffmap.solve.machine import Machine, as_machine
 from stiffmap.workspace.maps.inputs import magnitude
@@ -224,7 +224,7 @@ def with_distances(plan: Experiment, sigma: float) -> Experiment:
     kept = plan.reading[:, len(AXES) :], plan.sigma[:, len(AXES) :]
     return replace(
         plan,
-        extra=(READING.channel, *plan.extra),
+        extra=(DISTANCE.channel, *plan.extra),
         other=there,
         other_rotation=plan.rotation,
         reading=np.hstack([unread, column, kept[0]]),
