@@ -92,9 +92,8 @@ def _orientation(table: Table, model: OrientationModel, second: bool) -> Floats 
         table.fail(f"column '{two}': orientations are given twice, as {one} … and as {two} …; keep one")
     form = forms[0]
     # a turn about one axis may leave out the others
-    cells = table.block(
-        [names[c] for c in form], blank=second, missing=0.0 if form is fields.VECTOR else None
-    )
+    missing = 0.0 if form is fields.VECTOR else None
+    cells = table.block([names[c] for c in form], blank=second, missing=missing)
     empty: Mask = np.asarray(~np.isfinite(cells).all(axis=1))
     if form in (fields.QUATERNION, fields.MATRIX):
         out = (_quaternions if form is fields.QUATERNION else _matrices)(table, cells, empty)
@@ -191,13 +190,8 @@ def approach(table: Table) -> Floats | None:
 
 def declared(noise: NoiseModel, units: Units, channels: Sequence[Channel]) -> Floats:
     """(c,) declared standard deviations; NaN where none is."""
-    values = [getattr(noise, c.name, None) for c in channels]
-    return np.array(
-        [
-            np.nan if v is None else units.size(c.name, np.nan) * v
-            for c, v in zip(channels, values, strict=True)
-        ]
-    )
+    values = {c.name: getattr(noise, c.name, None) for c in channels}
+    return np.array([np.nan if v is None else units.size(n, np.nan) * v for n, v in values.items()])
 
 
 def sigma(model: ExperimentFile, table: Table, units: Units, channels: tuple[Channel, ...]) -> Floats:

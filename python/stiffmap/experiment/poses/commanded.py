@@ -128,7 +128,18 @@ def resolved(machine: Machine, e: Experiment) -> tuple[Machine, Experiment]:
 
 
 def _sighted(machine: Machine, e: Experiment) -> tuple[Machine, Experiment]:
-    sighting, names = _sighting(machine, e)
+    n, home = len(e), machine.description.home.r
+    (setup, setups), (target, targets) = setups_of(e), targets_of(e)
+    sighting = Sighting(
+        e.position,
+        np.tile(home, (n, 1, 1)) if e.rotation is None else e.rotation,
+        np.full((n, 3), np.nan) if e.seen is None else e.seen,
+        np.full((n, 3, 3), np.nan) if e.seen_rotation is None else e.seen_rotation,
+        setup,
+        target,
+        tool_unknown=e.tool != "known",
+        turn_unknown=e.tool == "unknown",
+    )
     if e.frame == "known":
         frames = unmoved(sighting)
     else:
@@ -140,8 +151,8 @@ def _sighted(machine: Machine, e: Experiment) -> tuple[Machine, Experiment]:
         reading[:, :3] = shift
     if e.seen_rotation is not None:
         reading[:, 3:6] = turn
-    found = [(f"instrument {n}", frames.base_r[i], frames.base_p[i]) for i, n in enumerate(names[0])]
-    found += [(f"target {n}", frames.tool_r[i], frames.tool_p[i]) for i, n in enumerate(names[1])]
+    found = [(f"instrument {k}", frames.base_r[i], frames.base_p[i]) for i, k in enumerate(setups)]
+    found += [(f"target {k}", frames.tool_r[i], frames.tool_p[i]) for i, k in enumerate(targets)]
     e = replace(e, reading=reading, seen=None, seen_rotation=None, registration=tuple(found))
     bare = sighting.placed & ~sighting.turned
     if not (bare.any() and sighting.tool_unknown):
@@ -152,23 +163,6 @@ def _sighted(machine: Machine, e: Experiment) -> tuple[Machine, Experiment]:
             f"(row {e.ids[int(np.flatnonzero(bare)[0])]} has none)"
         )
     return _on_points(machine, e, frames.tool_p, sighting.target)
-
-
-def _sighting(machine: Machine, e: Experiment) -> tuple[Sighting, tuple[list[str], list[str]]]:
-    n = len(e)
-    where, places = setups_of(e)
-    which, targets = targets_of(e)
-    home = machine.description.home.r
-    return Sighting(
-        e.position,
-        np.tile(home, (n, 1, 1)) if e.rotation is None else e.rotation,
-        np.full((n, 3), np.nan) if e.seen is None else e.seen,
-        np.full((n, 3, 3), np.nan) if e.seen_rotation is None else e.seen_rotation,
-        where,
-        which,
-        tool_unknown=e.tool != "known",
-        turn_unknown=e.tool == "unknown",
-    ), (places, targets)
 
 
 def _enough(e: Experiment, s: Sighting) -> None:

@@ -115,9 +115,8 @@ def _travels(machine: Machine, experiment: Experiment, back: Floats) -> Floats:
         there = inverse_kinematics(machine, experiment.position - back, experiment.rotation).actuators
         return np.asarray(here - there)
     twist = np.hstack([back, np.zeros_like(back)])
-    return np.asarray(
-        np.einsum("nai,ni->na", np.linalg.pinv(np.nan_to_num(drive_jacobian(machine, experiment))), twist)
-    )
+    drives = np.linalg.pinv(np.nan_to_num(drive_jacobian(machine, experiment)))
+    return np.asarray(np.einsum("nai,ni->na", drives, twist))
 
 
 def lagging(machine: Machine, sign: Floats, weighs: bool = False) -> Machine:

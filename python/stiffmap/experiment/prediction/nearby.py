@@ -89,18 +89,18 @@ class Nearby:
         out = np.zeros((len(others), len(self.plan), len(self.plan.channels)))
         if self.plan.quantity == "deflection" and not self.plan.wrench.any():
             return out  # from the state without load to itself
+        states = [
+            (self.plan, 1.0),
+            *([(self.plan.without_load, -1.0)] if self.plan.quantity == "deflection" else []),
+        ]
         at_once = max(1, MOST_BYTES // (48 * max(len(self.plan.distinct[0]), 1)) - 1)
         for first in range(0, len(others), at_once):
             some = slice(first, first + at_once)
-            loaded = self._states(machine, self.plan, others[some])
-            if loaded is None:
-                return None
-            out[some, :, :6] = loaded
-            if self.plan.quantity == "deflection":
-                rest = self._states(machine, self.plan.without_load, others[some])
-                if rest is None:
+            for plan, sign in states:
+                found = self._states(machine, plan, others[some])
+                if found is None:
                     return None
-                out[some, :, :6] -= rest
+                out[some, :, :6] += sign * found
         return out
 
     def _states(self, machine: Machine, plan: Experiment, others: Sequence[Machine]) -> Floats | None:

@@ -245,9 +245,8 @@ def write_folder(
     if told:
         head["record"] = told
     with only_job(make_folder(folder)):
-        head["rows"] = write_rows(
-            folder / "data.csv", [ABSOLUTE.get(h, h) for h in found.rows.header], found.rows
-        )
+        header = [ABSOLUTE.get(h, h) for h in found.rows.header]
+        head["rows"] = write_rows(folder / "data.csv", header, found.rows)
         if not head["rows"]:
             read = ", ".join(f"'{c.name}'" for c in found.columns if c.meaning in READINGS)
             raise StiffmapError(f"{sheet.file}: no row has a reading: no number in {read}")

@@ -21,6 +21,9 @@ NAMED = 5
 """Lines that a sentence names."""
 LEVER = 5.0
 """mm from the tool's point, from which it is said where a target sits."""
+SOCKET = r"(ball[ _-]?)?(socket|seat|nest|cup|datum|pfanne|kugelpfanne|sphere|ball|kugel)[ _.-]?(id|name|no\.?|nr\.?|number|nummer)?"
+PLACE = r"position|pos\.?|place|location|station|ort|stelle|platz"
+BALL = "the one ball"
 
 
 def seen_next_to_commands(m: Meant) -> None:
@@ -88,11 +91,6 @@ def without_lost(m: Meant, seen: Floats, commanded: Floats, names: Sequence[str]
     which = f"line{'s' if len(lines) > 1 else ''} {', '.join(lines[:NAMED])}{more}"
     m.said.append(f"left out: {which}: {', '.join(map(repr, names))} are 0, as of a target that was not seen")
     return np.where(lost[:, None], np.nan, seen)
-
-
-SOCKET = r"(ball[ _-]?)?(socket|seat|nest|cup|datum|pfanne|kugelpfanne|sphere|ball|kugel)[ _.-]?(id|name|no\.?|nr\.?|number|nummer)?"
-PLACE = r"position|pos\.?|place|location|station|ort|stelle|platz"
-BALL = "the one ball"
 
 
 def seated(m: Meant) -> None:

@@ -138,9 +138,8 @@ def plan_of_joints(
 def _each(loads: Floats | Sequence[Floats], number: int) -> list[Floats]:
     if isinstance(loads, np.ndarray):
         loads = [loads] * number
-    each = [
-        wrench_array(w, "loads").reshape(-1, 6) for w in instance_of(loads, Sequence, "loads", "wrenches")
-    ]
+    given = instance_of(loads, Sequence, "loads", "wrenches")
+    each = [wrench_array(w, "loads").reshape(-1, 6) for w in given]
     if len(each) != number:
         raise StiffmapError(f"loads: expected one array for each of {number} poses, got {len(each)}")
     return each
