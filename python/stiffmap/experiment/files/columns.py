@@ -103,18 +103,14 @@ def _orientation(table: Table, model: OrientationModel, second: bool) -> Floats 
     if form is fields.VECTOR:
         turned = Rotation.from_rotvec(angles)
     else:
+        if model.euler is None:
+            table.fail(
+                f"column '{names[form[0]]}': Euler angles need their convention: orientation: {{euler: XYZ}} for turns "
+                "about x, the turned y, the twice turned z; {euler: xyz} for turns about fixed axes"
+            )
         angles[empty] = 0.0
-        turned = Rotation.from_euler(_sequence(table, model, names[form[0]]), angles)
+        turned = Rotation.from_euler(model.euler, angles)
     return np.ascontiguousarray(turned.as_matrix())
-
-
-def _sequence(table: Table, model: OrientationModel, column: str) -> str:
-    if model.euler is None:
-        table.fail(
-            f"column '{column}': Euler angles need their convention: orientation: {{euler: XYZ}} for turns "
-            "about x, the turned y, the twice turned z; {euler: xyz} for turns about fixed axes"
-        )
-    return model.euler
 
 
 def _quaternions(table: Table, cells: Floats, empty: Mask) -> Floats:

@@ -31,7 +31,13 @@ def located(machine: Machine, experiment: Experiment) -> Experiment:
     """
     if experiment.command is None or experiment.joints is not None:
         return against_base(experiment, machine.description.home.r)
-    order = _columns(machine, experiment)
+    given = [c.joint for c in experiment.command_of]
+    if sorted(given) != sorted(machine.actuators):
+        raise StiffmapError(
+            f"{experiment.name}: command: expected all actuators of {machine.name} "
+            f"({', '.join(machine.actuators)}), got {', '.join(given)}"
+        )
+    order = [given.index(a) for a in machine.actuators]
     found = forward_kinematics(machine, experiment.command[:, order])
     names = machine.compiled.names
     index = list(names.joints.values())
@@ -92,16 +98,6 @@ def rows_in_words(experiment: Experiment, failed: Mask, why: str, cause: str = O
     if np.isfinite(where).all():
         rows += f"; first at ({', '.join(f'{1e3 * v:.1f}' for v in where)}) mm"
     return f"{why} {at.size} row{'s' if at.size > 1 else ''} (id {rows}): {cause}"
-
-
-def _columns(machine: Machine, experiment: Experiment) -> list[int]:
-    given = [c.joint for c in experiment.command_of]
-    if sorted(given) != sorted(machine.actuators):
-        raise StiffmapError(
-            f"{experiment.name}: command: expected all actuators of {machine.name} "
-            f"({', '.join(machine.actuators)}), got {', '.join(given)}"
-        )
-    return [given.index(a) for a in machine.actuators]
 
 
 def resolved(machine: Machine, e: Experiment) -> tuple[Machine, Experiment]:

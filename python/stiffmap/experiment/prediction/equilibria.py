@@ -114,9 +114,10 @@ def _at_rest(machine: Machine, plan: Experiment, threads: int | None) -> tuple[F
 
 
 def _equilibria(machine: Machine, plan: Experiment, threads: int | None) -> tuple[Floats, int]:
-    """(n, c) under the wrenches of the plan."""
+    """(n, c) under the wrenches of the plan; where nothing moves the machine, zero at poses that can be reached."""
     if not plan.wrench.any() and not moves_unloaded(machine, plan):
-        return _at_command(machine, plan), 0
+        there = in_reach(machine, plan.each_pose)[plan.groups]
+        return np.where(there[:, None], np.zeros((len(plan), len(plan.channels))), np.nan), 0
     if len(set(plan.load_points)) < 2:
         return _unique(machine, threads, plan, plan.load_points[0] if plan.load_points else plan.load_point)
     return _in_parts(plan, plan.load_points, partial(_unique, machine, threads))
@@ -201,12 +202,6 @@ def seen_from(machine: Machine, plan: Experiment, on: str, motion: Floats, carri
     linear = turn.inv().apply(arm + motion[:, :3] - carrier_motion[:, :3]) - arm
     angular = (turn.inv() * Rotation.from_rotvec(np.nan_to_num(motion[:, 3:]))).as_rotvec()
     return np.where(np.isfinite(motion), np.hstack([linear, angular]), np.nan)
-
-
-def _at_command(machine: Machine, plan: Experiment) -> Floats:
-    """(n, c) zero where the pose can be reached, else NaN."""
-    there = in_reach(machine, plan.each_pose)[plan.groups]
-    return np.where(there[:, None], np.zeros((len(plan), len(plan.channels))), np.nan)
 
 
 def moves_unloaded(machine: Machine, plan: Experiment) -> bool:

@@ -164,7 +164,7 @@ def _steps_show(machine: Machine, plan: Experiment) -> bool:
 def _step_leads(machine: Machine, other: MachineDescription, plan: Experiment) -> bool:
     """Whether one step from the machine's equilibria leads to those of another."""
     d = machine.description
-    heavy = _is_heavy(machine, plan)
+    heavy = any(plan.gravity or d.gravity or ())
     if heavy and machine.compiled.names.free_spins:  # a weight that is off turns them
         return False
     if not alike(d, other, heavy=heavy) or is_sided(other, plan):
@@ -176,10 +176,6 @@ def _holds_as(machine: Machine, other: Machine) -> bool:
     """Whether both have the same coordinates and hold the same spins."""
     a, b = machine.compiled.names, other.compiled.names
     return (a.coordinates, a.free_spins) == (b.coordinates, b.free_spins) and not other.fast
-
-
-def _is_heavy(machine: Machine, plan: Experiment) -> bool:
-    return any(plan.gravity or machine.description.gravity or ())
 
 
 def _points(machine: Machine, plan: Experiment) -> set[str]:
