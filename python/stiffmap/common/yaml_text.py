@@ -176,7 +176,7 @@ def _text(dumper: Any, data: str) -> Any:
 
 _Dumper.add_representer(list, _list)
 _Dumper.add_representer(str, _text)
-_Dumper.add_multi_representer(np.generic, lambda dumper, data: dumper.represent_data(data.item()))
+_Dumper.add_multi_representer(np.generic, lambda dumper, data: dumper.represent_data(data.item()))  # type: ignore[type-abstract]
 
 
 def text_of(data: Any) -> str:

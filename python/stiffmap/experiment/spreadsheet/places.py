@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from stiffmap.common.broadcasting import Floats
+from stiffmap.common.errors import StiffmapError
 from stiffmap.common.tables.table import Table
 from stiffmap.experiment.channels import AXES
 from stiffmap.experiment.files.fields import POSE, SEEN
@@ -19,6 +20,8 @@ from stiffmap.solve.machine import Machine
 
 NAMED = 5
 """Lines that a sentence names."""
+LINE = 0.02
+"""Second extent of the commands over the first, below which they are a line."""
 LEVER = 5.0
 """mm from the tool's point, from which it is said where a target sits."""
 SOCKET = r"(ball[ _-]?)?(socket|seat|nest|cup|datum|pfanne|kugelpfanne|sphere|ball|kugel)[ _.-]?(id|name|no\.?|nr\.?|number|nummer)?"
@@ -54,6 +57,13 @@ def in_base_axes(m: Meant, machine: Callable[[], Machine]) -> None:
     frame = own_frame(seen, commanded, None if pose is None else pose.rotation)
     if frame is None:
         return
+    good = commanded[np.isfinite(commanded).all(axis=1)]
+    extents = np.linalg.svd(good - good.mean(axis=0), compute_uv=False)
+    if extents[1] < LINE * extents[0]:
+        raise StiffmapError(
+            f"{m.sheet.file}: the commands lie on a line, next to which the unloaded places do not show the axes of the instrument's "
+            "own frame; give differences along base axes (dx, dy, dz), or further poses"
+        )
     at = [m.index(m.chosen[a][0]) for a in AXES[:3]]
     turned = (m.metres(at, AXES[:3]) @ frame.base_r[0]).T
     units = [m.written_unit(i, a) for i, a in zip(at, AXES[:3], strict=True)]  # as --noise has them

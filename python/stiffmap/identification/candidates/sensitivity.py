@@ -66,6 +66,8 @@ class Variant:
         (p,) +1 where the parameter can only grow from its null, -1 only fall, 0 both.
     start
         Values of further parameters from the strengths of the columns.
+    most
+        Largest strength, in scales.
     """
 
     candidate: Candidate
@@ -73,6 +75,7 @@ class Variant:
     sign: Floats
     shape: Shape = ()
     start: Start | None = None
+    most: float = np.inf
 
     def lines(self, use: Integers | slice = EVERY) -> Floats:
         """(p, N) the columns, one per line, of some of the readings, else of all."""
@@ -106,7 +109,7 @@ def variants(
             ]
             columns = lines_of(np.stack(single, axis=-1), base, index)
             sign = np.array([side(p) for p in linear])
-        yield None if columns is None else Variant(candidate, columns, sign, shape, s.start)
+        yield None if columns is None else Variant(candidate, columns, sign, shape, s.start, s.most)
 
 
 def lines_of(columns: Floats, base: Floats, index: Index) -> Floats | None:

@@ -66,7 +66,14 @@ class Chosen:
     @property
     def is_possible(self) -> bool:
         """Whether all strengths lie within what their parameters can be."""
-        return all(low <= x <= high for p, x in self.strengths for low, high in [possible(p)])
+        return not self.is_too_large and all(
+            low <= x <= high for p, x in self.strengths for low, high in [possible(p)]
+        )
+
+    @property
+    def is_too_large(self) -> bool:
+        """Whether no machine can have it so large."""
+        return float(np.abs(self.values).max(initial=0.0)) > self.variant.most
 
     @property
     def whole(self) -> Floats:
@@ -82,6 +89,7 @@ class Chosen:
             both = [(*possible(p), float(p.null or 0.0), p.scale) for p in self.place.candidate.linear]
             low = np.array([(a - null) / scale for a, _, null, scale in both])
             high = np.array([(b - null) / scale for _, b, null, scale in both])
+        low, high = np.maximum(low, -self.variant.most), np.minimum(high, self.variant.most)
         shape = [p for p, _ in self.shaped]
         return (
             np.append(low, [p.lower / p.scale for p in shape]),

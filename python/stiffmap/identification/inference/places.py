@@ -97,7 +97,7 @@ def shape_of(v: Variant, white: Floats) -> Shape | None:
     length = np.linalg.norm(white, axis=0)
     linear = v.candidate.linear
     limits = [reach(p) for p in linear] if len(linear) == len(v.sign) else []  # largest plausible values
-    most = np.minimum([*limits, *[np.inf] * (white.shape[1] - len(limits))], 1.0 / NULL)
+    most = np.minimum([*limits, *[np.inf] * (white.shape[1] - len(limits))], min(v.most, 1.0 / NULL))
     seen = length * most > VISIBLE
     if not seen.any():
         return None

@@ -185,6 +185,8 @@ class World:
         columns = self.columns
         parts = (*self.numbers, *self.gaps, *(c.part for c in chosen))
         fit = fitted(columns, parts, start, weights, lighter)
+        if any(c.by_posterior(fit).is_too_large for c in chosen):
+            return Model(self.name, chosen, fit, -np.inf)
         if self.predict and chosen:
             fit, chosen = self._corrected(fit, chosen)
         chosen = tuple(c if len(c.values) else c.by_posterior(fit) for c in chosen)

@@ -171,6 +171,8 @@ class Signature:
         with a null stands at its null plus strength times scale.
     grows
         Whether strengths can only be positive.
+    most
+        Largest strength that a machine can have.
     period
         In place of columns: all periods that are tried alike, and the number of this one. They are not written out
         where rows are many.
@@ -180,6 +182,7 @@ class Signature:
     columns: Floats | None = None
     start: Callable[[Floats], Mapping[str, float]] | None = None
     grows: bool = False
+    most: float = np.inf
     period: tuple[Periods, int] | None = None
 
 

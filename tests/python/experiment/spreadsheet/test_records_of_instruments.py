@@ -297,6 +297,18 @@ def test_loaded_and_unloaded_places_in_the_frame_of_the_instrument(
     assert any("turned from its axes into those of the base" in r for r in found.remarks)
 
 
+def test_commands_on_a_line_show_no_axes(tmp_path: Path) -> None:
+    places = GRID * [1.0, 0.0, 0.0] + (2500, 300, -120)
+    rows = (
+        ";".join(f"{v:g}" for v in (p[0], 0, 0, 100, *q, *(q + 0.1)))
+        for p, q in zip(GRID, places, strict=True)
+    )
+    names = (f"{a} {s} [mm]" for s in ("unloaded", "loaded") for a in "XYZ")
+    text = "\n".join([";".join(["x [mm];y [mm];z [mm];Fx [N]", *names]), *rows, ""])
+    with pytest.raises(StiffmapError, match=r"record.csv: the commands lie on a line.*dx, dy, dz"):
+        made(tmp_path, text, "tripteron", noise=NOISE)
+
+
 def test_unloaded_gauges_that_are_no_places_are_taken_as_they_are(tmp_path: Path) -> None:
     rows = (
         ";".join(f"{v:.6f}" for v in (*p, 100, *e, *(e + 0.1))) for p, e in zip(GRID, ERRORS, strict=True)

@@ -109,6 +109,8 @@ PAYLOAD = EffectType(
 
 SLACK = (0.0, 0.7)
 """Free length as a share of the distance to the middle of the plan."""
+HARDEST = 1e4
+"""N: no tool is pulled harder, whatever is read; a spring that shows by its stiffness alone would pull with meganewtons."""
 ANCHOR = tuple(
     Parameter(f"anchor_{a}", "m", -100.0, 100.0, None, 0.1, f"fixed end, {a}", fitted=False) for a in "xyz"
 )
@@ -140,11 +142,12 @@ def signature(probe: Probe, tried: Tried) -> Iterator[Signature]:
     scale, yields = tried.parameters[0].scale, probe.compliance()
     for anchor, length in anchors(plan.position):
         pull = _force(plan.position + probe.base[:, :3], anchor, length)
+        most = HARDEST / (scale * float(np.nanmax(np.linalg.norm(pull, axis=1))))
         if plan.quantity == "deflection":
             pull = pull - _force(plan.position, anchor, length)
         column = np.einsum("nij,nj->ni", yields, pull) * scale
         named = zip(("anchor_x", "anchor_y", "anchor_z"), anchor.tolist(), strict=True)
-        yield Signature({"length": length, **dict(named)}, column[..., None], grows=True)
+        yield Signature({"length": length, **dict(named)}, column[..., None], grows=True, most=most)
 
 
 def anchors(position: Floats) -> Iterator[tuple[Floats, float]]:
