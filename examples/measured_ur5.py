@@ -21,7 +21,7 @@ import stiffmap as sm
 from stiffmap.experiment import Experiment, Predictor
 from stiffmap.experiment.experiment import Floats, Mask
 from stiffmap.experiment.files.load import load_experiment
-from stiffmap.experiment.noise.held_out import left_unseen
+from stiffmap.experiment.noise.whitening import left_unseen
 from stiffmap.identification.numbers import Tolerances
 from stiffmap.solve.kinematics import forward_kinematics
 from stiffmap.ui.cli.calibrate import write as write_calibration

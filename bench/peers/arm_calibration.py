@@ -25,7 +25,7 @@ from scipy.spatial.transform import Rotation
 
 import stiffmap as sm
 from stiffmap.experiment import Predictor, load_experiment
-from stiffmap.experiment.noise.held_out import folds
+from stiffmap.experiment.noise.whitening import folds
 from stiffmap.identification.numbers import Tolerances
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "examples"))

@@ -12,8 +12,7 @@ from scipy.stats import chi2
 from stiffmap.common.broadcasting import given_path, instance_of, random_numbers, real_number
 from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.comparison.limitations import limitations, refuse_unreachable
-from stiffmap.experiment.comparison.residual import Residual
-from stiffmap.experiment.comparison.summary import summary
+from stiffmap.experiment.comparison.residual import Residual, summary
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.files.load import load_experiment
 from stiffmap.experiment.noise.checks import checks

@@ -1,4 +1,4 @@
-"""Experiments and residuals as a notebook shows them."""
+"""Experiments as a notebook shows them."""
 
 from __future__ import annotations
 
@@ -36,12 +36,3 @@ def experiment_rows(e: Any) -> tuple[list[str], list[list[str]]]:
         cells += [f"{e.reading[n, i] * (1e6 if e.channels[i].unit == 'm' else 1e3):.5g}" for i in read]
         rows.append(cells)
     return head, rows
-
-
-def residual_html(r: Any) -> str:
-    """Size of the residual per axis and its worst rows."""
-    unit = {c.name: ("µm", 1e6) if c.unit == "m" else ("mrad", 1e3) for c in r.experiment.channels}
-    rows = [(a, f"{v * unit[a][1]:.3g} {unit[a][0]}") for a, v in r.summary.per_axis.items()]
-    worst = [(i, a, f"{v * unit[a][1]:.3g} {unit[a][0]}") for i, a, v in r.worst(20)]
-    head = f"{r.experiment.name}: rms {1e6 * r.summary.rms:.3g} µm, p = {r.lack_of_fit:.2g}"
-    return titled(head, table(("axis", "rms"), rows), table(("worst row", "axis", "residual"), worst))

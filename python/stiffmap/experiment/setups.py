@@ -27,13 +27,8 @@ def members(number: Integers) -> Floats:
 
 def target_positions(experiment: Experiment) -> Floats:
     """(n, 3) m, base axes: where the targets were commanded."""
-    return np.asarray(experiment.position + _levers(experiment))
-
-
-def _levers(experiment: Experiment) -> Floats:
-    """(n, 3) m, base axes: from the tool point to the target that was seen, where it has been found."""
-    out = np.zeros((len(experiment), 3))
-    if experiment.rotation is None or not experiment.points:  # the same in all rows: a shift
+    out = experiment.position.copy()
+    if experiment.rotation is None or not experiment.points:  # the lever is the same in all rows: a shift
         return out
     shifts = {name: shift for name, _, shift in experiment.registration}
     number, names = targets_of(experiment)
@@ -41,7 +36,7 @@ def _levers(experiment: Experiment) -> Floats:
     for k, name in enumerate(names):
         if (shift := shifts.get(f"target {name}")) is not None:
             here = seen & (number == k)
-            out[here] = experiment.rotation[here] @ shift
+            out[here] += experiment.rotation[here] @ shift
     return out
 
 

@@ -97,9 +97,8 @@ class DeflectionBudget:
         import pandas as pd
 
         names = ("dx, µm", "dy, µm", "dz, µm")
-        rows = {
-            n: dict(zip(names, 1e6 * c[:3], strict=True)) | {"share, %": 100 * s} for n, c, s in self.ranked()
-        }
+        parts = {n: dict(zip(names, 1e6 * c[:3], strict=True)) for n, c, _ in self.ranked()}
+        rows = {n: parts[n] | {"share, %": 100 * s} for n, _, s in self.ranked()}
         return pd.DataFrame.from_dict(rows, orient="index").rename_axis("element")
 
     def __str__(self) -> str:

@@ -65,13 +65,7 @@ def assembly_wrenches(
     machine file says. Raises StiffmapError for bad input.
     """
     s = machine.solve(
-        position,
-        wrench,
-        rotation=rotation,
-        point=point,
-        gravity=gravity,
-        threads=threads,
-        method="reference",
+        position, wrench, rotation=rotation, point=point, gravity=gravity, threads=threads, method="reference"
     )
     shape, p, r, w = loaded_poses(machine.compiled, position, wrench, rotation)
     gravity = machine.compiled.gravity(gravity)

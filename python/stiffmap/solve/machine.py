@@ -190,10 +190,7 @@ class Machine:
 
     @spelled_out(SolveKeywords)
     def solve_joints(
-        self,
-        actuators: ArrayLike,
-        wrench: ArrayLike | None = None,
-        **given: Unpack[SolveKeywords],
+        self, actuators: ArrayLike, wrench: ArrayLike | None = None, **given: Unpack[SolveKeywords]
     ) -> Solution:
         """Equilibrium and stiffness at commanded actuators (..., actuators) m or rad, in the order of `actuators`.
 

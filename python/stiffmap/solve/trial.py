@@ -61,9 +61,8 @@ def tried(machine: Machine) -> Trial:
     force = TINY * machine.compiled.length / float(np.nanmax(soft))
     for axis, load in zip("xyz", force * np.eye(3, 6), strict=True):
         under = machine.solve(at[good], load)
-        findings += _failed(
-            machine, at[good], under.status, under.free_twists, f"under {force:.2g} N along {axis} "
-        )
+        load_words = f"under {force:.2g} N along {axis} "
+        findings += _failed(machine, at[good], under.status, under.free_twists, load_words)
     return Trial(ends, force, findings)
 
 

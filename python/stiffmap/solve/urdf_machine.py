@@ -9,10 +9,7 @@ from stiffmap.solve.machine import Machine
 
 
 def import_urdf(
-    urdf: str | PathLike[str],
-    sidecar: str | PathLike[str] | None = None,
-    *,
-    tip: str | None = None,
+    urdf: str | PathLike[str], sidecar: str | PathLike[str] | None = None, *, tip: str | None = None
 ) -> Machine:
     """Machine (SI) of a URDF file: a serial chain from the root link to the tip, or legs in parallel with a sidecar.
 

@@ -1,4 +1,4 @@
-"""Residual of an experiment against a machine, with noise floor, lack of fit, outliers and checks."""
+"""Residual of an experiment against a machine: its size, noise floor, lack of fit, outliers and checks."""
 
 from __future__ import annotations
 
@@ -13,15 +13,56 @@ from scipy.spatial.transform import Rotation
 from stiffmap.common.broadcasting import whole_number
 from stiffmap.common.json_text import plain
 from stiffmap.common.outputs import number_cells, write_rows
-from stiffmap.common.short import short_repr
-from stiffmap.experiment.comparison.summary import Summary
+from stiffmap.common.short import short_repr, table, titled
+from stiffmap.experiment.channels import AXIS_CHANNELS, Channel, metres
 from stiffmap.experiment.experiment import Experiment, Floats, Mask
 from stiffmap.experiment.noise.checks import Check
-from stiffmap.experiment.noise.level import Noise
-from stiffmap.experiment.notebook import residual_html
+from stiffmap.experiment.noise.level import Noise, rms
 
 if TYPE_CHECKING:
     import pandas as pd
+
+
+@dataclass(frozen=True)
+class Summary:
+    """Of single readings of lengths, m (angles apart, rad)."""
+
+    rms: float
+    p95: float
+    max: float
+    per_axis: dict[str, float]
+    """rms of each axis, m or rad."""
+    n: int
+    """Number of readings (linear and angular)."""
+    ratio: float
+    """rms over the noise floor, linear and angular readings together."""
+    rotation_rms: float | None = None
+
+    @property
+    def size(self) -> tuple[float, str]:
+        """rms in m of the lengths, or in rad where only angles are read; and that unit."""
+        if self.rotation_rms is not None and not np.isfinite(self.rms):
+            return self.rotation_rms, "rad"
+        return self.rms, "m"
+
+
+def summary(residual: Floats, sigma: Floats, channels: tuple[Channel, ...] = AXIS_CHANNELS) -> Summary:
+    """Summary of residuals (n, c), NaN where nothing was read."""
+    linear, angular = residual[:, metres(channels)], residual[:, ~metres(channels)]
+    size = np.abs(linear[np.isfinite(linear)])
+    if not size.size:
+        size = np.array([np.nan])
+    read = [i for i in range(len(channels)) if np.isfinite(residual[:, i]).any()]
+    per_axis = {channels[i].name: rms(residual[:, i]) for i in read}
+    return Summary(
+        rms=rms(linear),
+        p95=float(np.percentile(size, 95)),
+        max=float(size.max()),
+        per_axis=per_axis,
+        n=int(np.isfinite(residual).sum()),
+        ratio=rms(residual / sigma),
+        rotation_rms=rms(angular) if np.isfinite(angular).any() else None,
+    )
 
 
 @short_repr
@@ -51,7 +92,11 @@ class Residual:
     """What this experiment cannot determine, in sentences."""
 
     def _repr_html_(self) -> str:
-        return residual_html(self)
+        unit = {c.name: ("µm", 1e6) if c.unit == "m" else ("mrad", 1e3) for c in self.experiment.channels}
+        rows = [(a, f"{v * unit[a][1]:.3g} {unit[a][0]}") for a, v in self.summary.per_axis.items()]
+        worst = [(i, a, f"{v * unit[a][1]:.3g} {unit[a][0]}") for i, a, v in self.worst(20)]
+        head = f"{self.experiment.name}: rms {1e6 * self.summary.rms:.3g} µm, p = {self.lack_of_fit:.2g}"
+        return titled(head, table(("axis", "rms"), rows), table(("worst row", "axis", "residual"), worst))
 
     def to_dataframe(self) -> pd.DataFrame:
         """A row per row of the experiment: pose (mm), wrench (N, N·m), and of each channel reading, prediction

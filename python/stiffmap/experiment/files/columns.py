@@ -16,22 +16,9 @@ from stiffmap.common.errors import FileError
 from stiffmap.common.tables.table import Table
 from stiffmap.experiment.channels import Channel
 from stiffmap.experiment.experiment import BRANCHES, Floats, Integers, Mask
-from stiffmap.experiment.files.fields import (
-    APPROACH,
-    FORMS,
-    MATRIX,
-    POSE,
-    POSE2,
-    QUATERNION,
-    SEEN,
-    SEEN_QUATERNION,
-    SEEN_TURNED,
-    TURNED,
-    TURNED2,
-    VECTOR,
-)
+from stiffmap.experiment.files import fields
 from stiffmap.experiment.files.schema import ExperimentFile, NoiseModel, OrientationModel
-from stiffmap.experiment.files.units import Units
+from stiffmap.experiment.files.table import Units
 from stiffmap.experiment.readings import kind_of
 
 UNIT_LENGTH, ORTHONORMAL = 1e-3, 1e-4
@@ -41,11 +28,11 @@ UNIT_LENGTH, ORTHONORMAL = 1e-3, 1e-4
 def position(table: Table, commanded: bool) -> Floats:
     """(n, 3) m; NaN where actuator coordinates are commanded instead."""
     if commanded:
-        twice = table.one_of((*POSE, *TURNED))
+        twice = table.one_of((*fields.POSE, *fields.TURNED))
         if twice:
             table.fail(f"column '{twice}': actuators are commanded (command:), so the pose follows from them")
         return np.full((len(table), 3), np.nan)
-    return table.block(POSE, blank=False, missing=None)
+    return table.block(fields.POSE, blank=False, missing=None)
 
 
 def command(model: ExperimentFile, table: Table, behind: str = "") -> Floats | None:
@@ -61,20 +48,20 @@ def command(model: ExperimentFile, table: Table, behind: str = "") -> Floats | N
 
 def seen(table: Table) -> Floats | None:
     """(n, 3) m: coordinates of the target in the instrument's frame."""
-    if not table.one_of(SEEN):
+    if not table.one_of(fields.SEEN):
         return None
-    out = table.block(SEEN, blank=True, missing=None)
+    out = table.block(fields.SEEN, blank=True, missing=None)
     return np.where(np.asarray(np.isfinite(out).all(axis=1))[:, None], out, np.nan)
 
 
 def seen_rotation(model: ExperimentFile, table: Table) -> Floats | None:
     """(n, 3, 3) of the target in the instrument's frame, from three angles or a quaternion; NaN where blank."""
-    names = next((g for g in (SEEN_TURNED, SEEN_QUATERNION) if table.one_of(g)), None)
+    names = next((g for g in (fields.SEEN_TURNED, fields.SEEN_QUATERNION) if table.one_of(g)), None)
     if names is None:
         return None
     values = table.block(names, blank=True, missing=None)
     good = np.asarray(np.isfinite(values).all(axis=1))[:, None]
-    if names is SEEN_QUATERNION:
+    if names is fields.SEEN_QUATERNION:
         filled = np.where(good, values, [0.0, 0.0, 0.0, 1.0])
         unit = np.abs(np.linalg.norm(filled, axis=1) - 1.0) <= 1e-2
         table.check(unit, lambda _: "columns 'pqx' to 'pqw': expected a quaternion of length 1, x y z w")
@@ -96,8 +83,8 @@ def rotations(table: Table, model: OrientationModel) -> tuple[Floats | None, Flo
 
 
 def _orientation(table: Table, model: OrientationModel, second: bool) -> Floats | None:
-    names = dict(zip(TURNED, TURNED2 if second else TURNED, strict=True))
-    forms = [f for f in FORMS if table.one_of(names[c] for c in f)]
+    names = dict(zip(fields.TURNED, fields.TURNED2 if second else fields.TURNED, strict=True))
+    forms = [f for f in fields.FORMS if table.one_of(names[c] for c in f)]
     if not forms:
         return None
     if len(forms) > 1:
@@ -105,28 +92,25 @@ def _orientation(table: Table, model: OrientationModel, second: bool) -> Floats 
         table.fail(f"column '{two}': orientations are given twice, as {one} … and as {two} …; keep one")
     form = forms[0]
     # a turn about one axis may leave out the others
-    cells = table.block([names[c] for c in form], blank=second, missing=0.0 if form is VECTOR else None)
+    missing = 0.0 if form is fields.VECTOR else None
+    cells = table.block([names[c] for c in form], blank=second, missing=missing)
     empty: Mask = np.asarray(~np.isfinite(cells).all(axis=1))
-    if form in (QUATERNION, MATRIX):
-        out = (_quaternions if form is QUATERNION else _matrices)(table, cells, empty)
+    if form in (fields.QUATERNION, fields.MATRIX):
+        out = (_quaternions if form is fields.QUATERNION else _matrices)(table, cells, empty)
         out[empty] = np.eye(3)
         return np.ascontiguousarray(out)
     angles = np.nan_to_num(cells)
-    if form is VECTOR:
+    if form is fields.VECTOR:
         turned = Rotation.from_rotvec(angles)
     else:
+        if model.euler is None:
+            table.fail(
+                f"column '{names[form[0]]}': Euler angles need their convention: orientation: {{euler: XYZ}} for turns "
+                "about x, the turned y, the twice turned z; {euler: xyz} for turns about fixed axes"
+            )
         angles[empty] = 0.0
-        turned = Rotation.from_euler(_sequence(table, model, names[form[0]]), angles)
+        turned = Rotation.from_euler(model.euler, angles)
     return np.ascontiguousarray(turned.as_matrix())
-
-
-def _sequence(table: Table, model: OrientationModel, column: str) -> str:
-    if model.euler is None:
-        table.fail(
-            f"column '{column}': Euler angles need their convention: orientation: {{euler: XYZ}} for turns "
-            "about x, the turned y, the twice turned z; {euler: xyz} for turns about fixed axes"
-        )
-    return model.euler
 
 
 def _quaternions(table: Table, cells: Floats, empty: Mask) -> Floats:
@@ -184,9 +168,9 @@ def other(
                 file=table.file,
             )
         return np.full((len(table), 3), np.nan)
-    out = table.block(POSE2, blank=True, missing=None)
+    out = table.block(fields.POSE2, blank=True, missing=None)
     read = np.isfinite(reading[:, at]).any(axis=1)
-    same = np.abs(out - table.block(POSE, blank=True)).max(axis=1) < 1e-9
+    same = np.abs(out - table.block(fields.POSE, blank=True)).max(axis=1) < 1e-9
     told = f"column '{kind.name}': {kind.title}"
     table.check(~read | np.isfinite(out).all(axis=1), lambda _: f"{told} has no second pose (x2, y2, z2)")
     table.check(~same, lambda _: f"{told} is between a pose and itself")
@@ -195,20 +179,15 @@ def other(
 
 def approach(table: Table) -> Floats | None:
     """(n, 3) direction of the last travel; an empty cell is 0."""
-    if not table.one_of(APPROACH):
+    if not table.one_of(fields.APPROACH):
         return None
-    return np.nan_to_num(table.block(APPROACH, blank=True, missing=0.0))
+    return np.nan_to_num(table.block(fields.APPROACH, blank=True, missing=0.0))
 
 
 def declared(noise: NoiseModel, units: Units, channels: Sequence[Channel]) -> Floats:
     """(c,) declared standard deviations; NaN where none is."""
-    values = [getattr(noise, c.name, None) for c in channels]
-    return np.array(
-        [
-            np.nan if v is None else units.size(c.name, np.nan) * v
-            for c, v in zip(channels, values, strict=True)
-        ]
-    )
+    values = {c.name: getattr(noise, c.name, None) for c in channels}
+    return np.array([np.nan if v is None else units.size(n, np.nan) * v for n, v in values.items()])
 
 
 def sigma(model: ExperimentFile, table: Table, units: Units, channels: tuple[Channel, ...]) -> Floats:

@@ -1,7 +1,8 @@
-"""Reading an experiment folder."""
+"""Reading an experiment folder, or a plan: a CSV file with the columns of an experiment without readings."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
@@ -14,18 +15,24 @@ from stiffmap.common.errors import FileError, MissingColumnError
 from stiffmap.common.tables.table import Table
 from stiffmap.common.units import name_and_unit
 from stiffmap.common.yaml_text import read as read_yaml
-from stiffmap.experiment.channels import AXIS_CHANNELS, Channel
-from stiffmap.experiment.experiment import ASKED, AXES, WRENCH, Experiment, Floats, Loop
+from stiffmap.experiment.channels import AXES, AXIS_CHANNELS, Channel
+from stiffmap.experiment.experiment import ASKED, WRENCH, Experiment, Floats, Loop
 from stiffmap.experiment.files import columns as read_columns
-from stiffmap.experiment.files.fields import POSE, SEEN, SEEN_QUATERNION, SEEN_TURNED, absolute, known, read
-from stiffmap.experiment.files.schema import ExperimentFile, file_model
-from stiffmap.experiment.files.table import read_table
-from stiffmap.experiment.files.units import ANGLES, Units
+from stiffmap.experiment.files import fields
+from stiffmap.experiment.files.schema import ExperimentFile, ExperimentUnitsModel, file_model
+from stiffmap.experiment.files.table import ANGLES, Units, read_table
 from stiffmap.experiment.readings import kinds
+from stiffmap.experiment.virtual.plans import unread
 from stiffmap.model.files.report import validated
+from stiffmap.solve.machine import Machine
 
 SAME = ("point", "unloaded", "frame", "tool", "title", "reference_temperature")
 """Keys of the file that an `Experiment` has as they are."""
+KNOWN = tuple(c for c in fields.PLAN if c not in (*fields.EULER, *fields.TURNED2))
+READ_LATER = ("asked", "hours", "instrument", "target", "other_rotation")
+"""What a plan may have columns of, and only readings need."""
+Parts = Sequence[tuple[tuple[str, ...], Floats | None]]
+"""Columns of readings, and what those in coordinates of their own hold for them."""
 
 
 def load_experiment(path: str | PathLike[str]) -> Experiment:
@@ -45,7 +52,7 @@ def load_experiment(path: str | PathLike[str]) -> Experiment:
     units = Units(model, str(file))
     table = _rename(read_table(file.parent / model.data, model.rows), model.columns)
     table = units.of_header(table, {*model.joints, *model.command})
-    if units.common["length"] < 1e-5 and not model.command and not {*POSE} & {*units.own}:
+    if units.common["length"] < 1e-5 and not model.command and not {*fields.POSE} & {*units.own}:
         raise FileError(
             "units: with length: um the poses x, y, z would be in µm as well; write their unit, as in "
             "{length: mm, dx: um, dy: um, dz: um} (or x: um, if they are)",
@@ -53,9 +60,9 @@ def load_experiment(path: str | PathLike[str]) -> Experiment:
         )
     seconds = [f"{c}2" for c in model.command if f"{c}2" in table]
     own = (*model.joints, *model.command, *seconds)
-    if taken := next((c for c in own if c in known()), None):
+    if taken := next((c for c in own if c in fields.known()), None):
         table.fail(f"joints, command: '{taken}' has a meaning of its own; give the column another name")
-    table.refuse_unknown((*known(), *own, *(f"u_{c}" for c in own)), "known:")
+    table.refuse_unknown((*fields.known(), *own, *(f"u_{c}" for c in own)), "known:")
     for column in own:
         table.text(column)
     return _assemble(model, table, units, file)
@@ -103,15 +110,19 @@ def _readings(
     of_kinds = {
         k.name: table.si(k.absolute, blank=True) for k in kinds() if k.absolute and k.absolute in table
     }
-    _above_zero(table, of_kinds)
-    _promise(reading, channels, table, seen, seen_rotation, of_kinds)
+    for kind in (k for k in kinds() if k.positive and k.name in of_kinds):
+        expected = f"column '{kind.absolute}': expected {kind.title} above zero"
+        found = [f"{expected}; found {v:g} m" for v in of_kinds[kind.name]]
+        table.check(~(of_kinds[kind.name] <= 0.0), found.__getitem__)
+    single = (((name,), values) for name, values in of_kinds.items())
+    _promise(reading, channels, table, [(AXES[:3], seen), (AXES[3:], seen_rotation), *single])
     if not np.isfinite(reading).any():
-        if empty := [c for c in (*read(), *absolute()) if c in table]:
+        if empty := [c for c in (*fields.read(), *fields.absolute()) if c in table]:
             raise FileError(
                 f"expected a reading in one row or more of {', '.join(empty)}; found none", file=table.file
             )
         raise MissingColumnError(
-            f"missing column: no reading ({', '.join((*read(), *absolute()))}, joints)",
+            f"missing column: no reading ({', '.join((*fields.read(), *fields.absolute()))}, joints)",
             file=table.file,
         )
     _fits(model.quantity, table)
@@ -191,7 +202,7 @@ def _certificate(model: ExperimentFile, units: Units, file: Path) -> tuple[tuple
 
 def _fits(quantity: str, table: Table) -> None:
     """FileError for a column that an experiment of this quantity cannot have."""
-    of_position = (*SEEN, *SEEN_TURNED, *SEEN_QUATERNION)
+    of_position = (*fields.SEEN, *fields.SEEN_TURNED, *fields.SEEN_QUATERNION)
     wrong = [] if quantity == "position" else [(c, "a place (quantity: position)") for c in of_position]
     wrong += [(c, k.title) for k in kinds() if quantity not in k.quantities for c in (k.name, k.absolute)]
     for column, title in wrong:
@@ -199,27 +210,10 @@ def _fits(quantity: str, table: Table) -> None:
             table.fail(f"column '{column}': {title} is no {quantity}")
 
 
-def _above_zero(table: Table, absolute: dict[str, Floats]) -> None:
-    """FileError for a reading that has the wrong sign."""
-    for kind in (k for k in kinds() if k.positive and k.name in absolute):
-        values = absolute[kind.name]
-        expected = f"column '{kind.absolute}': expected {kind.title} above zero"
-        table.check(~(values <= 0.0), [f"{expected}; found {v:g} m" for v in values].__getitem__)
-
-
-def _promise(
-    reading: Floats,
-    channels: tuple[Channel, ...],
-    table: Table,
-    seen: Floats | None,
-    seen_rotation: Floats | None,
-    absolute: dict[str, Floats],
-) -> None:
-    """Marks what absolute columns will read once poses are known; FileError where both forms are given."""
+def _promise(reading: Floats, channels: tuple[Channel, ...], table: Table, parts: Parts) -> None:
+    """Marks what absolute columns, next to their readings, will read once poses are known; FileError where both forms are given."""
     at = {c.name: i for i, c in enumerate(channels)}
-    parts: list[tuple[Floats | None, tuple[str, ...]]] = [(seen, AXES[:3]), (seen_rotation, AXES[3:])]
-    parts += [(values, (name,)) for name, values in absolute.items()]
-    for values, names in parts:
+    for names, values in parts:
         if values is None:
             continue
         if twice := table.one_of(names):
@@ -237,3 +231,34 @@ def _wrench(model: ExperimentFile, table: Table) -> Floats:
             "missing column: a deflection needs a load (fx, fy, fz, mx, my, mz)", file=table.file
         )
     return table.block(WRENCH, blank=False, missing=0.0)
+
+
+def load_plan(
+    path: Path,
+    machine: Machine,
+    quantity: str,
+    *,
+    axes: Sequence[str] = AXES[:3],
+    noise: float | None = None,
+    angle_noise: float = 1e-5,
+) -> Experiment:
+    """Plan of a CSV file (mm, N and rad, or the unit that a header names: ``x [um]``) with x, y, z and, as wanted, loads,
+    orientation, order, temperature, branch, set-up, approach and points. Raises `FileError` naming file, row and column."""
+    units = ExperimentUnitsModel(length="mm", force="N", angle="rad")
+    model = ExperimentFile(machine=machine.name, quantity=quantity, units=units)  # type: ignore[arg-type]
+    table = Units(model, str(path)).of_header(read_table(path))
+    table.refuse_unknown(KNOWN, "a plan knows")
+    n = len(table)
+    rows = {k: v for k, v in rows_of(model, table).items() if k not in READ_LATER}
+    if rows["order"] is None:
+        rows["order"] = np.arange(1, n + 1, dtype=float)
+    if quantity == "deflection" and not rows["wrench"].any():
+        raise FileError("a plan of deflections needs a load (fx, fy, fz, mx, my, mz)", file=table.file)
+    return Experiment(
+        name=path.stem,
+        machine=machine.name,
+        quantity=quantity,
+        rotation_against="home",
+        **unread(n, quantity, axes, noise, angle_noise),
+        **rows,
+    )

@@ -12,16 +12,7 @@ from scipy.spatial.transform import Rotation
 from stiffmap.common.outputs import make_folder, number_cells, putting, write_rows, write_text
 from stiffmap.common.yaml_text import text_of
 from stiffmap.experiment.experiment import ASKED, AXES, WRENCH, Channel, Experiment, Floats, Loop
-from stiffmap.experiment.files.fields import (
-    APPROACH,
-    COUNTED,
-    POSE,
-    POSE2,
-    SEEN,
-    SEEN_TURNED,
-    VECTOR,
-    WORDS,
-)
+from stiffmap.experiment.files import fields
 from stiffmap.experiment.readings import kinds
 from stiffmap.experiment.setups import SEEN as SEEN_TARGET
 
@@ -120,14 +111,14 @@ def _columns(e: Experiment) -> dict[str, list[Any]]:
             columns[c.name] = number_cells(e.reading[:, i] * _scale(c))
             if _declared(e, i) is None and np.isfinite(e.sigma[:, i]).any():
                 columns[f"u_{c.name}"] = number_cells(e.sigma[:, i] * _scale(c))
-    for name in COUNTED:
+    for name in fields.COUNTED:
         if getattr(e, name) is not None:
             columns[name] = number_cells(np.asarray(getattr(e, name), dtype=float))
     return columns | {n: v for n, v in _words(e).items() if not (n == "point" and SEEN_TARGET in v[0])}
 
 
 def _words(e: Experiment) -> dict[str, list[Any]]:
-    return {n: list(getattr(e, field)) for n, field in WORDS.items() if getattr(e, field)}
+    return {n: list(getattr(e, field)) for n, field in fields.WORDS.items() if getattr(e, field)}
 
 
 def plan_columns(e: Experiment) -> dict[str, list[Any]]:
@@ -138,10 +129,10 @@ def plan_columns(e: Experiment) -> dict[str, list[Any]]:
 
 def _absolute(e: Experiment) -> tuple[dict[str, list[Any]], tuple[str, ...]]:
     """Columns of readings in coordinates of their own, and the channels that they stand for."""
-    columns = _block(SEEN, e.seen, MM)
+    columns = _block(fields.SEEN, e.seen, MM)
     told: tuple[str, ...] = AXES[:3] if columns else ()
     if e.seen_rotation is not None:
-        columns |= _rotvec(e.seen_rotation, SEEN_TURNED)
+        columns |= _rotvec(e.seen_rotation, fields.SEEN_TURNED)
         told += AXES[3:]
     for kind in kinds():
         values = e.absolute.get(kind.name)
@@ -158,10 +149,10 @@ def _commanded(e: Experiment) -> dict[str, list[Any]]:
         names, units = [c.name for c in e.command_of], [_scale(c) for c in e.command_of]
         out = _block(names, e.command, units) | _block([f"{c}2" for c in names], e.other_command, units)
     else:
-        out = _block(POSE, e.position, MM) | _rotvec(e.rotation, VECTOR)
+        out = _block(fields.POSE, e.position, MM) | _rotvec(e.rotation, fields.VECTOR)
     if e.other is not None and e.command is None:
-        out |= _block(POSE2, e.other, MM) | _rotvec(e.other_rotation, [f"{c}2" for c in VECTOR])
-    return out | _block(APPROACH, e.approach)
+        out |= _block(fields.POSE2, e.other, MM) | _rotvec(e.other_rotation, [f"{c}2" for c in fields.VECTOR])
+    return out | _block(fields.APPROACH, e.approach)
 
 
 def _block(names: Sequence[str], values: Floats | None, units: Any = 1.0) -> dict[str, list[Any]]:

@@ -182,9 +182,8 @@ def _lines(t: Conditions, here: Integers) -> Iterator[list[int]]:
     size = np.linalg.norm(t.wrench[here], axis=1)
     loaded, size = here[size > 0], size[size > 0]
     order = np.argsort(size, kind="stable")
-    for line in (
-        _grouped(numbered([np.round(t.wrench[loaded] / size[:, None], 6)])[order]) if size.size else ()
-    ):
+    along = np.round(t.wrench[loaded] / size[:, None], 6)
+    for line in _grouped(numbered([along])[order]) if size.size else ():
         yield loaded[order[line]].tolist()
 
 

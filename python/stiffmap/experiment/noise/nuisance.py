@@ -72,10 +72,10 @@ def _tools(experiment: Experiment, base: Floats, kinds: Kinds) -> Iterator[Float
     if experiment.tool == "known":
         return
     turned = np.nan_to_num(base[:, 3:6])
-    there = Rotation.from_rotvec(turned)
+    there, tools = Rotation.from_rotvec(turned), experiment.rotation
     for here in members(targets_of(experiment)[0]):
         for k in range(3):
-            arm = _tool_axis(experiment.rotation, len(experiment), k)
+            arm = np.tile(np.eye(3)[k], (len(turned), 1)) if tools is None else tools[:, :, k]
             held = there.apply(arm)
             linear = held if experiment.quantity == "position" else held - arm
             column = _wide(experiment, np.hstack([linear, np.zeros_like(linear)]))
@@ -112,10 +112,6 @@ def _standing(e: Experiment, base: Floats, kind: ReadingKind, i: int) -> Experim
         again = kind.found(out, e.reading[:, i] + kind.commanded(e))
         out = replace(out, registration=(*e.registration, *again))
     return out
-
-
-def _tool_axis(rotation: Floats | None, n: int, k: int) -> Floats:
-    return np.tile(np.eye(3)[k], (n, 1)) if rotation is None else np.asarray(rotation[:, :, k])
 
 
 def _wide(experiment: Experiment, axes: Floats) -> Floats:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import combinations
 
 import numpy as np
 from scipy.stats import chi2
@@ -80,19 +81,18 @@ def swapped(experiment: Experiment, left: Floats, sigma: Floats, out: Mask) -> l
     if experiment.quantity == "position":
         where[:, :3] = target_positions(experiment)
     shown = where + experiment.reading - left
-    rows = list(np.flatnonzero(out))
+    rows = np.flatnonzero(out).tolist()
     pairs: list[tuple[int, int]] = []
     if len(rows) < 2:
         return pairs
     typical = [np.median(np.abs(v[np.isfinite(v)])) if np.isfinite(v).any() else np.nan for v in left[~out].T]
     limit = GROSS * np.fmax(1.4826 * np.array(typical), sigma)
-    for k, i in enumerate(rows):
-        for j in rows[k + 1 :]:
-            moved = shown[j] - shown[i]
-            both = np.stack([left[j] + moved, left[i] - moved]) / limit[[i, j]]
-            read = np.isfinite(both)
-            if read.any() and (np.abs(both[read]) < 1.0).all():
-                pairs.append((int(i), int(j)))
+    for i, j in combinations(rows, 2):
+        moved = shown[j] - shown[i]
+        both = np.stack([left[j] + moved, left[i] - moved]) / limit[[i, j]]
+        read = np.isfinite(both)
+        if read.any() and (np.abs(both[read]) < 1.0).all():
+            pairs.append((i, j))
     return pairs
 
 

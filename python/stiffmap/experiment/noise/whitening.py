@@ -1,4 +1,4 @@
-"""The readings of an experiment as one whitened vector, nuisances projected out.
+"""The readings of an experiment as one whitened vector, nuisances projected out, and what these are in rows held out.
 
 Generalised least squares: with the covariance V = L Lᵀ of the readings (independent noise, plus the
 zero that the readings of one pose share) everything is multiplied by L⁻¹, and the nuisances (unknown
@@ -12,10 +12,20 @@ from functools import cached_property
 
 import numpy as np
 
+from stiffmap.common.broadcasting import random_numbers
 from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.experiment import Experiment, Floats, Integers, Mask
 from stiffmap.experiment.noise.nuisance import nuisance_columns
-from stiffmap.experiment.noise.robust import ROUNDS, fitted
+
+FOLDS = 5
+DEGREES = 1.0
+"""Of freedom: readings far off have no weight at all."""
+ROUNDS, SETTLED = 50, 1e-3
+"""Fits, and change of weights that ends them."""
+LEAST = 1e-9
+"""Share of the largest reading that is no spread."""
+MOST = 100
+"""Columns up to which a fit is robust; a zero of each of many poses is fitted plainly."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,3 +152,51 @@ def _blocks(
             v = np.diag(sigma[index][where] ** 2) + s**2
             out.append((where, np.linalg.inv(np.linalg.cholesky(v))))
     return tuple(out)
+
+
+def fitted(columns: Floats, values: Floats, rounds: int = ROUNDS) -> tuple[Floats, Floats]:
+    """(p,) coefficients of columns (N, p) for values (N,) in noise, and (N,) what they leave in robust standard deviations, which
+    are at least the noise; one round is plain least squares."""
+    size = np.linalg.norm(columns, axis=0)
+    scaled = columns / np.where(size > 0.0, size, 1.0)
+    weights: Floats = np.ones(len(values))
+    found: Floats = np.zeros(columns.shape[1])
+    left, scale = values, 1.0
+    for _ in range(rounds if columns.shape[1] <= MOST else 1):
+        root = np.sqrt(weights)
+        found = np.asarray(np.linalg.lstsq(scaled * root[:, None], values * root, rcond=1e-9)[0])
+        left = np.abs(values - scaled @ found)
+        spread = 1.4826 * float(np.median(left)) if len(left) else 1.0
+        scale = max(spread, LEAST * np.abs(values).max(initial=0.0), 1.0)
+        moved = (DEGREES + 1.0) / (DEGREES + (left / scale) ** 2)
+        if np.abs(moved - weights).max(initial=0.0) < SETTLED:
+            break
+        weights = np.asarray(moved)
+    return found / np.where(size > 0.0, size, 1.0), left / scale
+
+
+def folds(experiment: Experiment, seed: int) -> tuple[Integers, str]:
+    """(n,) fold of every row: whole set-ups where there are several, else whole poses."""
+    if experiment.runs.max() > 0:
+        return experiment.runs, "set-ups"
+    number = int(experiment.groups.max()) + 1
+    label = random_numbers(seed).permutation(number) % min(FOLDS, number)
+    return label[experiment.groups], "poses"
+
+
+def left_unseen(e: Experiment, sigma: Floats, prediction: Floats, seen: Mask, unseen: Mask) -> Floats:
+    """(n, c) reading minus prediction (n, c) at noise `sigma` (n, c), less the nuisances of rows `unseen` (n,) as those in
+    `seen` (n,) determine them. What frames and tools change is taken at the prediction."""
+    others, own = (LinearProblem.of(e, sigma, prediction, rows) for rows in (seen, unseen))
+    left = e.reading - prediction
+    return np.asarray(left - unseen_nuisances(others, own, left))
+
+
+def unseen_nuisances(others: LinearProblem, own: LinearProblem, values: Floats) -> Floats:
+    """(n, c) what nuisances say of `values` (n, c) where the readings of `own` are held out: as the readings of `others`
+    determine them; those that none of `others` knows (the frame of another set-up, the zero of another pose) as their
+    own readings do."""
+    columns = nuisance_columns(others.experiment, others.base)
+    known = np.abs(np.nan_to_num(columns[others.index])).max(axis=0, initial=0.0) > 0.0
+    said = best_fit(others, columns[..., known], values)
+    return np.asarray(said + best_fit(own, columns[..., ~known], values - said))

@@ -1,4 +1,5 @@
-"""Where the rigid machine stands in each row of a plan: its joints, its named points, how its tool follows each drive.
+"""Where the rigid machine stands in each row of a plan: its joints, its named points, how its tool follows each drive; and which
+points the metrology loop takes: what carries the instrument, the target, the reaction.
 
 What is found once holds for a plan and all machines of one nominal geometry.
 """
@@ -6,6 +7,7 @@ What is found once holds for a plan and all machines of one nominal geometry.
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable
+from dataclasses import replace
 from functools import wraps
 from typing import Any, TypeVar
 from weakref import WeakKeyDictionary
@@ -15,8 +17,10 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from stiffmap.common.kept import Kept
-from stiffmap.experiment.experiment import Experiment, Floats, Integers, Mask
+from stiffmap.experiment.experiment import Experiment, Floats, Integers, Loop, Mask
+from stiffmap.model.description import Element, Point, Spring
 from stiffmap.model.description.alike import nominal_geometry, straight
+from stiffmap.model.effects import get, kinds
 from stiffmap.solve.closing import of_drives
 from stiffmap.solve.kinematics import forward_kinematics, inverse_kinematics
 from stiffmap.solve.machine import Machine
@@ -26,6 +30,8 @@ KEPT = 32
 """Arrays of one plan: a fit that moves a nominal point makes another geometry with every trial."""
 STEP = 1e-6
 """m or rad of a drive to either side."""
+BASE, PLATFORM = "base.rig_on_base", "platform.rig_on_platform"
+"""Points of the metrology loop."""
 
 
 def _once(make: Callable[..., Array]) -> Callable[..., Array]:
@@ -91,8 +97,9 @@ def point_positions(machine: Machine, name: str, plan: Experiment) -> Floats:
     return plan.position if name == "tcp" else _point(machine, plan, name)
 
 
-def positions_of(machine: Machine, plan: Experiment, read: tuple[str, ...]) -> Floats:
-    """(n, 3) m, where the point of each row is as commanded."""
+def positions_of(machine: Machine, plan: Experiment) -> Floats:
+    """(n, 3) m, where the point that is read in each row is as commanded."""
+    read = targets(machine, plan)
     at = {p: point_positions(machine, p, plan) for p in set(read)}
     return np.stack([at[p][i] for i, p in enumerate(read)])
 
@@ -123,3 +130,37 @@ def drive_jacobian(machine: Machine, plan: Experiment) -> Floats:
         turn = np.where(lost[:, 0], np.nan, turn)
         columns.append(np.hstack([up.position - down.position, turn]) / (2 * STEP))
     return np.stack(columns, axis=-1)[back]
+
+
+def rigged(machine: Machine, loop: Loop) -> Machine:
+    """The machine with a point behind the base's elements and one before the tool's holder, where the
+    loop needs them."""
+    d = machine.description
+    if "base" in (loop.instrument_on, loop.force_against) and _yields(d.base):
+        d = replace(d, base=(*d.base, Point(BASE.removeprefix("base."))))
+    if loop.target_on == "platform" and _yields(d.platform):
+        holders = tuple(k for k in kinds() if get(k).behind_platform)  # with which their names begin
+        at = next((i for i, e in enumerate(d.platform) if e.name.startswith(holders)), len(d.platform))
+        d = replace(
+            d, platform=(*d.platform[:at], Point(PLATFORM.removeprefix("platform.")), *d.platform[at:])
+        )
+    return machine if d is machine.description else Machine(d, like=machine)
+
+
+def _yields(elements: tuple[Element, ...]) -> bool:
+    return any(isinstance(e, Spring) for e in elements)
+
+
+def carrier(machine: Machine, where: str) -> str:
+    """Point that moves with what `where` names; empty for what does not move."""
+    if where == "base":
+        return BASE if BASE in machine.points else ""
+    return "" if where == "floor" else where
+
+
+def targets(machine: Machine, experiment: Experiment) -> tuple[str, ...]:
+    """(n,) point that is read in each row; on the platform instead of the tool where the loop says so."""
+    points = experiment.points or (experiment.point,) * len(experiment)
+    if PLATFORM not in machine.points:
+        return points
+    return tuple(PLATFORM if p == "tcp" else p for p in points)

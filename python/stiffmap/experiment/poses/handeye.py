@@ -200,7 +200,8 @@ def _refined(s: Sighting, f: Frames) -> Frames:
     """Gauss-Newton on all frames; steps of least norm, so that what the plan leaves open stays."""
     for _ in range(STEPS):
         residual, columns = _linear(s, f)
-        weight = _weights(residual)
+        far = np.abs(residual) / max(HUBER * _typical(residual), 1e-15)
+        weight = np.sqrt(1.0 / np.maximum(far, 1.0))
         near, slopes = _near_the_tool(s, f, residual, columns.shape[1])
         residual, columns = np.append(residual, near), np.vstack([columns, slopes])
         weight = np.append(weight, np.ones(len(near)))
@@ -220,11 +221,6 @@ def _near_the_tool(s: Sighting, f: Frames, residual: Floats, unknown: int) -> tu
     scale = _typical(residual) * max(float(s.placed.sum()) / ROWS, 1.0) ** 0.5 / ARM
     places = np.arange(unknown).reshape(-1, 6)[len(f.base_r) :, :3].ravel()
     return (scale * f.tool_p).ravel(), scale * np.eye(unknown)[places]
-
-
-def _weights(residual: Floats) -> Floats:
-    far = np.abs(residual) / max(HUBER * _typical(residual), 1e-15)
-    return np.asarray(np.sqrt(1.0 / np.maximum(far, 1.0)))
 
 
 def _typical(residual: Floats) -> float:

@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from stiffmap.experiment.experiment import Experiment, Floats, Integers, Mask
-from stiffmap.experiment.poses.configuration import coordinates_of, in_reach, point_positions, positions_of
-from stiffmap.experiment.prediction.joints import joint_channels, joint_motions
-from stiffmap.experiment.prediction.metrology_loop import carrier, rigged, targets
-from stiffmap.experiment.prediction.unloaded_state import is_sided, lagging, signs
+from stiffmap.experiment.experiment import Experiment, Floats, Mask
+from stiffmap.experiment.poses.configuration import (
+    carrier,
+    coordinates_of,
+    in_reach,
+    point_positions,
+    positions_of,
+    rigged,
+    targets,
+)
+from stiffmap.experiment.prediction.joints import is_sided, joint_channels, joint_motions, lagging, signs
 from stiffmap.experiment.readings import Seen, kind_of
 from stiffmap.model.description.alike import rests_at_command
 from stiffmap.solve.closing import of_drives
@@ -37,11 +43,11 @@ def motions(machine: Machine, plan: Experiment, threads: int | None = None) -> t
         return _in_parts(plan, plan.gravity_of, partial(_under_gravity, machine, threads))
     if any(kind_of(c) for c in plan.extra):
         return _with_kinds(machine, plan, threads)
-    solver = Solver(rigged(machine, plan.loop), plan, threads)
+    machine = rigged(machine, plan.loop)
     if plan.quantity == "position":
-        return solver.rest() if not plan.wrench.any() else solver.loaded()
-    out, count = solver.loaded()
-    rest, more = solver.rest()
+        return (_equilibria if plan.wrench.any() else _at_rest)(machine, plan, threads)
+    out, count = _equilibria(machine, plan, threads)
+    rest, more = _at_rest(machine, plan, threads)
     return out - rest, count + more
 
 
@@ -72,29 +78,14 @@ def _with_kinds(machine: Machine, plan: Experiment, threads: int | None) -> tupl
     motion, count = motions(machine, bare, threads)
     out = np.full((len(plan), len(plan.channels)), np.nan)
     out[:, [plan.channels.index(c) for c in bare.channels]] = motion
-    here = Seen(bare, motion[:, :6], partial(_places, machine, bare))
-    pairs: tuple[Integers, Seen, Seen] | None = None
-    for i, kind in ((i, kind_of(c)) for i, c in enumerate(plan.channels)):
-        if kind is None:
-            continue
+    here = Seen(bare, motion[:, :6], partial(positions_of, machine, bare))
+    kinds = [(i, kind) for i, c in enumerate(plan.channels) if (kind := kind_of(c))]
+    for i, kind in kinds:
         if not kind.pair:
             out[:, i] = kind.change(here, None)
-            continue
-        if plan.other is None or not np.isfinite(plan.other).all(axis=1).any():
-            continue  # no row of these reads one
-        if pairs is None:
-            pairs, more = _pairs(machine, plan, bare, motion, threads)
-            count += more
-        rows, start, end = pairs
-        out[rows, i] = kind.change(start, end)
-    return out, count
-
-
-def _pairs(
-    machine: Machine, plan: Experiment, bare: Experiment, motion: Floats, threads: int | None
-) -> tuple[tuple[Integers, Seen, Seen], int]:
-    """Rows with a second commanded pose, and what is seen at both."""
-    assert plan.other is not None
+    paired = [(i, kind) for i, kind in kinds if kind.pair]
+    if not paired or plan.other is None or not np.isfinite(plan.other).all(axis=1).any():
+        return out, count
     rows = np.flatnonzero(np.isfinite(plan.other).all(axis=1))
     second = replace(
         bare,
@@ -104,71 +95,61 @@ def _pairs(
         joints=plan.other_joints,
         near=None,
     ).rows(rows)
-    there, count = motions(machine, second, threads)
+    there, more = motions(machine, second, threads)
     first = bare.rows(rows)
-    start = Seen(first, motion[rows, :6], partial(_places, machine, first))
-    return (rows, start, Seen(second, there[:, :6], partial(_places, machine, second))), count
+    start = Seen(first, motion[rows, :6], partial(positions_of, machine, first))
+    end = Seen(second, there[:, :6], partial(positions_of, machine, second))
+    for i, kind in paired:
+        out[rows, i] = kind.change(start, end)
+    return out, count + more
 
 
-def _places(machine: Machine, plan: Experiment) -> Floats:
-    return positions_of(machine, plan, targets(machine, plan))
+def _at_rest(machine: Machine, plan: Experiment, threads: int | None) -> tuple[Floats, int]:
+    """(n, c) without the wrenches: in the centre of every gap, or on the side of the approach."""
+    bare = plan.without_load
+    if not is_sided(machine.description, plan):
+        return _equilibria(machine, bare, threads)
+    behind = partial(lagging, machine, weighs=bool(plan.gravity))
+    return _in_parts(bare, signs(machine, bare), lambda part, side: _equilibria(behind(side), part, threads))
 
 
-@dataclass(frozen=True, eq=False)
-class Solver:
-    """States of one machine under one plan."""
+def _equilibria(machine: Machine, plan: Experiment, threads: int | None) -> tuple[Floats, int]:
+    """(n, c) under the wrenches of the plan; where nothing moves the machine, zero at poses that can be reached."""
+    if not plan.wrench.any() and not moves_unloaded(machine, plan):
+        there = in_reach(machine, plan.each_pose)[plan.groups]
+        return np.where(there[:, None], np.zeros((len(plan), len(plan.channels))), np.nan), 0
+    if len(set(plan.load_points)) < 2:
+        return _unique(machine, threads, plan, plan.load_points[0] if plan.load_points else plan.load_point)
+    return _in_parts(plan, plan.load_points, partial(_unique, machine, threads))
 
-    machine: Machine
-    plan: Experiment
-    threads: int | None
 
-    def loaded(self) -> tuple[Floats, int]:
-        """(n, c) under the wrenches of the plan."""
-        return self._equilibria(self.machine, self.plan)
-
-    def rest(self) -> tuple[Floats, int]:
-        """(n, c) without the wrenches: in the centre of every gap, or on the side of the approach."""
-        bare = self.plan.without_load
-        if is_sided(self.machine.description, self.plan):
-            sides = signs(self.machine, bare)
-            behind = partial(lagging, self.machine, weighs=bool(self.plan.gravity))
-            return _in_parts(bare, sides, lambda part, side: self._equilibria(behind(side), part))
-        return self._equilibria(self.machine, bare)
-
-    def _equilibria(self, machine: Machine, plan: Experiment) -> tuple[Floats, int]:
-        if not plan.wrench.any() and not moves_unloaded(machine, plan):
-            return _at_command(machine, plan), 0
-        if len(set(plan.load_points)) < 2:
-            return self._unique(machine, plan, plan.load_points[0] if plan.load_points else plan.load_point)
-        return _in_parts(plan, plan.load_points, partial(self._unique, machine))
-
-    def _unique(self, machine: Machine, plan: Experiment, load_point: str) -> tuple[Floats, int]:
-        """Each different (pose, wrench) is solved once."""
-        once, back = plan.distinct
-        read = targets(machine, plan)
-        on = carrier(machine, plan.loop.instrument_on)
-        wanted = list(dict.fromkeys([*read, *([on] if on else [])]))
-        against = carrier(machine, plan.loop.force_against)
-        options = SolveOptions(
-            point=str(load_point),
-            wrenches=_reaction(machine, once, load_point, against) if against else {},
-            read_points=wanted,
-            gravity=once.gravity,
-            stiffness=bool(joint_channels(plan)),
-            threads=self.threads,
-        )
-        solution = solved(machine, once, options)
-        ok = solution.ok | _in_play(solution, once)
-        moved = np.where(ok[:, None, None], solution.readings[:, 1:], np.nan)
-        number = {point: i for i, point in enumerate(wanted)}
-        linear = moved[back, [number[r] for r in read]]
-        if on:
-            linear = seen_from(machine, plan, read, on, linear, moved[back, number[on]])
-        if not joint_channels(plan):
-            return linear, len(once)
-        joints = joint_motions(machine, once, solution.coordinates, solution.coordinate_names)
-        joints = np.where(ok[:, None], joints, np.nan)
-        return np.hstack([linear, joints[back]]), len(once)
+def _unique(machine: Machine, threads: int | None, plan: Experiment, load_point: str) -> tuple[Floats, int]:
+    """Each different (pose, wrench) is solved once."""
+    once, back = plan.distinct
+    read = targets(machine, plan)
+    on = carrier(machine, plan.loop.instrument_on)
+    wanted = list(dict.fromkeys([*read, *([on] if on else [])]))
+    against = carrier(machine, plan.loop.force_against)
+    options = SolveOptions(
+        point=str(load_point),
+        wrenches=_reaction(machine, once, load_point, against) if against else {},
+        read_points=wanted,
+        gravity=once.gravity,
+        stiffness=bool(joint_channels(plan)),
+        threads=threads,
+    )
+    solution = solved(machine, once, options)
+    ok = solution.ok | _in_play(solution, once)
+    moved = np.where(ok[:, None, None], solution.readings[:, 1:], np.nan)
+    number = {point: i for i, point in enumerate(wanted)}
+    linear = moved[back, [number[r] for r in read]]
+    if on:
+        linear = seen_from(machine, plan, on, linear, moved[back, number[on]])
+    if not joint_channels(plan):
+        return linear, len(once)
+    joints = joint_motions(machine, once, solution.coordinates, solution.coordinate_names)
+    joints = np.where(ok[:, None], joints, np.nan)
+    return np.hstack([linear, joints[back]]), len(once)
 
 
 def solved(machine: Machine, plan: Experiment, options: SolveOptions) -> Solution:
@@ -213,22 +194,14 @@ def _reaction(machine: Machine, plan: Experiment, load_point: str, against: str)
     return {against: -np.hstack([force, moment + np.cross(arm, force)])}
 
 
-def seen_from(
-    machine: Machine, plan: Experiment, read: tuple[str, ...], on: str, motion: Floats, carrier_motion: Floats
-) -> Floats:
+def seen_from(machine: Machine, plan: Experiment, on: str, motion: Floats, carrier_motion: Floats) -> Floats:
     """(n, 6) motion of the points read, in the axes of the body that carries the instrument."""
     origin = point_positions(machine, on, plan)
-    arm = positions_of(machine, plan, read) - origin
+    arm = positions_of(machine, plan) - origin
     turn = Rotation.from_rotvec(np.nan_to_num(carrier_motion[:, 3:]))
     linear = turn.inv().apply(arm + motion[:, :3] - carrier_motion[:, :3]) - arm
     angular = (turn.inv() * Rotation.from_rotvec(np.nan_to_num(motion[:, 3:]))).as_rotvec()
     return np.where(np.isfinite(motion), np.hstack([linear, angular]), np.nan)
-
-
-def _at_command(machine: Machine, plan: Experiment) -> Floats:
-    """(n, c) zero where the pose can be reached, else NaN."""
-    there = in_reach(machine, plan.each_pose)[plan.groups]
-    return np.where(there[:, None], np.zeros((len(plan), len(plan.channels))), np.nan)
 
 
 def moves_unloaded(machine: Machine, plan: Experiment) -> bool:

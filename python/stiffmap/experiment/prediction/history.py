@@ -1,12 +1,15 @@
-"""Readings that depend on the rows before: effects with a `drive`, such as `hysteresis`.
+"""Readings that depend on what the rows record: on their order, by effects with a `drive` such as `hysteresis`, or on a number
+such as a temperature.
 
-The drive's extra deflection moves the tool by the rigid machine's Jacobian.
+The drive's extra deflection moves the tool by the rigid machine's Jacobian. With a number, motions are solved at three values of
+the record and interpolated between them. Growth by heat is a strain of about 1e-5 per kelvin; what a parabola through three
+temperatures leaves out is of third order in it, far below any reading.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,7 +17,6 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.poses.configuration import drive_jacobian, positions_of
 from stiffmap.experiment.prediction.equilibria import solved
-from stiffmap.experiment.prediction.metrology_loop import targets
 from stiffmap.experiment.readings import Seen, kind_of
 from stiffmap.model.description import AppliedEffect
 from stiffmap.model.description.tree import joints
@@ -23,6 +25,9 @@ from stiffmap.model.effects.evidence import Drive
 from stiffmap.model.effects.registry import get
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.options import SolveOptions
+
+Terms = tuple[AppliedEffect, ...]
+Solve = Callable[[Experiment, Terms], Floats]
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,10 +40,10 @@ class Drives:
     jacobian: Floats
     """(n, 6, actuators) twist of the tool per unit of each drive."""
 
-
-def drives_of(machine: Machine, plan: Experiment) -> Drives:
-    """Efforts and Jacobian at a plan's rows."""
-    return Drives(machine, _efforts(machine, plan), drive_jacobian(machine, plan))
+    @staticmethod
+    def of(machine: Machine, plan: Experiment) -> Drives:
+        """Those at a plan's rows."""
+        return Drives(machine, _efforts(machine, plan), drive_jacobian(machine, plan))
 
 
 def history_motion(drives: Drives, plan: Experiment, terms: tuple[AppliedEffect, ...]) -> Floats:
@@ -102,7 +107,7 @@ def _extra(
 def _seen(machine: Machine, plan: Experiment, name: str, column: Floats, more: Floats) -> Floats:
     """(n, c) what every channel shows of a drive's extra deflection."""
     twist = column * more[:, None]
-    arm = positions_of(machine, plan, targets(machine, plan)) - plan.position
+    arm = positions_of(machine, plan) - plan.position
     linear = twist[:, :3] + np.cross(twist[:, 3:], arm)
     out = np.zeros((len(plan), len(plan.channels)))
     out[:, :6] = np.hstack([linear, twist[:, 3:]])
@@ -112,3 +117,35 @@ def _seen(machine: Machine, plan: Experiment, name: str, column: Floats, more: F
         elif c.joint == name and c.side == "load":
             out[:, i] = more
     return out
+
+
+def records_of(terms: Sequence[AppliedEffect]) -> list[str]:
+    """Columns of an experiment that give numbers of these effects."""
+    return sorted({p.recorded for t in terms for p in get(t.kind).parameters if p.recorded})
+
+
+def at_records(plan: Experiment, terms: Terms, solve: Solve, columns: Sequence[str] | None = None) -> Floats:
+    """(n, c) motions with every row at its own record: its change against the file's reference, of temperatures, or the first row."""
+    left = records_of(terms) if columns is None else columns
+    if not left:
+        return solve(plan, terms)
+    column, *others = left
+    values = getattr(plan, column)
+    if values is None:
+        raise StiffmapError(f"{plan.name}: missing column '{column}'")
+    reference = plan.reference_temperature if column == "temperature" else None
+    change = values - (float(values[0]) if reference is None else reference)
+    low, high = float(change.min()), float(change.max())
+    nodes = np.array([low, (low + high) / 2, high]) if high - low > 1e-9 else np.array([low])
+    out = np.zeros(())
+    for node in nodes:
+        rest = nodes[nodes != node]
+        weight = np.prod((change[:, None] - rest) / (node - rest), axis=1)  # Lagrange's
+        recorded = tuple(_recorded(t, column, float(node)) for t in terms)
+        out = out + weight[:, None] * at_records(plan, recorded, solve, others)
+    return out
+
+
+def _recorded(term: AppliedEffect, column: str, value: float) -> AppliedEffect:
+    mine = {p.name: value for p in get(term.kind).parameters if p.recorded == column}
+    return replace(term, parameters=tuple({**dict(term.parameters), **mine}.items())) if mine else term

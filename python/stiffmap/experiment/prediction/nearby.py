@@ -5,19 +5,18 @@ Readings of displacements at the loaded body alone; everything else is for whole
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
+from typing import Generic, TypeVar
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.experiment import Experiment, Floats
-from stiffmap.experiment.poses.configuration import point_positions, positions_of
+from stiffmap.experiment.poses.configuration import carrier, point_positions, positions_of, rigged, targets
 from stiffmap.experiment.prediction.equilibria import moves_unloaded
-from stiffmap.experiment.prediction.joints import joint_channels
-from stiffmap.experiment.prediction.metrology_loop import carrier, rigged, targets
-from stiffmap.experiment.prediction.unloaded_state import is_sided
+from stiffmap.experiment.prediction.joints import is_sided, joint_channels
 from stiffmap.experiment.readings import kind_of
 from stiffmap.model.description import Body, MachineDescription, Offset, Point
 from stiffmap.model.description.alike import alike
@@ -90,18 +89,18 @@ class Nearby:
         out = np.zeros((len(others), len(self.plan), len(self.plan.channels)))
         if self.plan.quantity == "deflection" and not self.plan.wrench.any():
             return out  # from the state without load to itself
+        states = [
+            (self.plan, 1.0),
+            *([(self.plan.without_load, -1.0)] if self.plan.quantity == "deflection" else []),
+        ]
         at_once = max(1, MOST_BYTES // (48 * max(len(self.plan.distinct[0]), 1)) - 1)
         for first in range(0, len(others), at_once):
             some = slice(first, first + at_once)
-            loaded = self._states(machine, self.plan, others[some])
-            if loaded is None:
-                return None
-            out[some, :, :6] = loaded
-            if self.plan.quantity == "deflection":
-                rest = self._states(machine, self.plan.without_load, others[some])
-                if rest is None:
+            for plan, sign in states:
+                found = self._states(machine, plan, others[some])
+                if found is None:
                     return None
-                out[some, :, :6] -= rest
+                out[some, :, :6] += sign * found
         return out
 
     def _states(self, machine: Machine, plan: Experiment, others: Sequence[Machine]) -> Floats | None:
@@ -142,10 +141,9 @@ class Nearby:
         if not np.isfinite(varied[solution.ok]).all():
             return None
         found = np.moveaxis(varied, 1, 0)
-        read = targets(machine, plan)
-        if set(read) == {point}:
+        if set(targets(machine, plan)) == {point}:
             return np.asarray((found[1:] - found[:1])[:, back])
-        return _seen_at(machine, plan, point, read, found[:, back])
+        return _seen_at(machine, plan, point, found[:, back])
 
 
 def _steps_show(machine: Machine, plan: Experiment) -> bool:
@@ -166,7 +164,7 @@ def _steps_show(machine: Machine, plan: Experiment) -> bool:
 def _step_leads(machine: Machine, other: MachineDescription, plan: Experiment) -> bool:
     """Whether one step from the machine's equilibria leads to those of another."""
     d = machine.description
-    heavy = _is_heavy(machine, plan)
+    heavy = any(plan.gravity or d.gravity or ())
     if heavy and machine.compiled.names.free_spins:  # a weight that is off turns them
         return False
     if not alike(d, other, heavy=heavy) or is_sided(other, plan):
@@ -180,18 +178,14 @@ def _holds_as(machine: Machine, other: Machine) -> bool:
     return (a.coordinates, a.free_spins) == (b.coordinates, b.free_spins) and not other.fast
 
 
-def _is_heavy(machine: Machine, plan: Experiment) -> bool:
-    return any(plan.gravity or machine.description.gravity or ())
-
-
 def _points(machine: Machine, plan: Experiment) -> set[str]:
     """All that are loaded or read."""
     return {*targets(machine, plan), *(plan.load_points or (plan.load_point,))}
 
 
-def _seen_at(machine: Machine, plan: Experiment, point: str, read: tuple[str, ...], found: Floats) -> Floats:
+def _seen_at(machine: Machine, plan: Experiment, point: str, found: Floats) -> Floats:
     """(others, n, 6) at other points of the same rigid body, from (1 + others, n, 6) at one."""
-    arm = positions_of(machine, plan, read) - point_positions(machine, point, plan)
+    arm = positions_of(machine, plan) - point_positions(machine, point, plan)
     motion = found.copy()
     lost = ~np.isfinite(motion).all(axis=-1, keepdims=True)
     turn = Rotation.from_rotvec(np.where(lost, 0.0, motion[..., 3:]).reshape(-1, 3))
@@ -206,3 +200,29 @@ def _rigid_platform(description: MachineDescription) -> bool:
         isinstance(e, (Body, Point)) or (isinstance(e, Offset) and e.actual in (None, e.nominal))
         for e in description.platform
     )
+
+
+K = TypeVar("K", bound=Hashable)
+Tell = Callable[[Sequence[K]], Sequence[Floats | None]]
+
+
+class Ahead(Generic[K]):
+    """Slopes by key, in the order in which they will be asked for; each is handed out once.
+
+    tell
+        Slopes of some keys; None where whole predictions are needed.
+    """
+
+    def __init__(self, keys: Sequence[K], at_once: int, tell: Tell[K]) -> None:
+        self._keys, self._at_once, self._tell = keys, at_once, tell
+        self._place = {key: i for i, key in enumerate(keys)}
+        self._told: dict[K, Floats | None] = {}
+
+    def of(self, key: K) -> Floats | None:
+        """(n, c); None where whole predictions are needed, and for what is not among the keys."""
+        if key not in self._place:
+            return None
+        if key not in self._told:
+            some = self._keys[self._place[key] :][: self._at_once]
+            self._told.update(zip(some, self._tell(some), strict=True))
+        return self._told.pop(key)

@@ -10,22 +10,20 @@ from functools import partial
 import numpy as np
 
 from stiffmap.common.errors import StiffmapError
+from stiffmap.common.fingerprints import code, digest
 from stiffmap.common.kept import MOST_BYTES, Kept
 from stiffmap.experiment.experiment import Experiment, Floats, Mask
-from stiffmap.experiment.poses.against_command import resolved
-from stiffmap.experiment.poses.commanded import OUT_OF_REACH, located, without
+from stiffmap.experiment.poses.commanded import OUT_OF_REACH, located, resolved, without
 from stiffmap.experiment.poses.configuration import coordinates_of
 from stiffmap.experiment.prediction.equilibria import motions
-from stiffmap.experiment.prediction.history import Drives, drives_of, history_motion
+from stiffmap.experiment.prediction.history import Drives, Terms, at_records, history_motion, records_of
 from stiffmap.experiment.prediction.joints import check_joints
 from stiffmap.experiment.prediction.nearby import Near, Nearby
-from stiffmap.experiment.prediction.recorded import at_records, records_of
 from stiffmap.model import effects
 from stiffmap.model.description import AppliedEffect, MachineDescription
 from stiffmap.model.effects import apply_records
 from stiffmap.solve.machine import Machine
 
-Terms = tuple[AppliedEffect, ...]
 MACHINES, OTHERS = 4, 32
 """Machines with terms, and predictors of other machines and of some rows, that are kept."""
 
@@ -60,15 +58,12 @@ class Predictor:
         if remembering:
             plan = self._plan_under(load)
             if key not in self._drives:
-                self._drives = {key: drives_of(self.with_terms(mechanical), plan)}
+                self._drives = {key: Drives.of(self.with_terms(mechanical), plan)}
             motion = motion + history_motion(self._drives[key], plan, remembering)
         return readings(self.experiment, motion, terms)
 
     def changes(
-        self,
-        moved: Sequence[Terms],
-        base: Terms = (),
-        unmoved: Sequence[Terms] | None = None,
+        self, moved: Sequence[Terms], base: Terms = (), unmoved: Sequence[Terms] | None = None
     ) -> list[Floats | None]:
         """(n, c) m, rad each: how much more the readings of some sets of terms show than those of `base`, to first order in
         what differs, many at a fraction of a prediction each; not to be written to. None where whole predictions are needed: other loads, laws
@@ -263,3 +258,23 @@ def _on_branch(term: AppliedEffect, branch: str) -> AppliedEffect:
     if not _has_branch(term):
         return term
     return replace(term, options=tuple({**dict(term.options), "branch": branch}.items()))
+
+
+def fingerprint(predictor: Predictor) -> str:
+    """Digest of the machine and of all of the plan that a prediction depends on."""
+    e = predictor.experiment
+    parts = [
+        predictor.machine.description,
+        e.quantity,
+        e.branch,
+        e.setup,
+        e.point,
+        e.load_point,
+        e.gravity,
+        e.loop,
+    ]
+    parts += [e.reference_temperature, e.extra, e.points, e.load_points, e.unloaded]
+    parts += [e.frame, e.tool, e.instrument, e.target, e.surface, e.normal, e.joint_names]
+    arrays = [e.position, e.wrench, e.rotation, e.other, e.other_rotation, e.approach, e.order, e.temperature]
+    arrays += [e.joints, e.other_joints, e.gravity_of, e.hours]
+    return digest(parts, arrays, code())

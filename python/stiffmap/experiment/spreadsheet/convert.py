@@ -159,13 +159,10 @@ class Rows:
         meanings = list(dict.fromkeys(c.meaning for c in used if c.repeat))
         header = [*(c.meaning for c in common), *constants, *meanings]
         self.header = [*header, *(["repeat"] if self.repeats > 1 else [])]
-        self._numbers = {
-            c.index: sheet.numbers(c.index) * factors.get(c.meaning, 1.0) + 0.0  # no -0
-            if c.meaning in factors
-            else sheet.numbers(c.index)
-            for c in used
-            if c.meaning not in WORDS
-        }
+        self._numbers = {c.index: sheet.numbers(c.index) for c in used if c.meaning not in WORDS}
+        for c in used:
+            if c.meaning in factors:
+                self._numbers[c.index] = self._numbers[c.index] * factors[c.meaning] + 0.0  # no -0
         at = {(c.meaning, c.repeat): c.index for c in used}
         always = [*(c.index for c in common), *map(float, constants.values())]
         self._wanted: list[list[int | float | None]] = [
@@ -231,12 +228,8 @@ def write_folder(
 ) -> None:
     """Write the folder; raises FileError where it cannot be written."""
     sheet = m.sheet
-    head: dict[str, Any] = {
-        "title": title,
-        "machine": machine,
-        "quantity": quantity,
-        "units": head_units(found, sheet.file),
-    }
+    head: dict[str, Any] = {"title": title, "machine": machine, "quantity": quantity}
+    head["units"] = head_units(found, sheet.file)
     if m.noise:
         factors = {n.replace("p", "d"): f for n, f in found.factors.items()}
         own = {absolute: n for n, absolute in ABSOLUTE.items()}
@@ -252,9 +245,8 @@ def write_folder(
     if told:
         head["record"] = told
     with only_job(make_folder(folder)):
-        head["rows"] = write_rows(
-            folder / "data.csv", [ABSOLUTE.get(h, h) for h in found.rows.header], found.rows
-        )
+        header = [ABSOLUTE.get(h, h) for h in found.rows.header]
+        head["rows"] = write_rows(folder / "data.csv", header, found.rows)
         if not head["rows"]:
             read = ", ".join(f"'{c.name}'" for c in found.columns if c.meaning in READINGS)
             raise StiffmapError(f"{sheet.file}: no row has a reading: no number in {read}")

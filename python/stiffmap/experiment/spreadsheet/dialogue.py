@@ -93,7 +93,13 @@ def ask_all(m: Meant, ask: Ask | None, loaded: bool = False) -> ImportedSheet:
     found = asked(m, ask, understood)
     read = dict.fromkeys(READ.get(r, r) for r in READINGS if r in found.units)
     if ask is not None and found.rows.repeats < 2:
-        _noise(m, [r for r in read if r not in m.noise], ask)
+        for r in (r for r in read if r not in m.noise):
+            said = ask(
+                f"One standard deviation of a reading of {r}, in its unit? Empty: repeats show it"
+            ).strip()
+            if said:
+                _keep_number(m.noise, r, said)
+                m.answered = True
     return found
 
 
@@ -148,14 +154,6 @@ def _answer(m: Meant, question: Question, ask: Ask) -> None:
 def _keep_number(where: dict[str, float], name: str, said: str) -> None:
     with suppress(ValueError):
         where[name] = number_in(said.replace(",", "."))
-
-
-def _noise(m: Meant, lost: list[str], ask: Ask) -> None:
-    for r in lost:
-        said = ask(f"One standard deviation of a reading of {r}, in its unit? Empty: repeats show it").strip()
-        if said:
-            _keep_number(m.noise, r, said)
-            m.answered = True
 
 
 def _column(sheet: Table, said: str) -> str | None:

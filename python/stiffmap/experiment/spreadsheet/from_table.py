@@ -23,29 +23,20 @@ from stiffmap.experiment.experiment import Experiment
 from stiffmap.experiment.files.fields import READ
 from stiffmap.experiment.files.load import load_experiment
 from stiffmap.experiment.noise.level import against_the_load, contradictions, no_difference, not_at_zero
+from stiffmap.experiment.spreadsheet import dialogue
 from stiffmap.experiment.spreadsheet.answers import Answers, Meant, Question
 from stiffmap.experiment.spreadsheet.convert import ImportedSheet, write_folder
 from stiffmap.experiment.spreadsheet.dh import LEG, QUANTITIES, arm, read_dh
-from stiffmap.experiment.spreadsheet.dialogue import (
-    Ask,
-    Unanswered,
-    ask_all,
-    asked,
-    profile_file,
-    remember,
-    remembered,
-)
 from stiffmap.experiment.spreadsheet.guess import has_meaning
 from stiffmap.experiment.spreadsheet.instrument import Instrument, as_readings, load_instrument
 from stiffmap.experiment.spreadsheet.joints import DIFFERENCES, as_seen, commanded, drives_of, turned
-from stiffmap.experiment.spreadsheet.places import in_base_axes, seen_next_to_commands
-from stiffmap.experiment.spreadsheet.sockets import seated
+from stiffmap.experiment.spreadsheet.places import in_base_axes, seated, seen_next_to_commands
 from stiffmap.experiment.spreadsheet.together import one_point_a_row, oriented, together
 from stiffmap.solve.machine import Machine, load_machine
 
 CIRCULAR = ("deviation",)
 """What a ball bar reads, by the name that its mapping file has for it."""
-Understand = Callable[[str | None, Ask | None], tuple[Meant, ImportedSheet]]
+Understand = Callable[[str | None, dialogue.Ask | None], tuple[Meant, ImportedSheet]]
 """What is meant by a sheet of that name, with answers to its questions."""
 
 
@@ -86,7 +77,7 @@ def experiment_from_table(
     header: Sequence[str] = (),
     which: int | None = None,
     record: Mapping[str, str] | None = None,
-    ask: Ask | None = None,
+    ask: dialogue.Ask | None = None,
     overwrite: bool = False,
 ) -> FromTable:
     """Make an experiment folder of a spreadsheet or text table: columns, units, repeats and separators are understood.
@@ -194,7 +185,7 @@ def _refuse_units(units: Mapping[str, str], m: Meant, drives: Iterable[str], mor
 
 
 def _fitting(
-    file: Path, sheet: str | None, understood: Understand, ask: Ask | None
+    file: Path, sheet: str | None, understood: Understand, ask: dialogue.Ask | None
 ) -> tuple[Meant, ImportedSheet]:
     """The sheet that fits with the answers in use, and what was understood of it."""
     names = sheet_names(file) if sheet is None and file.suffix.lower() in WORKBOOKS else [sheet]
@@ -223,37 +214,39 @@ def _understood(
     given: Answers,
     declared: Callable[[Meant], Machine],
     name: str | None,
-    ask: Ask | None,
+    ask: dialogue.Ask | None,
 ) -> tuple[Meant, ImportedSheet]:
     """One sheet: `drives` (name -> whether it slides) it may command, what `wrote` it, the sign of its `difference`; rows of a
     `deflection` need a load; `declared`: the machine that it commands."""
     form = read_sheet(file, name, layout)
-    kept = remembered(form)
+    kept = dialogue.remembered(form)
     m = Meant.of_sheet(form, given if kept is None else kept.below(given))
     if kept is not None:
-        m.said.append(f"answers of an earlier sheet of this form are used: {profile_file(form)}")
+        m.said.append(f"answers of an earlier sheet of this form are used: {dialogue.profile_file(form)}")
     together(m, deflection)
     commanded(m, drives)
     one_point_a_row(m)
     if m.columns:
-        asked(m, ask, partial(seated, m))
+        dialogue.asked(m, ask, partial(seated, m))
         as_seen(m, difference)
     elif wrote is not None:
         as_readings(m, wrote)
-    asked(m, ask, partial(in_base_axes, m, partial(declared, m)))
+    dialogue.asked(m, ask, partial(in_base_axes, m, partial(declared, m)))
     oriented(m)
     if not m.placed:
         turned(m, difference)
-    asked(m, ask, partial(seen_next_to_commands, m))
+    dialogue.asked(m, ask, partial(seen_next_to_commands, m))
     try:
-        found = ask_all(m, ask, deflection and not m.placed)
-    except Unanswered as left:
+        found = dialogue.ask_all(m, ask, deflection and not m.placed)
+    except dialogue.Unanswered as left:
         said = m.to_remember(form, given)
         if said == given:
             raise
-        raise StiffmapError(f"{left}; the answers so far are remembered: {remember(form, said)}") from None
+        raise StiffmapError(
+            f"{left}; the answers so far are remembered: {dialogue.remember(form, said)}"
+        ) from None
     if m.answered:
-        kept_in = remember(form, m.to_remember(form, given))
+        kept_in = dialogue.remember(form, m.to_remember(form, given))
         m.said.append(f"the answers are remembered for sheets of this form: {kept_in}")
     m.said += found.said
     return m, found

@@ -17,16 +17,14 @@ from stiffmap.experiment.spreadsheet.answers import Meant
 from stiffmap.experiment.spreadsheet.guess import READINGS, guessed
 
 LOAD = re.compile(
-    r"(applied |test |hanging |hung )?(load|force|mass|weight|payload|last|prüflast|kraft|prüfkraft|masse|gewicht|belastung|"
-    r"zuladung|anhängelast|charge|f|m|p)( hung| applied)?",
-    re.IGNORECASE,
+    r"(?i)(applied |test |hanging |hung )?(load|force|mass|weight|payload|last|prüflast|kraft|prüfkraft|masse|gewicht|belastung|"
+    r"zuladung|anhängelast|charge|f|m|p)( hung| applied)?"
 )
 HUNG = re.compile(r"hung|hanging|\bmass|masse\b|weight\b|gewicht\b|anhängelast|angehängt", re.IGNORECASE)
 WEIGHS = re.compile(r"load|last|mass|weight|gewicht|kraft|force|charge|^m$", re.IGNORECASE)
 DIRECTION = re.compile(
-    r"(load|force|last|kraft)?[ _-]?(direction|dir\.?|richtung|axis|achse)( of (the )?(load|force))?|"
-    r"richtung der (last|kraft)",
-    re.IGNORECASE,
+    r"(?i)(load|force|last|kraft)?[ _-]?(direction|dir\.?|richtung|axis|achse)( of (the )?(load|force))?|"
+    r"richtung der (last|kraft)"
 )
 WAY = re.compile(r"([+-]?)\s*([xyz])|([xyz])\s*([+-])", re.IGNORECASE)
 STATES = {
@@ -36,13 +34,10 @@ STATES = {
 }  # fmt: skip
 """A gauge that was read ``before``, ``loaded`` and ``after`` was read without the load after it, too."""
 TARGET = re.compile(
-    r"(target|reflector|reflektor|smr|srm|nest|tooling ball|ball|sphere|kugel|marker|marke|prism|prisma|zielmarke|ziel|zielpunkt)"
-    r"[ _.-]?(id|name|no\.?|nr\.?|number|nummer)?",
-    re.IGNORECASE,
+    r"(?i)(target|reflector|reflektor|smr|srm|nest|tooling ball|ball|sphere|kugel|marker|marke|prism|prisma|zielmarke|ziel|zielpunkt)"
+    r"[ _.-]?(id|name|no\.?|nr\.?|number|nummer)?"
 )
-POINT = re.compile(
-    r"(mess)?(point|punkt|stelle|position|name|id)[ _.-]?(id|name|no\.?|nr\.?)?", re.IGNORECASE
-)
+POINT = re.compile(r"(?i)(mess)?(point|punkt|stelle|position|name|id)[ _.-]?(id|name|no\.?|nr\.?)?")
 MOST_METRES = 20.0
 """Of a wire or bar; larger numbers are mm."""
 NAMED = 5

@@ -21,7 +21,7 @@ from stiffmap.common.broadcasting import (
 from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.channels import AXES, AXIS_CHANNELS, Channel
 from stiffmap.experiment.experiment import Experiment, Floats
-from stiffmap.experiment.readings.library.distance import READING
+from stiffmap.experiment.readings.library.distance_and_height import DISTANCE
 from stiffmap.solve.kinematics import forward_kinematics, inverse_kinematics
 from stiffmap.solve.machine import Machine, as_machine
 from stiffmap.workspace.maps.inputs import magnitude
@@ -138,9 +138,8 @@ def plan_of_joints(
 def _each(loads: Floats | Sequence[Floats], number: int) -> list[Floats]:
     if isinstance(loads, np.ndarray):
         loads = [loads] * number
-    each = [
-        wrench_array(w, "loads").reshape(-1, 6) for w in instance_of(loads, Sequence, "loads", "wrenches")
-    ]
+    given = instance_of(loads, Sequence, "loads", "wrenches")
+    each = [wrench_array(w, "loads").reshape(-1, 6) for w in given]
     if len(each) != number:
         raise StiffmapError(f"loads: expected one array for each of {number} poses, got {len(each)}")
     return each
@@ -224,7 +223,7 @@ def with_distances(plan: Experiment, sigma: float) -> Experiment:
     kept = plan.reading[:, len(AXES) :], plan.sigma[:, len(AXES) :]
     return replace(
         plan,
-        extra=(READING.channel, *plan.extra),
+        extra=(DISTANCE.channel, *plan.extra),
         other=there,
         other_rotation=plan.rotation,
         reading=np.hstack([unread, column, kept[0]]),

@@ -10,7 +10,7 @@ from typing import Any
 from stiffmap.common.json_text import json_text, plain
 from stiffmap.common.number_text import with_uncertainty, within
 from stiffmap.common.short import short_repr
-from stiffmap.experiment.comparison.summary import Summary
+from stiffmap.experiment.comparison.residual import Summary
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.noise.outliers import set_aside
 from stiffmap.experiment.noise.over_time import OverTime

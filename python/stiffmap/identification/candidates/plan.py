@@ -8,8 +8,7 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.common.fingerprints import digest
 from stiffmap.common.kept import Kept
 from stiffmap.experiment.experiment import Floats
-from stiffmap.experiment.prediction.fingerprint import fingerprint
-from stiffmap.experiment.prediction.predict import Predictor
+from stiffmap.experiment.prediction.predict import Predictor, fingerprint
 from stiffmap.identification.candidates.candidates import Candidate, candidates
 from stiffmap.identification.candidates.sensitivity import Variant, slopes_of, variants
 from stiffmap.identification.clock import Clock

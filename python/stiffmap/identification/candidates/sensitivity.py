@@ -12,7 +12,7 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.experiment import Experiment, Floats, Integers
 from stiffmap.experiment.noise.whitening import readings_of
 from stiffmap.experiment.poses.configuration import coordinates_of
-from stiffmap.experiment.prediction.ahead import Ahead
+from stiffmap.experiment.prediction.nearby import Ahead
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.identification.candidates.candidates import Candidate
 from stiffmap.model.description import AppliedEffect

@@ -17,8 +17,7 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.experiment import Experiment, Floats, Integers
 from stiffmap.experiment.noise.nuisance import nuisance_columns
 from stiffmap.experiment.noise.outliers import GROSS, LEAST_MANY, MANY
-from stiffmap.experiment.noise.robust import fitted
-from stiffmap.experiment.noise.whitening import basis, readings_of
+from stiffmap.experiment.noise.whitening import basis, fitted, readings_of
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.identification.candidates.plan import CandidatePlan
 from stiffmap.identification.candidates.sensitivity import Variant

@@ -9,12 +9,11 @@ import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 
 from stiffmap.experiment.channels import metres
-from stiffmap.experiment.comparison.summary import Summary, summary
+from stiffmap.experiment.comparison.residual import Summary, summary
 from stiffmap.experiment.experiment import Floats, Integers, Mask
-from stiffmap.experiment.noise.held_out import folds, left_unseen
 from stiffmap.experiment.noise.outliers import GROSS
 from stiffmap.experiment.noise.over_time import OverTime, over_time
-from stiffmap.experiment.noise.whitening import LinearProblem, nuisance_part
+from stiffmap.experiment.noise.whitening import LinearProblem, folds, left_unseen, nuisance_part
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.identification.inference.amplitudes import Fit
 from stiffmap.identification.inference.columns import MOST_READINGS, Columns, drawn

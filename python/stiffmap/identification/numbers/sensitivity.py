@@ -12,10 +12,8 @@ import numpy as np
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.kept import Kept
 from stiffmap.experiment.experiment import Experiment, Floats, Mask
-from stiffmap.experiment.prediction.ahead import Ahead
-from stiffmap.experiment.prediction.fingerprint import fingerprint
-from stiffmap.experiment.prediction.nearby import Near
-from stiffmap.experiment.prediction.predict import Predictor
+from stiffmap.experiment.prediction.nearby import Ahead, Near
+from stiffmap.experiment.prediction.predict import Predictor, fingerprint
 from stiffmap.identification.numbers.certificate import INSTRUMENT, SCALE, frame_columns, scaled
 from stiffmap.identification.numbers.unknowns import Unknown
 from stiffmap.model.description import AppliedEffect, MachineDescription

@@ -13,7 +13,8 @@ from stiffmap.common.short import short_repr
 from stiffmap.experiment.experiment import Experiment
 from stiffmap.experiment.noise.level import noise_of
 from stiffmap.experiment.noise.whitening import LinearProblem
-from stiffmap.experiment.prediction.predict import Predictor, Terms
+from stiffmap.experiment.prediction.history import Terms
+from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.identification.candidates.candidates import words
 from stiffmap.identification.candidates.sensitivity import step_of
 from stiffmap.identification.inference.optimum import covariance, optimum

@@ -12,7 +12,8 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.experiment import Experiment, Integers
 from stiffmap.experiment.noise.nuisance import nuisance_columns
 from stiffmap.experiment.noise.whitening import LinearProblem
-from stiffmap.experiment.prediction.predict import Predictor, Terms
+from stiffmap.experiment.prediction.history import Terms
+from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.experiment.virtual.plans import plan_of_poses
 from stiffmap.identification.inference.optimum import covariance
 from stiffmap.identification.planning.estimate import fitted, slopes

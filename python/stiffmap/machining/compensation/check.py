@@ -9,7 +9,7 @@ import numpy as np
 
 from stiffmap.experiment.calls import as_experiment
 from stiffmap.experiment.comparison.limitations import refuse
-from stiffmap.experiment.comparison.summary import Summary, summary
+from stiffmap.experiment.comparison.residual import Summary, summary
 from stiffmap.experiment.experiment import Experiment, Mask
 from stiffmap.experiment.noise.level import noise_of
 from stiffmap.experiment.noise.whitening import LinearProblem, nuisance_part

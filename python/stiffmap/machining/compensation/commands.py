@@ -20,7 +20,7 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs import number_cells, write_rows
 from stiffmap.common.short import short_repr
 from stiffmap.experiment.experiment import AXES, Experiment
-from stiffmap.experiment.files.plan_file import load_plan
+from stiffmap.experiment.files.load import load_plan
 from stiffmap.experiment.poses.commanded import against_base
 from stiffmap.experiment.poses.configuration import coordinates_of, drive_jacobian
 from stiffmap.experiment.prediction.equilibria import motions

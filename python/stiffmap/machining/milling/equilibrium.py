@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiffmap.common.broadcasting import Floats
-from stiffmap.experiment.prediction.unloaded_state import STILL, TRAVEL, lagging, lags
+from stiffmap.experiment.prediction.joints import STILL, TRAVEL, lagging, lags
 from stiffmap.machining.milling.setting import Setting
 from stiffmap.solve.kinematics import inverse_kinematics, missed
 from stiffmap.solve.machine import Machine

@@ -3,11 +3,4 @@
 from stiffmap.solve.derivatives.differentiate import differentiate
 from stiffmap.solve.derivatives.prepared import DISPLACEMENT, Prepared, Request, prepare, read_requests
 
-__all__ = [
-    "DISPLACEMENT",
-    "Prepared",
-    "Request",
-    "differentiate",
-    "prepare",
-    "read_requests",
-]
+__all__ = ["DISPLACEMENT", "Prepared", "Request", "differentiate", "prepare", "read_requests"]

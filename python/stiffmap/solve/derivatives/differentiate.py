@@ -73,10 +73,8 @@ def along_input(
     for i, component in enumerate(INPUTS[name]):
         stencil = central(_step(machine, name))
         ends = [solve_call(machine, _moved(machine, call, name, i, h))[0] for h in stencil.offsets]
-        yield (
-            f"{name} {component}",
-            {q: stencil.combine(getattr(base, q), [getattr(s, q) for s in ends]) for q in of},
-        )
+        values = {q: stencil.combine(getattr(base, q), [getattr(s, q) for s in ends]) for q in of}
+        yield f"{name} {component}", values
 
 
 def _step(machine: CompiledMachine, name: str) -> float:

@@ -157,10 +157,7 @@ def _elbow(x: float, y: float, arm: float, forearm: float, bend: float) -> tuple
 
 _FUNCTIONS = {
     f.__name__: f for f in (math.sqrt, math.sin, math.cos, math.asin, math.atan2, math.degrees, math.radians)
-} | {
-    "arm_angle": lambda *to: _elbow(*to)[0],
-    "forearm_angle": lambda *to: _elbow(*to)[1],
-}
+} | {"arm_angle": lambda *to: _elbow(*to)[0], "forearm_angle": lambda *to: _elbow(*to)[1]}
 
 
 NAMES = ("3-rrr", "3-prr", "five-bar", "xy-table", "hexapod", "delta", "linear-delta", "orthoglide",

@@ -8,7 +8,7 @@ import typer
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs.option import written
-from stiffmap.experiment.comparison.summary import Summary
+from stiffmap.experiment.comparison.residual import Summary
 from stiffmap.machining import compensation
 from stiffmap.solve.machine import Machine
 from stiffmap.ui.cli import options

@@ -13,7 +13,7 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs.option import written
 from stiffmap.experiment import Experiment, Loop, load_experiment, save_experiment, simulate
 from stiffmap.experiment.channels import AXES, SIDES, Channel
-from stiffmap.experiment.files.plan_file import load_plan
+from stiffmap.experiment.files.load import load_plan
 from stiffmap.experiment.virtual import plans as make
 from stiffmap.solve.machine import Machine, load_machine
 from stiffmap.ui.cli import options

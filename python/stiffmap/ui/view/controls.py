@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.solve.reach import assembly_modes
+from stiffmap.solve.kinematics import assembly_modes
 from stiffmap.ui.view.moment import Moment, moves, turns
 from stiffmap.ui.view.numbers import ChangedNumbers, write
 from stiffmap.ui.view.outputs import Outputs

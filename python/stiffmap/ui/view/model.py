@@ -19,9 +19,8 @@ from stiffmap.model.addresses import listed
 from stiffmap.model.description import AppliedEffect, MachineDescription
 from stiffmap.model.effects import apply_records
 from stiffmap.solve.compiled import Status
-from stiffmap.solve.kinematics import inverse_kinematics
+from stiffmap.solve.kinematics import follow, inverse_kinematics
 from stiffmap.solve.machine import Machine, load_machine
-from stiffmap.solve.reach import follow
 from stiffmap.ui.view.moment import Moment, moves
 from stiffmap.ui.view.state import History, ViewState, checked
 

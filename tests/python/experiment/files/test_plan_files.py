@@ -9,7 +9,7 @@ import pytest
 
 import stiffmap as sm
 from stiffmap.common.errors import FileError
-from stiffmap.experiment.files.plan_file import load_plan
+from stiffmap.experiment.files.load import load_plan
 
 
 def plan(folder: Path, text: str) -> sm.Experiment:

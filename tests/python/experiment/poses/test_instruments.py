@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 import stiffmap as sm
 from stiffmap.experiment import Predictor, load_experiment, random_plan, residual
-from stiffmap.experiment.poses.against_command import resolved
+from stiffmap.experiment.poses.commanded import resolved
 from stiffmap.model.description import AppliedEffect
 from stiffmap.ui.cli.app import main
 

@@ -12,7 +12,7 @@ import stiffmap as sm
 from stiffmap.experiment import Predictor, load_experiment, random_plan
 from stiffmap.experiment.calls import placed
 from stiffmap.experiment.poses.configuration import coordinates_of
-from stiffmap.experiment.prediction.history import drives_of
+from stiffmap.experiment.prediction.history import Drives
 from stiffmap.experiment.ramps import directions
 from stiffmap.identification.planning import estimate
 from stiffmap.model.description.tree import joints
@@ -166,7 +166,7 @@ def test_friction_of_a_drive_behind_the_platform(tmp_path: Path) -> None:
     plan = load_experiment(tmp_path)
     predict = Predictor(machine, plan)
     more = predict([placed(machine, "hysteresis a level=5N·m")]) - predict()
-    torque = np.abs(drives_of(machine, plan).effort[:, machine.actuators.index("a")])
+    torque = np.abs(Drives.of(machine, plan).effort[:, machine.actuators.index("a")])
     assert torque[1] > 10.0
     law = joints(machine.description)["a"].law
     assert law is not None
@@ -248,10 +248,10 @@ def test_efforts_are_those_where_the_drives_are_commanded(name: str) -> None:
     start = coordinates_of(machine, plan)
     drives = [machine.compiled.names.joints[a] for a in machine.actuators]
     held = machine.solve_joints(start[:, drives], plan.wrench, start=start)
-    found = drives_of(machine, plan)
+    found = Drives.of(machine, plan)
     assert found.effort == pytest.approx(held.actuator_effort, rel=1e-9, abs=1e-9)
     soft = machine.with_effect("compliance", element=machine.actuators[0].rpartition(".")[2], scale=2.0)
-    assert drives_of(soft, plan).jacobian is found.jacobian  # of the rigid machine, found out once
+    assert Drives.of(soft, plan).jacobian is found.jacobian  # of the rigid machine, found out once
 
 
 def test_the_way_of_a_load_is_that_of_the_component_that_varies_most() -> None:

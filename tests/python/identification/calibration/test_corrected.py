@@ -11,8 +11,7 @@ import pytest
 import stiffmap as sm
 from stiffmap.experiment import Experiment, Predictor
 from stiffmap.experiment.experiment import Floats
-from stiffmap.experiment.noise.held_out import unseen_nuisances
-from stiffmap.experiment.noise.whitening import LinearProblem, best_fit
+from stiffmap.experiment.noise.whitening import LinearProblem, best_fit, unseen_nuisances
 from stiffmap.experiment.virtual.plans import plan_of_joints
 from stiffmap.identification.calibration import Calibration, calibrate
 from stiffmap.identification.calibration.result import in_display_units

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 import stiffmap as sm
 from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.model.files.shipped import find
-from stiffmap.solve.reach import assembly_modes
+from stiffmap.solve.kinematics import assembly_modes
 from stiffmap.ui.plot.elements import THICK, THIN, element_links, thicknesses
 from stiffmap.ui.plot.skeleton import skeleton
 from stiffmap.ui.view.model import ViewModel, addresses, changed

@@ -1,1 +1,1 @@
-"""One file per kind of reading: every module here has a ``READING``."""
+"""Kinds of readings: every `ReadingKind` of a module here is one."""

@@ -16,7 +16,7 @@ from stiffmap.common.from_above import from_above
 from stiffmap.common.json_text import json_text, parse_json, plain
 from stiffmap.common.number_text import percent, with_uncertainty
 from stiffmap.common.short import short_repr, titled
-from stiffmap.experiment.comparison.summary import Summary
+from stiffmap.experiment.comparison.residual import Summary
 from stiffmap.experiment.experiment import Experiment, Floats, Mask
 from stiffmap.experiment.noise.checks import Check
 from stiffmap.identification.diagnosis.report.findings import (
