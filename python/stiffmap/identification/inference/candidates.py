@@ -12,8 +12,8 @@ from scipy.stats import norm
 from stiffmap.experiment.experiment import Floats
 from stiffmap.identification.inference.amplitudes import Fit
 from stiffmap.identification.inference.constants import SIZES
+from stiffmap.identification.inference.parts import gains, log_mean
 from stiffmap.identification.inference.places import Place, Shape
-from stiffmap.identification.inference.sizes import gains, log_mean
 
 PAIR_STRIDE = 3
 """Of the sizes that pairs are tried with: every third; effort only."""

@@ -21,10 +21,10 @@ from scipy.optimize import least_squares
 from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.experiment import Floats, Mask
 from stiffmap.experiment.noise.outliers import MANY
+from stiffmap.identification.inference.chosen import WIDE, Term
 from stiffmap.identification.inference.constants import DEGREES, STANDS_OUT
 from stiffmap.identification.inference.optimum import covariance
 from stiffmap.identification.inference.readings import Readings
-from stiffmap.identification.inference.term import WIDE, Term
 from stiffmap.identification.inference.travel import Profile, profiles
 from stiffmap.identification.numbers.sensitivity import bends, moves_of, sensitivity_at, with_moves
 from stiffmap.model.description import AppliedEffect

@@ -15,8 +15,7 @@ from stiffmap.experiment.noise.whitening import basis, readings_of
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.identification.inference.amplitudes import NOTHING, Fit
 from stiffmap.identification.inference.columns import Columns, drawn, zeros
-from stiffmap.identification.inference.covariance import Covariance, covariance
-from stiffmap.identification.inference.kernels import ReadingPoints, gaps
+from stiffmap.identification.inference.kernels import Covariance, ReadingPoints, covariance, gaps
 from stiffmap.identification.inference.travel import DriveErrors, Profile, drives_of, knots_of
 from stiffmap.identification.numbers.sensitivity import Sensitivity, predicted, sensitivity, zeros_anew
 from stiffmap.identification.numbers.unknowns import Unknown, joint_name

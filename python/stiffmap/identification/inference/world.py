@@ -16,9 +16,8 @@ from stiffmap.identification.inference.candidates import evidence, of_pairs
 from stiffmap.identification.inference.chosen import Chosen, all_moved
 from stiffmap.identification.inference.columns import Columns
 from stiffmap.identification.inference.constants import MOST_EFFECTS, ODDS, REFITS, SIZES
-from stiffmap.identification.inference.parts import NOISE, Part
+from stiffmap.identification.inference.parts import NOISE, Part, gains, log_mean, spectrum
 from stiffmap.identification.inference.places import Place
-from stiffmap.identification.inference.sizes import gains, log_mean, spectrum
 
 EXACT = "exact"
 SETTLED = 0.3

@@ -7,9 +7,8 @@ import numpy as np
 from stiffmap.common.broadcasting import Floats, whole_number
 from stiffmap.common.errors import StiffmapError
 from stiffmap.identification.planning.information import exchange, information_of
-from stiffmap.identification.taps.causes import causes
 from stiffmap.identification.taps.fit import in_si
-from stiffmap.identification.taps.problem import TapsProblem
+from stiffmap.identification.taps.problem import TapsProblem, causes
 from stiffmap.identification.taps.table import TapTest
 from stiffmap.solve.machine import Machine, takes_machine
 from stiffmap.workspace.vibration.modes import tip_modes

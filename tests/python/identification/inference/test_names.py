@@ -17,8 +17,7 @@ from stiffmap.identification.candidates.candidates import Candidate
 from stiffmap.identification.inference.amplitudes import fitted
 from stiffmap.identification.inference.chosen import Chosen
 from stiffmap.identification.inference.constants import ODDS
-from stiffmap.identification.inference.inference import inferred, terms
-from stiffmap.identification.inference.names import searched, with_travel
+from stiffmap.identification.inference.names import inferred, searched, terms, with_travel
 from stiffmap.identification.inference.parts import Parts
 from stiffmap.identification.inference.places import Place, Shape
 from stiffmap.identification.inference.verdict import TOLERABLE, Beyond, effect_of, judged
