@@ -34,7 +34,6 @@ INNER = {
         "columns",
         "parts",
         "amplitudes",
-        "candidates",
         "chosen",
         "world",
         ("names", "shares"),

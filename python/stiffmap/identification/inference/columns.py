@@ -184,11 +184,7 @@ class Columns:
 
 
 def columns(
-    predictor: Predictor,
-    plan: CandidatePlan,
-    sigma: Floats,
-    unknowns: Sequence[Unknown],
-    seed: int = 0,
+    predictor: Predictor, plan: CandidatePlan, sigma: Floats, unknowns: Sequence[Unknown], seed: int = 0
 ) -> Columns:
     """Columns of everything that the readings of an experiment can hold.
 

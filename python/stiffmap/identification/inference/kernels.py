@@ -71,7 +71,8 @@ def gaps(machine: Machine, e: Experiment, points: ReadingPoints) -> Iterator[Ker
     yield from shared(e, points)
     when = e.hours if e.hours is not None else e.order
     if when is not None:
-        t = _in_sessions(when, e.runs)
+        longest = max((float(np.ptp(when[e.runs == k])) for k in np.unique(e.runs)), default=0.0)
+        t = when / (longest or 1.0)  # in shares of the longest session
         for length in SESSIONS:
             yield _wander(f"wander over {length:g} session", t / length, e.runs)
 
@@ -141,12 +142,6 @@ def _spaces(machine: Machine, e: Experiment) -> Iterator[tuple[str, Floats]]:
         if len(drives) <= FEW_DRIVES:
             return
     yield "place", unit(free_position(e))
-
-
-def _in_sessions(when: Floats, session: Integers) -> Floats:
-    """Times in shares of the longest session."""
-    longest = max((float(np.ptp(when[session == k])) for k in np.unique(session)), default=0.0)
-    return np.asarray(when / (longest or 1.0))
 
 
 def free_position(e: Experiment) -> Floats:

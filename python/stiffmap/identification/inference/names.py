@@ -84,11 +84,7 @@ def searched(
         best = _with_rivals(max(likelier, key=lambda m: m.score), searches, found)
     exact = next(w.null for w in searches if w.name == EXACT)
     off = [w.null.fit for w in searches if w.name != EXACT]
-    return replace(
-        best,
-        exact=exact.score,
-        calibrated=max(off, key=lambda f: f.score, default=None),
-    )
+    return replace(best, exact=exact.score, calibrated=max(off, key=lambda f: f.score, default=None))
 
 
 def _worlds(columns: Columns, predict: Predict | None, over: Callable[[], bool], travel: bool) -> list[World]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -73,13 +74,8 @@ class Readings:
     def only(self, keep: Mask) -> Readings:
         """Those of some rows (n,)."""
         own = keep[self.rows]
-        return replace(
-            self,
-            rows=self.rows[own],
-            channel=self.channel[own],
-            weights=self.weights[own],
-            rest=self.rest.only(own),
-        )
+        of_each: dict[str, Any] = {name: getattr(self, name)[own] for name in ("rows", "channel", "weights")}
+        return replace(self, rest=self.rest.only(own), **of_each)
 
     def weighed(self, weights: Floats) -> Readings:
         """With other weights (N,)."""
@@ -163,18 +159,8 @@ def readings(
     drives = tuple(_erring(predictor, s, columns, amplitude))
     index = [s.unknowns.index(u) for u in unknowns]
     s = replace(s, unknowns=unknowns, columns=s.columns[..., index])
-    return Readings(
-        predictor,
-        sigma,
-        rows,
-        channel,
-        fit.noise,
-        weights,
-        rest,
-        s,
-        np.array([size for _, size in known if size > 0.0]),
-        drives,
-    )
+    spread = np.array([size for _, size in known if size > 0.0])
+    return Readings(predictor, sigma, rows, channel, fit.noise, weights, rest, s, spread, drives)
 
 
 def _erring(

@@ -24,8 +24,8 @@ from stiffmap.identification.diagnosis.report.sentences import (
     opening,
 )
 from stiffmap.identification.diagnosis.slips import find
+from stiffmap.identification.diagnosis.slips.axes import Slip
 from stiffmap.identification.diagnosis.slips.find import find_slip
-from stiffmap.identification.diagnosis.slips.slip import Slip
 from stiffmap.identification.diagnosis.stages import by_gain
 from stiffmap.model import effects
 from stiffmap.model.description import AppliedEffect

@@ -310,10 +310,10 @@ def test_a_world_that_others_leave_far_behind_is_given_up_early(monkeypatch):
         c, numbers=10.0 * d, unknowns=unknowns, residual=residual, experiment=one_place(len(c.rows))
     )
     made: list[tuple[str, int]] = []
-    inner = World._made
+    inner = World._fit
     monkeypatch.setattr(
         World,
-        "_made",
+        "_fit",
         lambda w, chosen, *given: [made.append((w.name, len(chosen))), inner(w, chosen, *given)][1],
     )
     assert searched(whole).best.world != "exact"

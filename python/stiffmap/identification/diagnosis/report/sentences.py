@@ -10,7 +10,7 @@ from stiffmap.common.number_text import with_uncertainty, within
 from stiffmap.identification.candidates.candidates import words
 from stiffmap.identification.diagnosis.report.findings import Effect
 from stiffmap.identification.diagnosis.report.separation import Separation
-from stiffmap.identification.diagnosis.slips.slip import Slip
+from stiffmap.identification.diagnosis.slips.axes import Slip
 from stiffmap.model.effects import registry
 
 DISPLAY_UNITS = {"m": (1e3, "mm"), "m/N": (1e3, "mm/N"), "rad": (1e3, "mrad"), "1/m": (1e-3, "1/mm")}
