@@ -128,16 +128,11 @@ def fitted(problem: TapsProblem, begin: Causes, off: Floats | None = None) -> Fi
     def residual(x: Floats) -> Floats:
         return np.concatenate([problem.residual(at(x), x[k:]), x[k:]])
 
-    start = [free_number(p, value) for p, (_, value) in zip(numbers, begin, strict=True)]
-    low = [free_number(p, p.lower) for p in numbers]
-    high = [free_number(p, p.upper) for p in numbers]
-    fit = optimum(
-        residual,
-        np.r_[start, np.zeros(len(most)) if off is None else off],
-        (np.r_[low, -most], np.r_[high, most]),
-        lambda x: differences(residual, x, STEP),
-        STEPS,
-    )
+    off = np.zeros(len(most)) if off is None else off
+    start = np.r_[[free_number(p, value) for p, (_, value) in zip(numbers, begin, strict=True)], off]
+    low = np.r_[[free_number(p, p.lower) for p in numbers], -most]
+    high = np.r_[[free_number(p, p.upper) for p in numbers], most]
+    fit = optimum(residual, start, (low, high), lambda x: differences(residual, x, STEP), STEPS)
     found = []
     variances = np.diag(covariance(fit.jacobian)[0])[:k]
     for (c, value), p, variance in zip(at(fit.x), numbers, variances, strict=True):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from stiffmap.common.broadcasting import Floats, whole_number
@@ -60,14 +62,8 @@ def where_to_tap(
         )
     x = np.hstack([A, J])
     matrices = np.stack([x[pose == k].T @ x[pose == k] for k in range(pool)])
-    chosen = exchange(
-        matrices,
-        np.zeros_like(matrices[0]),
-        np.unique(pose),
-        wanted,
-        lambda m: information_of(m, A.shape[1], 1.0),
-        0,
-    )
+    value = partial(information_of, wanted=A.shape[1], prior=1.0)
+    chosen = exchange(matrices, np.zeros_like(matrices[0]), np.unique(pose), wanted, value, 0)
     return np.asarray(position[chosen])
 
 
