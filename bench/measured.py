@@ -23,7 +23,7 @@ from stiffmap.experiment import Experiment
 from stiffmap.experiment.files.load import load_experiment
 from stiffmap.identification.inference import columns as of_columns
 from stiffmap.identification.inference.chosen import Chosen
-from stiffmap.identification.inference.inference import inferred
+from stiffmap.identification.inference.names import inferred
 from stiffmap.identification.inference.places import Place
 from stiffmap.identification.inference.verdict import judged
 

@@ -17,9 +17,8 @@ from tests.python.workspace.vibration.mujoco_frf import machine_of, modes
 
 import stiffmap as sm
 from stiffmap.identification.taps import TapTest, explain_taps
-from stiffmap.identification.taps.causes import causes
 from stiffmap.identification.taps.fit import fitted
-from stiffmap.identification.taps.problem import TapsProblem, shifted, uncertain_numbers
+from stiffmap.identification.taps.problem import TapsProblem, causes, shifted, uncertain_numbers
 from stiffmap.model.effects import apply_records
 
 MACHINES = ("ur10", "five-bar", "travelling-column", "linear-delta", "orthoglide-revised")

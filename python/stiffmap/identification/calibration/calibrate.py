@@ -18,14 +18,14 @@ from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.noise.outliers import swapped
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.identification.calibration.result import Calibration, FoundNumber
-from stiffmap.identification.candidates.plan import CandidatePlan
+from stiffmap.identification.candidates.sensitivity import CandidatePlan
 from stiffmap.identification.clock import Clock, Progress
 from stiffmap.identification.inference.amplitudes import Fit
 from stiffmap.identification.inference.columns import Columns
 from stiffmap.identification.inference.constants import ODDS
 from stiffmap.identification.inference.corrected import Corrected, corrected
-from stiffmap.identification.inference.inference import Inferred, infer
 from stiffmap.identification.inference.machines import CALIBRATED, stands_out, vouched, written
+from stiffmap.identification.inference.names import Inferred, infer
 from stiffmap.identification.inference.readings import readings
 from stiffmap.identification.inference.shares import of_numbers, shares, tolerance_word, too_wide
 from stiffmap.identification.inference.verdict import judged

@@ -165,10 +165,8 @@ class Calibration:
     def as_plain(self) -> dict[str, Any]:
         """JSON data."""
         out = {f.name: plain(getattr(self, f.name)) for f in fields(self) if f.repr and f.name not in APART}
-        v = self.validity
-        out["validity"] = plain(
-            {"poses": v.poses, "drives": dict(v.drives), "loads": dict(v.loads), "temperature": v.temperature}
-        )
+        known = ("poses", "drives", "loads", "temperature")
+        out["validity"] = plain({name: getattr(self.validity, name) for name in known})
         out["shares"] = [{"part": name, "share": share} for name, share in self.shares.items()]
         out["beyond"], out["table"] = plain(self.beyond), plain(self.rows)
         out["travel"] = plain(self.profiles)

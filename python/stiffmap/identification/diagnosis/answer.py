@@ -16,16 +16,21 @@ from stiffmap.experiment.noise.nuisance import nuisance_columns
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.identification.calibration.calibrate import table_of
 from stiffmap.identification.clock import Clock
-from stiffmap.identification.diagnosis.report.effects import detectable, effects_of
-from stiffmap.identification.diagnosis.report.findings import Effect, FoundNumbers, NoiseReport, Rest
+from stiffmap.identification.diagnosis.report.findings import (
+    Effect,
+    FoundNumbers,
+    NoiseReport,
+    Rest,
+    detectable,
+    effects_of,
+)
 from stiffmap.identification.diagnosis.report.result import Diagnosis
 from stiffmap.identification.diagnosis.report.separation import separation
 from stiffmap.identification.inference.amplitudes import Fit
-from stiffmap.identification.inference.chosen import Chosen
+from stiffmap.identification.inference.chosen import Chosen, Term
 from stiffmap.identification.inference.columns import Columns
 from stiffmap.identification.inference.constants import ODDS, RARE
 from stiffmap.identification.inference.corrected import Corrected, along_travel, corrected, instead
-from stiffmap.identification.inference.inference import Inferred, terms
 from stiffmap.identification.inference.machines import (
     CALIBRATED,
     CORRECTED,
@@ -34,11 +39,10 @@ from stiffmap.identification.inference.machines import (
     vouched,
     written,
 )
-from stiffmap.identification.inference.names import put_instead, with_travel
+from stiffmap.identification.inference.names import Inferred, put_instead, terms, with_travel
 from stiffmap.identification.inference.parts import GAPS
 from stiffmap.identification.inference.readings import Readings, readings
 from stiffmap.identification.inference.shares import gap_of, shares, tolerance_word, too_wide
-from stiffmap.identification.inference.term import Term
 from stiffmap.identification.inference.verdict import Named, Verdict, judged, not_as_stated
 
 RIVALS = 3

@@ -14,15 +14,15 @@ from stiffmap.experiment.calls import as_experiment
 from stiffmap.experiment.comparison.limitations import refuse
 from stiffmap.experiment.experiment import Experiment
 from stiffmap.experiment.prediction.predict import Predictor
-from stiffmap.identification.candidates.plan import plan_of
+from stiffmap.identification.candidates.sensitivity import plan_of
 from stiffmap.identification.clock import Clock, Progress
 from stiffmap.identification.diagnosis.answer import answer
 from stiffmap.identification.diagnosis.report.findings import Effect
 from stiffmap.identification.diagnosis.report.result import Diagnosis
+from stiffmap.identification.diagnosis.slips.axes import Slip
 from stiffmap.identification.diagnosis.slips.factors import named_within
 from stiffmap.identification.diagnosis.slips.find import find_slip
-from stiffmap.identification.diagnosis.slips.slip import Slip
-from stiffmap.identification.inference.inference import infer
+from stiffmap.identification.inference.names import infer
 from stiffmap.identification.numbers import GROUPS, Tolerances
 from stiffmap.model.effects import get
 from stiffmap.solve.machine import Machine, as_machine

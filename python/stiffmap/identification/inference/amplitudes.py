@@ -31,8 +31,7 @@ from stiffmap.identification.inference.constants import (
     STANDS_OUT,
     WIDEST,
 )
-from stiffmap.identification.inference.parts import ALL_NUMBERS, GAPS, NOISE, Part
-from stiffmap.identification.inference.sizes import of_size
+from stiffmap.identification.inference.parts import ALL_NUMBERS, GAPS, NOISE, Part, of_size
 
 STEPS, LARGEST_STEP, ENOUGH = 30, 2.0, 0.01
 """Newton steps, their length in ln variance, and the gain of evidence that ends them."""

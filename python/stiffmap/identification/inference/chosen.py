@@ -1,19 +1,91 @@
-"""An effect at a place that is in the model: its strengths and shape, and how they show."""
+"""Effects at places: what all of them would add to the evidence; one in the model of a search; one that is fitted to the readings."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.linalg.blas import dtrmm
+from scipy.linalg.lapack import dtrtri
+from scipy.stats import norm
 
-from stiffmap.experiment.experiment import Floats
+from stiffmap.experiment.experiment import Floats, Mask
+from stiffmap.identification.candidates.candidates import Candidate
 from stiffmap.identification.candidates.sensitivity import Variant
 from stiffmap.identification.inference.amplitudes import Fit
 from stiffmap.identification.inference.columns import Columns
-from stiffmap.identification.inference.parts import Part
-from stiffmap.identification.inference.places import Place, possible
-from stiffmap.model.effects import Parameter
+from stiffmap.identification.inference.constants import SIZES
+from stiffmap.identification.inference.parts import Part, gains, log_mean
+from stiffmap.identification.inference.places import Place, Shape, possible
+from stiffmap.model.description import AppliedEffect
+from stiffmap.model.effects import Parameter, get
+
+PAIR_STRIDE = 3
+"""Of the sizes that pairs are tried with: every third; effort only."""
+AT_ONCE = 512
+"""Directions that are solved for together."""
+
+
+def evidence(fit: Fit, places: tuple[Place, ...]) -> list[Floats]:
+    """Per place, (shapes,) mean over sizes of the gain of evidence of an effect there, ln; worked out once for each fit."""
+    by_rank: dict[int, list[tuple[Floats, int, Shape]]] = {}
+    for p in places:
+        if id(p) not in fit.gain:
+            fit.gain[id(p)] = np.empty(len(p.shapes))
+            for k, s in enumerate(p.shapes):
+                by_rank.setdefault(s.directions.shape[1], []).append((fit.gain[id(p)], k, s))
+    asked = sum(rank * len(members) for rank, members in by_rank.items())
+    # of the factor: products with it take half the time, and pay where many are asked for
+    inverse = dtrtri(fit.root, lower=1)[0] if asked > len(fit.columns) else None
+    for rank, members in by_rank.items():
+        for begin in range(0, len(members), max(1, AT_ONCE // rank)):
+            some = members[begin : begin + max(1, AT_ONCE // rank)]
+            for (to, k, _), gain in zip(
+                some, _of_rank(fit, [s for _, _, s in some], rank, inverse), strict=True
+            ):
+                to[k] = gain
+    return [fit.gain[id(p)] for p in places]
+
+
+def _of_rank(fit: Fit, shapes: list[Shape], rank: int, inverse: Floats | None = None) -> Floats:
+    directions = np.concatenate([s.directions.T for s in shapes]).T
+    scale = len(fit.columns) / rank  # of a factor's square over that of the directions
+    white = fit.white(directions) if inverse is None else dtrmm(1.0, inverse, directions, lower=1)
+    white = white.T.reshape(len(shapes), rank, -1)
+    inside, vectors = np.linalg.eigh(scale * (white @ white.transpose(0, 2, 1)))
+    along = np.sqrt(scale) * (directions.T @ fit.solved).reshape(len(shapes), rank)
+    z = np.einsum("iab,ia->ib", vectors, along)
+    gain = gains(inside, z)
+    if rank == 1:
+        sign = np.array([s.sign for s in shapes])[:, None]
+        straight = (vectors[:, 0, 0] * z[:, 0])[:, None]
+        side = norm.logcdf(sign * straight * SIZES / np.sqrt(1.0 + inside * SIZES**2)) + np.log(2.0)
+        gain = gain + np.where(sign == 0, 0.0, side)
+    return log_mean(gain)
+
+
+def of_pairs(fit: Fit, shapes: Sequence[Shape]) -> Floats:
+    """(s, s) gain of evidence by every two of some shapes together, mean over both sizes; nothing of one with itself."""
+    m, s = len(fit.columns), len(shapes)
+    rank = max(v.directions.shape[1] for v in shapes)
+    factor = np.zeros((m, s, rank))
+    for k, v in enumerate(shapes):
+        factor[:, k, : v.directions.shape[1]] = v.factor
+    white = fit.white(factor.reshape(m, -1))
+    gram = (white.T @ white).reshape(s, rank, s, rank).swapaxes(1, 2)
+    z = (factor.reshape(m, -1).T @ fit.solved).reshape(s, rank)
+    b2 = SIZES[::PAIR_STRIDE] ** 2
+    root = np.sqrt(np.stack(np.meshgrid(b2, b2, indexing="ij"), axis=-1).reshape(-1, 2).repeat(rank, axis=1))
+    first, second = np.tril_indices(s, -1)
+    both = np.stack([first, second], axis=1)
+    of_two = gram[both[:, :, None], both[:, None, :]].swapaxes(2, 3).reshape(-1, 1, 2 * rank, 2 * rank)
+    inner = np.eye(2 * rank) + root[:, :, None] * of_two * root[:, None, :]
+    scaled = root * z[both].reshape(-1, 1, 2 * rank)
+    solved = np.linalg.solve(inner, scaled[..., None])[..., 0]
+    out = np.full((s, s), -np.inf)
+    out[first, second] = log_mean(0.5 * np.sum(scaled * solved, axis=-1) - 0.5 * np.linalg.slogdet(inner)[1])
+    return np.asarray(np.maximum(out, out.T))
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,3 +181,74 @@ def all_moved(chosen: Sequence[Chosen], x: Floats) -> tuple[Chosen, ...]:
     """The effects at strengths and shapes x, one after the other."""
     ends = np.cumsum([len(c.variant.sign) + len(c.shaped) for c in chosen])[:-1]
     return tuple(c.moved(part) for c, part in zip(chosen, np.split(x, ends), strict=True))
+
+
+WIDE = float(norm.isf(0.025))
+"""Standard deviations of a 95 % interval to either side."""
+AT_BOUND = 1e-3
+"""Of a parameter's scale, within which it is at a bound."""
+
+
+@dataclass(frozen=True, eq=False)
+class Term:
+    """An effect that is fitted: all its parameters, in their scales."""
+
+    candidate: Candidate
+    values: Floats
+    """(q,)."""
+    sd: Floats = field(default_factory=lambda: np.zeros(0))
+    """(q,) their standard deviations at an optimum, everything else integrated out; infinite where the readings determine nothing."""
+
+    @staticmethod
+    def of(candidate: Candidate, term: AppliedEffect) -> Term:
+        """With the values (SI) of an effect."""
+        given = dict(term.parameters)
+        found = [float(given.get(p.name, p.null or 0.0)) / p.scale for p in candidate.parameters]
+        return Term(candidate, np.clip(np.array(found), *Term(candidate, np.zeros(0)).bounds))
+
+    @property
+    def bounds(self) -> tuple[Floats, Floats]:
+        """(q,) least and largest values."""
+        both = [possible(p) if p.null is not None else (p.lower, p.upper) for p in self.candidate.parameters]
+        scale = np.array([p.scale for p in self.candidate.parameters])
+        low, high = (np.array(side, dtype=float) / scale for side in zip(*both, strict=True))
+        return low, high
+
+    def effect(self, values: Floats) -> AppliedEffect:
+        """With other values."""
+        p = self.candidate.parameters
+        return self.candidate.term([float(v) * q.scale for v, q in zip(values, p, strict=True)])
+
+    @property
+    def ends(self) -> tuple[Floats, Floats]:
+        """(q,) lower and upper ends of 95 % intervals, whatever the bounds."""
+        return self.values - WIDE * self.sd, self.values + WIDE * self.sd
+
+    @property
+    def nulls(self) -> Floats:
+        """(q,) values at which the effect vanishes; NaN where there is none."""
+        return np.array([np.nan if p.null is None else p.null / p.scale for p in self.candidate.parameters])
+
+    @property
+    def undetermined(self) -> Mask:
+        """(q,) parameters whose interval is all that they can be, shapes at a bound, and strengths if all are at one."""
+        (low, high), (least, most) = self.bounds, self.ends
+        shape = np.isnan(self.nulls)
+        near = [(np.abs(self.values - b) < AT_BOUND) & (b != self.nulls) for b in (low, high)]
+        at = near[0] | near[1]
+        return np.asarray(((least <= low) & (most >= high)) | (at & (shape | at[~shape].all())))
+
+    @property
+    def spare(self) -> Mask:
+        """(q,) parameters that are not determined and that the effect can do without: at their null, or their default."""
+        p, vector = self.candidate.parameters, get(self.candidate.kind).vector
+        may = [q.default is not None or q.name in vector for q in p]
+        shape = np.isnan(self.nulls)
+        least, most = self.ends
+        idle = (least <= self.nulls) & (self.nulls <= most) & (len(self.candidate.linear) > 1)
+        return np.asarray(self.undetermined & may & (shape | idle))
+
+    def without(self, k: int) -> Term:
+        """Without one parameter, from the same values."""
+        p = self.candidate.parameters
+        return Term(replace(self.candidate, parameters=p[:k] + p[k + 1 :]), np.delete(self.values, k))

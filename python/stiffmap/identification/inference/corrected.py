@@ -21,10 +21,10 @@ from scipy.optimize import least_squares
 from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.experiment import Floats, Mask
 from stiffmap.experiment.noise.outliers import MANY
+from stiffmap.identification.inference.chosen import WIDE, Term
 from stiffmap.identification.inference.constants import DEGREES, STANDS_OUT
 from stiffmap.identification.inference.optimum import covariance
 from stiffmap.identification.inference.readings import Readings
-from stiffmap.identification.inference.term import WIDE, Term
 from stiffmap.identification.inference.travel import Profile, profiles
 from stiffmap.identification.numbers.sensitivity import bends, moves_of, sensitivity_at, with_moves
 from stiffmap.model.description import AppliedEffect
@@ -215,16 +215,8 @@ def _optimum(
         raise StiffmapError("the machine has no equilibrium with the effects that were found")
     q = given.frames(shown(x))
     for _ in range(FRAMINGS if len(x) else 0):
-        x = least_squares(
-            lambda x, q=q: residual(x, q),
-            x,
-            lambda x, q=q: jacobian(x, q),
-            (low, high),
-            x_scale="jac",
-            ftol=LITTLE,
-            xtol=LITTLE,
-            max_nfev=steps,
-        ).x
+        ends = {"ftol": LITTLE, "xtol": LITTLE, "max_nfev": steps}
+        x = least_squares(residual, x, jacobian, (low, high), x_scale="jac", args=(q,), **ends).x
         left, before = raw(x), q
         q = given.frames(shown(x))
         if np.linalg.norm(before @ (before.T @ left) - q @ (q.T @ left)) < SETTLED:
@@ -246,9 +238,8 @@ def columns_of(found: Corrected) -> tuple[Floats, Floats]:
     frames = given.frames(found.prediction)
     effects = [given.white(c)[:, None] for c in found.slopes]
     whole = given.rest.coloured(np.hstack([*effects, columns, frames]))
-    return whole, np.concatenate(
-        [np.zeros(len(effects)), np.ones(columns.shape[1]), np.zeros(frames.shape[1])]
-    )
+    prior = [np.zeros(len(effects)), np.ones(columns.shape[1]), np.zeros(frames.shape[1])]
+    return whole, np.concatenate(prior)
 
 
 def _change(

@@ -8,8 +8,7 @@ import numpy as np
 
 from stiffmap.experiment.experiment import Floats, Integers
 from stiffmap.identification.candidates.candidates import Candidate
-from stiffmap.identification.candidates.plan import CandidatePlan
-from stiffmap.identification.candidates.sensitivity import Variant
+from stiffmap.identification.candidates.sensitivity import CandidatePlan, Variant
 from stiffmap.identification.inference.constants import LARGEST_ERROR
 from stiffmap.model.description import Joint, MachineDescription
 from stiffmap.model.description.tree import sequences

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -15,8 +16,7 @@ from stiffmap.experiment.noise.whitening import basis, readings_of
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.identification.inference.amplitudes import NOTHING, Fit
 from stiffmap.identification.inference.columns import Columns, drawn, zeros
-from stiffmap.identification.inference.covariance import Covariance, covariance
-from stiffmap.identification.inference.kernels import ReadingPoints, gaps
+from stiffmap.identification.inference.kernels import Covariance, ReadingPoints, covariance, gaps
 from stiffmap.identification.inference.travel import DriveErrors, Profile, drives_of, knots_of
 from stiffmap.identification.numbers.sensitivity import Sensitivity, predicted, sensitivity, zeros_anew
 from stiffmap.identification.numbers.unknowns import Unknown, joint_name
@@ -74,13 +74,8 @@ class Readings:
     def only(self, keep: Mask) -> Readings:
         """Those of some rows (n,)."""
         own = keep[self.rows]
-        return replace(
-            self,
-            rows=self.rows[own],
-            channel=self.channel[own],
-            weights=self.weights[own],
-            rest=self.rest.only(own),
-        )
+        of_each: dict[str, Any] = {name: getattr(self, name)[own] for name in ("rows", "channel", "weights")}
+        return replace(self, rest=self.rest.only(own), **of_each)
 
     def weighed(self, weights: Floats) -> Readings:
         """With other weights (N,)."""
@@ -164,18 +159,8 @@ def readings(
     drives = tuple(_erring(predictor, s, columns, amplitude))
     index = [s.unknowns.index(u) for u in unknowns]
     s = replace(s, unknowns=unknowns, columns=s.columns[..., index])
-    return Readings(
-        predictor,
-        sigma,
-        rows,
-        channel,
-        fit.noise,
-        weights,
-        rest,
-        s,
-        np.array([size for _, size in known if size > 0.0]),
-        drives,
-    )
+    spread = np.array([size for _, size in known if size > 0.0])
+    return Readings(predictor, sigma, rows, channel, fit.noise, weights, rest, s, spread, drives)
 
 
 def _erring(

@@ -12,19 +12,11 @@ from stiffmap.experiment.experiment import Experiment, Floats, Integers
 from stiffmap.identification.inference.amplitudes import OFF, Fit, noise_prior
 from stiffmap.identification.inference.chosen import Chosen
 from stiffmap.identification.inference.columns import Columns
-from stiffmap.identification.inference.constants import (
-    ALIKE,
-    EQUAL_SHARE,
-    NOISE_SD,
-    ODDS,
-    RARE,
-    TOLERANCES,
-)
+from stiffmap.identification.inference.constants import ALIKE, EQUAL_SHARE, NOISE_SD, ODDS, RARE, TOLERANCES
 from stiffmap.identification.inference.names import Search
 from stiffmap.identification.inference.parts import GAPS, Part
 from stiffmap.identification.inference.places import Place
 from stiffmap.identification.inference.shares import of_numbers
-from stiffmap.identification.inference.world import EXACT, Model
 from stiffmap.identification.numbers.unknowns import Unknown
 
 DETERMINED = 0.5
@@ -97,7 +89,7 @@ def judged(columns: Columns, search: Search) -> Verdict:
     """Names that stand, numbers out of tolerance, and the rest."""
     model = search.best
     named, refused = [], []
-    beyond = tuple(_out_of_tolerance(columns, model))
+    beyond = tuple(out_of_tolerance(columns, model.fit))
     each = zip(model.chosen, search.gain, search.equivalents, search.instead, strict=True)
     for c, odds, near, other in each:
         scatter, why = refusal(columns, model.fit, c)
@@ -105,7 +97,7 @@ def judged(columns: Columns, search: Search) -> Verdict:
         instead, against = other or (None, np.inf)
         if instead and against < np.log(ODDS):
             known = [b.unknown.name for b in beyond]
-            numbers = tuple(b for b in _out_of_tolerance(columns, instead) if b.unknown.name not in known)
+            numbers = tuple(b for b in out_of_tolerance(columns, instead.fit) if b.unknown.name not in known)
             if any((e := effect_of(columns, b, ())) and e.place is c.place for b in numbers):
                 numbers, against = (), np.inf  # the effect by another name
             why = why if numbers or against > 0.0 else TOLERABLE
@@ -246,10 +238,6 @@ def thirds(value: Floats) -> Integers:
     """(n,) 0, 1 or 2: the third of the rows, by size, that each belongs to; equal values stay together."""
     low, high = np.quantile(value, [1 / 3, 2 / 3], method="nearest")
     return np.asarray((value > low).astype(np.intp) + (value > high))
-
-
-def _out_of_tolerance(columns: Columns, model: Model) -> Iterator[Beyond]:
-    return out_of_tolerance(columns, model.fit) if model.world != EXACT else iter(())
 
 
 def out_of_tolerance(columns: Columns, fit: Fit) -> Iterator[Beyond]:

@@ -12,13 +12,11 @@ from scipy.optimize import least_squares
 from stiffmap.experiment.experiment import Floats
 from stiffmap.identification.candidates.candidates import clash
 from stiffmap.identification.inference.amplitudes import QUIET, Fit, evaluated, fitted, refitted
-from stiffmap.identification.inference.candidates import evidence, of_pairs
-from stiffmap.identification.inference.chosen import Chosen, all_moved
+from stiffmap.identification.inference.chosen import Chosen, all_moved, evidence, of_pairs
 from stiffmap.identification.inference.columns import Columns
 from stiffmap.identification.inference.constants import MOST_EFFECTS, ODDS, REFITS, SIZES
-from stiffmap.identification.inference.parts import NOISE, Part
+from stiffmap.identification.inference.parts import NOISE, Part, gains, log_mean, spectrum
 from stiffmap.identification.inference.places import Place
-from stiffmap.identification.inference.sizes import gains, log_mean, spectrum
 
 EXACT = "exact"
 SETTLED = 0.3
@@ -170,23 +168,13 @@ class World:
     ) -> Model:
         """A set at its best amplitudes, on a residual that is corrected for what the effects' columns miss; fitted once."""
         key = frozenset((id(c.place), c.shape) for c in chosen)
-        if key not in self.known:
-            bare = tuple(replace(c, values=np.zeros(0), refined=()) for c in chosen)
-            self.known[key] = self._made(bare, start, weights, lighter)
-        return self.known[key]
-
-    def _made(
-        self,
-        chosen: tuple[Chosen, ...],
-        start: dict[str, float] | None,
-        weights: Floats | None,
-        lighter: float,
-    ) -> Model:
-        columns = self.columns
+        if key in self.known:
+            return self.known[key]
+        chosen = tuple(replace(c, values=np.zeros(0), refined=()) for c in chosen)
         parts = (*self.numbers, *self.gaps, *(c.part for c in chosen))
-        fit = fitted(columns, parts, start, weights, lighter)
+        fit = fitted(self.columns, parts, start, weights, lighter)
         if any(c.by_posterior(fit).is_too_large for c in chosen):
-            return Model(self.name, chosen, fit, -np.inf)
+            return self.known.setdefault(key, Model(self.name, chosen, fit, -np.inf))
         if self.predict and chosen:
             fit, chosen = self._corrected(fit, chosen)
         chosen = tuple(c if len(c.values) else c.by_posterior(fit) for c in chosen)
@@ -196,7 +184,8 @@ class World:
                 each = evidence(fit.without([c.part.name]), (c.place,))[0]
                 shapes += float(log_mean(each) - each[c.shape])
         possible = all(c.is_possible for c in chosen)
-        return Model(self.name, chosen, fit, fit.score + shapes if possible else -np.inf)
+        self.known[key] = Model(self.name, chosen, fit, fit.score + shapes if possible else -np.inf)
+        return self.known[key]
 
     def _corrected(self, fit: Fit, chosen: tuple[Chosen, ...]) -> tuple[Fit, tuple[Chosen, ...]]:
         """The fit on a residual less what straight lines miss of the effects; where that does not settle, at their own optimum,
@@ -214,7 +203,7 @@ class World:
             if shown is None and _gain(fit, missed) < PROGRESS:
                 return fit, chosen
             shown = line
-            now = self._less(missed, now)
+            now = refitted(now, self.columns.residual - missed)
         found = self._at_optimum(fit, chosen)
         return found if found and all(len(c.strengths) for c in found[1]) else (fit, chosen)
 
@@ -227,7 +216,8 @@ class World:
         if not np.isfinite(shown).all():
             return None
         lines = np.hstack([c.rotated(self.columns) for c in at])
-        return self._less(shown - lines @ np.linalg.lstsq(lines, shown, rcond=1e-9)[0], fit), at
+        missed = shown - lines @ np.linalg.lstsq(lines, shown, rcond=1e-9)[0]
+        return refitted(fit, self.columns.residual - missed), at
 
     def _refined(self, model: Model) -> Model:
         """The set with its shapes (periods, knees) where they fit best, between those of the grid; the same where that is no better."""
@@ -241,10 +231,6 @@ class World:
         if gain <= PROGRESS or not all(c.is_possible for c in at):
             return model
         return replace(model, chosen=at, fit=fit, score=model.score + gain)
-
-    def _less(self, missed: Floats, fit: Fit) -> Fit:
-        """The fit on a residual less something."""
-        return refitted(fit, self.columns.residual - missed)
 
     def _optimum(self, fit: Fit, chosen: tuple[Chosen, ...]) -> tuple[Chosen, ...]:
         """The effects at the least squares of whole predictions, all else of the fit as it is; found once for each set."""
@@ -325,14 +311,12 @@ class World:
                 model = first[1]
         return model
 
-    def _steads(self, model: Model, c: Chosen) -> list[tuple[float, Place, Fit]]:
+    def _steads(self, model: Model, c: Chosen) -> list[Bound]:
         """Bounds of all places in an effect's stead, the likeliest first."""
         at_best = model.fit.without([c.part.name])
         return sorted(self._bounds(self.less(model, c), (at_best,)), key=lambda b: -b[0])
 
-    def _fitted(
-        self, model: Model, c: Chosen, steads: list[tuple[float, Place, Fit]]
-    ) -> list[tuple[Place, Model]]:
+    def _fitted(self, model: Model, c: Chosen, steads: list[Bound]) -> list[tuple[Place, Model]]:
         """The likeliest places in an effect's stead, fitted."""
         less = self.less(model, c)
         likely = [b for b in steads if b[1] is not c.place and b[0] > model.score - SHORT]

@@ -19,20 +19,9 @@ from stiffmap.model.description import Block, Body, Element, Joint, MachineDescr
 from stiffmap.model.with_errors import END, FRAME
 
 GROUPS = (
-    "zeros",
-    "gains",
-    "axis positions",
-    "axis directions",
-    "guide lean",
-    "link lengths",
-    "rod mismatch",
-    "width",
-    "tool",
-    "drive compliance",
-    "link compliance",
-    "masses",
-    INSTRUMENT,
-)
+    "zeros", "gains", "axis positions", "axis directions", "guide lean", "link lengths", "rod mismatch", "width", "tool",
+    "drive compliance", "link compliance", "masses", INSTRUMENT,
+)  # fmt: skip
 GEOMETRY = GROUPS[:9]
 ALONG = 0.999
 """Cosine beyond which an axis is that of a joint's own motion."""

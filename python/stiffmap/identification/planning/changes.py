@@ -18,8 +18,7 @@ from stiffmap.experiment.calls import Effects, as_experiment, effects_of
 from stiffmap.experiment.experiment import Experiment
 from stiffmap.experiment.noise.whitening import basis, readings_of
 from stiffmap.identification.inference.amplitudes import fitted
-from stiffmap.identification.inference.columns import Columns, drawn
-from stiffmap.identification.inference.free import Free
+from stiffmap.identification.inference.columns import Columns, Free, drawn
 from stiffmap.identification.inference.kernels import ReadingPoints, gaps
 from stiffmap.identification.inference.parts import Part
 from stiffmap.identification.planning.design import joined

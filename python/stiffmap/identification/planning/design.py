@@ -18,14 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from stiffmap.common.broadcasting import (
-    Floats,
-    one_of,
-    random_numbers,
-    trailing,
-    whole_number,
-    wrench_array,
-)
+from stiffmap.common.broadcasting import Floats, one_of, random_numbers, trailing, whole_number, wrench_array
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.short import short_repr
 from stiffmap.experiment.calls import Effects, as_experiment, effects_of

@@ -95,13 +95,8 @@ def estimate(machine: Machine, experiment: Experiment, terms: Sequence[AppliedEf
     def columns(x: Floats) -> Floats:
         return -problem.white(slopes(predictor, at(x), parameters) * scale)
 
-    found = optimum(
-        lambda x: problem.residual(predictor(at(x))),
-        values_of(begun, parameters) / scale,
-        (low / scale, high / scale),
-        columns,
-        STEPS,
-    )
+    begin, bounds = values_of(begun, parameters) / scale, (low / scale, high / scale)
+    found = optimum(lambda x: problem.residual(predictor(at(x))), begin, bounds, columns, STEPS)
     spread, rank = covariance(found.jacobian)
     return Estimate(
         tuple(

@@ -13,11 +13,17 @@ from stiffmap.common.tasks import on_one_thread
 from stiffmap.experiment import Experiment
 from stiffmap.identification.inference.constants import MOST_EFFECTS, ODDS
 from stiffmap.identification.inference.optimum import Optimum
-from stiffmap.identification.taps.causes import causes
-from stiffmap.identification.taps.fit import Explained, FittedCauses, best_of, fitted, price
+from stiffmap.identification.taps.fit import (
+    REFINED,
+    Explained,
+    FittedCauses,
+    best_of,
+    fitted,
+    named_causes,
+    price,
+)
 from stiffmap.identification.taps.predict import predict_taps
-from stiffmap.identification.taps.problem import LEAST, TapsProblem
-from stiffmap.identification.taps.search import REFINED, named_causes
+from stiffmap.identification.taps.problem import LEAST, TapsProblem, causes
 from stiffmap.identification.taps.table import TapTest
 from stiffmap.solve.machine import Machine, takes_machine
 

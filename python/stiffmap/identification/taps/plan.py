@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from stiffmap.common.broadcasting import Floats, whole_number
 from stiffmap.common.errors import StiffmapError
 from stiffmap.identification.planning.information import exchange, information_of
-from stiffmap.identification.taps.causes import causes
 from stiffmap.identification.taps.fit import in_si
-from stiffmap.identification.taps.problem import TapsProblem
+from stiffmap.identification.taps.problem import TapsProblem, causes
 from stiffmap.identification.taps.table import TapTest
 from stiffmap.solve.machine import Machine, takes_machine
 from stiffmap.workspace.vibration.modes import tip_modes
@@ -61,14 +62,8 @@ def where_to_tap(
         )
     x = np.hstack([A, J])
     matrices = np.stack([x[pose == k].T @ x[pose == k] for k in range(pool)])
-    chosen = exchange(
-        matrices,
-        np.zeros_like(matrices[0]),
-        np.unique(pose),
-        wanted,
-        lambda m: information_of(m, A.shape[1], 1.0),
-        0,
-    )
+    value = partial(information_of, wanted=A.shape[1], prior=1.0)
+    chosen = exchange(matrices, np.zeros_like(matrices[0]), np.unique(pose), wanted, value, 0)
     return np.asarray(position[chosen])
 
 

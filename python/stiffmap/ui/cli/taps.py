@@ -9,7 +9,7 @@ import numpy as np
 from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment import load_experiment
 from stiffmap.identification.taps import TapDiagnosis, TapTest, explain_taps, load_taps
-from stiffmap.identification.taps.causes import corrected
+from stiffmap.identification.taps.problem import corrected
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import finish, machine_with, words
 from stiffmap.ui.cli.options import argument, option

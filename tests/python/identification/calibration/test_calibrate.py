@@ -17,7 +17,7 @@ from stiffmap.experiment.noise.whitening import LinearProblem
 from stiffmap.identification.calibration import calibrate
 from stiffmap.identification.calibration.calibrate import independent
 from stiffmap.identification.inference.corrected import corrected
-from stiffmap.identification.inference.covariance import Covariance
+from stiffmap.identification.inference.kernels import Covariance
 from stiffmap.identification.inference.readings import Readings
 from stiffmap.identification.inference.shares import WideGroup, tolerance_word
 from stiffmap.identification.numbers import Tolerances, Unknown, unknowns

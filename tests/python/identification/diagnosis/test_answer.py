@@ -13,7 +13,7 @@ from stiffmap.experiment import Predictor, random_plan
 from stiffmap.identification.candidates.candidates import candidates
 from stiffmap.identification.diagnosis.answer import _change
 from stiffmap.identification.inference.chosen import Chosen
-from stiffmap.identification.inference.inference import terms
+from stiffmap.identification.inference.names import terms
 
 
 @pytest.mark.parametrize(("slope", "there"), [(0.5, True), (40.0, False)])

@@ -9,7 +9,7 @@ import numpy as np
 import stiffmap as sm
 from stiffmap.experiment import Experiment, Predictor, random_plan
 from stiffmap.experiment.experiment import Floats
-from stiffmap.identification.candidates.plan import plan_of
+from stiffmap.identification.candidates.sensitivity import plan_of
 from stiffmap.identification.numbers import unknowns
 from stiffmap.identification.numbers.sensitivity import predicted
 

@@ -9,8 +9,7 @@ import stiffmap as sm
 from stiffmap.experiment import random_plan, simulate
 from stiffmap.experiment.noise.whitening import readings_of
 from stiffmap.experiment.prediction.predict import Predictor
-from stiffmap.identification.candidates.plan import plan_of
-from stiffmap.identification.candidates.sensitivity import Wave
+from stiffmap.identification.candidates.sensitivity import Wave, plan_of
 
 
 @pytest.mark.parametrize("leg", ["x", "z"])

@@ -14,7 +14,7 @@ from stiffmap.common.number_text import within
 from stiffmap.experiment import random_plan, simulate
 from stiffmap.experiment.experiment import Experiment
 from stiffmap.experiment.prediction.predict import Predictor
-from stiffmap.identification.candidates.plan import plan_of
+from stiffmap.identification.candidates.sensitivity import plan_of
 from stiffmap.identification.diagnosis.report.findings import Effect
 from stiffmap.identification.diagnosis.report.sentences import (
     aliases,
@@ -24,8 +24,8 @@ from stiffmap.identification.diagnosis.report.sentences import (
     opening,
 )
 from stiffmap.identification.diagnosis.slips import find
+from stiffmap.identification.diagnosis.slips.axes import Slip
 from stiffmap.identification.diagnosis.slips.find import find_slip
-from stiffmap.identification.diagnosis.slips.slip import Slip
 from stiffmap.identification.diagnosis.stages import by_gain
 from stiffmap.model import effects
 from stiffmap.model.description import AppliedEffect

@@ -12,7 +12,7 @@ from tests.python.project.docs.json_schemas import obeys
 
 import stiffmap as sm
 from stiffmap.experiment import Predictor, random_plan, simulate
-from stiffmap.identification.candidates.plan import plan_of
+from stiffmap.identification.candidates.sensitivity import plan_of
 from stiffmap.model.description import AppliedEffect
 
 SETS = Path(__file__).parents[4] / "examples" / "experiments"

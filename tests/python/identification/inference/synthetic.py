@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from stiffmap.experiment.channels import Channel
-from stiffmap.identification.inference.columns import Columns
-from stiffmap.identification.inference.free import Free
+from stiffmap.identification.inference.columns import Columns, Free
 from stiffmap.identification.inference.parts import Part
 
 READINGS, FREE = 40, 3

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from stiffmap.experiment.noise.whitening import basis
-from stiffmap.identification.inference.free import Free
+from stiffmap.identification.inference.columns import Free
 
 
 @pytest.mark.parametrize("taken", [0, 1, 6, 11])

@@ -11,8 +11,8 @@ from tests.python.experiment.prediction.test_history import ONE_JOINT, ramp_fold
 
 import stiffmap as sm
 from stiffmap.experiment import Predictor, load_experiment
-from stiffmap.identification.candidates.plan import plan_of
-from stiffmap.identification.inference import columns, inference
+from stiffmap.identification.candidates.sensitivity import plan_of
+from stiffmap.identification.inference import columns, names
 from stiffmap.identification.inference.chosen import Chosen
 
 
@@ -27,13 +27,13 @@ def test_of_many_readings_those_in_use_are_predicted_as_among_all(
     plan = plan_of(predictor)
     asked: dict[str, Any] = {}
     monkeypatch.setattr(columns, "MOST_READINGS", 37)
-    monkeypatch.setattr(inference, "searched", lambda _, predict, *a, **k: asked.update(predict=predict))
-    found = inference.infer(predictor, plan).columns
+    monkeypatch.setattr(names, "searched", lambda _, predict, *a, **k: asked.update(predict=predict))
+    found = names.infer(predictor, plan).columns
     assert len(np.unique(found.rows)) < len(data)
     place = next(p for p in found.places if p.candidate.kind == kind)
     bare = Chosen.at(place, 0)
     chosen = [Chosen(place, 0, bare.part, np.full(bare.lines(found).shape[1], 3.0))]
-    change = predictor(inference.terms(chosen)) - plan.base
+    change = predictor(names.terms(chosen)) - plan.base
     expected = found.rotated(change[found.rows, found.channel])
     assert np.abs(expected).max() > 1.0
     assert asked["predict"](chosen) == pytest.approx(expected, rel=1e-9, abs=1e-9)

@@ -12,7 +12,7 @@ import pytest
 import stiffmap as sm
 from stiffmap.experiment import Experiment, Predictor, random_plan
 from stiffmap.identification.inference import kernels
-from stiffmap.identification.inference.covariance import covariance
+from stiffmap.identification.inference.kernels import covariance
 
 
 @pytest.mark.parametrize(

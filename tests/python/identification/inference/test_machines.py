@@ -14,10 +14,10 @@ from stiffmap.experiment import Predictor, random_plan
 from stiffmap.experiment.channels import AXIS_CHANNELS
 from stiffmap.identification.candidates.candidates import Candidate
 from stiffmap.identification.inference import machines
+from stiffmap.identification.inference.chosen import Term
 from stiffmap.identification.inference.corrected import Corrected, corrected, without
-from stiffmap.identification.inference.covariance import Covariance
+from stiffmap.identification.inference.kernels import Covariance
 from stiffmap.identification.inference.readings import Readings
-from stiffmap.identification.inference.term import Term
 from stiffmap.identification.numbers import unknowns
 from stiffmap.identification.numbers.sensitivity import predicted, sensitivity, zeros_anew
 from stiffmap.model.description import AppliedEffect

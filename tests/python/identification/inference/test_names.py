@@ -17,8 +17,7 @@ from stiffmap.identification.candidates.candidates import Candidate
 from stiffmap.identification.inference.amplitudes import fitted
 from stiffmap.identification.inference.chosen import Chosen
 from stiffmap.identification.inference.constants import ODDS
-from stiffmap.identification.inference.inference import inferred, terms
-from stiffmap.identification.inference.names import searched, with_travel
+from stiffmap.identification.inference.names import inferred, searched, terms, with_travel
 from stiffmap.identification.inference.parts import Parts
 from stiffmap.identification.inference.places import Place, Shape
 from stiffmap.identification.inference.verdict import TOLERABLE, Beyond, effect_of, judged
@@ -334,10 +333,10 @@ def test_a_world_that_others_leave_far_behind_is_given_up_early(monkeypatch):
         c, numbers=10.0 * d, unknowns=unknowns, residual=residual, experiment=one_place(len(c.rows))
     )
     made: list[tuple[str, int]] = []
-    inner = World._made
+    inner = World._fit
     monkeypatch.setattr(
         World,
-        "_made",
+        "_fit",
         lambda w, chosen, *given: [made.append((w.name, len(chosen))), inner(w, chosen, *given)][1],
     )
     assert searched(whole).best.world != "exact"

@@ -14,7 +14,7 @@ from tests.python.identification.inference.synthetic import READINGS, columns
 from stiffmap.experiment.channels import Channel
 from stiffmap.identification.inference import amplitudes, verdict
 from stiffmap.identification.inference.chosen import Chosen
-from stiffmap.identification.inference.free import Free
+from stiffmap.identification.inference.columns import Free
 from stiffmap.identification.inference.names import Search
 from stiffmap.identification.inference.parts import Part, Parts
 from stiffmap.identification.inference.places import Place, Shape

@@ -16,7 +16,7 @@ from stiffmap.experiment.poses.handeye import Sighting, find_frames
 from stiffmap.experiment.virtual.plans import plan_of_joints
 from stiffmap.identification.calibration import calibrate
 from stiffmap.identification.inference.corrected import corrected
-from stiffmap.identification.inference.covariance import Covariance
+from stiffmap.identification.inference.kernels import Covariance
 from stiffmap.identification.inference.readings import Readings
 from stiffmap.identification.numbers import unknowns
 from stiffmap.identification.numbers.sensitivity import predicted, sensitivity

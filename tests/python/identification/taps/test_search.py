@@ -10,10 +10,9 @@ from tests.python.identification.taps.test_taps import EXAMPLE, soft, tapped
 
 import stiffmap as sm
 from stiffmap.identification.inference.optimum import Optimum
-from stiffmap.identification.taps import search
-from stiffmap.identification.taps.causes import causes
+from stiffmap.identification.taps import fit as search
 from stiffmap.identification.taps.fit import FittedCauses, best_of, fitted
-from stiffmap.identification.taps.problem import TapsProblem
+from stiffmap.identification.taps.problem import TapsProblem, causes
 
 
 def fit(chi2, count, readings=20):

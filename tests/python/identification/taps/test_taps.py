@@ -255,10 +255,8 @@ def test_numbers_off_that_pair_other_modes_are_no_cause(seed):
 @pytest.mark.parametrize("factor", [0.5, 2.1, 9.0])
 def test_changes_between_predicted_sizes_are_those_of_the_machine(arm, factor):
     """As far as the same modes are paired; what is wrong between two pairings is mended by whole predictions."""
-    from stiffmap.identification.taps.causes import causes
-    from stiffmap.identification.taps.fit import fitted
-    from stiffmap.identification.taps.problem import TapsProblem
-    from stiffmap.identification.taps.search import place_of
+    from stiffmap.identification.taps.fit import fitted, place_of
+    from stiffmap.identification.taps.problem import TapsProblem, causes
 
     alone = tapped(arm, 6, count=1)
     problem = TapsProblem(arm, alone, None, 0.05)

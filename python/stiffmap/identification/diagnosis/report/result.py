@@ -34,7 +34,7 @@ from stiffmap.identification.diagnosis.report.sentences import (
     separation_text,
 )
 from stiffmap.identification.diagnosis.report.separation import Separation
-from stiffmap.identification.diagnosis.slips.slip import Slip
+from stiffmap.identification.diagnosis.slips.axes import Slip
 from stiffmap.identification.inference.machines import HeldOut
 from stiffmap.identification.inference.shares import largest
 from stiffmap.model.description import AppliedEffect

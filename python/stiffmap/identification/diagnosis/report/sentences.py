@@ -10,20 +10,16 @@ from stiffmap.common.number_text import with_uncertainty, within
 from stiffmap.identification.candidates.candidates import words
 from stiffmap.identification.diagnosis.report.findings import Effect
 from stiffmap.identification.diagnosis.report.separation import Separation
-from stiffmap.identification.diagnosis.slips.slip import Slip
+from stiffmap.identification.diagnosis.slips.axes import Slip
 from stiffmap.model.effects import registry
 
 DISPLAY_UNITS = {"m": (1e3, "mm"), "m/N": (1e3, "mm/N"), "rad": (1e3, "mrad"), "1/m": (1e-3, "1/mm")}
 LISTED = 5
 """Steps left out, numbers, and what cannot be distinguished from an effect: how many are named."""
 UNITS = {
-    "m": (1e6, "µm"),
-    "m/N": (1e6, "µm/N"),
-    "rad": (1e3, "mrad"),
-    "rad/(N*m)": (1e3, "mrad/(N·m)"),
-    "1/m": (1e-3, "1/mm"),
-    "1": (1.0, ""),
-}
+    "m": (1e6, "µm"), "m/N": (1e6, "µm/N"), "1/m": (1e-3, "1/mm"),
+    "rad": (1e3, "mrad"), "rad/(N*m)": (1e3, "mrad/(N·m)"), "1": (1.0, ""),
+}  # fmt: skip
 """Factor from SI, and the unit that a workshop reads."""
 NAMES = {"actuator": "drive"}
 ALIASES = 2

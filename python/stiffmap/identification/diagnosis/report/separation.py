@@ -40,9 +40,8 @@ def separation(
     """Best reading, of those that the machine can reach, of a trial plan: workspace corners, centre and random poses, six force
     directions; `floor` (c,) is the noise of each channel."""
     e = predictor.experiment
-    at = Predictor(
-        predictor.machine, _trial(e, predictor.machine.description, seed), threads=predictor.threads
-    )
+    plan = _trial(e, predictor.machine.description, seed)
+    at = Predictor(predictor.machine, plan, threads=predictor.threads)
     trial = at.experiment
     gap = at(one) - at(other)
     floor = floor[_kept(e)]

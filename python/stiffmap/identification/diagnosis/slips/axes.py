@@ -1,17 +1,58 @@
-"""Gauges and forces with a wrong sign, swapped, or along another axis; rows that are shifted."""
+"""Mistakes in how readings were taken or written: gauges and forces with a wrong sign, swapped, or along another axis; rows that are shifted."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import permutations, product
 
 import numpy as np
 
-from stiffmap.experiment.experiment import Experiment, Floats
+from stiffmap.experiment.experiment import Experiment, Floats, Mask
 from stiffmap.experiment.prediction.predict import Predictor
-from stiffmap.identification.diagnosis.slips.slip import Hypothesis
+
+
+@dataclass(frozen=True)
+class Slip:
+    """A mistake that explains readings better than any part of the machine does."""
+
+    kind: str
+    """``sign``, ``swap``, ``direction``, ``factor``, ``load`` or ``shift``."""
+    seen: str
+    """What the readings show, a clause."""
+    check: str
+    """What to check, a clause."""
+    also: tuple[str, ...]
+    """Other checks, of mistakes that these readings cannot distinguish from it."""
+    left: float
+    """Share of the squared misfit that stays once it is undone."""
+    undone: bool
+    """Whether everything else in the diagnosis is of readings with it undone."""
+    evidence: tuple[str, ...] = ()
+    """What linearity and reciprocity say, before and after."""
+    factor: float | None = None
+    """Reading over prediction, where it is one."""
+
+
+@dataclass(frozen=True, eq=False)
+class Hypothesis:
+    """How the declared machine would read with one mistake, and how that is undone."""
+
+    kind: str
+    seen: str
+    check: str
+    changes: int
+    """How many things are wrong at once; of equally good ones the fewest win."""
+    prediction: Floats
+    """(n, c) m, rad."""
+    undo: Callable[[Experiment], Experiment] | None
+    keep: Mask | None = None
+    """(n,) rows that it speaks of; None: all."""
+    factor: float | None = None
+    physical: bool = False
+    """Whether a part of the machine may show the same: it is then named only where none does."""
+
 
 AXES = "xyz"
 Turn = Mapping[int, tuple[int, int]]

@@ -10,8 +10,7 @@ import numpy as np
 
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.noise.whitening import LinearProblem
-from stiffmap.identification.diagnosis.slips.axes import times
-from stiffmap.identification.diagnosis.slips.slip import Hypothesis
+from stiffmap.identification.diagnosis.slips.axes import Hypothesis, times
 
 LENGTHS = (
     (1000.0, "µm and mm, or mm and m, mixed up"),

@@ -20,11 +20,9 @@ from stiffmap.experiment.noise.level import Noise, noise_of
 from stiffmap.experiment.noise.outliers import without_suspects
 from stiffmap.experiment.noise.whitening import LinearProblem
 from stiffmap.experiment.prediction.predict import Predictor
-from stiffmap.identification.candidates.plan import CandidatePlan
-from stiffmap.identification.candidates.sensitivity import Variant
-from stiffmap.identification.diagnosis.slips.axes import gauges, loads, moved, shifts, steps
+from stiffmap.identification.candidates.sensitivity import CandidatePlan, Variant
+from stiffmap.identification.diagnosis.slips.axes import Hypothesis, Slip, gauges, loads, moved, shifts, steps
 from stiffmap.identification.diagnosis.slips.factors import factors
-from stiffmap.identification.diagnosis.slips.slip import Hypothesis, Slip
 from stiffmap.identification.inference.places import Shape, shape_of
 from stiffmap.model.effects import get
 
