@@ -91,7 +91,9 @@ def own_frame(seen: Floats, commanded: Floats, rotation: Floats | None = None) -
         return None
     some = good[:: max(1, len(good) // MOST)]
     p, q = commanded[some], seen[some]
-    if _middle(q - p) <= ERROR:
+    other = np.random.default_rng(0).permutation(len(p))
+    shrunk = rotation is None and _middle(q - q[other]) < 0.5 * _middle(p - p[other])
+    if _middle(q - p) <= ERROR or shrunk:  # another frame keeps distances: small differences need no fit
         return None
     turn = np.tile(np.eye(3), (len(p), 1, 1)) if rotation is None else rotation[some]
     one = np.zeros(len(p), dtype=np.intp)

@@ -51,9 +51,9 @@ def in_base_axes(m: Meant, machine: Callable[[], Machine]) -> None:
         return
     pose = forward_kinematics(machine(), m.coordinates()) if m.columns else None
     commanded = commands(m) if pose is None else pose.position
-    seen = None if commanded is None else m.metres([m.unloaded[a] for a in AXES[:3]], AXES[:3])
-    if commanded is None or seen is None:
+    if commanded is None:
         return
+    seen = m.metres([m.unloaded[a] for a in AXES[:3]], AXES[:3])
     frame = own_frame(seen, commanded, None if pose is None else pose.rotation)
     if frame is None:
         return
