@@ -2,7 +2,7 @@
 // Steps across corners of laws: by deflections, as far as the energy falls (docs/fast_path.md F19).
 #pragma once
 
-#include "slots.hpp"
+#include "laws.hpp"
 
 namespace stiffmap::kernel {
 
@@ -38,7 +38,7 @@ struct Corners {
       V z = s.z[q] + share * s.dz[q];
       if (bends(q)) {
         const V a = s.x[q] - s.a_base[q] + share * s.da[q] * s.dz[q];
-        z = a + force(q, a) * (1 / law(q).stiffness);
+        z = a + force_at(P, law(q), s.linear[q], a) * (1 / law(q).stiffness);
       }
       s.z[q] = select(lanes, z, s.z[q]);
     }
@@ -52,21 +52,6 @@ struct Corners {
   bool bends(int q) const {
     const CoordinateProgram& k = P.coordinates[q];
     return k.law >= 0 && !k.locked && P.laws[k.law].count > 0;
-  }
-
-  /// The law's force at deflection a, without dry friction.
-  V force(int q, V a) const {
-    const LawProgram& of = law(q);
-    const double* n = P.knots + 3 * of.first;
-    const double* last = n + 3 * (of.count - 1);
-    const V k = s.linear[q];
-    V out = select(a < n[0], n[1] + k * (a - n[0]), last[1] + k * (a - last[0]));
-    for (int i = 1; i < of.count; ++i) {
-      const double *u = n + 3 * (i - 1), *v = u + 3;
-      const double rate = (v[1] - u[1]) / (v[0] - u[0]);
-      out = select((a >= u[0]) & (a < v[0]), u[1] + rate * (a - u[0]), out);
-    }
-    return out;
   }
 
   /// Work of the last step against the tangent's springs: what its first-order change of energy is, but for the sign.
@@ -93,7 +78,8 @@ struct Corners {
     for (int q = 0; q < P.coordinate_count; ++q) {
       if (!bends(q)) continue;
       const V a = s.x[q] - s.a_base[q], way = s.da[q] * s.dz[q];
-      out += (force(q, a + share * way) - force(q, a) - share * s.dtau[q] * s.dz[q]) * way;
+      const V more = force_at(P, law(q), s.linear[q], a + share * way) - force_at(P, law(q), s.linear[q], a);
+      out += (more - share * s.dtau[q] * s.dz[q]) * way;
     }
     return out;
   }

@@ -14,6 +14,19 @@ inline V slope_change(const Program& P, const Scratch& s, int q) {
   return 6 * P.laws[k.law].cubic * (s.x[q] - s.a_base[q]) * s.da[q] * s.dz[q];
 }
 
+/// Force at deflection a of a law with corners, without dry friction; k: its own slope beyond the ends.
+inline V force_at(const Program& P, const LawProgram& law, V k, V a) {
+  const double* n = P.knots + 3 * law.first;
+  const double* last = n + 3 * (law.count - 1);
+  V out = select(a < n[0], n[1] + k * (a - n[0]), last[1] + k * (a - last[0]));
+  for (int i = 1; i < law.count; ++i) {
+    const double *u = n + 3 * (i - 1), *v = u + 3;
+    const double rate = (v[1] - u[1]) / (v[0] - u[0]);
+    out = select((a >= u[0]) & (a < v[0]), u[1] + rate * (a - u[0]), out);
+  }
+  return out;
+}
+
 struct Laws {
   const Program& P;
   Scratch& s;
@@ -65,7 +78,12 @@ struct Laws {
       const V tau = select(bears, s.linear[q] * linear, splat(0)), side = sign(tau);
       const V spring = tau - law.friction * side;
       const V before = law.count > 0 ? point(law, s.linear[q], s.scale[q], splat(0)).tau : splat(0);
-      const V z = k.by_force ? spring / s.linear[q] : from_force(law, before + spring, s.linear[q]);
+      V z = k.by_force ? spring / s.linear[q] : from_force(law, before + spring, s.linear[q]);
+      if (P.bends && law.count > 0) {  // a cable that is slack has no place for that force: the deflection is the start
+        const V far = absolute(point(law, s.linear[q], s.scale[q], z).a) * k.unit;
+        const V there = linear + force_at(P, law, s.linear[q], linear) * (1 / law.stiffness);
+        z = select(far > slack * P.length, there, z);
+      }
       s.friction_sign[q] = select(active, side, s.friction_sign[q]);
       s.z[q] = select(active, select(bears, z, splat(0)), s.z[q]);
     }
@@ -114,7 +132,8 @@ struct Laws {
 
  private:
   static constexpr double unloaded = 1e-11;
-  static constexpr double doubt = 1.5;  ///< factor about it; closures of the two paths differ by some 1e-14
+  static constexpr double slack = 0.02;  ///< deflection, of the length, that no gap has
+  static constexpr double doubt = 1.5;   ///< factor about it; closures of the two paths differ by some 1e-14
 
   /// At the law's own parameter.
   void put(const LawProgram& law, int q) {

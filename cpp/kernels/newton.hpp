@@ -179,7 +179,7 @@ struct Newton {
     LoadSteps way{P, s};
     const bool patient = in.patience >= Patience::path;
     const bool searches = corners && P.bends && !patient && P.serial_joints == 0;
-    const double most_tries = in.max_iterations * (!corners ? 1.0 : patient ? 3.0 : 0.5);
+    const double most_tries = in.max_iterations * (!corners ? 1.0 : patient ? 3.0 : searches ? 1.0 : 0.5);
     way.begin(unloaded_lanes());
     for (int k = 0; k < most_iterations; ++k) {
       const bool secant = corners && k == 0;
@@ -250,7 +250,9 @@ struct Newton {
       if (P.serial_joints > 0) distrusted |= active & serial.play.doubtful;
       distrusted |= active & ~settled & (way.tries >= most_tries);
       if (searches) {
-        const V share = k > 1 ? Corners{P, s}.share() : splat(1);
+        // Beyond that the tangent says little of the way: what tightens a cable is of second order.
+        const V most = longest / norm, searched = k > 1 ? Corners{P, s}.share() : splat(1);
+        const V share = select(most < searched, most, searched);
         const M moving = active & ~resting & ~distrusted;
         if (any(moving & (share < 1.0))) shorten(select(moving, share, splat(1)));
         Corners{P, s}.move(moving, splat(1));
@@ -366,7 +368,8 @@ struct Newton {
 
   static constexpr int most_iterations = 96;
   const double pivot_floor = 1e-5 * P.softest;
-  static constexpr double small = 1e-13;  ///< step that changes the tangent by no more than that
+  static constexpr double longest = 0.05;  ///< step across corners
+  static constexpr double small = 1e-13;   ///< step that changes the tangent by no more than that
   static constexpr double nothing = 1e-15;
   static constexpr double nearly = 5e-11;     ///< the same of an arm, of its softest direction's pivot
   static constexpr double chord_most = 6e-4;  ///< step before a chord step, of the softest direction's pivot
