@@ -218,7 +218,7 @@ def test_bad_input_is_one_line(
 def test_solving_does_not_import_matplotlib() -> None:
     script = (
         "import sys; from stiffmap.ui.cli import main; main(['solve', 'orthoglide-revised', '--json']); "
-        "sys.exit('matplotlib' in sys.modules)"
+        "main(['polar', 'orthoglide-revised', '--directions', '4', '--json']); sys.exit('matplotlib' in sys.modules)"
     )
     assert subprocess.run([sys.executable, "-c", script], capture_output=True, check=False).returncode == 0
 
