@@ -312,14 +312,16 @@ def _within(r: DHRow, turn: float, reach: float) -> float:
 
 
 def _slopes(rows: Sequence[DHRow], standard: bool, q: Floats, reach: float) -> Floats:
-    """(6, joints) of the pose, lengths in reaches."""
-    out, step, at = np.zeros((6, len(q))), 1e-6, forward(rows, standard, q)
-    for i in range(len(q)):
-        moved = q.copy()
-        moved[i] += step
-        there = forward(rows, standard, moved)
-        out[:3, i] = (there - at)[:3, 3] / step / reach
-        out[3:, i] = Rotation.from_matrix(there[:3, :3] @ at[:3, :3].T).as_rotvec() / step
+    """(6, joints) of the pose, lengths in reaches: axes of the joints, and their moments about the tool."""
+    frames = [np.eye(4)]
+    for r, v in zip(rows, q, strict=True):
+        frames.append(frames[-1] @ forward([r], standard, np.array([v])))
+    out = np.zeros((6, len(q)))
+    for i, r in enumerate(rows):
+        at = frames[i] if standard else frames[i] @ _screw("x", r.alpha, r.a)
+        axis, lever = at[:3, 2], frames[-1][:3, 3] - at[:3, 3]
+        out[:3, i] = (axis if r.slides else np.cross(axis, lever)) / reach
+        out[3:, i] = 0.0 if r.slides else axis
     return out
 
 

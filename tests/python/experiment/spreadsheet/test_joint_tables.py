@@ -7,12 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import stiffmap as sm
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.tables.sheet import read_sheet
 from stiffmap.experiment import Predictor
 from stiffmap.experiment.noise.whitening import LinearProblem, nuisance_part
+from stiffmap.experiment.spreadsheet import dh
 from stiffmap.experiment.spreadsheet.dh import read_dh
 from stiffmap.model.description import Joint
 from stiffmap.ui.cli import main
@@ -286,6 +288,29 @@ def imported(folder: Path, text: str, convention: str, *more: str) -> sm.Machine
     file = write(folder, "arm.csv", text)
     assert main(["import", file, "--dh-convention", convention, *more, "-o", out]) == 0
     return sm.load_machine(out)
+
+
+@pytest.mark.parametrize("standard", [True, False])
+def test_slopes_of_a_table_are_central_differences(standard: bool) -> None:
+    """The home of an arm is chosen by them."""
+    rows = [
+        dh.DHRow("a", 0.1, 0.3, -0.4, 1.2, False, None),
+        dh.DHRow("b", 0.4, 0.2, 0.1, -0.7, True, None),
+        dh.DHRow("c", -0.3, 0.0, 0.2, 0.5, False, None),
+    ]
+    q, reach = np.array([0.3, 0.15, -0.8]), 0.7
+    found = dh._slopes(rows, standard, q, reach)
+
+    def off(step: float) -> float:
+        out = np.zeros((6, 3))
+        for i in range(3):
+            high, low = (dh.forward(rows, standard, q + s * step * np.eye(3)[i]) for s in (1, -1))
+            turned = Rotation.from_matrix(high[:3, :3] @ low[:3, :3].T).as_rotvec()
+            out[:, i] = np.r_[(high - low)[:3, 3] / reach, turned] / (2 * step)
+        return float(np.abs(out - found).max())
+
+    assert off(5e-3) < 1e-4
+    assert np.log2(off(1e-2) / off(5e-3)) == pytest.approx(2, abs=0.05)
 
 
 @pytest.fixture(scope="module")
