@@ -29,8 +29,15 @@ from stiffmap.experiment.spreadsheet.convert import ImportedSheet, write_folder
 from stiffmap.experiment.spreadsheet.dh import LEG, QUANTITIES, arm, read_dh
 from stiffmap.experiment.spreadsheet.guess import has_meaning
 from stiffmap.experiment.spreadsheet.instrument import Instrument, as_readings, load_instrument
-from stiffmap.experiment.spreadsheet.joints import DIFFERENCES, as_seen, commanded, drives_of, turned
-from stiffmap.experiment.spreadsheet.places import in_base_axes, seated, seen_next_to_commands
+from stiffmap.experiment.spreadsheet.joints import (
+    DIFFERENCES,
+    as_seen,
+    commanded,
+    compared,
+    drives_of,
+    turned,
+)
+from stiffmap.experiment.spreadsheet.places import in_base_axes, seated, seen_next_to_commands, without_lost
 from stiffmap.experiment.spreadsheet.together import one_point_a_row, oriented, together
 from stiffmap.solve.machine import Machine, load_machine
 
@@ -226,11 +233,17 @@ def _understood(
     together(m, deflection)
     commanded(m, drives)
     one_point_a_row(m)
+    measured = (wrote or load_instrument("tracker")).measured
+    without_lost(m, wrote.columns if wrote else {}, measured)
+    same = partial(compared, m, difference, measured, deflection)
     if m.columns:
         dialogue.asked(m, ask, partial(seated, m))
+        dialogue.asked(m, ask, same)
         as_seen(m, difference)
     elif wrote is not None:
         as_readings(m, wrote)
+    else:
+        dialogue.asked(m, ask, same)
     dialogue.asked(m, ask, partial(in_base_axes, m, partial(declared, m)))
     oriented(m)
     if not m.placed:
