@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,7 @@ from stiffmap.common.tables.sheet import read_sheet
 from stiffmap.experiment import Predictor
 from stiffmap.experiment.noise.whitening import LinearProblem, nuisance_part
 from stiffmap.experiment.spreadsheet import dh
-from stiffmap.experiment.spreadsheet.dh import read_dh
+from stiffmap.experiment.spreadsheet.dh import arm, read_dh
 from stiffmap.model.description import Joint
 from stiffmap.ui.cli import main
 
@@ -47,6 +48,52 @@ def turn_x(t: float, a: float) -> np.ndarray:
 def write(folder: Path, name: str, text: str) -> str:
     (folder / name).write_text(text, encoding="utf-8")
     return str(folder / name)
+
+
+ZEROS = "joint,theta,d [mm],a [mm],alpha [deg]\n1,{},127.3,0,90\n2,{},0,-612,0\n3,{},0,-572.3,0\n"
+
+
+@pytest.mark.parametrize("cells", [("0", "0", "0"), ("q1", "q2", "q3"), ("θ1", "θ2", "0*")])
+def test_angles_that_are_zero_need_no_unit(cells: tuple[str, ...], tmp_path: Path) -> None:
+    sheet = read_sheet(Path(write(tmp_path, "dh.csv", ZEROS.format(*cells))))
+    found = [(r.theta, r.a) for r in read_dh(sheet, {}, "standard")]
+    np.testing.assert_allclose(found, [(0, 0), (0, -0.612), (0, -0.5723)])
+    with pytest.raises(StiffmapError, match=r"column 'theta' .* has no unit"):
+        read_dh(read_sheet(Path(write(tmp_path, "dh.csv", ZEROS.format("0", "0.5", "0")))), {}, "standard")
+    limits = ZEROS.format(*cells).replace("\n", ",90\n").replace("[deg],90", "[deg],max")
+    with pytest.raises(StiffmapError, match=r"column 'theta' .* has no unit"):
+        read_dh(read_sheet(Path(write(tmp_path, "dh.csv", limits))), {}, "standard")
+
+
+@pytest.mark.parametrize(
+    ("unit", "lengths", "reach"),
+    [("m", 1.0, r"1\.31e\+03"), ("um", 1.0, "0.00131"), ("mm", 0.0, "0")],
+)
+def test_an_arm_of_a_kilometre_is_refused(unit: str, lengths: float, reach: str, tmp_path: Path) -> None:
+    text = ZEROS.format(0, 0, 0).replace("mm", unit)
+    sheet = read_sheet(Path(write(tmp_path, "dh.csv", text)))
+    rows = [replace(r, d=lengths * r.d, a=lengths * r.a) for r in read_dh(sheet, {}, "standard")]
+    with pytest.raises(StiffmapError, match=f"the arm reaches {reach} m: say the unit of its lengths"):
+        arm(rows, "standard", "own")
+    assert len(arm(read_dh(sheet, {"a": "mm", "d": "mm"}, "standard"), "standard", "own").legs) == 1
+
+
+@pytest.mark.parametrize(
+    "line", ["Units: mm, deg", "Units,mm,deg", "# Units: mm, deg", "Length unit,mm\nAngle unit,deg"]
+)
+def test_units_of_a_line_above_the_header_hold_where_commas_part_it(line: str, tmp_path: Path) -> None:
+    text = f"{line}\n" + ZEROS.format(0, 90, 0).replace(" [mm]", "").replace(" [deg]", "")
+    rows = read_dh(read_sheet(Path(write(tmp_path, "dh.csv", text))), {}, "standard")
+    found = [(r.d, r.alpha, r.theta) for r in rows[:2]]
+    np.testing.assert_allclose(found, [(0.1273, np.pi / 2, 0), (0, 0, np.pi / 2)])
+
+
+def test_columns_of_a_table_of_dh_that_are_not_used_are_said(tmp_path: Path) -> None:
+    text = ZEROS.format(0, 0, 0).replace("\n", ",4\n").replace("[deg],4", "[deg],mass [kg]")
+    joints = write(tmp_path, "joints.csv", "J1 [deg],J2 [deg],J3 [deg],Fz [N],dz [mm]\n0,10,20,-100,-0.1\n")
+    dh = write(tmp_path, "dh.csv", text)
+    made = sm.experiment_from_table(None, joints, tmp_path / "out", dh=dh, noise={"dz": 0.01})
+    assert f"left out of {dh}: column 'mass [kg]'" in made.remarks
 
 
 @pytest.mark.parametrize("convention", ["standard", "modified"])
