@@ -6,7 +6,10 @@ Imports inside functions and under TYPE_CHECKING count as well.
 from __future__ import annotations
 
 import ast
+import re
 import sys
+from collections.abc import Iterator
+from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -83,10 +86,18 @@ def module_name(path: Path) -> str:
 MODULES = {module_name(p): p for p in sorted(PACKAGE.rglob("*.py"))}
 
 
+def statements(block: list[ast.stmt]) -> Iterator[ast.stmt]:
+    """Every statement of a block, wherever in it, without what it computes."""
+    for node in block:
+        yield node
+        for name in ("body", "orelse", "finalbody", "handlers", "cases"):
+            yield from statements(getattr(node, name, []))
+
+
 def imported(path: Path) -> set[str]:
     """Modules of stiffmap that a file imports, wherever in it."""
     found = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in statements(ast.parse(path.read_text(encoding="utf-8")).body):
         if isinstance(node, ast.ImportFrom) and node.module and node.module.split(".")[0] == "stiffmap":
             for alias in node.names:
                 inner = f"{node.module}.{alias.name}"
@@ -96,7 +107,10 @@ def imported(path: Path) -> set[str]:
     return found
 
 
-GRAPH = {name: imported(path) - {name} for name, path in MODULES.items()}
+@cache
+def graph() -> dict[str, set[str]]:
+    """What each module imports; read when a test asks, which takes a second."""
+    return {name: imported(path) - {name} for name, path in MODULES.items()}
 
 
 def room(module: str) -> str:
@@ -107,14 +121,14 @@ def room(module: str) -> str:
 def test_no_circle() -> None:
     sys.setrecursionlimit(max(sys.getrecursionlimit(), 5000))
     try:
-        tuple(TopologicalSorter(GRAPH).static_order())
+        tuple(TopologicalSorter(graph()).static_order())
     except CycleError as circle:
         pytest.fail(" -> ".join(circle.args[1]))
 
 
 def test_imports_lead_to_earlier_ranks() -> None:
     wrong = []
-    for name, targets in GRAPH.items():
+    for name, targets in graph().items():
         for target in targets - FACE:
             if name not in FACE and RANK[room(target)] > RANK[room(name)]:
                 wrong.append(f"{name} imports {target}")
@@ -129,7 +143,7 @@ def test_rooms_inside_a_room_have_an_order(outer: str) -> None:
     inside = {m.removeprefix(here).split(".")[0] for m in MODULES if m.startswith(here)}
     assert inside == set(rank)
     wrong = []
-    for name, targets in GRAPH.items():
+    for name, targets in graph().items():
         for target in (t for t in targets if t.startswith(here) and name.startswith(here)):
             own, other = (n.removeprefix(here).split(".")[0] for n in (name, target))
             if own != other and rank[other] > rank[own]:
@@ -138,23 +152,28 @@ def test_rooms_inside_a_room_have_an_order(outer: str) -> None:
 
 
 def test_only_commands_use_the_shop_window() -> None:
-    users = {n for n, targets in GRAPH.items() if "stiffmap" in targets}
+    users = {n for n, targets in graph().items() if "stiffmap" in targets}
     assert {n for n in users if room(n) != "ui"} - FACE == set()
 
 
 def test_one_package_imports_the_core() -> None:
-    users = {n for n, targets in GRAPH.items() if any("_core" in t.split(".") for t in targets)}
+    users = {n for n, targets in graph().items() if any("_core" in t.split(".") for t in targets)}
     assert users and all(n.startswith("stiffmap.solve.compiled.") for n in users)
 
 
 def loaders(path: Path) -> set[str]:
     """Functions that load a module by its name as text, under whatever name a file imports or mentions them."""
-    found = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    found: set[str] = set()
+    text = path.read_text(encoding="utf-8")
+    if not any(word in text for word in (*LOADERS, "exec", "eval", "modules")):
+        return found  # nothing to take apart, which is what takes time
+    for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.ImportFrom):
             found |= {a.name for a in node.names} & LOADERS
         elif isinstance(node, ast.Attribute):
-            found |= {node.attr} & LOADERS | {ast.unparse(node)} & {"sys.modules"}
+            found |= {node.attr} & LOADERS
+            if node.attr == "modules" and ast.unparse(node) == "sys.modules":
+                found.add("sys.modules")
         elif isinstance(node, ast.Name):
             found |= {node.id} & (LOADERS | {"exec", "eval"})
         elif isinstance(node, ast.Constant) and isinstance(node.value, str):
@@ -171,7 +190,10 @@ def test_no_module_of_ours_is_imported_by_its_name_as_text() -> None:
     users, ours = set(), MODULES.keys() - {"stiffmap"}
     rooms = tuple(f"stiffmap.{r}" for r in ROOMS)
     for name, path in MODULES.items():
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        source = path.read_text(encoding="utf-8")
+        if not re.search(r"[\"']stiffmap\.", source):
+            continue
+        for node in ast.walk(ast.parse(source)):
             text = node.value if isinstance(node, ast.Constant) else ""
             if isinstance(text, str) and (text in ours or text.startswith(rooms)):
                 users.add(name)
@@ -181,7 +203,7 @@ def test_no_module_of_ours_is_imported_by_its_name_as_text() -> None:
 def test_two_methods_reach_up() -> None:
     """Whatever else asks for a room above is misplaced."""
     assert set(PLACES) == {"Machine.view", "Diagnosis.report"}
-    users = {n for n, targets in GRAPH.items() if "stiffmap.common.from_above" in targets} - {"stiffmap"}
+    users = {n for n, targets in graph().items() if "stiffmap.common.from_above" in targets} - {"stiffmap"}
     assert users == {"stiffmap.solve.machine", "stiffmap.identification.diagnosis.report.result"}
 
 

@@ -48,11 +48,11 @@ def direct_writes(path: Path) -> set[str]:
         if not isinstance(node, ast.Call) or id(node) in scratch:
             continue
         name = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
-        owner = ast.unparse(node.func.value) if isinstance(node.func, ast.Attribute) else ""
-        if name == "write_text" and not owner:
-            continue  # that of the room
-        if name in METHODS and MODULE_ONLY.get(name, owner) == owner:
-            found.add(name)
+        if name in METHODS:
+            owner = ast.unparse(node.func.value) if isinstance(node.func, ast.Attribute) else ""
+            room = name == "write_text" and not owner
+            if not room and MODULE_ONLY.get(name, owner) == owner:
+                found.add(name)
         if name == "open":
             modes = [*node.args[:2], *(k.value for k in node.keywords if k.arg == "mode")]
             texts = [m.value for m in modes if isinstance(m, ast.Constant) and isinstance(m.value, str)]

@@ -8,7 +8,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
-from tests.python.project.test_imports import GRAPH, MODULES, PACKAGE, ROOMS, imported
+from tests.python.project.test_imports import MODULES, PACKAGE, ROOMS, graph, imported
 
 ROOT = Path(__file__).parents[3]
 CONTRIBUTING = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
@@ -85,11 +85,11 @@ WAYS = {
 def reached(module: str) -> set[str]:
     """What a module imports, through the packages and the face that hand it on."""
     found: set[str] = set()
-    new = GRAPH[module]
+    new = graph()[module]
     while new:
         found |= new
         handed_on = {m for m in new if m in MODULES and MODULES[m].name == "__init__.py"}
-        new = {t for m in handed_on for t in GRAPH[m]} - found
+        new = {t for m in handed_on for t in graph()[m]} - found
     return found
 
 

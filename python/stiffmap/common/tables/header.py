@@ -7,7 +7,7 @@ import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from itertools import pairwise, zip_longest
+from itertools import pairwise, takewhile, zip_longest
 
 from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.number_text import terms
@@ -110,10 +110,12 @@ STATED = re.compile(
 def stated_unit(above: Sequence[str], quantity: str) -> str:
     """``Units: mm, deg`` or ``Length unit;inches`` in the cells above a table: what it says of a quantity, of lengths also a unit
     that nobody knows; nothing where it says nothing."""
-    for cell, following in zip_longest(above, above[1:], fillvalue=""):
+    for i, cell in enumerate(above):
         match = STATED.fullmatch(cell.strip())
         of = match and next((q for q in ("length", "angle", "force") if match[q]), "")
-        text = (match["text"] or following).strip() if match and of in ("", quantity) else ""
+        behind = [c.strip() for c in takewhile(unit_of, above[i + 1 :])]
+        said = [t for t in [match["text"], *behind] if t] or above[i + 1 : i + 2] if match else []
+        text = ", ".join(said).strip() if of in ("", quantity) else ""
         words = [text, *re.split(r"[\s,;/&|]+", text)]
         if found := next((w for w in words if unit_of(w, quantity)), ""):
             return found

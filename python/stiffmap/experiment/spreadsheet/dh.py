@@ -68,6 +68,8 @@ QUANTITIES = {"theta": "angle", "d": "length", "a": "length", "alpha": "angle"}
 LEG = "arm"
 STEP, TRIES = math.radians(30.0), 200
 """Of the coordinates among which a home is looked for, and how many are tried."""
+SHORTEST, LONGEST = 0.005, 100.0
+"""m: what an arm reaches whose lengths are in the unit that is said."""
 LEVERS = 1.5
 """Longest lever arms, among some positions, that the lengths of an arm add up to at most."""
 ROOM = 0.2
@@ -123,7 +125,9 @@ def read_dh(given: Table, units: Mapping[str, str], convention: str) -> list[DHR
         sheet.fail(f"'{given.header[more]}' says more than theta, d, a and alpha, which are all that is read")
     sheet, types = _constants(sheet, at, units)
     m = Meant(units=dict(units), sheet=sheet)
-    units_of = {n: m.unit(at[n], n, quantity=q).size for n, q in QUANTITIES.items()}
+    angles = () if {"low", "high"} & {*at} else ("theta", "alpha")
+    plain = [n for n in angles if not np.nan_to_num(sheet.numbers(at[n])).any()]  # zero in any unit
+    units_of = {n: 1.0 if n in plain else m.unit(at[n], n, quantity=q).size for n, q in QUANTITIES.items()}
     numbers = {n: np.nan_to_num(_in_si(sheet, at[n], units_of[n], q)) for n, q in QUANTITIES.items()}
     count = len(sheet.lines)
     said = [*sheet.columns[at["name"]]] if "name" in at else [""] * count
@@ -249,6 +253,10 @@ def arm(
     if convention not in CONVENTIONS:
         raise StiffmapError(f"--dh-convention: expected {' or '.join(CONVENTIONS)}, got '{convention}'")
     standard = convention == "standard"
+    if not SHORTEST < (reach := _reach(rows, standard)) < LONGEST:
+        raise StiffmapError(
+            f"{source or name}: the arm reaches {reach:.3g} m: say the unit of its lengths, as in --unit a=mm --unit d=mm"
+        )
     q = _home(rows, standard) if home is None else np.asarray(home, dtype=float)
     elements: list[Element] = []
     for i, r in enumerate(rows):
@@ -312,14 +320,16 @@ def _within(r: DHRow, turn: float, reach: float) -> float:
 
 
 def _slopes(rows: Sequence[DHRow], standard: bool, q: Floats, reach: float) -> Floats:
-    """(6, joints) of the pose, lengths in reaches."""
-    out, step, at = np.zeros((6, len(q))), 1e-6, forward(rows, standard, q)
-    for i in range(len(q)):
-        moved = q.copy()
-        moved[i] += step
-        there = forward(rows, standard, moved)
-        out[:3, i] = (there - at)[:3, 3] / step / reach
-        out[3:, i] = Rotation.from_matrix(there[:3, :3] @ at[:3, :3].T).as_rotvec() / step
+    """(6, joints) of the pose, lengths in reaches: axes of the joints, and their moments about the tool."""
+    frames = [np.eye(4)]
+    for r, v in zip(rows, q, strict=True):
+        frames.append(frames[-1] @ forward([r], standard, np.array([v])))
+    out = np.zeros((6, len(q)))
+    for i, r in enumerate(rows):
+        at = frames[i] if standard else frames[i] @ _screw("x", r.alpha, r.a)
+        axis, lever = at[:3, 2], frames[-1][:3, 3] - at[:3, 3]
+        out[:3, i] = (axis if r.slides else np.cross(axis, lever)) / reach
+        out[3:, i] = 0.0 if r.slides else axis
     return out
 
 

@@ -26,11 +26,18 @@ from stiffmap.experiment.noise.level import against_the_load, contradictions, no
 from stiffmap.experiment.spreadsheet import dialogue
 from stiffmap.experiment.spreadsheet.answers import Answers, Meant, Question
 from stiffmap.experiment.spreadsheet.convert import ImportedSheet, write_folder
-from stiffmap.experiment.spreadsheet.dh import LEG, QUANTITIES, arm, read_dh
+from stiffmap.experiment.spreadsheet.dh import LEG, QUANTITIES, arm, read_dh, unused
 from stiffmap.experiment.spreadsheet.guess import has_meaning
 from stiffmap.experiment.spreadsheet.instrument import Instrument, as_readings, load_instrument
-from stiffmap.experiment.spreadsheet.joints import DIFFERENCES, as_seen, commanded, drives_of, turned
-from stiffmap.experiment.spreadsheet.places import in_base_axes, seated, seen_next_to_commands
+from stiffmap.experiment.spreadsheet.joints import (
+    DIFFERENCES,
+    as_seen,
+    commanded,
+    compared,
+    drives_of,
+    turned,
+)
+from stiffmap.experiment.spreadsheet.places import in_base_axes, seated, seen_next_to_commands, without_lost
 from stiffmap.experiment.spreadsheet.together import one_point_a_row, oriented, together
 from stiffmap.solve.machine import Machine, load_machine
 
@@ -124,7 +131,8 @@ def experiment_from_table(
     sure = {READ.get(k, k): real_number(v, f"noise: {k}") for k, v in (noise or {}).items()}
     same = {k: real_number(v, f"constants: {k}") for k, v in (constants or {}).items()}
     given = Answers(chosen, dict(units or {}), same, sure)
-    rows = None if dh is None else read_dh(read_sheet(Path(dh)), given.units, dh_convention)
+    joints = None if dh is None else read_sheet(Path(dh))
+    rows = None if joints is None else read_dh(joints, given.units, dh_convention)
     drives = drives if rows is None else {f"{LEG}.{r.name}": r.slides for r in rows}
     numbered = any(h.strip("+-").isdigit() for many in chosen.values() for h in many)
     layout = Layout(has_meaning, tuple(header), numbered, which)
@@ -159,7 +167,8 @@ def experiment_from_table(
     # a gauge that is not at zero has no sign
     of_loads = no_difference(made) or not_at_zero(made) or against_the_load(made)
     warnings = tuple(line for line in (of_loads, *contradictions(made)) if line)
-    remarks = (*m.said, *(f"left out: {text}" for text in own.aside))
+    left = () if joints is None else (*(f"column '{h}'" for h in unused(joints)), *joints.aside)
+    remarks = (*m.said, *(f"left out: {t}" for t in own.aside), *(f"left out of {dh}: {t}" for t in left))
     return FromTable(made, output, declared, warnings, remarks, own, found, m if m.columns else None)
 
 
@@ -226,11 +235,17 @@ def _understood(
     together(m, deflection)
     commanded(m, drives)
     one_point_a_row(m)
+    measured = (wrote or load_instrument("tracker")).measured
+    without_lost(m, wrote.columns if wrote else {}, measured)
+    same = partial(compared, m, difference, measured, deflection)
     if m.columns:
         dialogue.asked(m, ask, partial(seated, m))
+        dialogue.asked(m, ask, same)
         as_seen(m, difference)
     elif wrote is not None:
         as_readings(m, wrote)
+    else:
+        dialogue.asked(m, ask, same)
     dialogue.asked(m, ask, partial(in_base_axes, m, partial(declared, m)))
     oriented(m)
     if not m.placed:

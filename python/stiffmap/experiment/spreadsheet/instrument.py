@@ -15,7 +15,6 @@ from stiffmap.common.yaml_text import read
 from stiffmap.experiment.files.fields import READ, SEEN, quantity_of
 from stiffmap.experiment.poses.handeye import own_frame
 from stiffmap.experiment.spreadsheet.answers import Meant
-from stiffmap.experiment.spreadsheet.places import without_lost
 
 FOLDER = Path(__file__).parent / "instruments"
 KEYS = {"title", "quantity", "columns", "measured", "circle", "units"}
@@ -111,7 +110,6 @@ def as_readings(m: Meant, instrument: Instrument) -> None:
     if at:
         read = np.column_stack([_si(m, own, r, instrument) for r, (own, _) in at.items()])
         asked = np.column_stack([_si(m, command, r[-1], instrument) for r, (_, command) in at.items()])
-        read = without_lost(m, read, asked, [m.sheet.header[own] for own, _ in at.values()])
         apart = len(at) == 3 and own_frame(1e-3 * read, 1e-3 * asked) is not None
         for (reading, (own, command)), values in zip(
             at.items(), (read if apart else read - asked).T, strict=True

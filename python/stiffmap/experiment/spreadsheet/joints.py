@@ -9,8 +9,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from stiffmap.common.errors import StiffmapError
+from stiffmap.common.tables.cells import Cells
 from stiffmap.common.tables.header import with_unit
-from stiffmap.common.units import Unit
+from stiffmap.common.units import Unit, unit_of
 from stiffmap.experiment.channels import AXES
 from stiffmap.experiment.files.fields import SEEN
 from stiffmap.experiment.spreadsheet.answers import Meant
@@ -25,6 +26,10 @@ MEASURED = r"([xyz])[ _.-]?meas(?:ured|\.)?"
 MOST_TURNS = 4.0 * math.pi
 """Of a joint; larger numbers are degrees."""
 DIFFERENCES = ("actual-minus-target", "target-minus-actual")
+UNITS = ("mm", "um", "m", "in", "mil")
+"""In which differences may be."""
+EXACT = 1e-9
+"""m, by which numbers differ that are the same."""
 NO_DIFFERENCE = "{}: --difference: no column is a difference; say --map dx='HEADER' where one is"
 
 
@@ -163,6 +168,65 @@ def as_seen(m: Meant, difference: str) -> None:
             f"places are targets {'plus' if sign > 0 else 'less'} differences ({difference}); their frame, and the reflector's place, are unknown"
         )
     m.head, m.placed = {"frame": "unknown", "tool": "unknown"}, True
+
+
+def compared(m: Meant, difference: str, measured: Mapping[str, str], deflection: bool) -> None:
+    """Differences next to what was commanded and measured, of which `measured` has the header's patterns. StiffmapError where they
+    have another sign or unit than what is said of them; rows that differ are named, of a `deflection` where others do not."""
+    of = {c.meaning: c.index for c in m.guessed if c.repeat == 0}
+    sign = 1.0 if difference == DIFFERENCES[0] else -1.0
+    turns, ways, shown = [], [], ""
+    for reading, pattern in measured.items():
+        at, command = of.get(reading), of.get(reading[-1])
+        if at is None or command is None or reading in m.unloaded:
+            continue
+        own = m.sheet.find(pattern, (at, command))
+        if own is None or not all(map(m.sheet.is_numeric, (at, command, own))):
+            continue
+        size, place = m.unit(at, reading).size, m.unit(command, reading[-1]).size
+        actual = (unit_of(m.sheet.unit(own), "length") or Unit("m", place)).size
+        read = m.sheet.numbers(at)
+        apart = sign * (actual * m.sheet.numbers(own) - place * m.sheet.numbers(command))
+        apart[~np.isfinite(read)] = np.nan
+        step, rounded = _step(m.sheet.columns[at]), actual * _step(m.sheet.columns[own])
+        units = {size: ""} | {u.size: n for n in UNITS if (u := unit_of(n, "length")) and u.size != size}
+        off = {
+            k * s: np.abs(k * s * read - apart) > rounded + k * step + EXACT
+            for k in units
+            for s in (1.0, -1.0)
+        }
+        telling = {k: np.abs(apart) > 2.0 * (rounded + abs(k) * step) for k in off}
+        found = next(
+            (k for k, t in telling.items() if t.sum() > 1 and 2 * (off[k] & t).sum() < t.sum()), None
+        )
+        turns.append(found is not None and found < 0.0)
+        rows = np.flatnonzero(off[size]).tolist()
+        if not rows:
+            continue
+        (i, *more), header = rows, m.sheet.header[at]
+        less = " less ".join(
+            f"'{m.sheet.header[k]}'" for k in ((own, command) if sign > 0 else (command, own))
+        )
+        told = f"line {m.sheet.lines[i]}: '{header}' is {1e3 * size * read[i]:.4g} mm, {less} {1e3 * apart[i]:.4g} mm"
+        told += f", and {len(more)} further rows differ" if more else ""
+        if found == size or (found is None and not deflection):
+            m.said.append(told)
+        elif found is not None:
+            shown = shown or told
+            if units[abs(found)]:
+                ways.append(f"--unit {reading}={units[abs(found)]}")
+            if found < 0.0:
+                ways.append(f"--map {reading}='{header[1:] if header[0] == '-' else '-' + header}'")
+    if shown:
+        if all(turns):
+            ways = [*(w for w in ways if w.startswith("--unit")), f"--difference {DIFFERENCES[sign > 0]}"]
+        raise StiffmapError(f"{m.sheet.file}: {shown}: say {' '.join(ways)}")
+
+
+def _step(cells: Cells) -> float:
+    """About half of the last digit of a column of numbers; 0 of numbers with powers of ten."""
+    digits = [c.replace(",", ".").partition(".")[2].lower() for c in cells]
+    return 0.0 if any("e" in d for d in digits) else 0.51 * 0.1 ** max(map(len, digits))
 
 
 def turned(m: Meant, difference: str) -> None:

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
+from stiffmap.common.tables.cells import Cells
+from stiffmap.common.tables.header import MEASURED
 from stiffmap.common.tables.table import Table
 from stiffmap.experiment.channels import AXES
+from stiffmap.experiment.experiment import Mask
 from stiffmap.experiment.files.fields import POSE, SEEN
 from stiffmap.experiment.poses.handeye import own_frame
 from stiffmap.experiment.spreadsheet.answers import Meant, Question
@@ -27,6 +31,19 @@ LEVER = 5.0
 SOCKET = r"(ball[ _-]?)?(socket|seat|nest|cup|datum|pfanne|kugelpfanne|sphere|ball|kugel)[ _.-]?(id|name|no\.?|nr\.?|number|nummer)?"
 PLACE = r"position|pos\.?|place|location|station|ort|stelle|platz"
 BALL = "the one ball"
+NINES = [round(10.0**k - 0.1**j, 4) for k in range(3, 9) for j in range(5)]
+"""999, 9999.99 and the like, which stand for no reading."""
+BEYOND = 5.0
+"""How many times the others such a number is, where it is the only one of its row."""
+AXIS = r"(?i)(?:(?<![a-z])|(?<=\b[dp]))[xyz](?![a-z])"
+"""In a header."""
+BESIDE = rf"\*[ ._-]?({MEASURED})|({MEASURED})[ ._-]?\*"
+SELDOM = 0.5
+"""Share of rows that have places of their own, at most, where a ball stood in sockets."""
+ALIKE = 1e-3
+"""Share of a distance by which rounded numbers differ."""
+STILL = 0.01
+"""Share of its range within which a command is the same one."""
 
 
 def seen_next_to_commands(m: Meant) -> None:
@@ -91,16 +108,85 @@ def commands(m: Meant) -> Floats | None:
     return np.column_stack([same[a] if a in same else m.metres([of[a]], [a])[:, 0] for a in POSE])
 
 
-def without_lost(m: Meant, seen: Floats, commanded: Floats, names: Sequence[str]) -> Floats:
-    """Places (n, k) with NaN in rows where all of a point are zero though others are not: the instrument had lost its target."""
-    lost = (seen == 0.0).all(axis=1) & (commanded != 0.0).any(axis=1)
-    if seen.shape[1] < 3 or not lost.any() or not seen.any():
-        return seen
+def without_marks(m: Meant) -> None:
+    """Cells emptied that are no readings but nines, in all axes of a row, or far beyond those in other rows where one axis is read."""
+    read = [c.index for c in m.guessed if c.meaning in READINGS and m.sheet.is_numeric(c.index)]
+    for at in [*_sets(m.sheet), *([i] for i in read)]:
+        values = np.column_stack([m.sheet.numbers(i) for i in at])
+        marks = np.isin(np.round(np.abs(values), 4), NINES).all(axis=1) & (values == values[:, :1]).all(
+            axis=1
+        )
+        if len(at) == 1:
+            marks &= np.abs(values[:, 0]) > BEYOND * np.nanmax(np.abs(values[~marks]), initial=0.0)
+        _emptied(m, at, marks, f"{values[marks][0, 0]:.10g}" if marks.any() else "")
+
+
+def without_lost(m: Meant, columns: Mapping[str, str], measured: Mapping[str, str]) -> None:
+    """Places emptied in rows where a target was not seen: one number stands for all axes, or those of the row before stand again though
+    another pose is commanded; so are differences made of them. Patterns of headers: what is commanded and what is `measured`."""
+    of = {c.meaning: c.index for c in m.guessed if c.repeat == 0}
+    given = {a: m.sheet.find(columns[a]) if a in columns else None for a in POSE}
+    command = [i for a in POSE if (i := given[a] if given[a] is not None else of.get(a)) is not None]
+    command = [i for i in command if m.sheet.is_numeric(i)]
+    asked = np.column_stack([m.sheet.numbers(i) for i in command]) if command else np.zeros((len(m.sheet), 0))
+    moves = m.coordinates() if m.columns else asked
+    moved = (np.abs(np.diff(moves, axis=0)) > STILL * np.ptp(moves, axis=0)).any(axis=1)
+    named = [m.sheet.find(pattern, command) for pattern in measured.values()]
+    made = [of[a] for a in AXES[:3] if a in of and of[a] not in named]
+    whole = len(made) == len(command) == len(POSE)
+    sizes = np.abs(np.column_stack([m.sheet.numbers(i) for i in made])) if whole else asked[:, :0]
+
+    def as_made(apart: Floats) -> Mask:
+        """Rows whose differences are such distances, in mm or µm."""
+        off = [np.abs(sizes - k * apart).max(axis=1) <= ALIKE * k * apart.max(axis=1) for k in (1.0, 1e3)]
+        return np.asarray((off[0] | off[1]) & (apart != 0.0).any(axis=1))
+
+    for at in [named, [of.get(a) for a in SEEN]]:
+        places = [i for i in at if i is not None and m.sheet.is_numeric(i)]
+        if len(places) < len(POSE) or not (m.columns or len(command) == len(POSE)):
+            continue
+        seen = np.column_stack([m.sheet.numbers(i) for i in places])
+        if m.columns and len(np.unique(seen, axis=0)) <= SELDOM * len(seen):
+            continue
+        one = (seen == seen[:, :1]).all(axis=1)
+        if len(command) == len(POSE):
+            one &= (asked != asked[:, :1]).any(axis=1) | ((seen == 0.0) & (asked != 0.0)).any(axis=1)
+        again = np.append(False, (seen[1:] == seen[:-1]).all(axis=1) & moved) & ~one
+        kinds = [(one & (seen[:, 0] == v), f"{v:.10g}") for v in np.unique(seen[one, 0])]
+        for lost, what in [*kinds, (again, "those of the row before, though another pose is commanded")]:
+            if not lost.all():
+                if whole:
+                    _emptied(m, made, lost & as_made(np.abs(seen - asked)), "made of it")
+                _emptied(m, places, lost, what)
+    if whole and not as_made(np.abs(asked)).all():
+        _emptied(m, made, as_made(np.abs(asked)), "as large as the commands, whose places were then 0")
+
+
+def _sets(sheet: Table) -> list[list[int]]:
+    """Columns of numbers whose names differ by their axis alone, but not places next to the commands."""
+    sets: dict[str, list[int]] = {}
+    for i, name in enumerate(sheet.names):
+        plain = re.sub(AXIS, "*", name).lower()
+        if plain != name.lower() and sheet.is_numeric(i) and not re.fullmatch(BESIDE, plain):
+            sets.setdefault(plain, []).append(i)
+    return [at for at in sets.values() if len(at) > 1]
+
+
+def _emptied(m: Meant, at: Sequence[int], lost: Mask, what: str) -> None:
+    """Empty cells of some columns in the rows that are `lost`, and say so."""
+    if not lost.any():
+        return
     lines = [str(m.sheet.lines[int(i)]) for i in np.flatnonzero(lost)]
     more = f" and {len(lines) - NAMED} more" if len(lines) > NAMED else ""
     which = f"line{'s' if len(lines) > 1 else ''} {', '.join(lines[:NAMED])}{more}"
-    m.said.append(f"left out: {which}: {', '.join(map(repr, names))} are 0, as of a target that was not seen")
-    return np.where(lost[:, None], np.nan, seen)
+    names = ", ".join(repr(m.sheet.header[i]) for i in at)
+    m.said.append(
+        f"left out: {which}: {names} {'are' if len(at) > 1 else 'is'} {what}, as of a target that was not seen"
+    )
+    columns = list(m.sheet.columns)
+    for i in at:
+        columns[i] = Cells.of("" if gone else c for c, gone in zip(columns[i], lost, strict=True))
+    m.sheet = replace(m.sheet, columns=tuple(columns))
 
 
 def seated(m: Meant) -> None:

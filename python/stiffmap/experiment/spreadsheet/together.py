@@ -15,6 +15,7 @@ from stiffmap.experiment.channels import AXES
 from stiffmap.experiment.files.fields import EULER, POSE, QUATERNION, SEEN, SEEN_TURNED, VECTOR
 from stiffmap.experiment.spreadsheet.answers import Meant
 from stiffmap.experiment.spreadsheet.guess import READINGS, guessed
+from stiffmap.experiment.spreadsheet.places import without_marks
 
 LOAD = re.compile(
     r"(?i)(applied |test |hanging |hung )?(load|force|mass|weight|payload|last|prüflast|kraft|prüfkraft|masse|gewicht|belastung|"
@@ -59,6 +60,7 @@ def together(m: Meant, deflection: bool) -> None:
     """Signs of chosen columns, gauges before and after a load, loads with their direction. Raises StiffmapError."""
     m.chosen = {"ll" if k == "length" else k: list(v) for k, v in m.chosen.items()}
     _signs(m)
+    without_marks(m)
     _lengths(m)
     if deflection:
         _differences(m)

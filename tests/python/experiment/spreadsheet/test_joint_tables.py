@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import stiffmap as sm
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.tables.sheet import read_sheet
 from stiffmap.experiment import Predictor
 from stiffmap.experiment.noise.whitening import LinearProblem, nuisance_part
-from stiffmap.experiment.spreadsheet.dh import read_dh
+from stiffmap.experiment.spreadsheet import dh
+from stiffmap.experiment.spreadsheet.dh import arm, read_dh
 from stiffmap.model.description import Joint
 from stiffmap.ui.cli import main
 
@@ -45,6 +48,52 @@ def turn_x(t: float, a: float) -> np.ndarray:
 def write(folder: Path, name: str, text: str) -> str:
     (folder / name).write_text(text, encoding="utf-8")
     return str(folder / name)
+
+
+ZEROS = "joint,theta,d [mm],a [mm],alpha [deg]\n1,{},127.3,0,90\n2,{},0,-612,0\n3,{},0,-572.3,0\n"
+
+
+@pytest.mark.parametrize("cells", [("0", "0", "0"), ("q1", "q2", "q3"), ("θ1", "θ2", "0*")])
+def test_angles_that_are_zero_need_no_unit(cells: tuple[str, ...], tmp_path: Path) -> None:
+    sheet = read_sheet(Path(write(tmp_path, "dh.csv", ZEROS.format(*cells))))
+    found = [(r.theta, r.a) for r in read_dh(sheet, {}, "standard")]
+    np.testing.assert_allclose(found, [(0, 0), (0, -0.612), (0, -0.5723)])
+    with pytest.raises(StiffmapError, match=r"column 'theta' .* has no unit"):
+        read_dh(read_sheet(Path(write(tmp_path, "dh.csv", ZEROS.format("0", "0.5", "0")))), {}, "standard")
+    limits = ZEROS.format(*cells).replace("\n", ",90\n").replace("[deg],90", "[deg],max")
+    with pytest.raises(StiffmapError, match=r"column 'theta' .* has no unit"):
+        read_dh(read_sheet(Path(write(tmp_path, "dh.csv", limits))), {}, "standard")
+
+
+@pytest.mark.parametrize(
+    ("unit", "lengths", "reach"),
+    [("m", 1.0, r"1\.31e\+03"), ("um", 1.0, "0.00131"), ("mm", 0.0, "0")],
+)
+def test_an_arm_of_a_kilometre_is_refused(unit: str, lengths: float, reach: str, tmp_path: Path) -> None:
+    text = ZEROS.format(0, 0, 0).replace("mm", unit)
+    sheet = read_sheet(Path(write(tmp_path, "dh.csv", text)))
+    rows = [replace(r, d=lengths * r.d, a=lengths * r.a) for r in read_dh(sheet, {}, "standard")]
+    with pytest.raises(StiffmapError, match=f"the arm reaches {reach} m: say the unit of its lengths"):
+        arm(rows, "standard", "own")
+    assert len(arm(read_dh(sheet, {"a": "mm", "d": "mm"}, "standard"), "standard", "own").legs) == 1
+
+
+@pytest.mark.parametrize(
+    "line", ["Units: mm, deg", "Units,mm,deg", "# Units: mm, deg", "Length unit,mm\nAngle unit,deg"]
+)
+def test_units_of_a_line_above_the_header_hold_where_commas_part_it(line: str, tmp_path: Path) -> None:
+    text = f"{line}\n" + ZEROS.format(0, 90, 0).replace(" [mm]", "").replace(" [deg]", "")
+    rows = read_dh(read_sheet(Path(write(tmp_path, "dh.csv", text))), {}, "standard")
+    found = [(r.d, r.alpha, r.theta) for r in rows[:2]]
+    np.testing.assert_allclose(found, [(0.1273, np.pi / 2, 0), (0, 0, np.pi / 2)])
+
+
+def test_columns_of_a_table_of_dh_that_are_not_used_are_said(tmp_path: Path) -> None:
+    text = ZEROS.format(0, 0, 0).replace("\n", ",4\n").replace("[deg],4", "[deg],mass [kg]")
+    joints = write(tmp_path, "joints.csv", "J1 [deg],J2 [deg],J3 [deg],Fz [N],dz [mm]\n0,10,20,-100,-0.1\n")
+    dh = write(tmp_path, "dh.csv", text)
+    made = sm.experiment_from_table(None, joints, tmp_path / "out", dh=dh, noise={"dz": 0.01})
+    assert f"left out of {dh}: column 'mass [kg]'" in made.remarks
 
 
 @pytest.mark.parametrize("convention", ["standard", "modified"])
@@ -286,6 +335,29 @@ def imported(folder: Path, text: str, convention: str, *more: str) -> sm.Machine
     file = write(folder, "arm.csv", text)
     assert main(["import", file, "--dh-convention", convention, *more, "-o", out]) == 0
     return sm.load_machine(out)
+
+
+@pytest.mark.parametrize("standard", [True, False])
+def test_slopes_of_a_table_are_central_differences(standard: bool) -> None:
+    """The home of an arm is chosen by them."""
+    rows = [
+        dh.DHRow("a", 0.1, 0.3, -0.4, 1.2, False, None),
+        dh.DHRow("b", 0.4, 0.2, 0.1, -0.7, True, None),
+        dh.DHRow("c", -0.3, 0.0, 0.2, 0.5, False, None),
+    ]
+    q, reach = np.array([0.3, 0.15, -0.8]), 0.7
+    found = dh._slopes(rows, standard, q, reach)
+
+    def off(step: float) -> float:
+        out = np.zeros((6, 3))
+        for i in range(3):
+            high, low = (dh.forward(rows, standard, q + s * step * np.eye(3)[i]) for s in (1, -1))
+            turned = Rotation.from_matrix(high[:3, :3] @ low[:3, :3].T).as_rotvec()
+            out[:, i] = np.r_[(high - low)[:3, 3] / reach, turned] / (2 * step)
+        return float(np.abs(out - found).max())
+
+    assert off(5e-3) < 1e-4
+    assert np.log2(off(1e-2) / off(5e-3)) == pytest.approx(2, abs=0.05)
 
 
 @pytest.fixture(scope="module")

@@ -127,12 +127,12 @@ def test_the_picture_has_no_line_between_cuts(tmp_path: Path) -> None:
 
 
 def test_python_does_what_the_command_does(capsys: pytest.CaptureFixture[str]) -> None:
-    asked = ["--size", "60", "--process", "trimming", "--at", "50,50,0", "--step", "5", "--json"]
+    asked = ["--size", "20", "--process", "trimming", "--at", "50,50,0", "--step", "10", "--json"]
     more = ["--entry", "best", "--reverse", "--tolerance", "0.1"]
     assert main(["mill", "orthoglide-revised", "circle", *asked, *more]) == 0
     said = json.loads(capsys.readouterr().out)
     ds = sm.mill(
-        "orthoglide-revised", "circle", "trimming", at=(0.05, 0.05, 0), size=(0.06,), step=5e-3,
+        "orthoglide-revised", "circle", "trimming", at=(0.05, 0.05, 0), size=(0.02,), step=0.01,
         entry="best", reverse=True, tolerance=1e-4,
     )  # fmt: skip
     assert ds.attrs["verdict"] == said["verdict"]
@@ -145,7 +145,7 @@ def test_python_does_what_the_command_does(capsys: pytest.CaptureFixture[str]) -
         sm.mill("orthoglide-revised", "circle", "trimming", stock=[1, 2, 3])
     with pytest.raises(sm.StiffmapError, match="offset: expected names from G54 to G59; got 'G60'"):
         sm.mill("orthoglide-revised", "circle", "trimming", offset={"G60": (0.01, 0, 0)})
-    placed = sm.mill("linear-delta", "circle", "trimming", size=(0.06,), step=8e-3, place=4)
+    placed = sm.mill("linear-delta", "circle", "trimming", size=(0.02,), step=0.01, place=2)
     assert "placements the best leaves" in placed.attrs["placement"]
 
 

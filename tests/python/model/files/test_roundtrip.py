@@ -10,10 +10,11 @@ from tests.python.model.files.full_machine import full_machine
 
 from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.model.description import AppliedEffect, Body, Leg, MachineDescription, Point
-from stiffmap.model.files import description_text, load_description, save_description, shipped_machines
+from stiffmap.model.files import description_text, load_description, save_description
+from stiffmap.model.files.shipped import machine_names
 
 
-@pytest.mark.parametrize("name", [machine.name for machine in shipped_machines()])
+@pytest.mark.parametrize("name", machine_names())
 def test_shipped_machines(name: str, tmp_path: Path) -> None:
     machine = load_description(name)
     save_description(machine, tmp_path / "m.yaml")

@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 
 import stiffmap as sm
-from stiffmap.model.files import shipped_machines
+from stiffmap.model.files.shipped import machine_folder
 from stiffmap.ui.cli import main
 
-FIVE_BAR = next(m.path for m in shipped_machines() if m.name == "five-bar")
+FIVE_BAR = machine_folder() / "five-bar.yaml"
 
 
 def changed(folder: Path, old: str, new: str) -> Path:

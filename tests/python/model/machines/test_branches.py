@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import stiffmap as sm
-from stiffmap.model.files import shipped_machines
+from stiffmap.model.files.shipped import machine_names
 from stiffmap.solve.kinematics import forward_kinematics, inverse_kinematics
 
-NAMES = [m.name for m in shipped_machines()]
+NAMES = machine_names()
 WRENCH = np.array([3.0, -2.0, 5.0, 0.02, -0.01, 0.03])
 
 

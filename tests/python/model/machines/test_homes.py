@@ -10,7 +10,8 @@ import pytest
 
 import stiffmap as sm
 from stiffmap.model.description import Joint
-from stiffmap.model.files import description_from_text, description_text, shipped_machines
+from stiffmap.model.files import description_from_text, description_text
+from stiffmap.model.files.shipped import machine_folder
 from stiffmap.solve.advice import check_file
 from stiffmap.solve.status import Status
 from stiffmap.ui.cli import main
@@ -116,7 +117,7 @@ def test_a_pose_beyond_the_border_is_unreachable() -> None:
         assert m.solve(reach * (1 + beyond)).status == Status.UNREACHABLE
 
 
-FIVE_BAR = next(m.path for m in shipped_machines() if m.name == "five-bar")
+FIVE_BAR = machine_folder() / "five-bar.yaml"
 
 
 def rough_five_bar() -> str:
@@ -183,7 +184,7 @@ def test_check_says_what_it_changed(tmp_path: Path, capsys: pytest.CaptureFixtur
 
 
 @pytest.mark.parametrize(
-    "path", [m.path for m in shipped_machines()], ids=[m.name for m in shipped_machines()]
+    "path", [machine_folder() / f"{name}.yaml" for name in sm.machine_names()], ids=sm.machine_names()
 )
 def test_a_shipped_machine_closes_as_declared(path: str) -> None:
     """Also where joints stand before or behind the legs."""

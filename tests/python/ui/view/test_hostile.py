@@ -5,8 +5,6 @@ from __future__ import annotations
 import asyncio
 import math
 import random
-import subprocess
-import sys
 from typing import Any
 
 import numpy as np
@@ -47,17 +45,8 @@ async def sent(port: int, given: list[dict[str, Any]]) -> None:
             await socket.send(msgspec.msgpack.encode(message))
 
 
-def test_messages_that_no_page_sends_leave_no_traceback() -> None:
-    """In a process of its own, which must live to its end."""
+def test_messages_that_no_page_sends_leave_no_traceback(capfd: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("viser", reason="viser is not installed (pip install stiffmap[view])")
-    done = subprocess.run(
-        [sys.executable, "-B", "-X", "faulthandler", __file__], check=False, capture_output=True, text=True
-    )
-    assert (done.returncode, done.stdout) == (0, "lives\n"), done.stderr[-3000:]
-    assert "Traceback" not in done.stderr
-
-
-def attack() -> None:
     from stiffmap.ui.view.open import View, model_of
 
     with View(model_of(sm.load_machine("orthoglide-revised"))) as view:
@@ -70,8 +59,4 @@ def attack() -> None:
         assert view._viewer.worker.idle(60)
         view._viewer.drag(np.array([0.05, 0, 0]), np.array([1.0, 0, 0, 0]))
         assert not view._viewer.error and view.state.position == (0.05, 0.0, 0.0)
-    print("lives")
-
-
-if __name__ == "__main__":
-    attack()
+    assert "Traceback" not in capfd.readouterr().err

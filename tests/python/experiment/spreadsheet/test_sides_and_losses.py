@@ -1,0 +1,133 @@
+"""Differences next to what was commanded and measured, and rows in which a target was not seen."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import stiffmap as sm
+from stiffmap.common.errors import StiffmapError
+
+GRID = np.array([[x, y, z] for x in (-50, 0, 50) for y in (-50, 0, 50) for z in (-30, 30)], float)
+ERRORS = np.round(0.08 * np.cos(np.arange(3 * len(GRID)).reshape(-1, 3) ** 2), 3)
+"""mm."""
+SIDES = "X {0};Y {0};Z {0};X {1};Y {1};Z {1};{2}"
+COUNT = len(GRID)
+JOINTS = np.round(1.2 * np.sin(np.arange(6 * COUNT).reshape(-1, 6) ** 2), 6)
+ARM = ";".join(f"q{k} [rad]" for k in range(1, 7)) + ";"
+
+
+def made(
+    tmp_path: Path, head: str, *columns: np.ndarray, machine: str = "tripteron", **more: Any
+) -> sm.FromTable:
+    rows = (";".join(f"{v:.10g}" for v in row) for row in np.column_stack(columns).tolist())
+    (tmp_path / "t.csv").write_text("\n".join([head, *rows, ""]), encoding="utf-8")
+    usual = {"noise": {"dx": 0.05, "dy": 0.05, "dz": 0.05}, "overwrite": True, "quantity": "position"}
+    return sm.experiment_from_table(machine, tmp_path / "t.csv", tmp_path / "out", **(usual | more))
+
+
+def read(found: sm.FromTable) -> np.ndarray:
+    """(n, 3) mm of places as they were written, else of differences."""
+    table = np.genfromtxt(found.folder / "data.csv", delimiter=",", names=True)
+    if "px" in (table.dtype.names or ()):
+        return np.column_stack([table[f"p{a}"] for a in "xyz"])
+    return 1e3 * found.experiment.reading[:, :3]
+
+
+SWAPPED = {"difference": "target-minus-actual"}
+MICRONS = {"units": {"length": "mm", "dx": "um", "dy": "um", "dz": "um"}}
+
+
+@pytest.mark.parametrize(
+    ("names", "factor", "said", "answer"),
+    [
+        (("Nominal", "Actual", "dX;dY;dZ"), -1, "--difference target-minus-actual", SWAPPED),
+        (("soll", "ist", "Abweichung X;Abweichung Y;Abweichung Z"), (-1, -1, -1), "--difference", SWAPPED),
+        (("Nom", "Meas", "Dev X;Dev Y;Dev Z"), (1, -1, 1), "--map dy='-Dev Y'$", {"columns": {"dy": "-Dev Y"}}),
+        (("Cmd", "Meas", "dx;dy;dz"), 1e3, "--unit dx=um --unit dy=um --unit dz=um$", MICRONS),
+        (("cmd", "act", "dx;dy;dz"), -1e3, "--unit dx=um .*--difference target-minus", MICRONS | SWAPPED),
+        (("Target", "Actual", "dx;dy;dz"), (1, 1, 1e3), "--unit dz=um$", {"units": {"length": "mm", "dz": "um"}}),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("joints", [False, True])
+def test_differences_of_another_sign_or_unit_are_refused_and_read_as_told(
+    names: tuple[str, str, str], factor: Any, said: str, answer: dict[str, Any], joints: bool, tmp_path: Path
+) -> None:
+    sides = np.column_stack([GRID, GRID + ERRORS, np.asarray(factor) * ERRORS])
+    head = SIDES.format(*names)
+    more: dict[str, Any] = {"units": {"length": "mm"}}
+    if joints:
+        sides, head, more["machine"] = np.column_stack([JOINTS, sides]), ARM + head, "ur10"
+    with pytest.raises(StiffmapError, match=f"line [2-4]: '{head.split(';')[-3][:-1]}.*less '.*say .*{said}"):
+        made(tmp_path, head, sides, **more)
+    np.testing.assert_allclose(
+        read(made(tmp_path, head, sides, **(more | answer))), GRID + ERRORS if joints else ERRORS, atol=1e-9
+    )
+
+
+@pytest.mark.parametrize("digits", [2, 3])
+def test_single_rows_that_differ_are_named(digits: int, tmp_path: Path) -> None:
+    """A difference that was rounded is the same one; one of another row, or mistyped, is not."""
+    said, once = np.round(ERRORS, digits), np.round(ERRORS, digits)
+    once[3, 0] += 0.5
+    head = SIDES.format("nom", "act", "dx;dy;dz")
+    each = [
+        made(tmp_path, head, GRID, GRID + ERRORS, d, units={"length": "mm"}).remarks
+        for d in (said, once, np.roll(said, 1, axis=0))
+    ]
+    assert [[r[:15] for r in remarks] for remarks in each[:2]] == [[], ["line 5: 'dx' is"]]
+    assert "further rows differ" in each[2][0]
+
+
+def test_deflections_next_to_places_need_not_be_their_difference(tmp_path: Path) -> None:
+    head = "X nom [mm];Y nom [mm];Z nom [mm];Fx [N];X act [mm];Y act [mm];Z act [mm];dx [mm];dy [mm];dz [mm]"
+    own = 0.02 * np.abs(ERRORS)
+    found = made(tmp_path, head, GRID, np.full(COUNT, 50.0), GRID + ERRORS, own, quantity="deflection")
+    assert not found.remarks
+    np.testing.assert_allclose(found.experiment.reading[:, :3], 1e-3 * own)
+
+
+KEPT = np.setdiff1d(np.arange(COUNT), [4, 9])
+
+
+def losing(seen: np.ndarray, what: Any) -> np.ndarray:
+    out = seen.copy()
+    out[[4, 9]] = out[[3, 8]] if what == "held" else what
+    return out
+
+
+FORMS = ("px", "tracker", "joints", "joints meas", "sides")
+
+
+@pytest.mark.parametrize(
+    ("form", "what"),
+    [
+        *((form, what) for form in FORMS for what in (0.0, -999.0, 999.99, -1.0, 1e6, "held")),
+        *(("differences", what) for what in (0.0, -999.0, 9999.0)),
+    ],
+)
+def test_rows_of_a_target_that_was_not_seen_are_left_out(form: str, what: Any, tmp_path: Path) -> None:
+    seen, more = losing(GRID + ERRORS, what), dict[str, Any]()
+    head = "x [mm];y [mm];z [mm];px [mm];py [mm];pz [mm]"
+    columns = [GRID, seen]
+    if form == "tracker":
+        head, more = SIDES.format("nominal", "actual", "")[:-1], {"instrument": "tracker"}
+    elif form.startswith("joints"):
+        head = ARM + (
+            "px [mm];py [mm];pz [mm]" if form == "joints" else "X meas [mm];Y meas [mm];Z meas [mm]"
+        )
+        columns, more = [JOINTS, seen], {"machine": "ur10"}
+    elif form == "sides":
+        head, more = SIDES.format("nom", "act", "dx;dy;dz"), {"units": {"length": "mm"}}
+        columns = [GRID, seen, np.round(seen - GRID, 3)]
+    elif form == "differences":
+        head = "x [mm];y [mm];z [mm];dx [um];dy [um];dz [um]"
+        columns = [GRID, 1e3 * (seen - GRID) if what == 0.0 else losing(1e3 * ERRORS, what)]
+    found = made(tmp_path, head, *columns, **more)
+    assert [r[:22] for r in found.remarks if "not seen" in r][:1] == ["left out: lines 6, 11:"]
+    assert len(found.experiment) == COUNT - 2
+    places = form in ("px", "joints", "joints meas")
+    np.testing.assert_allclose(read(found), (GRID * places + ERRORS)[KEPT], atol=1e-9)
