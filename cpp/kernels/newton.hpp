@@ -178,7 +178,7 @@ struct Newton {
     M done = ~usable & usable, failed = ~usable;
     LoadSteps way{P, s};
     const bool patient = in.patience >= Patience::path;
-    const bool searches = corners && P.bends && !patient && P.serial_joints == 0;
+    const bool searches = corners && P.bends && P.serial_joints == 0;
     const double most_tries = in.max_iterations * (!corners ? 1.0 : patient ? 3.0 : searches ? 1.0 : 0.5);
     way.begin(unloaded_lanes());
     for (int k = 0; k < most_iterations; ++k) {
@@ -241,7 +241,7 @@ struct Newton {
         if (way.at_once) distrusted |= active & (way.tries == 0.0) & ~(e.lowest > pivot_floor);
       }
       // Corners make Newton's steps go to and fro: then each goes to the next corner, patiently.
-      const M corner_steps = patient ? active & (way.tries > 1.0) : M{};
+      const M corner_steps = patient && !searches ? active & (way.tries > 1.0) : M{};
       if (corners && any(corner_steps)) shorten(select(corner_steps, laws.to_corner(), splat(1)));
       if (corners && !patient && !searches)
         distrusted |= active & ~settled & (way.tries > 2.0) & ~(norm <= 0.5 * way.previous);
@@ -251,7 +251,8 @@ struct Newton {
       distrusted |= active & ~settled & (way.tries >= most_tries);
       if (searches) {
         // Beyond that the tangent says little of the way: what tightens a cable is of second order.
-        const V most = longest / norm, searched = k > 1 ? Corners{P, s}.share() : splat(1);
+        const V most = (patient ? 0.2 * longest : longest) / norm;
+        const V searched = k > 1 ? Corners{P, s}.share() : splat(1);
         const V share = select(most < searched, most, searched);
         const M moving = active & ~resting & ~distrusted;
         if (any(moving & (share < 1.0))) shorten(select(moving, share, splat(1)));
