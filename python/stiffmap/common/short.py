@@ -28,6 +28,11 @@ def short_repr(cls: type[T]) -> type[T]:
     return cls
 
 
+def first_of(names: Sequence[str], most: int = 12, between: str = ", ") -> str:
+    """Names in a row, the first of very many."""
+    return between.join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
+
+
 def shown_as(value: Any) -> str:
     """A value in a few characters."""
     if isinstance(value, np.ndarray):

@@ -8,6 +8,7 @@ from itertools import combinations
 import numpy as np
 from scipy.stats import chi2
 
+from stiffmap.common.short import first_of
 from stiffmap.experiment.experiment import Experiment, Floats, Integers, Mask
 from stiffmap.experiment.noise.level import Noise, noise_of
 from stiffmap.experiment.noise.whitening import LinearProblem, nuisance_part
@@ -15,8 +16,6 @@ from stiffmap.experiment.setups import target_positions
 
 MANY, LEAST_MANY = 0.1, 2
 """Share and number of rows beyond which those that stand alone before any effect is known are an effect."""
-NAMED = 12
-"""Rows that a line names."""
 GROSS = 8.0
 """Robust standard deviations beyond which a reading is an outlier before any effect is known; a pose that was
 read once is beyond them as a whole."""
@@ -100,9 +99,8 @@ def set_aside(ids: Sequence[str], pairs: Sequence[tuple[str, str]]) -> list[str]
     """Outliers in words, and which of them look swapped."""
     if not ids:
         return []
-    more = f" and {len(ids) - NAMED} more" if len(ids) > NAMED else ""
     plural = "s" if len(ids) > 1 else ""
-    out = [f"set aside as outlier{plural}: row{plural} {', '.join(ids[:NAMED])}{more}"]
+    out = [f"set aside as outlier{plural}: row{plural} {first_of(ids)}"]
     return out + [f"rows {a} and {b} fit as swapped: each as the reading of the other" for a, b in pairs]
 
 

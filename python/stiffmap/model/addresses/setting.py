@@ -10,6 +10,7 @@ from functools import partial
 
 from stiffmap.common.broadcasting import instance_of, real_number
 from stiffmap.common.errors import StiffmapError
+from stiffmap.common.short import first_of
 from stiffmap.model.addresses.fields import Field, field_of, fields, vector_fields
 from stiffmap.model.addresses.places import bar_offset, full_names, machine_fields, number_at, split
 from stiffmap.model.description import (
@@ -26,7 +27,6 @@ from stiffmap.model.description import (
 )
 
 LENGTH = "length"
-MOST_NAMED = 6
 
 
 def with_values(description: MachineDescription, values: Mapping[str, float]) -> MachineDescription:
@@ -100,8 +100,7 @@ def _unknown(description: MachineDescription, address: str, name: str, field: st
         if own:
             near = difflib.get_close_matches(field, own, n=1, cutoff=0.5)
             best = f" (did you mean '{name}/{near[0]}'?)" if near else ""
-            more = f" and {len(own) - MOST_NAMED} more" if len(own) > MOST_NAMED else ""
-            return f"{name} has no number '{field}'{best}; it has: {', '.join(own[:MOST_NAMED])}{more}"
+            return f"{name} has no number '{field}'{best}; it has: {first_of(own, 6)}"
         return f"{name} has no numbers of its own"
     short = [f"{a.split('.', 1)[1]}" for a in every if "." in a.partition("/")[0]]
     near = difflib.get_close_matches(address, [*every, *dict.fromkeys(short)], n=1, cutoff=0.3)

@@ -9,6 +9,7 @@ import numpy as np
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError, suggestion
+from stiffmap.common.short import first_of
 from stiffmap.model.description import Body, Pose
 from stiffmap.model.description.pose import Rows, Vector
 
@@ -106,7 +107,6 @@ class UrdfModel:
 TOOLS = (r"tool_?0", r"tcp|tool_cent(er|re)_point", r"tool\d*", r"eef?|end_?effector", r"flange",
          r"grasp(ing)?(_?(frame|center|target|point))?|gripper_frame")  # fmt: skip
 """Names of tools as makers write them, alone or as words of a longer name; the first is the surest."""
-LISTED = 12  # ends that a message names
 
 
 def rank(link: str) -> int:
@@ -131,16 +131,10 @@ def find_tip(model: UrdfModel) -> tuple[str, str]:
     longest = max((model.way(n) for n in found), key=len)
     along = {model.root, *(j.child for j in longest)}
     if not all(model.body_of(n) in along for n in found):
-        raise FileError(f"the tree has {len(found)} ends ({listed(found)}); say which one is the tool: --tip LINK, "
+        raise FileError(f"the tree has {len(found)} ends ({first_of(found)}); say which one is the tool: --tip LINK, "
                         "or tip in Python and in a sidecar", file=model.file)  # fmt: skip
     tip = min(found, key=lambda n: (rank(n), -len(model.way(n))))
-    return tip, f"chosen from the ends {listed(ends)}"
-
-
-def listed(names: list[str]) -> str:
-    """Names in a row, the first of very many."""
-    more = len(names) - LISTED
-    return ", ".join(names[:LISTED]) + (f" and {more} more" if more > 0 else "")
+    return tip, f"chosen from the ends {first_of(ends)}"
 
 
 def _named(links: list[str]) -> list[str]:

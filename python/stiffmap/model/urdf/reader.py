@@ -15,9 +15,10 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError, reading
 from stiffmap.common.number_text import LARGEST, number_in
 from stiffmap.common.rotations import rotation_about
+from stiffmap.common.short import first_of
 from stiffmap.model.description import Body, Pose
 from stiffmap.model.description.pose import vector
-from stiffmap.model.urdf.model import Mimic, UrdfJoint, UrdfModel, listed, tensor
+from stiffmap.model.urdf.model import Mimic, UrdfJoint, UrdfModel, tensor
 
 KINDS = {"revolute": "revolute", "continuous": "revolute", "prismatic": "prismatic", "fixed": "fixed"}
 READ = ("link", "joint", "inertial", "mass", "inertia", "origin", "axis", "parent", "child", "limit", "mimic")
@@ -116,7 +117,7 @@ def _check_tree(links: list[str], joints: list[UrdfJoint], wrong: Wrong) -> None
     ring = [link for link in links if link not in reached]
     if ring:
         raise wrong(
-            f"links hang on each other in a ring and not on the root link '{roots[0]}': {listed(ring)}"
+            f"links hang on each other in a ring and not on the root link '{roots[0]}': {first_of(ring)}"
         )
 
 

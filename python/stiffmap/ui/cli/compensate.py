@@ -8,6 +8,7 @@ import typer
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs.option import written
+from stiffmap.common.short import first_of
 from stiffmap.experiment.comparison.residual import Summary
 from stiffmap.machining import compensation
 from stiffmap.solve.machine import Machine
@@ -21,7 +22,6 @@ MM = 1e3
 WORSE = "worse: these commands would enlarge the error of these readings; the file does not hold where they were taken"
 BETTER = "better"
 BEYOND = "rows beyond what the machine was calibrated by"
-NAMED = 12  # rows that a line names
 
 LINE, LOADS = {"through", "zero", "format", "output"}, {"effect", "force", "gravity"}
 USES = {"axis": {*LINE, *LOADS, "points"}, "axis of a map": {*LINE, "case"}, "poses": {*LOADS, "output"},
@@ -147,8 +147,7 @@ def _commands(found: compensation.Commands, output: Path | None) -> dict[str, ob
     told: dict[str, object] = {}
     if found.beyond is not None:
         far = [found.ids[i] for i in np.flatnonzero(found.beyond)]
-        more = f" and {len(far) - NAMED} more" if len(far) > NAMED else ""
-        told[BEYOND] = f"{', '.join(far[:NAMED])}{more}" or "none"
+        told[BEYOND] = first_of(far) or "none"
     return told | {
         "rows": len(found.ids),
         "corrected components": " ".join(found.components),

@@ -15,7 +15,7 @@ from stiffmap.common.errors import FileError, reading
 from stiffmap.common.from_above import from_above
 from stiffmap.common.json_text import json_text, parse_json, plain
 from stiffmap.common.number_text import percent, with_uncertainty
-from stiffmap.common.short import short_repr, titled
+from stiffmap.common.short import first_of, short_repr, titled
 from stiffmap.experiment.comparison.residual import Summary
 from stiffmap.experiment.experiment import Experiment, Floats, Mask
 from stiffmap.experiment.noise.checks import Check
@@ -187,8 +187,7 @@ def _more(d: Diagnosis) -> list[str]:
         out += [f"declared numbers: {d.calibration.verdict}", *map(str, d.calibration.wide)]
     out += [f"not named: {why}" for why in d.refused]
     if d.stopped:
-        more = f" and {len(d.not_tried) - LISTED} more" if len(d.not_tried) > LISTED else ""
-        what = f"; not tried: {'; '.join(d.not_tried[:LISTED])}{more}" if d.not_tried else ""
+        what = f"; not tried: {first_of(d.not_tried, LISTED, '; ')}" if d.not_tried else ""
         out.append(f"stopped early: this is the best so far{what}")
     return out
 
