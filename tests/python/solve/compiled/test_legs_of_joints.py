@@ -9,7 +9,7 @@ import pytest
 from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 from tests.oracle.classes import Classes
-from tests.oracle.unseen import cable_suspension
+from tests.oracle.unseen import cable_suspension, planar_cable_suspension
 from tests.python.solve.compiled.agreement import TOLERANCE, compare
 
 import stiffmap as sm
@@ -114,3 +114,20 @@ def test_drives_that_pull_settle_in_the_kernels_with_their_preload() -> None:
     for i in range(3):
         u = least_energy(d, position[i], force[i])
         assert np.abs(u - fast.displacement[i]).max() < 1e-3 * np.abs(u).max()
+
+
+@pytest.mark.parametrize("level", _core.kernel_levels())
+def test_drives_that_go_slack_settle_in_the_kernels(level: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Newton started slack drives kilometres away, where the law bears the linear force, and its steps were lengths of the machine:
+    four of ten poses were left to the reference path, at a hundred times the price."""
+    monkeypatch.setenv("STIFFMAP_ISA", level)
+    machine, rng = sm.Machine(planar_cable_suspension()), np.random.default_rng(7)
+    position = rng.uniform(*machine.workspace, (96, 3))
+    wrench = np.zeros((96, 6))
+    wrench[:, :2] = rng.normal(size=(96, 2)) * 150
+    fast = machine.solve(position, wrench)
+    assert fast.ok.all()
+    assert (np.abs(fast.actuator_effort) < 1).any(axis=1).mean() > 0.3  # newtons: a drive is slack
+    assert fast.reference_share < 0.05
+    reference = machine.solve(position[:24], wrench[:24], method="reference")
+    assert np.abs(reference.displacement - fast.displacement[:24]).max() < TOLERANCE
