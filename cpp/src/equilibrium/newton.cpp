@@ -15,6 +15,8 @@ constexpr int most_idle = 10;  // Newton steps in which the merit is not halved 
 
 /// A linear deflection below this share of the length is closure noise: the coordinate bears nothing.
 constexpr double unloaded = 1e-11;
+/// A deflection, of the length, that no gap has: where a drive that only pulls, and is slack, would bear the force.
+constexpr double slack = 0.02;
 /// The same for the force that a gap would have to bear at an equilibrium: certainly noise, and certainly a force.
 constexpr double gap_noise = 1e-15, gap_force = 1e-14;
 
@@ -30,8 +32,10 @@ void start_laws(const Mechanism& m, Problem& p, State& state) {
     const Law& law = m.laws[at(c.law)];
     const double tau = bears ? law.stiffness() / p.drive_scale[j] * state.z[j] : 0.0;
     p.friction_sign[j] = tau > 0 ? 1 : tau < 0 ? -1 : 0;
-    const double in_spring = tau - law.friction() * p.friction_sign[j];
+    const double in_spring = tau - law.friction() * p.friction_sign[j], linear = state.z[j];
     state.z[j] = bears ? law.from_force(law.at(0, p.drive_scale[j]).tau + in_spring, p.drive_scale[j]) : 0.0;
+    const double far = std::abs(law.at(state.z[j], p.drive_scale[j]).a) * m.unit(j);
+    if (far > slack * m.length && !law.sticks()) state.z[j] = law.from_deflection(linear, p.drive_scale[j]);
   }
 }
 
