@@ -251,6 +251,23 @@ def test_what_is_not_clear_is_asked(
     assert asked in " ".join(capsys.readouterr().err.split())
 
 
+@pytest.mark.parametrize(
+    ("names", "said"),
+    [
+        ("q1,q2,q3,q4,q5,q6", "'q1' goes to 8.192e+04: expected an angle; of counts of an encoder"),
+        ("enc1,enc2,enc3,enc4,enc5,enc6", "which column commands arm.base? Say --map arm.base="),
+        ("S [pulse],L [pulse],U [pulse],R [pulse],B [pulse],T [pulse]", "which column commands arm.base?"),
+    ],
+)
+def test_counts_of_encoders_are_no_degrees(names: str, said: str, tmp_path: Path) -> None:
+    """And with a table of the arm nobody is asked for positions x, y, z."""
+    file = write(tmp_path, "t.csv", f"{names},px [mm],py [mm],pz [mm]\n" + "81920,1,2,3,4,5,6,7,8\n" * 2)
+    arm_file = write(tmp_path, "dh.csv", table())
+    with pytest.raises(StiffmapError) as found:
+        sm.experiment_from_table(None, file, tmp_path / "e", dh=arm_file)
+    assert said in str(found.value)
+
+
 def test_units_of_joints_and_of_places_are_said(tmp_path: Path) -> None:
     """Minutes of arc, and px py pz in metres by --unit of each, are the same readings as degrees and mm."""
     joints = (0, -60, 90, -120, -90, 0)
