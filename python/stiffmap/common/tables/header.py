@@ -38,7 +38,10 @@ def header_of(
     """
     width = sum(bool(c.strip()) for c in first)
     lines = [(n, [_plain(c) for c in cells]) for n, cells in above]
-    lines = [(n, cells) for n, cells in lines if any(c.strip("-=_–—: ") for c in cells)][-MOST_LINES:]
+    lines = [(n, cells) for n, cells in lines if any(c.strip("-=_–—: ") for c in cells)]
+    lines = [line for line in lines if not any(m and m["text"] for m in map(STATED.fullmatch, line[1]))][
+        -MOST_LINES:
+    ]
     units: list[str] = []
     while lines and not fits(lines[-1][1], width):
         if _units(lines[-1][1]):

@@ -26,7 +26,7 @@ from stiffmap.experiment.noise.level import against_the_load, contradictions, no
 from stiffmap.experiment.spreadsheet import dialogue
 from stiffmap.experiment.spreadsheet.answers import Answers, Meant, Question
 from stiffmap.experiment.spreadsheet.convert import ImportedSheet, write_folder
-from stiffmap.experiment.spreadsheet.dh import LEG, QUANTITIES, arm, read_dh, unused
+from stiffmap.experiment.spreadsheet.dh import LAYOUT, LEG, QUANTITIES, arm, read_dh, unused
 from stiffmap.experiment.spreadsheet.guess import has_meaning
 from stiffmap.experiment.spreadsheet.instrument import Instrument, as_readings, load_instrument
 from stiffmap.experiment.spreadsheet.joints import (
@@ -132,7 +132,7 @@ def experiment_from_table(
     sure = {READ.get(k, k): real_number(v, f"noise: {k}") for k, v in (noise or {}).items()}
     same = {k: real_number(v, f"constants: {k}") for k, v in (constants or {}).items()}
     given = Answers(chosen, dict(units or {}), same, sure)
-    joints = None if dh is None else read_sheet(Path(dh))
+    joints = None if dh is None else read_sheet(Path(dh), layout=LAYOUT)
     rows = None if joints is None else read_dh(joints, given.units, dh_convention)
     drives = drives if rows is None else {f"{LEG}.{r.name}": r.slides for r in rows}
     numbered = any(h.strip("+-").isdigit() for many in chosen.values() for h in many)
