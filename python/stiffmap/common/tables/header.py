@@ -149,7 +149,7 @@ def _bare(cell: str) -> str:
 
 def _is_unit(text: str) -> bool:
     """Whether it is a unit, also one of several, such as g/N, m/s^2/N or mm/min."""
-    more = (*TIMES, "Hz", "kHz", "rpm", "tooth", "rev")
+    more = (*TIMES, "ms", "us", "µs", "Hz", "kHz", "rpm", "tooth", "rev")
     with suppress(StiffmapError):
         return unit_of(text) is not None or all(unit_of(n) is not None or n in more for n, _ in terms(text))
     return False
