@@ -105,9 +105,12 @@ def known(quantity: str | None = None) -> str:
 
 def name_and_unit(header: str) -> tuple[str, str]:
     """``x [mm]`` is x in mm; an empty unit where none stands in brackets, as in joint[1]."""
-    match = re.fullmatch(r"(?s)\s*(.*?)\s*(?:(?!\b\[(?:\w+_)?\d+\])[\[(]\s*([^])]*?)\s*[])])?\s*", header)
+    match = re.fullmatch(
+        r"(?s)\s*(.*?)\s*(?:(?!\b\[(?:\w+_)?\d+\])(?:\[\s*([^]]*?)\s*\]|[\[(]\s*([^])]*?)\s*[])]))?\s*",
+        header,
+    )
     assert match is not None  # any text is a name
-    return match[1], match[2] or ""
+    return match[1], match[2] or match[3] or ""
 
 
 def size_of(unit: str) -> float:

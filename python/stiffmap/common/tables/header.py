@@ -38,7 +38,10 @@ def header_of(
     """
     width = sum(bool(c.strip()) for c in first)
     lines = [(n, [_plain(c) for c in cells]) for n, cells in above]
-    lines = [(n, cells) for n, cells in lines if any(c.strip("-=_–—: ") for c in cells)][-MOST_LINES:]
+    lines = [(n, cells) for n, cells in lines if any(c.strip("-=_–—: ") for c in cells)]
+    lines = [line for line in lines if not any(m and m["text"] for m in map(STATED.fullmatch, line[1]))][
+        -MOST_LINES:
+    ]
     units: list[str] = []
     while lines and not fits(lines[-1][1], width):
         if _units(lines[-1][1]):
@@ -110,10 +113,11 @@ STATED = re.compile(
 def stated_unit(above: Sequence[str], quantity: str) -> str:
     """``Units: mm, deg`` or ``Length unit;inches`` in the cells above a table: what it says of a quantity, of lengths also a unit
     that nobody knows; nothing where it says nothing."""
+    above = [re.sub(r"[][]", "", cell).strip() for cell in above]
     for i, cell in enumerate(above):
-        match = STATED.fullmatch(cell.strip())
+        match = STATED.fullmatch(cell)
         of = match and next((q for q in ("length", "angle", "force") if match[q]), "")
-        behind = [c.strip() for c in takewhile(unit_of, above[i + 1 :])]
+        behind = [*takewhile(unit_of, above[i + 1 :])]
         said = [t for t in [match["text"], *behind] if t] or above[i + 1 : i + 2] if match else []
         text = ", ".join(said).strip() if of in ("", quantity) else ""
         words = [text, *re.split(r"[\s,;/&|]+", text)]
@@ -145,7 +149,7 @@ def _bare(cell: str) -> str:
 
 def _is_unit(text: str) -> bool:
     """Whether it is a unit, also one of several, such as g/N, m/s^2/N or mm/min."""
-    more = (*TIMES, "Hz", "kHz", "rpm", "tooth", "rev")
+    more = (*TIMES, "ms", "us", "µs", "Hz", "kHz", "rpm", "tooth", "rev")
     with suppress(StiffmapError):
         return unit_of(text) is not None or all(unit_of(n) is not None or n in more for n, _ in terms(text))
     return False
@@ -249,6 +253,7 @@ PATTERNS: tuple[tuple[str, str], ...] = (
     *((f"u_d{a}", rf"(u|±|sigma|std|uncertainty) ?_?d?{a}") for a in "xyz"),
     *((f"d{a}", rf"(d|delta|δ|{DEFLECTION}|abweichung|error|dev|(dial )?gau?ge|dial|indicator|(mess)?uhr|reading|auslenkung|weg|dehnung)[ _.]?(in |en |[dδ][ _]?)?{a}|{a} ?_?(dif|diff|difference|dev|deviation|err|error|abweichung)|{a}[ _-]?({DEFLECTION}|dial|gau?ge|uhr|reading)") for a in "xyz"),
     *((f"p{a}", rf"p_?{a}") for a in "xyz"),
+    *((f"approach_{a}", rf"(approach|travel|anfahrt|anfahrrichtung|fahrrichtung)[ _.-]?(in |dir(ection)?[ _.-]?)?{a}") for a in "xyz"),
     ("ll", r"l|ll|(measured |gemessene )?(length|länge|laenge)|(draw[ -]?)?wire( ?length)?|(cable|string|ball-?bar|bar) ?length|seil(zug)?(länge)?|distance|abstand"),
     *((f"r{a}", rf"r ?_?{a}|rotation ?_?{a}") for a in "xyz"),
     *((a, rf"{a}|pos\.?[ _-]?{a}|{a}[ _-]?pos\.?|position ?_?{a}|(pose|punkt|messpunkt|tcp|ort|lage|koordinate|coordinate) ?_?{a}|{a}[ _-]?(t|{COMMANDED})|({COMMANDED})[ _-]?{a}") for a in "xyz"),

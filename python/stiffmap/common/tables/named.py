@@ -27,6 +27,10 @@ from stiffmap.common.tables.sheet import Layout, read_sheet
 from stiffmap.common.tables.table import Table
 from stiffmap.common.units import QUANTITIES, unit_of
 
+SPELLED = {
+    "s": {"ms": 1e-3, "us": 1e-6, "µs": 1e-6, "μs": 1e-6}, "Hz": {"kHz": 1e3}, "percent": {"%": 1.0, "-": 100.0, "1": 100.0},
+}  # fmt: skip
+"""SI unit -> others that tables of such columns have."""
 TURNING = {"rpm": math.pi / 30, "1/min": math.pi / 30, "rad/s": 1.0}
 PER = re.compile(r"_(?:per_)?(min|s|tooth)$")
 WORD = "word"
@@ -136,7 +140,7 @@ def _meaning(head: str, known: Known, table: NamedTable) -> tuple[str, str, floa
     """Name of a column, its unit as written, and the SI size of that."""
     text, unit = split_unit(head)
     name = _joined(text)
-    if not known.has(text):  # x_per_tooth_mm, real_m/N
+    if not known.has(text) and not re.search(r"[])]\s*$", head):  # x_per_tooth_mm, real_m/N
         whole = re.sub(r"\s", "_", head)
         cuts = [m.start() for m in re.finditer("_", whole) if known.has(whole[: m.start()])]
         if cuts:
@@ -169,8 +173,8 @@ def size_in(unit: str, si: str) -> float:
     """SI size of a unit that has the dimension of `si`, as experiments, effects and workshops write it; StiffmapError."""
     if si == "rad/s" and unit in TURNING:
         return TURNING[unit]
-    if unit == si or (si == "percent" and unit == "%"):
-        return 1.0
+    if unit == si or unit in SPELLED.get(si, ()):
+        return 1.0 if unit == si else SPELLED[si][unit]
     spelled = unit_of(unit, QUANTITIES[si]) if si in QUANTITIES else None
     try:
         return read_value(f"1 {unit}", si)

@@ -104,15 +104,18 @@ def read_sheet(path: Path, sheet: str | None = None, layout: Layout = PLAIN) -> 
         way = f"; if the table has none, name its columns: {WAY}, or by their numbers, as in --map x=2"
         begin = f"; expected its names of columns, such as {layout.names}" if layout.names else ""
         rule = "; a row of numbers has two or more, each alone in its cell, in half of its cells or more"
-        raise FileError(
-            f"no header line with rows of numbers below it was found{begin if layout.strict else way if first else rule}",
-            file=str(path),
-        )
+        more = begin if layout.strict or (begin and first) else way if first else rule
+        raise FileError(f"no header line with rows of numbers below it was found{more}", file=str(path))
     number_, header = found
     names = _checked(header, str(path), number_)
     if not layout.repeated:
         way = " (names with blanks in them?)" if separator == " " else ""
-        refuse_twice(names, str(path), number_, way + ("" if layout.strict else f"; name the columns: {WAY}"))
+        refuse_twice(
+            names,
+            str(path),
+            number_,
+            way + ("" if layout.strict or layout.names else f"; name the columns: {WAY}"),
+        )
     width = len(names)
     said = [*header, *(c.strip() for _, cells in above for c in cells)]
     aside = [f"row {n}, of numbers above the header" for n, _ in begun[:-1]]

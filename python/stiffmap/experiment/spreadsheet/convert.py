@@ -23,6 +23,7 @@ from stiffmap.experiment.files.fields import POSE, quantity_of
 from stiffmap.experiment.spreadsheet.answers import Meant
 from stiffmap.experiment.spreadsheet.guess import READINGS, Column
 from stiffmap.experiment.spreadsheet.instrument import load_instrument
+from stiffmap.experiment.spreadsheet.sides import side_of_run
 from stiffmap.experiment.spreadsheet.together import weight
 
 WORDS = ("id", "setup", "branch", "target")
@@ -137,6 +138,11 @@ def _ask(m: Meant, known_: set[str], joints: bool) -> None:
         places = "--map px='HEADER' (py, pz) for measured positions; of differences " if joints else ""
         seen = map(m.sheet.find, () if joints else load_instrument("tracker").measured.values())
         names = [n for i in seen if i is not None and (n := m.sheet.names[i]).lower() not in ("x", "y", "z")]
+        if {1.0, -1.0} <= {*map(side_of_run, runs := [h for h in m.sheet.header if side_of_run(h)])}:
+            m.ask_column(
+                f"which column is a reading? Of runs in both directions, say --map dx='{'|'.join(runs)}' (dy, dz)",
+                "reading",
+            )
         if names:
             places = f"--instrument tracker, which takes the command off '{names[0]}'; of differences "
         m.ask_column(

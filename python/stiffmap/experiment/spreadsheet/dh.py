@@ -22,6 +22,7 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.common.tables.cells import Cells
 from stiffmap.common.tables.header import split_unit, with_unit
 from stiffmap.common.tables.lines import DASHES, IN_PI, is_nothing, radians, sum_in
+from stiffmap.common.tables.sheet import Layout
 from stiffmap.common.tables.table import Table
 from stiffmap.common.units import unit_of
 from stiffmap.experiment.spreadsheet.answers import Meant
@@ -64,6 +65,9 @@ NOTHING_MORE = {"", "0", "0.0", "1", "1.0", "+1", "+"}
 """Cells of such a column that change nothing."""
 TURNS = r"(r|dreh|turn|hinge|cont|0).*|d|c|"
 SLIDES = r"p(ris.*)?|t(rans.*)?|s(lid.*|chub.*)?|l(in.*)?|1(\.0*)?"
+IN_PI_RAD = re.compile(r"(?i)[*×x·]? *(pi|π) *\*? *(rad)?")
+"""A unit of angles that are shares of π."""
+LAYOUT = Layout(names="joint, theta [deg], d [mm], a [mm], alpha [deg]")
 QUANTITIES = {"theta": "angle", "d": "length", "a": "length", "alpha": "angle"}
 LEG = "arm"
 STEP, TRIES = math.radians(30.0), 200
@@ -115,7 +119,10 @@ def read_dh(given: Table, units: Mapping[str, str], convention: str) -> list[DHR
             f"row a joint; found {', '.join(given.header)}"
         )
     for name in NUMBERS:
-        if (other := sheet.find(NUMBERS[name], at.values())) is not None:
+        other = sheet.find(NUMBERS[name], at.values())
+        if other is not None and name == "theta" and _turning(sheet, at):
+            at[name] = other
+        elif other is not None:
             both = f"'{given.header[at[name]]}' and '{given.header[other]}'"
             sheet.fail(
                 f"{both} are both {name}; leave one, theta being what is added to the joint's coordinate"
@@ -155,6 +162,15 @@ def read_dh(given: Table, units: Mapping[str, str], convention: str) -> list[DHR
     return out
 
 
+def _turning(sheet: Table, at: Mapping[str, int]) -> bool:
+    """Whether theta is nothing but the coordinates of joints that all turn, which another column is added to."""
+    left = (re.sub(VARIABLE.format("theta|θ|th"), "", c) for c in sheet.columns[at["theta"]])
+    plain = not any(c.strip("0., ") for c in left)
+    return plain and (
+        "type" not in at or all(re.fullmatch(TURNS, c.lower()) for c in sheet.columns[at["type"]])
+    )
+
+
 def _symbols(given: Table) -> list[str]:
     """Names of the columns without marks."""
     return [_plain(h).replace("\\", "") for h in given.header]
@@ -172,7 +188,7 @@ def _constants(sheet: Table, at: Mapping[str, int], units: Mapping[str, str]) ->
     """The table of numbers without the joints' coordinates, and the types: a joint whose type nobody says slides where its d is one."""
     columns, header = list(sheet.columns), list(sheet.header)
     types = [w.lower() for w in columns[at["type"]]] if "type" in at else [""] * len(sheet.lines)
-    for name, symbol, sliding in (("theta", "theta|θ", False), ("d", "d", True)):
+    for name, symbol, sliding in (("theta", "theta|θ|th", False), ("d", "d", True)):
         cells = [*columns[at[name]]]
         for i, cell in enumerate(cells):
             left = re.sub(VARIABLE.format(symbol), "", cell, count=1).strip()
@@ -192,10 +208,13 @@ def _constants(sheet: Table, at: Mapping[str, int], units: Mapping[str, str]) ->
         read = [not is_nothing(c) or DASHES.fullmatch(c) or not c for c in cells]
         sheet.check(read, lambda i: f"{found} '{cells[i]}'")  # noqa: B023
         sheet.check([not RANGE.search(c) for c in cells], lambda i: f"{found} '{cells[i]}', {limits}")  # noqa: B023
+        plain, own = split_unit(header[at[name]])
+        said = units.get(name) or own or units.get(quantity, "rad")
+        if quantity == "angle" and IN_PI_RAD.fullmatch(said.strip()):
+            said = "rad"
+            cells = [c if not c or IN_PI.search(c) else f"{c}*π" for c in cells]
         sums = (None if IN_PI.search(c) else sum_in(c, sheet.decimal_comma) for c in cells)
         cells = [c if v is None else point(v) for v, c in zip(sums, cells, strict=True)]
-        plain, own = split_unit(header[at[name]])
-        said = units.get(name) or own or units.get("angle", "rad")
         angles = [radians(c, sheet.decimal_comma) for c in cells]
         if quantity == "angle" and (unit := unit_of(said, "angle")) and angles.count(None) < len(angles):
             cells = [c if a is None else point(a / unit.size) for a, c in zip(angles, cells, strict=True)]

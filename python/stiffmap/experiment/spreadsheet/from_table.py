@@ -26,7 +26,7 @@ from stiffmap.experiment.noise.level import against_the_load, contradictions, no
 from stiffmap.experiment.spreadsheet import dialogue
 from stiffmap.experiment.spreadsheet.answers import Answers, Meant, Question
 from stiffmap.experiment.spreadsheet.convert import ImportedSheet, write_folder
-from stiffmap.experiment.spreadsheet.dh import LEG, QUANTITIES, arm, read_dh, unused
+from stiffmap.experiment.spreadsheet.dh import LAYOUT, LEG, QUANTITIES, arm, read_dh, unused
 from stiffmap.experiment.spreadsheet.guess import has_meaning
 from stiffmap.experiment.spreadsheet.instrument import Instrument, as_readings, load_instrument
 from stiffmap.experiment.spreadsheet.joints import (
@@ -38,6 +38,7 @@ from stiffmap.experiment.spreadsheet.joints import (
     turned,
 )
 from stiffmap.experiment.spreadsheet.places import in_base_axes, seated, seen_next_to_commands, without_lost
+from stiffmap.experiment.spreadsheet.sides import approached
 from stiffmap.experiment.spreadsheet.together import one_point_a_row, oriented, together
 from stiffmap.solve.machine import Machine, load_machine
 
@@ -131,7 +132,7 @@ def experiment_from_table(
     sure = {READ.get(k, k): real_number(v, f"noise: {k}") for k, v in (noise or {}).items()}
     same = {k: real_number(v, f"constants: {k}") for k, v in (constants or {}).items()}
     given = Answers(chosen, dict(units or {}), same, sure)
-    joints = None if dh is None else read_sheet(Path(dh))
+    joints = None if dh is None else read_sheet(Path(dh), layout=LAYOUT)
     rows = None if joints is None else read_dh(joints, given.units, dh_convention)
     drives = drives if rows is None else {f"{LEG}.{r.name}": r.slides for r in rows}
     numbered = any(h.strip("+-").isdigit() for many in chosen.values() for h in many)
@@ -143,14 +144,22 @@ def experiment_from_table(
             return loaded
         return Machine(arm(rows, dh_convention, output.name, f"from {Path(dh).name}", m.middle()))
 
+    alone = rows is not None
     understood = partial(
-        _understood, file, layout, drives, wrote, difference, quantity == "deflection", given, declared_for
+        _understood,
+        file,
+        layout,
+        drives,
+        wrote,
+        difference,
+        quantity == "deflection",
+        given,
+        declared_for,
+        alone,
     )
     m, found = _fitting(file, sheet, understood, ask)
     own = m.sheet
     _refuse_units(given.units, m, drives, () if rows is None else QUANTITIES)
-    if rows is not None and not m.columns:
-        raise StiffmapError(f"{file}: no column commands a joint; the arm has {', '.join(drives)}")
     quantity = "position" if m.placed or "ll" in found.units else quantity
     declared = str(output / "machine.yaml") if machine is None else str(machine)
     title = f"from {own.file.replace(str(file), file.name)}"
@@ -222,34 +231,38 @@ def _understood(
     deflection: bool,
     given: Answers,
     declared: Callable[[Meant], Machine],
+    alone: bool,
     name: str | None,
     ask: dialogue.Ask | None,
 ) -> tuple[Meant, ImportedSheet]:
     """One sheet: `drives` (name -> whether it slides) it may command, what `wrote` it, the sign of its `difference`; rows of a
-    `deflection` need a load; `declared`: the machine that it commands."""
+    `deflection` need a load; `declared`: the machine that it commands, by its joints `alone`."""
     form = read_sheet(file, name, layout)
     kept = dialogue.remembered(form)
     m = Meant.of_sheet(form, given if kept is None else kept.below(given))
     if kept is not None:
         m.said.append(f"answers of an earlier sheet of this form are used: {dialogue.profile_file(form)}")
     together(m, deflection)
-    commanded(m, drives)
+    approached(m)
+    commanded(m, drives, alone)
     one_point_a_row(m)
     measured = (wrote or load_instrument("tracker")).measured
     without_lost(m, wrote.columns if wrote else {}, measured)
     same = partial(compared, m, difference, measured, deflection)
+    less: set[str] = set()
     if m.columns:
         dialogue.asked(m, ask, partial(seated, m))
         dialogue.asked(m, ask, same)
         as_seen(m, difference)
     elif wrote is not None:
-        as_readings(m, wrote)
+        if less := as_readings(m, wrote):
+            compared(m, difference, measured, deflection, less)
     else:
         dialogue.asked(m, ask, same)
     dialogue.asked(m, ask, partial(in_base_axes, m, partial(declared, m)))
     oriented(m)
     if not m.placed:
-        turned(m, difference)
+        turned(m, difference, less)
     dialogue.asked(m, ask, partial(seen_next_to_commands, m))
     try:
         found = dialogue.ask_all(m, ask, deflection and not m.placed)

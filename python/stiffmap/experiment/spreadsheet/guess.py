@@ -10,7 +10,7 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.common.tables.header import meaning_of, split_unit
 from stiffmap.common.units import TIMES, unit_of
 from stiffmap.experiment.channels import AXES
-from stiffmap.experiment.files.fields import SEEN
+from stiffmap.experiment.files.fields import APPROACH, SEEN
 
 REPEATED = re.compile(r"^(.*?)[ _.-]*(?:#|run|messung|wdh|rep|repeat)?[ _.-]*(\d+)$", re.IGNORECASE)
 TORQUE = re.compile(r"^[tT](?=[ _]?[xyzXYZ]$)")
@@ -52,10 +52,10 @@ def guess(headers: Sequence[str], chosen: Mapping[str, Sequence[str]]) -> list[C
             out.append(Column(index, name, unit, meaning, repeat if len(chosen[meaning]) > 1 else 0))
         else:
             time = unit in (*TIMES, "ms", "h") or (name == "t" and not unit)  # T is a temperature
-            meaning, repeat = (
-                ("note", 0) if time else _meaning(TORQUE.sub("m", name) if unit_of(unit, "moment") else name)
-            )
-            out.append(Column(index, name, unit, "note" if meaning in chosen else meaning, repeat))
+            plain = TORQUE.sub("m", name) if unit_of(unit, "moment") else name
+            meaning, repeat = ("note", 0) if time else _meaning(plain)
+            place = unit and meaning in APPROACH  # a point from which it came, no direction
+            out.append(Column(index, name, unit, "note" if place or meaning in chosen else meaning, repeat))
     if "ll" not in chosen and any(c.meaning in READINGS and c.meaning != "ll" for c in out):
         # a length of something else
         out = [replace(c, meaning="note") if c.meaning == "ll" else c for c in out]

@@ -70,8 +70,8 @@ def load_instrument(name_or_path: str) -> Instrument:
     return Instrument(**data)
 
 
-def as_readings(m: Meant, instrument: Instrument) -> None:
-    """Columns of readings, their meanings, and units of those without.
+def as_readings(m: Meant, instrument: Instrument) -> set[str]:
+    """Columns of readings, their meanings, and units of those without; which of them are what was measured less what was commanded.
 
     What a person says of columns stays. Where that or the headers name px, py, pz, nothing is taken off the places seen.
 
@@ -82,7 +82,7 @@ def as_readings(m: Meant, instrument: Instrument) -> None:
     instrument = replace(instrument, units=usual)  # --unit and a line above speak of all without one
     if instrument.circle:
         _of_circle(m, instrument)
-        return
+        return set()
     chosen: dict[str, list[str]] = {}
     units: dict[str, str] = {}
     for meaning, pattern in instrument.columns.items():
@@ -122,7 +122,9 @@ def as_readings(m: Meant, instrument: Instrument) -> None:
             chosen[meaning] = [name]
             if meaning not in m.chosen:
                 m.units.pop(meaning, None)
+    less = set() if seen or not at or apart else {*at} - {*m.chosen}
     m.chosen, m.units = chosen | m.chosen, units | m.units
+    return less
 
 
 def _of_circle(m: Meant, instrument: Instrument) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from stiffmap.common.units import Unit, unit_of
 from stiffmap.experiment.channels import AXES
 from stiffmap.experiment.files.fields import SEEN
 from stiffmap.experiment.spreadsheet.answers import Meant
-from stiffmap.experiment.spreadsheet.guess import READINGS, Column
+from stiffmap.experiment.spreadsheet.guess import READINGS, Column, guess
 from stiffmap.experiment.spreadsheet.together import quaternion
 from stiffmap.solve.machine import Machine
 
@@ -25,6 +25,8 @@ MEASURED = r"([xyz])[ _.-]?meas(?:ured|\.)?"
 """A header of a measured position, next to joints."""
 MOST_TURNS = 4.0 * math.pi
 """Of a joint; larger numbers are degrees."""
+MOST_DEGREES = 7200.0
+"""Of a joint; larger numbers are counts of an encoder."""
 DIFFERENCES = ("actual-minus-target", "target-minus-actual")
 UNITS = ("mm", "um", "m", "in", "mil")
 """In which differences may be."""
@@ -38,8 +40,8 @@ def drives_of(machine: Machine) -> dict[str, bool]:
     return {a: machine.compiled.names.is_prismatic(a) for a in machine.actuators}
 
 
-def commanded(m: Meant, drives: Mapping[str, bool]) -> None:
-    """Columns of a table of joints, and their units; nothing where no column commands a drive.
+def commanded(m: Meant, drives: Mapping[str, bool], alone: bool = False) -> None:
+    """Columns of a table of joints, and their units; nothing where no column commands a drive and they are not what `alone` does.
 
     `drives`: full name -> whether it slides. Columns go by the drive's name, full or short, or by its number (`joint_1`, `q1`,
     `J1`, `A1`), or as they are chosen. Raises StiffmapError where some drives have a column and others none, and where a unit is
@@ -50,7 +52,7 @@ def commanded(m: Meant, drives: Mapping[str, bool]) -> None:
     numbers = zip(drives, _numbered(m, len(drives), len(given) == len(drives)), strict=True)
     at = {name: _find(m, name, number, given.get(name)) for name, number in numbers}
     lost = [n for n, i in at.items() if i is None]
-    if len(lost) == len(at):
+    if len(lost) == len(at) and not alone:
         return
     if lost:
         m.ask_column(
@@ -118,6 +120,11 @@ def _unit(m: Meant, index: int, name: str, slides: bool) -> Unit:
     if m.sheet.names[index] in m.spent and (slides or not largest):  # mm by --set; zero in any unit
         return Unit("mm" if slides else "deg")
     if not slides and largest > MOST_TURNS and not m.written_unit(index, *names, quantity=quantity):
+        if largest > MOST_DEGREES:
+            raise StiffmapError(
+                f"{m.sheet.file}: '{m.sheet.header[index]}' goes to {largest:.4g}: expected an angle; of counts of an encoder, write "
+                "angles (counts × 360 / counts per turn), or say --unit joints=deg where they are"
+            )
         m.said.append(f"'{m.sheet.header[index]}' goes to {largest:.4g}: taken as degrees")
         return Unit("deg")
     return m.unit(index, *names, quantity=quantity)
@@ -170,53 +177,52 @@ def as_seen(m: Meant, difference: str) -> None:
     m.head, m.placed = {"frame": "unknown", "tool": "unknown"}, True
 
 
-def compared(m: Meant, difference: str, measured: Mapping[str, str], deflection: bool) -> None:
+def compared(
+    m: Meant, difference: str, measured: Mapping[str, str], deflection: bool, taken: Collection[str] = ()
+) -> None:
     """Differences next to what was commanded and measured, of which `measured` has the header's patterns. StiffmapError where they
-    have another sign or unit than what is said of them; rows that differ are named, of a `deflection` where others do not."""
-    of = {c.meaning: c.index for c in m.guessed if c.repeat == 0}
+    have another sign or unit than what is said of them; rows that differ are named, of a `deflection` where others do not, and where
+    what was measured less what was commanded was `taken` instead."""
+    columns = guess(m.sheet.header, {}) if taken else m.guessed
+    of = {c.meaning: c.index for c in columns if c.repeat == 0}
     sign = 1.0 if difference == DIFFERENCES[0] else -1.0
     turns, ways, shown = [], [], ""
     for reading, pattern in measured.items():
         at, command = of.get(reading), of.get(reading[-1])
-        if at is None or command is None or reading in m.unloaded:
+        own = m.sheet.find(pattern, [i for i in (at, command) if i is not None])
+        if at is None or command is None or own is None or reading in m.unloaded:
             continue
-        own = m.sheet.find(pattern, (at, command))
-        if own is None or not all(map(m.sheet.is_numeric, (at, command, own))):
+        if not all(map(m.sheet.is_numeric, (at, command, own))):
             continue
-        size, place = m.unit(at, reading).size, m.unit(command, reading[-1]).size
-        actual = (unit_of(m.sheet.unit(own), "length") or Unit("m", place)).size
+        place = m.unit(command, reading[-1])
+        written, seen = (unit_of(m.sheet.unit(i), "length") or place for i in (at, own))
+        size, actual = written.size if taken else m.unit(at, reading).size, seen.size
         read = m.sheet.numbers(at)
-        apart = sign * (actual * m.sheet.numbers(own) - place * m.sheet.numbers(command))
+        apart = sign * (actual * m.sheet.numbers(own) - place.size * m.sheet.numbers(command))
         apart[~np.isfinite(read)] = np.nan
-        step, rounded = _step(m.sheet.columns[at]), actual * _step(m.sheet.columns[own])
-        units = {size: ""} | {u.size: n for n in UNITS if (u := unit_of(n, "length")) and u.size != size}
-        off = {
-            k * s: np.abs(k * s * read - apart) > rounded + k * step + EXACT
-            for k in units
-            for s in (1.0, -1.0)
-        }
+        step, rounded = _step(m.sheet.columns[at]), actual * _step(m.sheet.columns[own]) + EXACT
+        units = {u.size: n for n in UNITS if (u := unit_of(n, "length"))} | {size: ""}
+        ks = [size, *(k for k in units if k != size)]
+        off = {k: np.abs(k * read - apart) > rounded + abs(k) * step for one in ks for k in (one, -one)}
         telling = {k: np.abs(apart) > 2.0 * (rounded + abs(k) * step) for k in off}
-        found = next(
-            (k for k, t in telling.items() if t.sum() > 1 and 2 * (off[k] & t).sum() < t.sum()), None
-        )
+        fits = (k for k, t in telling.items() if t.sum() > 1 and 2 * (off[k] & t).sum() < t.sum())
+        found = next(fits, None)
         turns.append(found is not None and found < 0.0)
-        rows = np.flatnonzero(off[size]).tolist()
-        if not rows:
+        if not (rows := np.flatnonzero(off[size])).size:
             continue
-        (i, *more), header = rows, m.sheet.header[at]
-        less = " less ".join(
-            f"'{m.sheet.header[k]}'" for k in ((own, command) if sign > 0 else (command, own))
-        )
+        header, both = m.sheet.header[at], [f"'{m.sheet.header[k]}'" for k in (own, command)]
+        less, i = " less ".join(both[:: int(sign)]), rows[0]
         told = f"line {m.sheet.lines[i]}: '{header}' is {1e3 * size * read[i]:.4g} mm, {less} {1e3 * apart[i]:.4g} mm"
-        told += f", and {len(more)} further rows differ" if more else ""
-        if found == size or (found is None and not deflection):
+        told += f", and {len(rows) - 1} further rows differ" if len(rows) > 1 else ""
+        if reading in taken:
+            m.said.append(f"{told}; {' less '.join(both)} is taken")
+        elif found == size or (found is None and not deflection):
             m.said.append(told)
         elif found is not None:
             shown = shown or told
-            if units[abs(found)]:
-                ways.append(f"--unit {reading}={units[abs(found)]}")
-            if found < 0.0:
-                ways.append(f"--map {reading}='{header[1:] if header[0] == '-' else '-' + header}'")
+            ways += [f"--unit {reading}={units[abs(found)]}"] if units[abs(found)] else []
+            turn = header[1:] if header[0] == "-" else f"-{header}"
+            ways += [f"--map {reading}='{turn}'"] if found < 0.0 else []
     if shown:
         if all(turns):
             ways = [*(w for w in ways if w.startswith("--unit")), f"--difference {DIFFERENCES[sign > 0]}"]
@@ -229,17 +235,17 @@ def _step(cells: Cells) -> float:
     return 0.0 if any("e" in d for d in digits) else 0.51 * 0.1 ** max(map(len, digits))
 
 
-def turned(m: Meant, difference: str) -> None:
-    """Readings as actual minus target in columns of their own; nothing where they are that already."""
+def turned(m: Meant, difference: str, besides: Collection[str] = ()) -> None:
+    """Readings as actual minus target in columns of their own, `besides` those that are that already."""
     if difference == DIFFERENCES[0]:
         return
     chosen: dict[str, list[str]] = {}
     for c in m.guessed:
-        if c.meaning in (*AXES, "dd"):
+        if c.meaning in {*AXES, "dd"} - {*besides}:
             name = f"less {with_unit(c.name, c.unit)}"
             m.sheet = m.sheet.with_column(name, -m.sheet.numbers(c.index))
             chosen.setdefault(c.meaning, []).append(name)
-    if not chosen:
+    if not chosen and not besides:
         raise StiffmapError(NO_DIFFERENCE.format(m.sheet.file))
     m.chosen |= chosen
 

@@ -164,7 +164,7 @@ def _differences(m: Meant) -> None:
         m.said.append(f"{meaning} is '{header[i]}' less '{header[j]}'{left}")
 
 
-def _way(cell: str) -> tuple[str, float] | None:
+def way_of(cell: str) -> tuple[str, float] | None:
     match = WAY.fullmatch(cell.strip().replace("−", "-"))
     if match is None:
         return None
@@ -174,7 +174,7 @@ def _way(cell: str) -> tuple[str, float] | None:
 def _directions(m: Meant) -> None:
     """Components of a load whose size and direction stand in columns of their own."""
     names = m.sheet.names
-    at = [i for i, n in enumerate(names) if DIRECTION.fullmatch(n) and any(map(_way, m.sheet.columns[i]))]
+    at = [i for i, n in enumerate(names) if DIRECTION.fullmatch(n) and any(map(way_of, m.sheet.columns[i]))]
     loads = [
         i
         for i, n in enumerate(names)
@@ -188,7 +188,7 @@ def _directions(m: Meant) -> None:
     sizes = m.sheet.numbers(load)
     parts = np.zeros((len(sizes), 3))
     for row, (cell, size) in enumerate(zip(m.sheet.columns[way], sizes, strict=True)):
-        found = _way(cell)
+        found = way_of(cell)
         if found is not None:
             parts[row, "xyz".index(found[0])] = found[1] * size
         elif size and not np.isnan(size):

@@ -21,10 +21,15 @@ ABOVE_ZERO = ("frequency", "u", "u_damping", "u_dir")
 NUMBERS = (*POSE, *ABOVE_ZERO, "damping", *WAY)
 UNITS = {
     **dict.fromkeys(POSE, "m"), "frequency": "Hz", "u": "Hz", "u_damping": "percent", "u_dir": "", "damping": "percent",
-    **dict.fromkeys(WAY, ""), **dict.fromkeys(("response", "along", "hammer"), WORD),
+    **dict.fromkeys(WAY, ""), **dict.fromkeys(("response", "along", "hammer", "mode"), WORD),
 }  # fmt: skip
 USUAL = {n: f"{n}_{ {'m': 'mm'}.get(u, u) }" for n, u in UNITS.items() if u not in ("", WORD)}
-KNOWN = Known(UNITS, USUAL, {}, blank=True)
+ALIASES = {
+    **dict.fromkeys(("f", "fn", "f_n", "freq", "natural_frequency", "eigenfrequency", "frequenz", "eigenfrequenz"), "frequency"),
+    **dict.fromkeys(("zeta", "ζ", "damping_ratio", "dämpfung", "dämpfungsgrad", "lehr"), "damping"),
+    **dict.fromkeys(("mode_no", "mode_no.", "mode_number", "mode_nr"), "mode"),
+}  # fmt: skip
+KNOWN = Known(UNITS, USUAL, ALIASES, blank=True)
 SHARE = 0.01
 """Standard uncertainty of a frequency where none is given, relative."""
 DAMPING_SHARE = 0.2

@@ -77,7 +77,9 @@ def read_points(path: Path) -> Toolpath:
 
     Raises FileError naming the column or the line.
     """
-    t = read_named(path, Known(COLUMNS, USUAL, {"f": "feed", "s": "spindle"}))
+    t = read_named(
+        path, Known(COLUMNS, USUAL, {"f": "feed", "vorschub": "feed", "s": "spindle", "drehzahl": "spindle"})
+    )
     n = len(t.lines)
     if n < 2:
         t.fail("expected a line of names and two or more points")

@@ -80,13 +80,13 @@ def _remarks(found: Imported, assumed: bool) -> Iterator[Text]:
 
 def _of_table(file: Path, convention: str, unit: list[str] | None) -> Imported:
     from stiffmap.common.tables.sheet import read_sheet
-    from stiffmap.experiment.spreadsheet.dh import QUANTITIES, arm, read_dh, unused
+    from stiffmap.experiment.spreadsheet.dh import LAYOUT, QUANTITIES, arm, read_dh, unused
 
     name = re.sub(r"[^A-Za-z0-9_\-]+", "-", file.stem)
     units = pairs(unit, "unit")
     if wrong := [n for n in units if n not in {*QUANTITIES, *QUANTITIES.values()}]:
         raise StiffmapError(f"--unit {wrong[0]}: expected one of {', '.join(QUANTITIES)}")
-    sheet = read_sheet(file)
+    sheet = read_sheet(file, layout=LAYOUT)
     rows = read_dh(sheet, units, convention)
     description = arm(rows, convention, name, f"from {file.name}")
     aside = (*(f"column '{h}'" for h in unused(sheet)), *sheet.aside)

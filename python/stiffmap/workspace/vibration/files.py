@@ -17,15 +17,19 @@ from stiffmap.common.tables.workbook import TABLES
 from stiffmap.workspace.vibration.response import Complex
 from stiffmap.workspace.vibration.response_units import FREQUENCIES, ResponseUnit, response_unit
 
+PREFIX = re.compile(r"(frf|h[12]?)_(?=.)")
+"""Before the part of a response, as in ``H1 Real [m/N]``."""
 COLUMNS = Known(
     {**dict.fromkeys(("frequency", "real", "imag", "magnitude", "coherence"), ""), "phase": "rad", "response": WORD},
     {"frequency": "frequency_Hz", **{n: f"{n}_m/N" for n in ("real", "imag", "magnitude")}, "phase": "phase_deg"},
     {
-        "freq": "frequency", "f": "frequency", "coh": "coherence", "phase_angle": "phase", "arg(h)": "phase", **dict.fromkeys(("h", "frf", "h1", "h2", "h(f)", "complex"), "response"),
-        **dict.fromkeys(("re", "re(h)", "re(frf)", "real_part"), "real"),
-        **dict.fromkeys(("im", "im(h)", "im(frf)", "imaginary", "imaginary_part", "imag_part"), "imag"),
-        **dict.fromkeys(("mag", "amplitude", "|h|", "|frf|", "accelerance", "inertance", "mobility", "receptance"), "magnitude"),
+        **dict.fromkeys(("freq", "f", "hz", "frequenz"), "frequency"), **dict.fromkeys(("coh", "kohärenz"), "coherence"),
+        **dict.fromkeys(("phase_angle", "arg(h)", "arg_h"), "phase"), **dict.fromkeys(("h", "frf", "h1", "h2", "h(f)", "complex"), "response"),
+        **dict.fromkeys(("re", "re(h)", "re(frf)", "real_part", "realteil"), "real"),
+        **dict.fromkeys(("im", "im(h)", "im(frf)", "imaginary", "imaginary_part", "imag_part", "imaginärteil"), "imag"),
+        **dict.fromkeys(("mag", "amplitude", "|h|", "|frf|", "accelerance", "inertance", "mobility", "receptance", "compliance", "betrag", "nachgiebigkeit"), "magnitude"),
     },
+    lambda name, unit: (PREFIX.sub("", name), unit),
 )  # fmt: skip
 FORMS = (("real", "imag"), ("magnitude", "phase"))
 EXAMPLES = "m/N, mm/N, um/N, m/s/N, m/s2/N, g/N and the like"
@@ -72,6 +76,8 @@ def read_responses(path: str | PathLike[str]) -> list[MeasuredResponse]:
 
 def _table(path: Path) -> MeasuredResponse:
     t = read_named(path, COLUMNS)
+    if {*FORMS[0], *FORMS[1]} <= {*t.values}:  # the same in another form
+        t.values = {n: v for n, v in t.values.items() if n not in FORMS[1]}
     if words := t.values.pop("response", None):
         parts = [complex_number(c) for c in words]
         if None in parts:

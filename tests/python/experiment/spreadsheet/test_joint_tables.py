@@ -53,6 +53,40 @@ def write(folder: Path, name: str, text: str) -> str:
 ZEROS = "joint,theta,d [mm],a [mm],alpha [deg]\n1,{},127.3,0,90\n2,{},0,-612,0\n3,{},0,-572.3,0\n"
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "joint,theta [pi],d [mm],a [mm],alpha [pi]\n1,0,400,25,1/2\n2,-1/2,0,455,0\n3,0,0,35,-1/2\n",
+        "joint,theta [π rad],d [mm],a [mm],alpha [pi rad]\n1,0,400,25,0.5\n2,-.5,0,455,\n3,0,0,35,-0.5\n",
+        "Units: [mm], [deg]\njoint,theta,d,a,alpha\n1,0,400,25,90\n2,-90,0,455,0\n3,0,0,35,-90\n",
+        "joint,theta,d [mm],a [mm],alpha [deg],offset [deg]\n1,q1,400,25,90,0\n2,q2,0,455,0,-90\n3,q3,0,35,-90,0\n",
+        "joint,type,theta [deg],d [mm],a [mm],alpha [deg],offset [deg]\n1,R,0,400,25,90,0\n2,R,0.0,0,455,0,-90\n3,R,0,0,35,-90,0\n",
+        "joint,theta [deg],d [mm],a [mm],alpha [deg]\n1,th1,400,25,90\n2,th2 - 90,0,455,0\n3,th3,0,35,-90\n",
+    ],
+)  # fmt: skip
+def test_one_arm_as_many_write_it(text: str, tmp_path: Path) -> None:
+    found = read_dh(read_sheet(Path(write(tmp_path, "dh.csv", text))), {}, "standard")
+    wanted = [(0, 0.4, 0.025, 90), (-90, 0, 0.455, 0), (0, 0, 0.035, -90)]
+    each = [(math.degrees(r.theta), r.d, r.a, math.degrees(r.alpha)) for r in found]
+    np.testing.assert_allclose(each, wanted, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("1,0,400,25,90\n2,0,0,455,0\n3,0,0,35,90\n", "such as joint, theta \\[deg\\], d"),
+        ("joint,type,theta [deg],d [mm],a [mm],alpha [deg],offset [deg]\n1,R,0,400,25,90,0\n2,P,0,0,455,0,-90\n", "are both theta"),
+        ("joint,theta [deg],d [mm],a [mm],alpha [deg],offset [deg]\n1,5,400,25,90,0\n2,0,0,455,0,-90\n", "are both theta"),
+    ],
+)  # fmt: skip
+def test_tables_of_arms_that_are_not_clear_say_what_one_has(text: str, said: str, tmp_path: Path) -> None:
+    file, made = write(tmp_path, "dh.csv", text), tmp_path / "m.yaml"
+    with pytest.raises(StiffmapError, match=said) as found:
+        read_dh(read_sheet(Path(file), layout=dh.LAYOUT), {}, "standard")
+    assert "--header" not in str(found.value)
+    assert main(["import", file, "-o", str(made)]) == 2 and not made.exists()
+
+
 @pytest.mark.parametrize("cells", [("0", "0", "0"), ("q1", "q2", "q3"), ("θ1", "θ2", "0*")])
 def test_angles_that_are_zero_need_no_unit(cells: tuple[str, ...], tmp_path: Path) -> None:
     sheet = read_sheet(Path(write(tmp_path, "dh.csv", ZEROS.format(*cells))))
@@ -251,6 +285,23 @@ def test_what_is_not_clear_is_asked(
     assert asked in " ".join(capsys.readouterr().err.split())
 
 
+@pytest.mark.parametrize(
+    ("names", "said"),
+    [
+        ("q1,q2,q3,q4,q5,q6", "'q1' goes to 8.192e+04: expected an angle; of counts of an encoder"),
+        ("enc1,enc2,enc3,enc4,enc5,enc6", "which column commands arm.base? Say --map arm.base="),
+        ("S [pulse],L [pulse],U [pulse],R [pulse],B [pulse],T [pulse]", "which column commands arm.base?"),
+    ],
+)
+def test_counts_of_encoders_are_no_degrees(names: str, said: str, tmp_path: Path) -> None:
+    """And with a table of the arm nobody is asked for positions x, y, z."""
+    file = write(tmp_path, "t.csv", f"{names},px [mm],py [mm],pz [mm]\n" + "81920,1,2,3,4,5,6,7,8\n" * 2)
+    arm_file = write(tmp_path, "dh.csv", table())
+    with pytest.raises(StiffmapError) as found:
+        sm.experiment_from_table(None, file, tmp_path / "e", dh=arm_file)
+    assert said in str(found.value)
+
+
 def test_units_of_joints_and_of_places_are_said(tmp_path: Path) -> None:
     """Minutes of arc, and px py pz in metres by --unit of each, are the same readings as degrees and mm."""
     joints = (0, -60, 90, -120, -90, 0)
@@ -308,7 +359,7 @@ def test_limits_of_joints_have_units_of_their_own(unit: str, table_unit: str, tm
         *((f"{title}\n{DH}\n0,0,1,0\n", f"'{title}': of the link before") for title in MODIFIED),
         *((f"{DH},{name}\n0,0,1,0,{v}\n", f"'{name}' says more than") for name, v in MORE),
         *(
-            (f"{name},{DH}\n0,0,0,1,0\n", f"'{name}' and")
+            (f"{name},{DH}\n5,5,0,1,0\n", f"'{name}' and")
             for name in ("offset [deg]", "theta offset [rad]", "d [m]")
         ),
         *((f"type,{DH}\n{kind},0,0,1,0\n", f"found '{kind}'") for kind in ("fixed", "ball", "spherical")),

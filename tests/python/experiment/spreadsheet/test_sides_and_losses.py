@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -88,6 +90,91 @@ def test_deflections_next_to_places_need_not_be_their_difference(tmp_path: Path)
     found = made(tmp_path, head, GRID, np.full(COUNT, 50.0), GRID + ERRORS, own, quantity="deflection")
     assert not found.remarks
     np.testing.assert_allclose(found.experiment.reading[:, :3], 1e-3 * own)
+
+
+@pytest.mark.parametrize(
+    ("reads", "factor", "agrees"),
+    [
+        ("dX;dY;dZ", 1, "actual-minus-target"),
+        ("dX;dY;dZ", -1, "target-minus-actual"),
+        ("X dev [um];Y dev [um];Z dev [um]", 1e3, "actual-minus-target"),
+        ("dX;dY;dZ", 1e3, ""),
+    ],
+)
+@pytest.mark.parametrize("difference", ["actual-minus-target", "target-minus-actual"])
+def test_an_instrument_reads_actual_less_nominal_whatever_differences_stand_next_to_them(
+    reads: str, factor: float, agrees: str, difference: str, tmp_path: Path
+) -> None:
+    """The sign of the file's differences turns those alone, and differences that contradict are named."""
+    sides = np.column_stack([GRID, GRID + ERRORS, factor * ERRORS])
+    head = SIDES.format("nom", "act", reads)
+    found = made(tmp_path, head, sides, instrument="tracker", difference=difference)
+    np.testing.assert_allclose(read(found), ERRORS, atol=1e-9)
+    assert any("'X act' less 'X nom' is taken" in r for r in found.remarks) == (difference != agrees)
+
+
+POINTS = "x [mm];y [mm];z [mm];"
+LINE = np.column_stack([np.repeat([0.0, 50.0, 100.0], 2), np.zeros((6, 2))])
+BOTH = [1.0, -1.0]
+
+
+@pytest.mark.parametrize(
+    ("head", "cells", "more"),
+    [
+        ("approach_x;approach_y;approach_z", ("1;0;0", "-1;0;0"), {}),
+        ("Approach", ("1", "-1"), {}),
+        ("Anfahrrichtung", ("+", "-"), {}),
+        ("Direction", ("forward", "reverse"), {}),
+        ("Travel direction", ("+x", "-X"), {}),
+        ("Seite", ("up", "down"), {"columns": {"approach_x": "Seite"}}),
+    ],
+)
+def test_directions_of_travel_are_read(
+    head: str, cells: tuple[str, str], more: dict[str, Any], tmp_path: Path
+) -> None:
+    rows = (f"{x:g};0;0;{cells[i % 2]};{i}" for i, x in enumerate(LINE[:, 0]))
+    (tmp_path / "t.csv").write_text("\n".join([f"{POINTS}{head};dx [um]", *rows]), encoding="utf-8")
+    usual = {"noise": {"dx": 1.0}, "quantity": "position"}
+    found = sm.experiment_from_table("tripteron", tmp_path / "t.csv", tmp_path / "o", **usual, **more)  # type: ignore[arg-type]
+    np.testing.assert_array_equal(found.experiment.approach, np.outer(BOTH * 3, [1.0, 0.0, 0.0]))
+
+
+@pytest.mark.parametrize(
+    ("names", "runs"),
+    [(f"{a};{b};{c};{d}", f"{a}|{b}|{c}|{d}") for a, b, c, d in (
+        ("Run 1 +", "Run 1 -", "Run 2 +", "Run 2 -"), ("1 up", "1 down", "2 up", "2 down"), ("V1 forward", "V1 reverse", "V2 forward", "V2 reverse"),
+    )],
+)  # fmt: skip
+def test_runs_in_both_directions_side_by_side_keep_them(names: str, runs: str, tmp_path: Path) -> None:
+    """As in tables of ISO 230-2: they are no repeats of one another."""
+    values = np.arange(12.0).reshape(3, 4)
+    more: dict[str, Any] = {"constants": {"y": 0, "z": 0}, "units": {"dx": "um"}, "noise": {"dx": 1.0}}
+    asked = partial(made, tmp_path, f"Target [mm];{names}", LINE[::2, 0], values, **more)
+    with pytest.raises(StiffmapError, match=f"runs in both directions, say --map dx='{re.escape(runs)}'"):
+        asked(columns={"x": "Target [mm]"})
+    found = asked(columns={"x": "Target [mm]", "dx": runs}).experiment
+    assert found.approach is not None
+    np.testing.assert_array_equal(found.approach[:, 0], BOTH * 6)
+    np.testing.assert_allclose(found.reading[:, 0], 1e-6 * values.ravel())
+
+
+@pytest.mark.parametrize(
+    ("signs", "way", "said"),
+    [
+        (BOTH * 9, {}, "along which axis is 'Approach'. Say --map approach_x='Approach'"),
+        ([0.0, 1.0] * 9, {}, "column 'Approach': expected directions of travel as 1 and -1"),
+        (BOTH * 9, {"machine": "ur10"}, "joints are commanded"),
+    ],
+)
+def test_a_direction_of_travel_that_is_not_clear_is_no_note_in_silence(
+    signs: list[float], way: dict[str, Any], said: str, tmp_path: Path
+) -> None:
+    if way:
+        head = f"{ARM}px [mm];py [mm];pz [mm];Approach"
+        assert said in " ".join(made(tmp_path, head, JOINTS, GRID, np.array(signs), **way).remarks)
+        return
+    with pytest.raises(StiffmapError, match=said):
+        made(tmp_path, f"{POINTS}dx [mm];dy [mm];dz [mm];Approach", GRID, ERRORS, np.array(signs))
 
 
 KEPT = np.setdiff1d(np.arange(COUNT), [4, 9])

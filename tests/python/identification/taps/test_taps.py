@@ -268,3 +268,18 @@ def test_changes_between_predicted_sizes_are_those_of_the_machine(arm, factor):
         for s in place_of(problem, a2, null, np.eye(len(change))).shapes
     ]
     assert min(across) < 0.02
+
+
+@pytest.mark.parametrize(
+    ("head", "row"),
+    [
+        ("x [mm],y [mm],z [mm],mode,f [Hz],zeta [%]", "10,0,0,1,50,2"),
+        ("Mode No.,x [mm],y [mm],z [mm],fn [kHz],zeta [-]", "1,10,0,0,.05,.02"),
+        ("x [mm];y [mm];z [mm];Eigenfrequenz [Hz];Dämpfung [%]", "10;0;0;50;2"),
+        ("x [mm],y [mm],z [mm],natural frequency [Hz],damping ratio [1]", "10,0,0,50,0.02"),
+    ],
+)
+def test_modes_as_modal_programs_list_them(head, row, tmp_path):
+    (tmp_path / "t.csv").write_text(f"{head}\n{row}\n", encoding="utf-8")
+    taps = load_taps(tmp_path / "t.csv")
+    np.testing.assert_allclose([*taps.frequency, *taps.ratio, *taps.position[0]], [50, 0.02, 0.01, 0, 0])

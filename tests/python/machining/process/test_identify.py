@@ -83,6 +83,14 @@ def made(noise: float = 0.0, signals: bool = False, runout: float = 0.0) -> dict
     return {**out, "teeth": 2, "axial_mm": 3.0, "spindle_rpm": 6000, "diameter_mm": 25, "helix_deg": 30}
 
 
+def test_means_of_forces_and_words_name_columns(tmp_path: Path) -> None:
+    head = "feed [mm/tooth];Fx mean [N];Fy_avg [N];Fz average [N];Zähne;axial depth of cut [mm]"
+    (tmp_path / "f.csv").write_text(f"{head}\n0,05;-50;100;30;2;1\n0,1;-90;180;50;2;1\n", encoding="utf-8")
+    found = read_table(tmp_path / "f.csv")
+    np.testing.assert_allclose(found.force, [[-50, 100, 30], [-90, 180, 50]])
+    np.testing.assert_allclose([p.cut.axial for p in found.cuts], 1e-3)
+
+
 def test_letters_of_data_sheets_name_columns() -> None:
     table = {k: v for k, v in MEASURED.items() if k not in ("feed_per_tooth_mm", "teeth")}
     feed = [c * 2 * 3000 for c in MEASURED["feed_per_tooth_mm"]]
@@ -215,15 +223,21 @@ def test_a_unit_next_to_rpm_counts(unit: str, tmp_path: Path) -> None:
         assert read_table(tmp_path / "f.csv").cuts[0].spindle == pytest.approx(200 * np.pi)
 
 
-@pytest.mark.parametrize("units", ["s N N N mm mm", "[s] [N] [N] [N] [mm] [mm]", "min N kN N mm mm"])
+@pytest.mark.parametrize(
+    "units",
+    ["s N N N mm mm", "[s] [N] [N] [N] [mm] [mm]", "min N kN N mm mm", "ms N N N mm mm", "µs N N N mm mm"],
+)
 def test_times_have_a_unit_in_a_line_of_units(units: str, tmp_path: Path) -> None:
-    size, force = (60.0, 1e3) if units.startswith("min") else (1.0, 1.0)
+    size = {"min": 60.0, "ms": 1e-3, "µs": 1e-6}.get(units.split()[0], 1.0)
+    force = 1e3 if "kN" in units else 1.0
     lines = [
         "Time Fx Fy Fz feed_per_tooth axial teeth spindle_rpm".replace(" ", "\t"),
         units.replace(" ", "\t"),
     ]
     lines += [f"{0.001 * k / size:.9g}\t10\t20\t30\t0.05\t3\t2\t6000" for k in range(21)]
-    (tmp_path / "record.txt").write_text("Date:\t01.02.2026\nSampling rate [Hz]:\t1000\n" + "\n".join(lines))
+    (tmp_path / "record.txt").write_text(
+        "Date:\t01.02.2026\nSampling rate [Hz]:\t1000\n" + "\n".join(lines), encoding="utf-8"
+    )
     table_ = read_table(tmp_path / "record.txt")
     np.testing.assert_allclose(np.abs(table_.force), [[10, 20 * force, 30]])
     np.testing.assert_allclose(table_.signals[0].time[-1], 0.02, atol=0.0011)

@@ -358,6 +358,9 @@ def test_a_coherence_in_percent_is_none(head, tmp_path):
         ("Frequency (Hz),Accelerance (m/s^2/N),Phase (deg)", lambda a: (abs(a), np.degrees(np.angle(a)))),
         ("f [Hz],Re(H) [mm/s²/N],Im(H) [mm/s²/N]", lambda a: (1e3 * a.real, 1e3 * a.imag)),
         ("Freq (Hz),Real Part (m/s2/N),Imaginary Part (m/s2/N),Coh", lambda a: (a.real, a.imag, 0 * abs(a) + 0.9)),
+        ("f [Hz],Accelerance [(m/s^2)/N],Phase [deg]", lambda a: (abs(a), np.degrees(np.angle(a)))),
+        ("Frequenz [Hz],H1 Realteil [m/s²/N],H1 Imaginärteil [m/s²/N]", lambda a: (a.real, a.imag)),
+        ("f [Hz],FRF Real [m/s²/N],FRF Imag [m/s²/N],Magnitude [m/s²/N],Phase [deg]", lambda a: (a.real, a.imag, abs(a), np.degrees(np.angle(a)))),
     ],
 )  # fmt: skip
 def test_names_of_analysers(header, columns, tmp_path):

@@ -30,7 +30,9 @@ NEEDED = ("feed_per_tooth", "fx", "fy", "fz", "teeth", "axial")
 ALIASES = {
     "c": "feed_per_tooth", "chip": "feed_per_tooth", "depth": "axial", "ap": "axial", "ae": "radial", "width": "radial",
     "rpm": "spindle", "z": "teeth", "n_teeth": "teeth", "flutes": "teeth", "t": "time", "vf": "feed", "n": "spindle",
-    "d": "diameter", "spindle_speed": "spindle",
+    "d": "diameter", "spindle_speed": "spindle", "a_p": "axial", "a_e": "radial", "axial_depth": "axial", "axial_depth_of_cut": "axial",
+    "number_of_teeth": "teeth", "zähne": "teeth", "zeit": "time", "vorschub": "feed", "drehzahl": "spindle",
+    **{f"{force}_{mean}": force for force in ("fx", "fy", "fz") for mean in ("mean", "avg", "average")},
 }  # fmt: skip
 PER_TOOTH = re.compile(r"(/|_per_|_)tooth$")
 PER_EDGE = ("feed_per_tooth", "c", "chip")
