@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtr
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.channels import Channel, metres
@@ -61,7 +61,7 @@ def noise_of(experiment: Experiment, keep: Mask | None = None) -> Noise:
     squares, freedom, declared = _within(experiment, keep)
     with np.errstate(invalid="ignore", divide="ignore"):
         repeats = np.sqrt(squares / freedom)
-        lower = chi2.cdf(squares / declared**2, np.maximum(freedom, 1))
+        lower = chdtr(np.maximum(freedom, 1), squares / declared**2)
     p = np.where((freedom > 0) & (declared > 0), 2 * np.minimum(lower, 1 - lower), np.nan)
     if lost := _unknown(experiment, squares, freedom, declared):
         raise StiffmapError(

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from itertools import combinations
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from stiffmap.common.short import first_of
 from stiffmap.experiment.experiment import Experiment, Floats, Integers, Mask
@@ -67,7 +67,7 @@ def _worst(rows: Integers, z: Floats) -> Integers:
     away = np.where(read, z - middle[:, None], 0.0)
     score = np.sum(away**2, axis=2)
     freedom = np.maximum(read.sum(axis=(1, 2)) - some.sum(axis=(1, 2)), 1)
-    found = chi2.sf(score.sum(axis=1), freedom) <= 1e-5
+    found = chdtrc(freedom, score.sum(axis=1)) <= 1e-5
     if rows.shape[1] == 2:  # two that disagree: the one farther from the model
         score = np.sum(np.where(read, z, 0.0) ** 2, axis=2)
     return np.asarray(rows[found, np.argmax(score[found], axis=1)])

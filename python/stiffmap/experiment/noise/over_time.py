@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import f
+from scipy.special import fdtrc
 
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.noise.whitening import LinearProblem, basis
@@ -52,7 +52,7 @@ def over_time(problem: LinearProblem, residual: Floats) -> OverTime | None:
         return None
     gain = float(np.sum((q.T @ residual) ** 2))
     rest = float(residual @ residual) - gain
-    p = float(f.sf((gain / q.shape[1]) / max(rest / freedom, 1e-300), q.shape[1], freedom))
+    p = float(fdtrc(q.shape[1], freedom, (gain / q.shape[1]) / max(rest / freedom, 1e-300)))
     return OverTime(p, float(np.sqrt(gain / max(rest, 1e-300))), _clock(problem.experiment)[0])
 
 

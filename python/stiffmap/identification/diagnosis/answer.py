@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.comparison.limitations import limitations
@@ -215,7 +215,7 @@ def _noise(found: Inferred, made: Written, best: Corrected | None) -> NoiseRepor
     def lack(left: Floats, values: int) -> float:
         z = (left / n.sigma)[~made.listed]
         z = z[np.isfinite(z)]
-        return float(chi2.sf(float(z @ z), max(1, len(z) - frames - values)))
+        return float(chdtrc(max(1, len(z) - frames - values), float(z @ z)))
 
     floor, repeats, declared, consistency = (
         {c.name: float(v) for c, v, read in zip(e.channels, each, e.axis_read, strict=True) if read}

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.linalg.blas import dtrmm
 from scipy.linalg.lapack import dtrtri
-from scipy.stats import norm
+from scipy.special import log_ndtr, ndtri
 
 from stiffmap.experiment.experiment import Floats, Mask
 from stiffmap.identification.candidates.candidates import Candidate
@@ -60,7 +60,7 @@ def _of_rank(fit: Fit, shapes: list[Shape], rank: int, inverse: Floats | None = 
     if rank == 1:
         sign = np.array([s.sign for s in shapes])[:, None]
         straight = (vectors[:, 0, 0] * z[:, 0])[:, None]
-        side = norm.logcdf(sign * straight * SIZES / np.sqrt(1.0 + inside * SIZES**2)) + np.log(2.0)
+        side = log_ndtr(sign * straight * SIZES / np.sqrt(1.0 + inside * SIZES**2)) + np.log(2.0)
         gain = gain + np.where(sign == 0, 0.0, side)
     return log_mean(gain)
 
@@ -183,7 +183,7 @@ def all_moved(chosen: Sequence[Chosen], x: Floats) -> tuple[Chosen, ...]:
     return tuple(c.moved(part) for c, part in zip(chosen, np.split(x, ends), strict=True))
 
 
-WIDE = float(norm.isf(0.025))
+WIDE = float(-ndtri(0.025))
 """Standard deviations of a 95 % interval to either side."""
 AT_BOUND = 1e-3
 """Of a parameter's scale, within which it is at a bound."""

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2, norm
+from scipy.special import chdtrc, ndtri
 
 from stiffmap.experiment.experiment import Experiment, Floats, Integers
 from stiffmap.identification.inference.amplitudes import OFF, Fit, noise_prior
@@ -213,7 +213,7 @@ def evenness(columns: Columns, rest: Fit, raw: Floats, block: Integers) -> tuple
     spread = precision.sum() - float((precision**2).sum()) / precision.sum()
     mean = float(together @ r) / float(together @ together)
     scatter = np.sqrt(max(0.0, drop - freedom) / max(spread, 1e-12)) / max(abs(mean), 1e-12)
-    return float(chi2.sf(max(drop, 0.0), freedom)), float(scatter)
+    return float(chdtrc(freedom, max(drop, 0.0))), float(scatter)
 
 
 def partitions(e: Experiment, rows: Integers) -> Iterator[tuple[str, Integers]]:
@@ -248,8 +248,8 @@ def out_of_tolerance(columns: Columns, fit: Fit) -> Iterator[Beyond]:
     found = [Beyond(u, value, sd, float(abs(value) * s)) for u, (value, sd, _), s in said]
     number = {id(b): k for k, b in enumerate(found)}
     determined = sum(b.sd < DETERMINED for b in found)
-    largest = float(norm.isf(RARE / (2.0 * max(1, determined))))
-    doubt = float(norm.isf(1.0 / (2.0 * ODDS * max(1, len(found)))))
+    largest = float(-ndtri(RARE / (2.0 * max(1, determined))))
+    doubt = float(-ndtri(1.0 / (2.0 * ODDS * max(1, len(found)))))
     for b in sorted(found, key=lambda b: -b.share):
         value, sd = _of_logarithm(b) if b.unknown.unit == "ln" else (b.value, b.sd)
         far = abs(value) - doubt * sd > TOLERANCES and abs(value) > largest
@@ -295,7 +295,7 @@ def _significant(fit: Fit, names: Sequence[str], freedom: int = 0) -> bool:
     bare = fit.without(names)
     noisier = (bare.without([], bare.noise * factor) for factor in (1.0, 1.1, 1.2, 1.35, 1.5, 2.0, 3.0))
     gain = 2.0 * (_supported(fit) - max(map(_supported, noisier)))
-    return float(0.5 * chi2.sf(max(gain, 0.0), freedom or max(1, len(names) // 2))) < RARE
+    return float(0.5 * chdtrc(freedom or max(1, len(names) // 2), max(gain, 0.0))) < RARE
 
 
 def _supported(fit: Fit) -> float:

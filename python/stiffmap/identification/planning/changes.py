@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from scipy.linalg import block_diag, cholesky, solve_triangular
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
@@ -118,7 +118,7 @@ def monitor(
     a, b = (estimate(machine, _some(as_experiment(e)), terms) for e in (before, after))
     step, covariance = difference(machine, a, b)
     u = np.sqrt(np.diag(covariance))
-    single = chi2.sf((step / u) ** 2, 1)
+    single = chdtrc(1, (step / u) ** 2)
     known = np.flatnonzero(np.isfinite(u))
     scaled, pull = covariance[np.ix_(known, known)] / np.outer(u[known], u[known]), step[known] / u[known]
     together = float(pull @ np.linalg.pinv(scaled) @ pull)
@@ -126,7 +126,7 @@ def monitor(
         Change(n, s, float(x), float(x + d), float(w), float(min(1.0, len(step) * p)))
         for n, s, x, d, w, p in zip(a.names, a.units, a.values, step, u, single, strict=True)
     )
-    return Comparison(a, b, changes, float(chi2.sf(together, max(len(known), 1))))
+    return Comparison(a, b, changes, float(chdtrc(max(len(known), 1), together)))
 
 
 def difference(machine: Machine, a: Estimate, b: Estimate) -> tuple[Floats, Floats]:

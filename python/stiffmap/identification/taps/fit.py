@@ -13,7 +13,7 @@ from itertools import combinations, pairwise
 
 import numpy as np
 from scipy.interpolate import CubicSpline
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
@@ -96,7 +96,7 @@ class FittedCauses:
     @property
     def explains(self) -> bool:
         """Whether chi-square is no larger than chance lets it be."""
-        return bool(chi2.sf(self.chi2, len(self.lines.residual)) > RARE)
+        return bool(chdtrc(len(self.lines.residual), self.chi2) > RARE)
 
     @property
     def causes(self) -> Causes:

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import minimize
-from scipy.stats import qmc
 
 from stiffmap.common.broadcasting import Floats, whole_number
 from stiffmap.common.errors import StiffmapError
@@ -101,6 +100,8 @@ def placements(
     whole_number(points, "points", 2)
     search = PlacementSearch(machine, path, process, points, threads)
     naive = Placement((search.low + search.high) / 2 - search.middle, 0.0)
+    from scipy.stats import qmc
+
     power = int(np.ceil(np.log2(max(count, 2))))
     unit = qmc.Sobol(4, seed=0).random_base2(power)[:count]
     turn = 2 * np.pi * unit[:, 3] - np.pi

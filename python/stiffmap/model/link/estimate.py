@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import chi2, t
+from scipy.special import chdtrc, stdtrit
 
 from stiffmap.model.link.checks import DisplacementField
 from stiffmap.model.link.noise import Correlation, FieldNoise
@@ -113,17 +113,17 @@ class SpringEstimate:
         size = np.sqrt(np.diag(V))
         if not np.all(size > 0):
             return float("nan")
-        return float(chi2.sf((gap / size) @ np.linalg.solve(V / np.outer(size, size), gap / size), 15))
+        return float(chdtrc(15, (gap / size) @ np.linalg.solve(V / np.outer(size, size), gap / size)))
 
     @property
     def case_p_value(self) -> float:
         """Chi-square p-value of "the cases agree with one matrix"; NaN when none is repeated."""
         r = self.evidence.regression
-        return float(chi2.sf(r.lack_of_fit, r.lack_dof)) if r.lack_dof else float("nan")
+        return float(chdtrc(r.lack_dof, r.lack_of_fit)) if r.lack_dof else float("nan")
 
     def interval(self, probability: float = 0.95) -> Floats:
         """(6, 6, 2) confidence interval of each entry (not simultaneous)."""
-        half = t.isf((1 - probability) / 2, self.entry_dof) * self.standard_error
+        half = -stdtrit(self.entry_dof, (1 - probability) / 2) * self.standard_error
         return np.stack([self.compliance - half, self.compliance + half], axis=-1)
 
     def at(self, reference: Floats) -> tuple[Floats, Floats]:
@@ -138,4 +138,4 @@ def critical_multiple(level: float, tests: int, dof: Floats | float) -> Floats:
     Bonferroni over ``tests`` entries (21 under symmetry, else 36): the probability that any entry that is truly zero
     is taken for non-zero stays below ``level`` whatever the correlation of the entries.
     """
-    return np.asarray(t.isf(level / (2 * tests), dof))
+    return np.asarray(-stdtrit(dof, level / (2 * tests)))

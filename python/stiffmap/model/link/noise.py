@@ -17,7 +17,7 @@ from scipy.sparse import csr_matrix, kron
 from scipy.sparse import eye as sparse_eye
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
-from scipy.stats import chi2, norm
+from scipy.special import chdtrc, ndtr
 
 from stiffmap.model.link.rigidfit import design_matrix
 from stiffmap.model.link.transport import Floats, Ints
@@ -65,7 +65,7 @@ def bartlett(variance: Floats, dof: Ints) -> float:
     common = float(np.sum(dof * variance) / total)
     statistic = total * np.log(common) - float(np.sum(dof * np.log(variance)))
     correction = 1 + (float(np.sum(1 / dof)) - 1 / total) / (3 * (k - 1))
-    return float(chi2.sf(statistic / correction, k - 1))
+    return float(chdtrc(k - 1, statistic / correction))
 
 
 LEVEL = 1e-3
@@ -97,7 +97,7 @@ def analyse_correlation(points: Floats, residuals: Floats) -> Correlation:
     if n <= NEIGHBOURS + 3 or len(live) == 0:
         return none
     z = _moran(points, live)
-    p = float(norm.sf(z.sum() / np.sqrt(len(z))))
+    p = float(ndtr(-z.sum() / np.sqrt(len(z))))
     unit = live.reshape(len(live), -1) / np.sqrt(energy[energy > 0])[:, None]
     cross = np.abs(unit @ unit.T - np.eye(len(live))).max() if len(live) > 1 else 0.0
     tested = none._replace(p_value=p, repetition=float(cross))

@@ -8,7 +8,7 @@ answer is the same for any numbering of the nodes.
 from __future__ import annotations
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from stiffmap.model.link.rigidfit import design_matrix
 from stiffmap.model.link.transport import Bools, Floats
@@ -39,7 +39,7 @@ def find_outliers(points: Floats, displacements: Floats, level: float, sigma: fl
     A[:, :, 3:] /= np.abs(A[:, :, 3:]).max()
     u = displacements[order]
     floor = 1e-12 * float(np.abs(u).max(initial=0.0))
-    found = _refine(A, u, _trimmed_start(A, u), float(chi2.isf(level / n, 3)), floor, sigma)
+    found = _refine(A, u, _trimmed_start(A, u), float(chdtri(3, level / n)), floor, sigma)
     outliers = np.zeros(n, dtype=bool)
     outliers[order] = found
     return outliers
@@ -65,7 +65,7 @@ def _trimmed_start(A: Floats, u: Floats) -> Bools:
 def _refine(A: Floats, u: Floats, inlier: Bools, cut: float, floor: float, sigma: float | None) -> Bools:
     n = len(u)
     d2 = _squared_residuals(A, u, np.flatnonzero(inlier))
-    scale2 = sigma**2 if sigma else max(float(np.median(d2) / chi2.ppf(0.5, 3)), floor**2)
+    scale2 = sigma**2 if sigma else max(float(np.median(d2) / chdtri(3, 0.5)), floor**2)
     seen: list[Bools] = []
     for _ in range(ROUNDS):
         if scale2 == 0.0:

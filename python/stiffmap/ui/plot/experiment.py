@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from scipy.stats import f as f_distribution
+from scipy.special import fdtrc
 
 from stiffmap.experiment.comparison.residual import Residual
 from stiffmap.experiment.experiment import Experiment, Floats
@@ -238,8 +238,8 @@ def _follows(x: Floats, y: Floats) -> float:
     rest, whole = float(left @ left), float(np.sum((y[good] - y[good].mean()) ** 2))
     if rest <= 0:
         return 1.0 if whole <= 0 else 0.0
-    ratio = ((whole - rest) / (columns - 1)) / (rest / (n - columns))
-    return float(f_distribution.sf(ratio, columns - 1, n - columns))
+    ratio = (max(whole - rest, 0.0) / (columns - 1)) / (rest / (n - columns))
+    return float(fdtrc(columns - 1, n - columns, ratio))
 
 
 def trends(d: Diagnosis, drivers: list[Driver]) -> Figure:

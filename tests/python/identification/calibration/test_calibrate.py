@@ -67,7 +67,7 @@ def test_a_perfect_machine_is_as_declared(name: str) -> None:
 
 
 def test_one_beyond_tolerance_is_named() -> None:
-    machine, data, _ = drawn("ur10", 8, size=0.5, poses=60)
+    machine, data, _ = drawn("ur10", 8, size=0.5)
     far = Predictor(machine.with_effect("zero_offset", element="elbow", error=0.03), data)
     data = data.with_readings(data.reading + far() - Predictor(machine, data)())
     c = calibrate(machine, data)
@@ -259,7 +259,7 @@ def test_a_fault_does_not_disappear_with_more_readings(name: str, what: str, pos
 
 
 def test_a_group_that_is_off_as_a_whole_is_said() -> None:
-    machine, data, _ = drawn("ur10", 4, size=4.0, poses=100)
+    machine, data, _ = drawn("ur10", 4, size=4.0, poses=40)
     c = calibrate(machine, data)
     assert c.verdict.startswith(("adjusted beyond", "beyond"))
     assert c.wide and all(2.0 < w.factor < 8.0 for w in c.wide)

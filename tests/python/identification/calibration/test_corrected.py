@@ -44,7 +44,7 @@ def true_machine(machine: sm.Machine) -> sm.Machine:
 
 @pytest.fixture(scope="module")
 def calibrated() -> tuple[Calibration, sm.Machine]:
-    machine, plan = plan_of(250, 7)
+    machine, plan = plan_of(120, 7)
     return calibrate(machine, read(plan, true_machine(machine), 1)), machine
 
 

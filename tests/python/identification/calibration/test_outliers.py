@@ -10,7 +10,7 @@ import pytest
 import stiffmap as sm
 from stiffmap.experiment import Experiment, Predictor, random_plan
 from stiffmap.experiment.noise.outliers import without_suspects
-from stiffmap.identification.calibration import calibrate
+from stiffmap.identification.calibration import Calibration, calibrate
 
 
 def read_once(poses: int, seed: int = 1) -> tuple[sm.Machine, Experiment]:
@@ -27,17 +27,12 @@ def wild(data: Experiment, rows: list[int]) -> Experiment:
     return data.with_readings(reading)
 
 
-def test_a_pose_that_was_read_once_may_be_an_outlier_and_is_named() -> None:
-    machine, data = read_once(100)
-    c = calibrate(machine, wild(data, [16, 60]))
-    assert c.outliers == (data.ids[16], data.ids[60])
-    assert f"set aside as outliers: rows {data.ids[16]}, {data.ids[60]}" in str(c)
-    assert c.verdict == "as declared"
-
-
-def test_the_rest_of_the_readings_is_as_without_them() -> None:
+def test_poses_that_were_read_once_are_named_and_the_rest_is_as_without_them() -> None:
     machine, data = read_once(100)
     clean, spoiled = calibrate(machine, data), calibrate(machine, wild(data, [16, 60]))
+    assert spoiled.outliers == (data.ids[16], data.ids[60])
+    assert f"set aside as outliers: rows {data.ids[16]}, {data.ids[60]}" in str(spoiled)
+    assert spoiled.verdict == "as declared"
     assert spoiled.after.rms == pytest.approx(clean.after.rms, rel=0.05)
     assert spoiled.scale == pytest.approx(clean.scale, rel=0.1)
 
@@ -51,15 +46,21 @@ def off(machine: sm.Machine, data: Experiment) -> Experiment:
     return replace(data.with_readings(data.reading + shown), frame="unknown", tool="offset_unknown")
 
 
-@pytest.mark.parametrize("by", [0.6, 2e-2, 5e-3, 1e-3])
-@pytest.mark.parametrize("row", [3, 21])
-def test_one_row_that_slipped_is_named_whatever_its_size(by: float, row: int) -> None:
-    """Unknown frames, fitted by least squares, would spread it over all others."""
+@pytest.fixture(scope="module")
+def unspoiled() -> tuple[sm.Machine, Experiment, Calibration]:
     machine, data = read_once(30, 4)
-    clean = calibrate(machine, off(machine, data))
-    reading = off(machine, data).reading.copy()
+    return machine, off(machine, data), calibrate(machine, off(machine, data))
+
+
+@pytest.mark.parametrize(("row", "by"), [(3, 0.6), (3, 5e-3), (21, 2e-2), (21, 1e-3)])
+def test_one_row_that_slipped_is_named_whatever_its_size(
+    by: float, row: int, unspoiled: tuple[sm.Machine, Experiment, Calibration]
+) -> None:
+    """Unknown frames, fitted by least squares, would spread it over all others."""
+    machine, data, clean = unspoiled
+    reading = data.reading.copy()
     reading[row, :3] += by * np.array([0.8, -0.5, 0.33])
-    spoiled = off(machine, data).with_readings(reading)
+    spoiled = data.with_readings(reading)
     c = calibrate(machine, spoiled)
     assert c.outliers == (data.ids[row],)
     assert c.verdict == clean.verdict

@@ -21,16 +21,15 @@ from stiffmap.identification.inference.travel import DriveErrors, apart, hats
 from stiffmap.model.with_errors import edited
 from stiffmap.ui.cli.calibrate import write
 
-POSES = 250
 AMPLITUDE, PERIOD = 3e-4, 0.5
 RIPPLE = {"amplitude": AMPLITUDE, "period": PERIOD, "phase": 0.4}
 
 
-def arm() -> tuple[sm.Machine, Experiment, Floats]:
+def arm(poses: int = 250) -> tuple[sm.Machine, Experiment, Floats]:
     """An arm commanded by its joints, positions read, and the shoulder's coordinate."""
     machine = sm.load_machine("ur10")
     rng = np.random.default_rng(7)
-    joints = np.radians([0, -60, 90, -120, -90, 0]) + rng.uniform(-0.7, 0.7, (POSES, 6))
+    joints = np.radians([0, -60, 90, -120, -90, 0]) + rng.uniform(-0.7, 0.7, (poses, 6))
     plan = replace(plan_of_joints(machine, joints, noise=1e-5), frame="unknown")
     return machine, plan, joints[:, 1]
 
@@ -84,7 +83,7 @@ def test_files_have_the_profiles(rippled: tuple[Calibration, Floats], tmp_path: 
 
 
 def test_errors_that_follow_no_drive_make_no_profile() -> None:
-    machine, plan, _ = arm()
+    machine, plan, _ = arm(60)
     for more in (1e-4, 0.0):
         c = calibrate(machine, read(plan, Predictor(machine, plan)(), more=more))
         assert sum(s for name, s in c.shares.items() if "travel" in name) < 0.02

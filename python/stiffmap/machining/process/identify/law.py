@@ -9,8 +9,7 @@ from os import PathLike
 from pathlib import Path
 
 import numpy as np
-from scipy.stats import chi2, wilcoxon
-from scipy.stats import f as fisher
+from scipy.special import chdtrc, fdtrc
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError
@@ -85,6 +84,8 @@ class IdentifiedLaw:
         more = ((np.abs(other.left_out) - np.abs(self.best.left_out)) / scale).ravel()
         if other is self.best or not np.isfinite(more).all() or not more.any():
             return 1.0
+        from scipy.stats import wilcoxon
+
         p = float(wilcoxon(more).pvalue)
         return min(p, self.bend) if other.model.name == "straight" and self.bent else p
 
@@ -298,5 +299,5 @@ def _bend(straight: Fitted, bent: Fitted) -> float:
     """F test of three squares of the feed against the straight law, each axis in its own scatter."""
     free = len(straight.residual) - 3
     a, b = (straight.residual**2).sum(axis=0), (bent.residual**2).sum(axis=0)
-    each = fisher.sf((a - b) / np.maximum(b / free, 1e-18), 1, free)
-    return float(chi2.sf(-2 * np.log(np.maximum(each, 1e-300)).sum(), 6))  # Fisher's sum over the three axes
+    each = fdtrc(1, free, np.maximum(a - b, 0.0) / np.maximum(b / free, 1e-18))
+    return float(chdtrc(6, -2 * np.log(np.maximum(each, 1e-300)).sum()))  # Fisher's sum over the three axes

@@ -9,7 +9,7 @@ from math import pi
 
 import numpy as np
 from scipy.optimize import least_squares, minimize_scalar
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.machining.process.description import EndMill, Process, mean_force, own_arc
@@ -136,7 +136,7 @@ def stated(
     names: Sequence[str], v: Floats, u: Floats, freedom: Floats, relative: bool = False
 ) -> dict[str, Number]:
     """Numbers by name; `relative`: u is of their logarithms."""
-    reach = student.ppf(0.975, freedom) * u
+    reach = stdtrit(freedom, 0.975) * u
     far = np.exp(np.minimum(reach, 300.0))
     ends = np.sort([v / far, v * far], axis=0) if relative else np.array([v - reach, v + reach])
     each = np.array([v, np.abs(v) * u if relative else u, *ends]).T.tolist()
@@ -252,13 +252,13 @@ def runout_of(table: ForceTable, law: Fitted) -> Runout | None:
     middle = offset**2 + float(slope @ (measured - at)) / size
     free = len(measured) - 1
     left = measured - at - slope * (middle - offset**2)
-    reach = float(student.ppf(0.975, free)) * np.sqrt((left @ left) / free / size)  # feed by feed
+    reach = float(stdtrit(free, 0.975)) * np.sqrt((left @ left) / free / size)  # feed by feed
     if np.isfinite(variance).all():  # by the noise, wider where the feeds differ by more
         birge = max(float((left**2 / np.maximum(variance, 1e-300)).mean()) * len(left) / free, 1.0)
         reach = 1.96 * np.sqrt(birge * (slope**2 @ variance)) / size
     u = np.sqrt(np.diag(law.covariance))
     moved = np.array([slope @ (predicted(offset, law.values + d) - at) / size for d in np.diag(u)])
-    moved *= student.ppf(0.975, law.freedom)
+    moved *= stdtrit(law.freedom, 0.975)
     correlation = law.covariance / np.maximum(np.outer(u, u), 1e-300)
     reach = float(np.sqrt(reach**2 + moved @ correlation @ moved))
     low, high = (float(np.sqrt(max(middle + k * reach, 0.0))) for k in (-1, 1))
