@@ -10,6 +10,7 @@ import numpy as np
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
+from stiffmap.common.short import first_of
 from stiffmap.common.tables.cells import Cells
 from stiffmap.common.tables.header import MEASURED
 from stiffmap.common.tables.table import Table
@@ -177,8 +178,7 @@ def _emptied(m: Meant, at: Sequence[int], lost: Mask, what: str) -> None:
     if not lost.any():
         return
     lines = [str(m.sheet.lines[int(i)]) for i in np.flatnonzero(lost)]
-    more = f" and {len(lines) - NAMED} more" if len(lines) > NAMED else ""
-    which = f"line{'s' if len(lines) > 1 else ''} {', '.join(lines[:NAMED])}{more}"
+    which = f"line{'s' if len(lines) > 1 else ''} {first_of(lines, NAMED)}"
     names = ", ".join(repr(m.sheet.header[i]) for i in at)
     m.said.append(
         f"left out: {which}: {names} {'are' if len(at) > 1 else 'is'} {what}, as of a target that was not seen"

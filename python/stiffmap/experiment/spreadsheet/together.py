@@ -8,6 +8,7 @@ import re
 import numpy as np
 
 from stiffmap.common.errors import StiffmapError
+from stiffmap.common.short import first_of
 from stiffmap.common.tables.header import split_unit
 from stiffmap.common.tables.table import Table, column_letter
 from stiffmap.common.units import Unit, unit_of
@@ -116,8 +117,7 @@ def _lengths(m: Meant) -> None:
             m.said.append(f"'{c.name}' goes to {np.nanmax(values):.4g}: taken as mm")
         wrong = np.flatnonzero(values <= 0.0)
         if wrong.size:
-            rows = ", ".join(f"line {m.sheet.lines[i]} ({values[i]:g})" for i in wrong[:NAMED])
-            told = f"{rows} and {wrong.size - NAMED} more" if wrong.size > NAMED else rows
+            told = first_of([f"line {m.sheet.lines[i]} ({values[i]:g})" for i in wrong], NAMED)
             m.said.append(f"'{c.name}': expected lengths above zero; left out: {told}")
             unit = m.written_unit(c.index, "ll")
             m.add(f"{c.name} in use", unit, np.where(values > 0.0, values, np.nan), "ll")
