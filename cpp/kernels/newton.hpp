@@ -178,7 +178,7 @@ struct Newton {
     M done = ~usable & usable, failed = ~usable;
     LoadSteps way{P, s};
     const bool patient = in.patience >= Patience::path;
-    const bool searches = corners && P.bends && P.serial_joints == 0;
+    const bool searches = corners && P.bends && P.serial_joints == 0 && in.patience != Patience::path;
     const double most_tries = in.max_iterations * (!corners ? 1.0 : patient ? 3.0 : searches ? 1.0 : 0.5);
     way.begin(unloaded_lanes());
     for (int k = 0; k < most_iterations; ++k) {
