@@ -24,6 +24,8 @@ PLANE_ANGLES: dict[str, Fraction | float] = {
 }  # fmt: skip
 SIZES: dict[str, Fraction | float] = {**LENGTHS, **FORCES, **MASSES, **MOMENTS, **STRESSES, **PLANE_ANGLES}
 TIMES = {"s": Fraction(1), "min": Fraction(60)}
+SHORT_TIMES = {"ms": 1e-3, "us": 1e-6, "µs": 1e-6, "μs": 1e-6}
+"""Of the time in tables alone."""
 QUANTITIES = {"m": "length", "N": "force", "N*m": "moment", "rad": "angle"}
 """By the unit of SI."""
 GRAVITY = Fraction("9.80665")

@@ -12,7 +12,7 @@ from itertools import pairwise, takewhile, zip_longest
 from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.number_text import terms
 from stiffmap.common.tables.lines import COMMENTS
-from stiffmap.common.units import TIMES, name_and_unit, unit_of
+from stiffmap.common.units import SHORT_TIMES, TIMES, name_and_unit, unit_of
 
 Line = tuple[int, list[str]]
 MOST_LINES = 4
@@ -39,9 +39,7 @@ def header_of(
     width = sum(bool(c.strip()) for c in first)
     lines = [(n, [_plain(c) for c in cells]) for n, cells in above]
     lines = [(n, cells) for n, cells in lines if any(c.strip("-=_–—: ") for c in cells)]
-    lines = [line for line in lines if not any(m and m["text"] for m in map(STATED.fullmatch, line[1]))][
-        -MOST_LINES:
-    ]
+    lines = [(n, cells) for n, cells in lines if not any(map(_states_unit, cells))][-MOST_LINES:]
     units: list[str] = []
     while lines and not fits(lines[-1][1], width):
         if _units(lines[-1][1]):
@@ -110,6 +108,10 @@ STATED = re.compile(
 )
 
 
+def _states_unit(cell: str) -> bool:
+    return bool((match := STATED.fullmatch(cell)) and match["text"])
+
+
 def stated_unit(above: Sequence[str], quantity: str) -> str:
     """``Units: mm, deg`` or ``Length unit;inches`` in the cells above a table: what it says of a quantity, of lengths also a unit
     that nobody knows; nothing where it says nothing."""
@@ -149,7 +151,7 @@ def _bare(cell: str) -> str:
 
 def _is_unit(text: str) -> bool:
     """Whether it is a unit, also one of several, such as g/N, m/s^2/N or mm/min."""
-    more = (*TIMES, "ms", "us", "µs", "Hz", "kHz", "rpm", "tooth", "rev")
+    more = (*TIMES, *SHORT_TIMES, "Hz", "kHz", "rpm", "tooth", "rev")
     with suppress(StiffmapError):
         return unit_of(text) is not None or all(unit_of(n) is not None or n in more for n, _ in terms(text))
     return False

@@ -25,11 +25,9 @@ from stiffmap.common.tables.header import meaning_of, split_unit
 from stiffmap.common.tables.lines import Spelling, finite_number, number
 from stiffmap.common.tables.sheet import Layout, read_sheet
 from stiffmap.common.tables.table import Table
-from stiffmap.common.units import QUANTITIES, unit_of
+from stiffmap.common.units import QUANTITIES, SHORT_TIMES, unit_of
 
-SPELLED = {
-    "s": {"ms": 1e-3, "us": 1e-6, "µs": 1e-6, "μs": 1e-6}, "Hz": {"kHz": 1e3}, "percent": {"%": 1.0, "-": 100.0, "1": 100.0},
-}  # fmt: skip
+SPELLED = {"s": SHORT_TIMES, "Hz": {"kHz": 1e3}, "percent": {"%": 1.0, "-": 100.0, "1": 100.0}}
 """SI unit -> others that tables of such columns have."""
 TURNING = {"rpm": math.pi / 30, "1/min": math.pi / 30, "rad/s": 1.0}
 PER = re.compile(r"_(?:per_)?(min|s|tooth)$")
@@ -173,8 +171,10 @@ def size_in(unit: str, si: str) -> float:
     """SI size of a unit that has the dimension of `si`, as experiments, effects and workshops write it; StiffmapError."""
     if si == "rad/s" and unit in TURNING:
         return TURNING[unit]
-    if unit == si or unit in SPELLED.get(si, ()):
-        return 1.0 if unit == si else SPELLED[si][unit]
+    if unit == si:
+        return 1.0
+    if unit in SPELLED.get(si, ()):
+        return SPELLED[si][unit]
     spelled = unit_of(unit, QUANTITIES[si]) if si in QUANTITIES else None
     try:
         return read_value(f"1 {unit}", si)

@@ -176,12 +176,13 @@ def _symbols(given: Table) -> list[str]:
     return [_plain(h).replace("\\", "") for h in given.header]
 
 
-def unused(given: Table) -> list[str]:
-    """Names of the columns that `read_dh` makes nothing of."""
+def left_out(given: Table) -> tuple[str, ...]:
+    """Columns that `read_dh` makes nothing of, and lines that are no rows of the table."""
     known = "|".join(f"({p})" for p in (*NUMBERS.values(), *WORDS.values(), MORE, "r", "i|#|no|nr"))
     plain = (split_unit(INDEX.sub(r"\1", h))[0] for h in _symbols(given))
     each = zip(given.header, plain, given.columns, strict=True)
-    return [h for h, n, cells in each if any(cells) and not re.fullmatch(known, n, re.IGNORECASE)]
+    unread = (h for h, n, cells in each if any(cells) and not re.fullmatch(known, n, re.IGNORECASE))
+    return (*(f"column '{h}'" for h in unread), *given.aside)
 
 
 def _constants(sheet: Table, at: Mapping[str, int], units: Mapping[str, str]) -> tuple[Table, list[str]]:

@@ -26,7 +26,7 @@ from stiffmap.experiment.noise.level import against_the_load, contradictions, no
 from stiffmap.experiment.spreadsheet import dialogue
 from stiffmap.experiment.spreadsheet.answers import Answers, Meant, Question
 from stiffmap.experiment.spreadsheet.convert import ImportedSheet, write_folder
-from stiffmap.experiment.spreadsheet.dh import LAYOUT, LEG, QUANTITIES, arm, read_dh, unused
+from stiffmap.experiment.spreadsheet.dh import LAYOUT, LEG, QUANTITIES, arm, left_out, read_dh
 from stiffmap.experiment.spreadsheet.guess import has_meaning
 from stiffmap.experiment.spreadsheet.instrument import Instrument, as_readings, load_instrument
 from stiffmap.experiment.spreadsheet.joints import (
@@ -176,7 +176,7 @@ def experiment_from_table(
     # a gauge that is not at zero has no sign
     of_loads = no_difference(made) or not_at_zero(made) or against_the_load(made)
     warnings = tuple(line for line in (of_loads, *contradictions(made)) if line)
-    left = () if joints is None else (*(f"column '{h}'" for h in unused(joints)), *joints.aside)
+    left = () if joints is None else left_out(joints)
     remarks = (*m.said, *(f"left out: {t}" for t in own.aside), *(f"left out of {dh}: {t}" for t in left))
     return FromTable(made, output, declared, warnings, remarks, own, found, m if m.columns else None)
 

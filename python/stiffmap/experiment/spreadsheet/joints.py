@@ -212,14 +212,14 @@ def compared(
             continue
         header, both = m.sheet.header[at], [f"'{m.sheet.header[k]}'" for k in (own, command)]
         less, i = " less ".join(both[:: int(sign)]), rows[0]
-        told = f"line {m.sheet.lines[i]}: '{header}' is {1e3 * size * read[i]:.4g} mm, {less} {1e3 * apart[i]:.4g} mm"
-        told += f", and {len(rows) - 1} further rows differ" if len(rows) > 1 else ""
+        differs = f"line {m.sheet.lines[i]}: '{header}' is {1e3 * size * read[i]:.4g} mm, {less} {1e3 * apart[i]:.4g} mm"
+        differs += f", and {len(rows) - 1} further rows differ" if len(rows) > 1 else ""
         if reading in taken:
-            m.said.append(f"{told}; {' less '.join(both)} is taken")
+            m.said.append(f"{differs}; {' less '.join(both)} is taken")
         elif found == size or (found is None and not deflection):
-            m.said.append(told)
+            m.said.append(differs)
         elif found is not None:
-            shown = shown or told
+            shown = shown or differs
             ways += [f"--unit {reading}={units[abs(found)]}"] if units[abs(found)] else []
             turn = header[1:] if header[0] == "-" else f"-{header}"
             ways += [f"--map {reading}='{turn}'"] if found < 0.0 else []

@@ -38,7 +38,7 @@ BEYOND = 5.0
 """How many times the others such a number is, where it is the only one of its row."""
 AXIS = r"(?i)(?:(?<![a-z])|(?<=\b[dp]))[xyz](?![a-z])"
 """In a header."""
-BESIDE = rf"\*[ ._-]?({MEASURED})|({MEASURED})[ ._-]?\*"
+MEASURED_AXIS = rf"\*[ ._-]?({MEASURED})|({MEASURED})[ ._-]?\*"
 SELDOM = 0.5
 """Share of rows that have places of their own, at most, where a ball stood in sockets."""
 ALIKE = 1e-3
@@ -168,7 +168,7 @@ def _sets(sheet: Table) -> list[list[int]]:
     sets: dict[str, list[int]] = {}
     for i, name in enumerate(sheet.names):
         plain = re.sub(AXIS, "*", name).lower()
-        if plain != name.lower() and sheet.is_numeric(i) and not re.fullmatch(BESIDE, plain):
+        if plain != name.lower() and sheet.is_numeric(i) and not re.fullmatch(MEASURED_AXIS, plain):
             sets.setdefault(plain, []).append(i)
     return [at for at in sets.values() if len(at) > 1]
 

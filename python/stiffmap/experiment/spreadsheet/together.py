@@ -117,8 +117,8 @@ def _lengths(m: Meant) -> None:
             m.said.append(f"'{c.name}' goes to {np.nanmax(values):.4g}: taken as mm")
         wrong = np.flatnonzero(values <= 0.0)
         if wrong.size:
-            told = first_of([f"line {m.sheet.lines[int(i)]} ({values[i]:g})" for i in wrong], NAMED)
-            m.said.append(f"'{c.name}': expected lengths above zero; left out: {told}")
+            lines = first_of([f"line {m.sheet.lines[int(i)]} ({values[i]:g})" for i in wrong], NAMED)
+            m.said.append(f"'{c.name}': expected lengths above zero; left out: {lines}")
             unit = m.written_unit(c.index, "ll")
             m.add(f"{c.name} in use", unit, np.where(values > 0.0, values, np.nan), "ll")
 

@@ -80,7 +80,7 @@ def _remarks(found: Imported, assumed: bool) -> Iterator[Text]:
 
 def _of_table(file: Path, convention: str, unit: list[str] | None) -> Imported:
     from stiffmap.common.tables.sheet import read_sheet
-    from stiffmap.experiment.spreadsheet.dh import LAYOUT, QUANTITIES, arm, read_dh, unused
+    from stiffmap.experiment.spreadsheet.dh import LAYOUT, QUANTITIES, arm, left_out, read_dh
 
     name = re.sub(r"[^A-Za-z0-9_\-]+", "-", file.stem)
     units = pairs(unit, "unit")
@@ -89,5 +89,4 @@ def _of_table(file: Path, convention: str, unit: list[str] | None) -> Imported:
     sheet = read_sheet(file, layout=LAYOUT)
     rows = read_dh(sheet, units, convention)
     description = arm(rows, convention, name, f"from {file.name}")
-    aside = (*(f"column '{h}'" for h in unused(sheet)), *sheet.aside)
-    return Imported(description, aside, tuple(r.name for r in rows))
+    return Imported(description, left_out(sheet), tuple(r.name for r in rows))
