@@ -19,7 +19,7 @@ struct Answers {
   M never = {};  ///< lanes out of reach
   M closed = {};
   M unstable = {}, ended = {}, unverified = {}, nowhere = {};
-  M unfinished = {};  ///< on a load path that takes more steps than those of most lanes
+  M unfinished = {};  ///< on a load path, or across corners, in more steps than most lanes take
   M stuck = {};       ///< in equilibrium, but not where spins come to rest
 
   std::int64_t place(int lane) const { return first + (lane < count ? lane : count - 1); }

@@ -38,7 +38,7 @@ struct Corners {
       V z = s.z[q] + share * s.dz[q];
       if (bends(q)) {
         const V a = s.x[q] - s.a_base[q] + share * s.da[q] * s.dz[q];
-        z = a + force_at(P, law(q), s.linear[q], a) * (1 / law(q).stiffness);
+        z = from_deflection(P, law(q), s.linear[q], a);
       }
       s.z[q] = select(lanes, z, s.z[q]);
     }

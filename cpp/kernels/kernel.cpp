@@ -222,7 +222,7 @@ struct Block : Answers {
     // Poses of the passes for paths are those that Newton's first steps do not settle.
     M done =
         path ? follow(usable, newton, iterations, steps) : newton.solve(usable, P.starts_linear, iterations, steps);
-    if (P.bends && P.serial_joints == 0) unfinished = usable & ~done;  // in shorter steps across corners
+    if (newton.steps_by_deflections()) unfinished = usable & ~done;  // in shorter steps across corners
     if (P.free_balls) done &= ~drop_locked();
     if (P.hanging && e.heavy) return hang(done, newton, iterations, steps);
     V K[6][6];

@@ -27,6 +27,11 @@ inline V force_at(const Program& P, const LawProgram& law, V k, V a) {
   return out;
 }
 
+/// Parameter of that point (theory L1).
+inline V from_deflection(const Program& P, const LawProgram& law, V k, V a) {
+  return a + force_at(P, law, k, a) * (1 / law.stiffness);
+}
+
 struct Laws {
   const Program& P;
   Scratch& s;
@@ -81,8 +86,7 @@ struct Laws {
       V z = k.by_force ? spring / s.linear[q] : from_force(law, before + spring, s.linear[q]);
       if (P.bends && law.count > 0) {  // a cable that is slack has no place for that force: the deflection is the start
         const V far = absolute(point(law, s.linear[q], s.scale[q], z).a) * k.unit;
-        const V there = linear + force_at(P, law, s.linear[q], linear) * (1 / law.stiffness);
-        z = select(far > slack * P.length, there, z);
+        z = select(far > slack * P.length, from_deflection(P, law, s.linear[q], linear), z);
       }
       s.friction_sign[q] = select(active, side, s.friction_sign[q]);
       s.z[q] = select(active, select(bears, z, splat(0)), s.z[q]);

@@ -178,7 +178,7 @@ struct Newton {
     M done = ~usable & usable, failed = ~usable;
     LoadSteps way{P, s};
     const bool patient = in.patience >= Patience::path;
-    const bool searches = corners && P.bends && P.serial_joints == 0 && in.patience != Patience::path;
+    const bool searches = corners && steps_by_deflections() && in.patience != Patience::path;
     const double most_tries = in.max_iterations * (!corners ? 1.0 : patient ? 3.0 : searches ? 1.0 : 0.5);
     way.begin(unloaded_lanes());
     for (int k = 0; k < most_iterations; ++k) {
@@ -353,6 +353,9 @@ struct Newton {
     const M here = TipLoads::circulatory(in.turns, whole_load);
     return turning.several() ? here | turning.circulatory() : here;
   }
+
+  /// Whether corners can be crossed by deflections (F19).
+  bool steps_by_deflections() const { return P.bends && P.serial_joints == 0; }
 
   /// Takes only a share of the last step.
   [[gnu::noinline]] void shorten(V share) {

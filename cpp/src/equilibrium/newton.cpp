@@ -34,8 +34,9 @@ void start_laws(const Mechanism& m, Problem& p, State& state) {
     p.friction_sign[j] = tau > 0 ? 1 : tau < 0 ? -1 : 0;
     const double in_spring = tau - law.friction() * p.friction_sign[j], linear = state.z[j];
     state.z[j] = bears ? law.from_force(law.at(0, p.drive_scale[j]).tau + in_spring, p.drive_scale[j]) : 0.0;
+    if (!law.has_knots() || law.sticks()) continue;
     const double far = std::abs(law.at(state.z[j], p.drive_scale[j]).a) * m.unit(j);
-    if (far > slack * m.length && !law.sticks()) state.z[j] = law.from_deflection(linear, p.drive_scale[j]);
+    if (far > slack * m.length) state.z[j] = law.from_deflection(linear, p.drive_scale[j]);
   }
 }
 
