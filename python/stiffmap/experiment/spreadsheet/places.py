@@ -112,7 +112,8 @@ def commands(m: Meant) -> Floats | None:
 def without_marks(m: Meant) -> None:
     """Cells emptied that are no readings but nines, in all axes of a row, or far beyond those in other rows where one axis is read."""
     read = [c.index for c in m.guessed if c.meaning in READINGS and m.sheet.is_numeric(c.index)]
-    for at in [*_sets(m.sheet), *([i] for i in read)]:
+    asked = {c.index for c in m.guessed if c.meaning in POSE}
+    for at in [*(s for s in _sets(m.sheet) if not asked & {*s}), *([i] for i in read)]:
         values = np.column_stack([m.sheet.numbers(i) for i in at])
         marks = np.isin(np.round(np.abs(values), 4), NINES).all(axis=1) & (values == values[:, :1]).all(
             axis=1

@@ -218,3 +218,10 @@ def test_rows_of_a_target_that_was_not_seen_are_left_out(form: str, what: Any, t
     assert len(found.experiment) == COUNT - 2
     places = form in ("px", "joints", "joints meas")
     np.testing.assert_allclose(read(found), (GRID * places + ERRORS)[KEPT], atol=1e-9)
+
+
+def test_a_command_of_nines_is_no_lost_target(tmp_path: Path) -> None:
+    found = made(tmp_path, "x [mm];y [mm];z [mm];dx [um];dy [um];dz [um]", losing(GRID, 9999.0), 1e3 * ERRORS)
+    assert len(found.experiment) == COUNT
+    np.testing.assert_allclose(found.experiment.position[4], 9.999)
+    assert not any("not seen" in r for r in found.remarks)
