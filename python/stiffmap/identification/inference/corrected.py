@@ -13,17 +13,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import compress
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.experiment import Floats, Mask
 from stiffmap.experiment.noise.outliers import MANY
 from stiffmap.identification.inference.chosen import WIDE, Term
 from stiffmap.identification.inference.constants import DEGREES, STANDS_OUT
-from stiffmap.identification.inference.optimum import covariance
+from stiffmap.identification.inference.optimum import covariance, remembered, triangular
 from stiffmap.identification.inference.readings import Readings
 from stiffmap.identification.inference.travel import Profile, profiles
 from stiffmap.identification.numbers.sensitivity import bends, moves_of, sensitivity_at, with_moves
@@ -149,21 +149,6 @@ def _each(terms: Sequence[Term], x: Floats) -> list[Floats]:
     return np.split(x, np.cumsum([len(t.values) for t in terms]))[: len(terms)]
 
 
-def _remembered(function: Callable[[Floats], Floats]) -> Callable[[Floats], Floats]:
-    """The function with its last value kept, since a search asks again where it stands."""
-    last: dict[bytes, Floats] = {}
-
-    def value(x: Floats) -> Floats:
-        key = x.tobytes()
-        if key not in last:
-            found = function(x)
-            last.clear()
-            last[key] = found
-        return last[key]
-
-    return value
-
-
 def _optimum(
     given: Readings, terms: Sequence[Term], others: Floats | None = None, held: Floats | None = None
 ) -> Corrected:
@@ -178,14 +163,14 @@ def _optimum(
     def effects(x: Floats) -> list[AppliedEffect]:
         return [t.effect(v) for t, v in zip(terms, _each(terms, x), strict=True)]
 
-    @_remembered
+    @remembered
     def at(x: Floats) -> Floats:
         return given.predicted(x[k:] * given.spread, effects(x))
 
     def shown(x: Floats) -> Floats:
         return at(x[: k + p])
 
-    @_remembered
+    @remembered
     def slopes(x: Floats) -> Floats:
         if held is not None:
             return held
@@ -195,16 +180,16 @@ def _optimum(
     def raw(x: Floats) -> Floats:
         return given.white(e.reading - shown(x)) - along @ x[k + p :]
 
-    def residual(x: Floats, q: Floats) -> Floats:
-        left = raw(x)
-        if not np.isfinite(left).all():
-            return np.full(len(left) + p + m, np.inf)
-        return np.append(left - q @ (q.T @ left), x[k:])
-
     def jacobian(x: Floats, q: Floats) -> Floats:
         whole = -np.column_stack([*(given.white(c) for c in slopes(x[: k + p])), columns, along])
         whole -= q @ (q.T @ whole)
         return np.vstack([whole, np.hstack([np.zeros((p + m, k)), np.eye(p + m)])])
+
+    def whole(x: Floats, q: Floats) -> Floats:
+        left = raw(x)
+        if not np.isfinite(left).all():
+            return np.full((len(left) + p + m, len(x) + 1), np.inf)
+        return np.column_stack([jacobian(x, q), np.append(left - q @ (q.T @ left), x[k:])])
 
     low = np.concatenate([*(t.bounds[0] for t in terms), np.full(p + m, -np.inf)])
     high = np.concatenate([*(t.bounds[1] for t in terms), np.full(p + m, np.inf)])
@@ -215,8 +200,7 @@ def _optimum(
         raise StiffmapError("the machine has no equilibrium with the effects that were found")
     q = given.frames(shown(x))
     for _ in range(FRAMINGS if len(x) else 0):
-        ends = {"ftol": LITTLE, "xtol": LITTLE, "max_nfev": steps}
-        x = least_squares(residual, x, jacobian, (low, high), x_scale="jac", args=(q,), **ends).x
+        x = triangular(partial(whole, q=q), x, (low, high), ftol=LITTLE, xtol=LITTLE, max_nfev=steps)
         left, before = raw(x), q
         q = given.frames(shown(x))
         if np.linalg.norm(before @ (before.T @ left) - q @ (q.T @ left)) < SETTLED:

@@ -69,6 +69,41 @@ def optimum(
     return Optimum(found.x, found.fun[: len(here)], last[0])
 
 
+def remembered(function: Residual) -> Residual:
+    """The function with its last value kept, since a search asks again where it stands."""
+    last: dict[bytes, Floats] = {}
+
+    def value(x: Floats) -> Floats:
+        key = x.tobytes()
+        if key not in last:
+            found = function(x)
+            last.clear()
+            last[key] = found
+        return last[key]
+
+    return value
+
+
+def triangular(whole: Residual, begin: Floats, bounds: tuple[Floats, Floats], **ends: float) -> Floats:
+    """(n,) the least squares near `begin`, within the bounds; `whole`: (n,) -> (N, n + 1) the columns and the residual, infinite where
+    no step leads to. Their triangle has the same squares and the same steps in n + 1 rows."""
+
+    @remembered
+    def triangle(x: Floats) -> Floats:
+        rows = whole(x)
+        if not np.isfinite(rows).all():
+            return np.full((min(rows.shape), rows.shape[1]), np.inf)
+        return np.asarray(np.linalg.qr(rows, mode="r"))
+
+    def residual(x: Floats) -> Floats:
+        return triangle(x)[:, -1]
+
+    def columns(x: Floats) -> Floats:
+        return triangle(x)[:, :-1]
+
+    return np.asarray(least_squares(residual, begin, columns, bounds, x_scale="jac", **ends).x)
+
+
 def possible(residual: Residual, x: Floats, n: int) -> Floats:
     """(n,) residuals; infinite where the machine cannot be."""
     try:
@@ -103,7 +138,10 @@ def covariance(jacobian: Floats) -> tuple[Floats, int]:
 
 def _directions(jacobian: Floats) -> tuple[Floats, Floats, Floats]:
     """(r,) singular values of columns (N, k), and (r, k) their directions, as far as determined; (k - r, k) the other directions."""
-    _, size, v = np.linalg.svd(jacobian, full_matrices=len(jacobian) < jacobian.shape[1])
+    triangle = np.asarray(
+        np.linalg.qr(jacobian, mode="r")
+    )  # of as many rows as columns, quicker than all of them
+    _, size, v = np.linalg.svd(triangle, full_matrices=len(triangle) < triangle.shape[1])
     size = np.append(size, np.zeros(len(v) - len(size)))
     told = size > max(RANK * size.max(initial=0.0), LEAST)
     return size[told], v[told], v[~told]
