@@ -114,11 +114,9 @@ def changed(beam: BeamNumbers, key: str, value: float) -> BeamNumbers:
 def compliance(beam: BeamNumbers) -> Matrix6:
     """(6, 6) at the far end, local axes; StiffmapError where the numbers make no beam."""
     n = dict(beam.numbers)
-    least = {"material.nu": -1.0}
-    wrong = [k for k, v in beam.numbers if not v > least.get(k, 0.0)]
-    if wrong:
-        key = wrong[0]
-        raise StiffmapError(f"beam.{key}: must be above {least.get(key, 0):g}; found {n[key]:g}")
+    for key, value in beam.numbers:
+        if fault := number_fault(key, value):
+            raise StiffmapError(f"beam.{key}: {fault}; found {value:g}")
     if "EA" in n:
         values = [n[key] for key in products(beam.along)]
     else:
@@ -131,6 +129,13 @@ def compliance(beam: BeamNumbers) -> Matrix6:
         g = n["material.G"] if "material.G" in n else e / (2 * (1 + n["material.nu"]))
         values = [e * s.area, g * s.torsion, e * s.about_width, e * s.about_height]
     return as_rows(cantilever_compliance(n["length"], beam.along, *values))
+
+
+def number_fault(key: str, value: float) -> str:
+    """Why a number makes no beam; empty where it may."""
+    if key != "material.nu":
+        return "" if value > 0.0 else "must be positive"
+    return "" if -1.0 < value <= 0.5 else "must be above -1 and at most 0.5 (a laminate with more: give G)"
 
 
 def section(sort: str, n: dict[str, float]) -> Section:

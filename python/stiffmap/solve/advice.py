@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from stiffmap.common.broadcasting import Floats
-from stiffmap.common.units import FORCES, LENGTHS
+from stiffmap.common.units import DENSITY, MODULUS, UnitSystem
 from stiffmap.common.yaml_text import read
 from stiffmap.model.description import Body, Cable, Joint, MachineDescription, Spring
 from stiffmap.model.description.tree import all_elements
@@ -98,8 +98,11 @@ def _warnings(description: MachineDescription, gaps: list[Gap], size: float) -> 
 TRIAL = 0.01
 """Of the machine's length, how far from home reach is tried."""
 STEEL = 8000.0
-SOLID = (1e7, 2e12)
-"""Pa: from rubber to diamond."""
+SOLIDS = {
+    "E": (MODULUS, "{0.force}/{0.length}²", 3e8, 2e12, 2.1e11),
+    "density": (DENSITY, "{0.mass}/{0.length}³", 20.0, 25e3, 7850.0),
+}
+"""Numbers of materials: their unit, the least and the largest from polyethylene and foam to diamond and osmium, and that of steel, SI."""
 RIGID = "the machine is rigid: no spring and no drive yields, so nothing deflects"
 
 
@@ -198,20 +201,19 @@ def _numbers(machine: Machine, path: str | PathLike[str]) -> Iterator[str]:
             yield f"{name}: {e.mass:g} kg is more than solid steel of the machine's size ({heaviest:.3g} kg)"
     data = read(find(path)).data
     units = data.get("units", {}) if isinstance(data, dict) else {}
-    if not {"length", "force"} <= set(units):
-        return
-    pascal = float(FORCES[units["force"]]) / float(LENGTHS[units["length"]]) ** 2
-    for key, part in _walk(data, ""):
-        modulus = _plain(part.get("E")) if isinstance(part, dict) else None
-        if modulus is not None and not SOLID[0] <= pascal * modulus <= SOLID[1]:
-            unit = f"{units['force']}/{units['length']}²"
-            yield f"{key}.E = {modulus:g} {unit} is no solid (steel: {2.1e11 / pascal:.3g} {unit})"
+    system = UnitSystem(**units)
+    for name, (dimension, words, least, most, steel) in SOLIDS.items():
+        size, unit = system.to_si(1.0, dimension), words.format(system)
+        for key, part in _walk(data, ""):
+            value = _plain(part.get(name)) if isinstance(part, dict) else None
+            if value is not None and not least <= size * value <= most:
+                yield f"{key}.{name} = {value:g} {unit} is no solid (steel: {steel / size:.3g} {unit})"
     for key, sequence in _sequences(data):
         yield from _long_beams(key, sequence)
 
 
 def _long_beams(key: str, sequence: list[object]) -> Iterator[str]:
-    """Beams that are much longer than the offset before them."""
+    """Beams that are much longer than the offset before them, or nothing of it."""
     span = None
     for e in sequence:
         if not isinstance(e, dict):
@@ -221,7 +223,7 @@ def _long_beams(key: str, sequence: list[object]) -> Iterator[str]:
             span = None if None in numbers else float(np.linalg.norm(np.array(numbers, dtype=float)))
         beam = e.get("beam")
         length = _plain(beam.get("length")) if isinstance(beam, dict) else None
-        if length is not None and span and length > 1.5 * span:
+        if length is not None and span and not 0.01 * span < length < 1.5 * span:
             yield f"{key}: the beam of '{e.get('spring')}' is {length:g} long, the offset before it spans {span:g}"
 
 

@@ -38,6 +38,24 @@ CASES = {
         "E: 2.1e11",
         "materials.steel.E = 2.1e+11 N/mm² is no solid (steel: 2.1e+05",
     ),
+    "modulus in GPa": (
+        STARTER,
+        "E: 2.1e5",
+        "E: 210",
+        "materials.steel.E = 210 N/mm² is no solid (steel: 2.1e+05",
+    ),
+    "density in t": (
+        STARTER,
+        "density: 7.85e-6",
+        "density: 7.85e-9",
+        "materials.steel.density = 7.85e-09 kg/mm³ is no solid (steel: 7.85e-06 kg/mm³",
+    ),
+    "beam in m": (
+        STARTER,
+        "length: 500\n",
+        "length: 0.5\n",
+        "the beam of 'bar' is 0.5 long, the offset before it spans 500",
+    ),
     "mass": (STARTER, "mass: 6", "mass: 5000", "5000 kg is more than solid steel"),
     "beam": (
         STARTER,

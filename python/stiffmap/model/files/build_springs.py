@@ -119,12 +119,12 @@ def build_beam(beam: Beam, context: Context) -> BeamNumbers:
 def _read(
     holder: FileModel, keys: Sequence[str], context: Context, prefix: str = ""
 ) -> tuple[tuple[str, float], ...]:
-    """Numbers of a beam, SI, by their keys; all but Poisson's ratio are positive."""
+    """Numbers of a beam, SI, by their keys."""
     out = []
     for key in keys:
         full, given = prefix + key, getattr(holder, key)
-        if given.value <= 0.0 and key != "nu":
-            context.at(*full.split(".")).fail(f"must be positive; found {given.value}")
+        if fault := beams.number_fault(full, given.value):
+            context.at(*full.split(".")).fail(f"{fault}; found {given.value}")
         out.append((full, context.si(given, beams.dimension(full), f"beam.{full}")))
     return tuple(out)
 
