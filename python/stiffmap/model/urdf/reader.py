@@ -8,11 +8,12 @@ from collections import Counter
 from difflib import get_close_matches
 from functools import partial
 from pathlib import Path
+from xml.parsers import expat
 
 import numpy as np
 
 from stiffmap.common.broadcasting import Floats
-from stiffmap.common.errors import FileError, reading
+from stiffmap.common.errors import FileError, reading, suggestion
 from stiffmap.common.number_text import LARGEST, number_in
 from stiffmap.common.rotations import rotation_about
 from stiffmap.common.short import first_of
@@ -21,13 +22,19 @@ from stiffmap.model.description.pose import vector
 from stiffmap.model.urdf.model import Mimic, UrdfJoint, UrdfModel, tensor
 
 KINDS = {"revolute": "revolute", "continuous": "revolute", "prismatic": "prismatic", "fixed": "fixed"}
-READ = ("link", "joint", "inertial", "mass", "inertia", "origin", "axis", "parent", "child", "limit", "mimic")
+ATTRIBUTES = {
+    "mass": ("value",), "inertia": ("ixx", "iyy", "izz", "ixy", "ixz", "iyz"), "origin": ("xyz", "rpy"), "axis": ("xyz",),
+    "parent": ("link",), "child": ("link",), "limit": ("lower", "upper", "effort", "velocity"),
+    "mimic": ("joint", "multiplier", "offset"),
+}  # fmt: skip
+READ = ("link", "joint", "inertial", *ATTRIBUTES)
 """Elements whose content counts."""
-ATTRIBUTES = {"limit": ("lower", "upper", "effort", "velocity"), "mimic": ("joint", "multiplier", "offset")}
-SHORT = {"min": "lower", "max": "upper"}
+SHORT = {"min": "lower", "max": "upper", "iyx": "ixy", "izx": "ixz", "izy": "iyz"}
 X, Y, Z = np.eye(3)
-MOST = 4 * np.pi
-"""Angle of an origin, two turns, beyond which none is in radians."""
+MOST, TURN = 4 * np.pi, 3.2
+"""Angle of an origin, two turns, beyond which none is in radians; and one beyond which whole and half ones are in degrees."""
+POINTER = b"version https://git-lfs"
+OTHERS = {"mujoco": "MuJoCo's format", "sdf": "SDF", "gazebo": "SDF", "COLLADA": "COLLADA"}
 Wrong = partial[FileError]
 """Makes the error of a place of the file from a message."""
 
@@ -38,19 +45,23 @@ def read_urdf(path: Path) -> UrdfModel:
     wrong = partial(FileError, file=file)
     with reading(path):
         text = path.read_bytes()
-    try:
-        robot = xml.fromstring(_with_prefixes(text))
-    except (xml.ParseError, LookupError, ValueError) as error:  # the latter two: no such encoding
-        raise wrong(f"not XML: {error}") from None
+    if text.startswith(POINTER):
+        raise wrong("this is a pointer of Git LFS and not the file itself, fetch that with: git lfs pull")
+    if b"<html" in text[:1000].lower():
+        raise wrong("this is a web page and not the file that it shows; download the raw file")
+    robot = _parsed(text, wrong)
     if path.suffix == ".xacro" or any(_is_xacro(e) for e in robot.iter()):
         plain = path.name.removesuffix(".xacro").removesuffix(".urdf")
         out = f"{plain}.urdf" if f"{plain}.urdf" != path.name else f"{plain}_expanded.urdf"
         raise wrong(f"this is xacro, expand it with: xacro {path.name} > {out}")
-    if robot.tag.rpartition("}")[2] != "robot":
-        raise wrong(f"expected a URDF, whose root element is <robot>; found <{robot.tag}>")
-    namespace = robot.tag.removesuffix("robot")
-    for e in robot.iter():  # one that has no prefix says nothing
-        e.tag = e.tag.removeprefix(namespace)
+    if robot.tag != "robot":
+        other = OTHERS.get(robot.tag)
+        known = f", which is {other}: give the robot's URDF, or convert this to URDF first" if other else ""
+        raise wrong(f"expected a URDF, whose root element is <robot>; found <{robot.tag}>{known}")
+    if robot.find("link") is None:
+        raise wrong(
+            "the robot has no <link>, as in an SRDF or a file of xacro that only defines macros; expected its URDF"
+        )
     _check_tags(robot, wrong)
     links = [(_name(e, wrong), _body(e, wrong)) for e in robot.findall("link")]
     joints = [_joint(e, wrong) for e in robot.findall("joint")]
@@ -58,17 +69,32 @@ def read_urdf(path: Path) -> UrdfModel:
     return UrdfModel(file, robot.get("name") or path.stem, dict(links), {j.child: j for j in joints})
 
 
-def _with_prefixes(text: bytes) -> bytes:
-    """The file with every prefix of an element explained, which XML asks for and readers of URDF do not."""
-    missing = {*re.findall(rb"<([A-Za-z_][\w.-]*):", text)} - {*re.findall(rb"xmlns:([\w.-]+)", text)}
-    names = b"".join(b' xmlns:%b="%b"' % (n, n) for n in sorted(missing))
-    return re.sub(rb"<robot\b", b"<robot" + names, text, count=1)
+def _parsed(text: bytes, wrong: Wrong) -> xml.Element:
+    """Root element; prefixes need no explanation, which XML asks for and readers of URDF do not."""
+    tree, parser = xml.TreeBuilder(), expat.ParserCreate()
+    parser.StartElementHandler, parser.EndElementHandler = tree.start, tree.end
+    parser.CharacterDataHandler = tree.data
+    try:
+        parser.Parse(tolerated(text), True)
+    except (expat.ExpatError, LookupError, ValueError) as error:  # the latter two: no such encoding
+        raise wrong(f"not XML: {error}") from None
+    return tree.close()
+
+
+def tolerated(text: bytes) -> bytes:
+    """The file, as long as it was, without what readers of URDF pass over and XML does not allow: dashes in comments,
+    lines before the declaration, an & in the name of a mesh, letters of another encoding in comments."""
+    if b"\0" in text:  # UTF-16
+        return text
+    text = re.sub(rb"<!--.*?-->", lambda found: re.sub(rb"[^\n]", b" ", found[0]), text, flags=re.DOTALL)
+    text = re.sub(rb"^(\s+)(<\?xml.*?\?>)", rb"\2\1", text, flags=re.DOTALL)
+    return re.sub(rb"&(?!#?\w+;)", b"_", text)
 
 
 def _is_xacro(e: xml.Element) -> bool:
     """An element of xacro, or a number or name that xacro fills in."""
     texts = [str(v) for k, v in e.attrib.items() if k != "filename"]
-    return "xacro" in str(e.tag).partition("}")[0] or any("${" in t or "$(" in t for t in texts)
+    return "xacro" in str(e.tag).partition(":")[0] or any("${" in t or "$(" in t for t in texts)
 
 
 def _check_tags(robot: xml.Element, wrong: Wrong) -> None:
@@ -82,6 +108,9 @@ def _check_tags(robot: xml.Element, wrong: Wrong) -> None:
             if meant:
                 raise wrong(f"expected <{meant[0]}>, found <{e.tag}>", key="" if e is top else key)
             names = ATTRIBUTES.get(e.tag, ())
+            inside = (e.text or "").strip() or "".join(f"<{inner.tag}>" for inner in e)
+            if names and inside and top.tag in READ[:2]:
+                raise wrong(f"expected <{e.tag} {names[0]}=...>, found '{inside}' in it", key=key)
             for k in (k for k in e.attrib if names and k not in names):
                 close = [SHORT[k]] if k in SHORT else get_close_matches(k.lower(), names, 1, 0.8)
                 if close:
@@ -103,7 +132,7 @@ def _check_tree(links: list[str], joints: list[UrdfJoint], wrong: Wrong) -> None
     for joint in joints:
         for end in (joint.parent, joint.child):
             if end not in links:
-                raise wrong(f"no link '{end}'", key=f"joint {joint.name}")
+                raise wrong(f"no link '{end}'{suggestion(end, links)}", key=f"joint {joint.name}")
     children = [j.child for j in joints]
     twice = next((c for c in children if children.count(c) > 1), None)
     if twice:
@@ -141,7 +170,7 @@ def _joint(e: xml.Element, wrong: Wrong) -> UrdfJoint:
         limits=(lower, upper) if ranged else None,
         effort=_largest(limit, "effort", wrong),
         velocity=_largest(limit, "velocity", wrong),
-        mimic=None if mimic is None else Mimic(mimic.get("joint", "?"), _number(
+        mimic=None if mimic is None or kind == "fixed" else Mimic(mimic.get("joint", "?"), _number(
             mimic, "multiplier", wrong, 1.0), _number(mimic, "offset", wrong)),
     )  # fmt: skip
 
@@ -187,7 +216,8 @@ def _origin(e: xml.Element, wrong: Wrong) -> Pose:
     if found is not None and other:
         raise wrong(f"origin: expected xyz and rpy, found {other[0]}='{found.get(other[0])}'")
     angles = _numbers(found, "rpy", np.zeros(3), wrong)
-    if found is not None and np.abs(angles).max() > MOST:
+    turns = np.abs(angles)
+    if found is not None and ((turns > MOST) | (turns > TURN) & (turns % 0.5 == 0)).any():
         raise wrong(f"rpy: expected radians, found '{found.get('rpy')}', as degrees are")
     roll, pitch, yaw = angles
     turned = rotation_about(Z, yaw) @ rotation_about(Y, pitch) @ rotation_about(X, roll)

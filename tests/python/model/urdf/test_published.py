@@ -217,6 +217,18 @@ def test_jaws_follow_a_home_and_each_other(tmp_path: Path) -> None:
     np.testing.assert_allclose(c, centre, atol=1e-14)
 
 
+def test_a_fixed_joint_follows_nothing(tmp_path: Path) -> None:
+    """Exporters fix the fingers of a gripper, and leave their <mimic> in the file."""
+    text = robot(
+        arm(), joint("f", "c", "finger", "fixed", '<mimic joint="q2" multiplier="-1" offset="0.2"/>')
+    )
+    (tmp_path / "side.yaml").write_text("home: {q2: 0.7}\n")
+    (tmp_path / "arm.urdf").write_text(text)
+    found = bodies(import_urdf(tmp_path / "arm.urdf", tmp_path / "side.yaml"))["q2"]
+    mass, centre, _ = Robot(text).masses("c", set())
+    np.testing.assert_allclose(sum(b.mass * np.array(b.com) for b in found) / mass, centre, atol=1e-14)
+
+
 def test_dust_of_a_tensor_is_zero(tmp_path: Path) -> None:
     upper = bodies(imported(tmp_path, DUST))["shoulder"][0]
     wanted = ((0.0123, 0.0, 0.0011), (0.0, 0.061, -0.0007), (0.0011, -0.0007, 0.067))
