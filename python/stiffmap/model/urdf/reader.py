@@ -139,7 +139,9 @@ def _check_tree(links: list[str], joints: list[UrdfJoint], wrong: Wrong) -> None
         raise wrong(f"link '{twice}' hangs on two joints; loops belong in the sidecar")
     roots = [link for link in links if link not in children]
     if len(roots) != 1:
-        raise wrong(f"expected one root link, found {len(roots)}: {', '.join(roots) or 'none'}")
+        raise wrong(
+            f"expected one root link, found {len(roots)}: {first_of(roots) or 'none'}; a joint, fixed say, carries every other"
+        )
     reached = set(roots)
     while more := {j.child for j in joints if j.parent in reached} - reached:
         reached |= more

@@ -217,6 +217,18 @@ def test_jaws_follow_a_home_and_each_other(tmp_path: Path) -> None:
     np.testing.assert_allclose(c, centre, atol=1e-14)
 
 
+def test_links_without_a_mass_are_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    bare = re.sub("<inertial>.*?</inertial>", "", robot(arm()))
+    text = bare.replace('<link name="b">', '<link name="b"><inertial><mass value="0"/></inertial>')
+    frame = joint("t", "c", "tool")  # its mass stays with c
+    for parts, said in ((text, "a, b, c"), (text.replace("</robot>", frame + "</robot>"), "a, b")):
+        (tmp_path / "arm.urdf").write_text(parts)
+        out = tmp_path / "arm.yaml"
+        assert main(["import", str(tmp_path / "arm.urdf"), "-o", str(out), "--overwrite"]) == 0
+        assert f"no mass (gravity does not pull on these links): {said}\n" in capsys.readouterr().out
+    assert not imported(tmp_path, robot(arm())).massless
+
+
 def test_a_fixed_joint_follows_nothing(tmp_path: Path) -> None:
     """Exporters fix the fingers of a gripper, and leave their <mimic> in the file."""
     text = robot(
@@ -313,9 +325,13 @@ def tensors(text: str, moment: float) -> str:
 
 
 DOUBTS = {
-    "millimetres": (machine_of(400.0, 5), "joint q2: origin: found it 800 m off; expected metres, 0.8 m if these are millimetres"),
+    "millimetres": (machine_of(400.0, 5), "joint q2: origin: found 800 m; expected metres, 0.8 m if these are millimetres"),
     "inertial in millimetres": (machine_of(0.4, 5).replace('xyz="0 0 0.2"', 'xyz="0 0 200"'),
-                                "link a: inertial: found it 200 m off; expected metres, 0.2 m if these are millimetres"),
+                                "link a: inertial: found 200 m; expected metres, 0.2 m if these are millimetres"),
+    "inertial of a small arm in millimetres": (machine_of(0.03, 0.1).replace('xyz="0 0 0.015"', 'xyz="0 0 15"'),
+                                               "link a: inertial: found 15 m; expected metres, 0.015 m if these are millimetres"),
+    "stroke in millimetres": (machine_of(0.4, 5, '<limit lower="-50" upper="350"/>', "prismatic"),
+                              "joint q0: limit: found 400 m; expected metres, 0.4 m if these are millimetres"),
     "degrees": (machine_of(0.4, 5, '<limit lower="-180" upper="92.5"/>'),
                 "joint q0: limit: found -180 to 92.5 rad; expected radians, -3.142 to 1.614 if these are degrees"),
     "grams": (machine_of(0.4, 2500), "link a: mass: found 2500 kg, and 7500 kg in all that moves, in a machine of 0.8 m; expected "
@@ -346,12 +362,12 @@ def test_numbers_that_no_machine_has_are_warned_of(name: str, tmp_path: Path) ->
     [
         machine_of(30.0, 9e4), machine_of(1.3, 1600), machine_of(0.02, 0.1), tensors(machine_of(0.4, 1e-3), 1.0),
         machine_of(0.4, 5, '<limit lower="-12.56" upper="12.56"/>'), machine_of(0.4, 5, '<limit lower="-1e16" upper="1e16"/>'),
-        machine_of(0.01, 1500, '<limit lower="0" upper="0.6"/>', "prismatic"),
+        machine_of(0.01, 1500, '<limit lower="0" upper="0.6"/>', "prismatic"), machine_of(0.4, 5, '<limit lower="-1e6" upper="1e6"/>', "prismatic"),
         machine_of(0.4, 5).replace('izz="0.008', 'izz="0.01605'),
         robot(arm()).replace('<link name="base"/>', '<link name="map"/><link name="base"/><joint name="m" type="fixed"><parent '
                              'link="map"/><child link="base"/><origin xyz="691000 5334000 0"/></joint>'),
     ],
-    ids=["crane", "heavy arm", "finger", "moments of one", "four turns", "no limit", "machine tool", "flat plate, rounded", "place on a map"],
+    ids=["crane", "heavy arm", "finger", "moments of one", "four turns", "no limit", "machine tool", "no end of a rail", "flat plate, rounded", "place on a map"],
 )  # fmt: skip
 def test_real_machines_are_not_doubted(text: str, tmp_path: Path) -> None:
     with warnings.catch_warnings():
