@@ -74,6 +74,11 @@ TIPS = {
     "tcp between fingers": (robot(arm(), HAND, FINGERS, joint("t", "hand", "r_hand_tcp")), "r_hand_tcp"),
     "two fingers": (robot(arm(), HAND, FINGERS), "hand"),
     "a finger that mimics": (robot(arm(), HAND, MIMIC), "hand"),
+    "a jaw alone": (robot(arm(), HAND, joint("jointGripper", "hand", "mover", "revolute")), "hand"),
+    "a jaw alone, before a frame": (robot(arm(), HAND, joint("jaw", "hand", "mover", "prismatic"), joint("m", "mover", "pad")),
+                                    "hand"),
+    "a jaw alone behind a tool": (robot(arm(), joint("t", "c", "tool0"), HAND.replace('"c"', '"tool0"'),
+                                        joint("claw", "hand", "mover", "revolute")), "tool0"),
     "tool0 before a gripper": (robot(arm(), joint("t", "c", "tool0"), joint("h", "tool0", "hand"), FINGERS), "tool0"),
     "tool0 before a hand": (robot(arm(), joint("t", "c", "tool0"), joint("h", "tool0", "hand"), *(
         joint(f"{f}{k}", ("hand", f"{f}1")[k - 1], f"{f}{k}", "revolute") for f in "xyz" for k in (1, 2))), "tool0"),
@@ -98,6 +103,14 @@ def test_tip(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> N
     assert main(["import", str(tmp_path / "arm.urdf"), "-o", str(tmp_path / "arm.yaml")]) == 0
     assert (f"tip {tip}, chosen from the ends" in capsys.readouterr().out) == bool(found.choice)
     assert sm.load_machine(tmp_path / "arm.yaml") == sm.import_urdf(tmp_path / "arm.urdf")
+
+
+@pytest.mark.parametrize("name", ["gripper_roll", "wrist_to_gripper", "joint_4"])
+def test_a_last_joint_that_turns_a_gripper_is_a_drive(name: str, tmp_path: Path) -> None:
+    found = imported(tmp_path, robot(arm(), joint(name, "c", "gripper", "revolute")))
+    assert (found.tip, found.choice, len(found.rigid)) == ("gripper", "", 4)
+    of_a_gripper = robot(joint("jaw_1", "base", "a", "revolute"), joint("jaw_2", "a", "b", "revolute"))
+    assert imported(tmp_path, of_a_gripper).tip == "b"
 
 
 MANY = {
