@@ -27,13 +27,15 @@ ATTRIBUTES = {
     "parent": ("link",), "child": ("link",), "limit": ("lower", "upper", "effort", "velocity"),
     "mimic": ("joint", "multiplier", "offset"),
 }  # fmt: skip
+HOLDS = {"robot": ("link", "joint"), "link": ("inertial", "origin"), "inertial": ("origin", "mass", "inertia"),
+         "joint": ("origin", "axis", "parent", "child", "limit", "mimic")}  # fmt: skip
 READ = ("link", "joint", "inertial", *ATTRIBUTES)
-"""Elements whose content counts."""
-SHORT = {"min": "lower", "max": "upper", "iyx": "ixy", "izx": "ixz", "izy": "iyz"}
+"""Elements whose content counts, in those that hold them; the origin of a link says nothing."""
+SHORT = {"min": "lower", "max": "upper", "iyx": "ixy", "izx": "ixz", "izy": "iyz", "pose": "origin", "transform": "origin",
+         "position": "origin"}  # fmt: skip
 X, Y, Z = np.eye(3)
 MOST, TURN = 4 * np.pi, 3.2
 """Angle of an origin, two turns, beyond which none is in radians; and one beyond which whole and half ones are in degrees."""
-POINTER = b"version https://git-lfs"
 OTHERS = {"mujoco": "MuJoCo's format", "sdf": "SDF", "gazebo": "SDF", "COLLADA": "COLLADA"}
 Wrong = partial[FileError]
 """Makes the error of a place of the file from a message."""
@@ -45,7 +47,7 @@ def read_urdf(path: Path) -> UrdfModel:
     wrong = partial(FileError, file=file)
     with reading(path):
         text = path.read_bytes()
-    if text.startswith(POINTER):
+    if text.startswith(b"version https://git-lfs"):
         raise wrong("this is a pointer of Git LFS and not the file itself, fetch that with: git lfs pull")
     if b"<html" in text[:1000].lower():
         raise wrong("this is a web page and not the file that it shows; download the raw file")
@@ -55,13 +57,14 @@ def read_urdf(path: Path) -> UrdfModel:
         out = f"{plain}.urdf" if f"{plain}.urdf" != path.name else f"{plain}_expanded.urdf"
         raise wrong(f"this is xacro, expand it with: xacro {path.name} > {out}")
     if robot.tag != "robot":
-        other = OTHERS.get(robot.tag)
-        known = f", which is {other}: give the robot's URDF, or convert this to URDF first" if other else ""
-        raise wrong(f"expected a URDF, whose root element is <robot>; found <{robot.tag}>{known}")
-    if robot.find("link") is None:
-        raise wrong(
-            "the robot has no <link>, as in an SRDF or a file of xacro that only defines macros; expected its URDF"
+        other = (
+            f", which is {OTHERS[robot.tag]}: give a URDF, or convert this first"
+            if robot.tag in OTHERS
+            else ""
         )
+        raise wrong(f"expected a URDF, whose root element is <robot>; found <{robot.tag}>{other}")
+    if robot.find("link") is None:
+        raise wrong("the robot has no <link>, as in an SRDF or in macros of xacro; expected its URDF")
     _check_tags(robot, wrong)
     links = [(_name(e, wrong), _body(e, wrong)) for e in robot.findall("link")]
     joints = [_joint(e, wrong) for e in robot.findall("joint")]
@@ -72,8 +75,11 @@ def read_urdf(path: Path) -> UrdfModel:
 def _parsed(text: bytes, wrong: Wrong) -> xml.Element:
     """Root element; prefixes need no explanation, which XML asks for and readers of URDF do not."""
     tree, parser = xml.TreeBuilder(), expat.ParserCreate()
-    parser.StartElementHandler, parser.EndElementHandler = tree.start, tree.end
-    parser.CharacterDataHandler = tree.data
+    parser.StartElementHandler, parser.EndElementHandler, parser.CharacterDataHandler = (
+        tree.start,
+        tree.end,
+        tree.data,
+    )
     try:
         parser.Parse(tolerated(text), True)
     except (expat.ExpatError, LookupError, ValueError) as error:  # the latter two: no such encoding
@@ -84,11 +90,9 @@ def _parsed(text: bytes, wrong: Wrong) -> xml.Element:
 def tolerated(text: bytes) -> bytes:
     """The file, as long as it was, without what readers of URDF pass over and XML does not allow: dashes in comments,
     lines before the declaration, an & in the name of a mesh, letters of another encoding in comments."""
-    if b"\0" in text:  # UTF-16
-        return text
     text = re.sub(rb"<!--.*?-->", lambda found: re.sub(rb"[^\n]", b" ", found[0]), text, flags=re.DOTALL)
     text = re.sub(rb"^(\s+)(<\?xml.*?\?>)", rb"\2\1", text, flags=re.DOTALL)
-    return re.sub(rb"&(?!#?\w+;)", b"_", text)
+    return re.sub(rb"&(?!#?\w+;|\0)", b"_", text)
 
 
 def _is_xacro(e: xml.Element) -> bool:
@@ -103,13 +107,19 @@ def _check_tags(robot: xml.Element, wrong: Wrong) -> None:
         if top.tag == "robot":
             raise wrong(f"expected one <robot>, found another in it: '{top.get('name', '')}'")
         key = f"{top.tag} {top.get('name', '')}"
-        for e in (top, *top, *(e for inner in top.findall("inertial") for e in inner)):
+        inner = [("inertial", e) for inertial in top.findall("inertial") for e in inertial]
+        for within, e in (("robot", top), *((top.tag, e) for e in top), *inner):
+            known = HOLDS.get(within, ())
+            if known and e.tag in READ and e.tag not in known:
+                place = " or ".join(f"<{name}>" for name, tags in HOLDS.items() if e.tag in tags)
+                raise wrong(f"expected <{e.tag}> in {place}, found it in <{within}>", key=key)
             meant = [] if e.tag in READ else get_close_matches(e.tag.lower(), READ, 1, 0.8)
+            meant = meant or [name for name in known if name == SHORT.get(e.tag)]
             if meant:
                 raise wrong(f"expected <{meant[0]}>, found <{e.tag}>", key="" if e is top else key)
             names = ATTRIBUTES.get(e.tag, ())
-            inside = (e.text or "").strip() or "".join(f"<{inner.tag}>" for inner in e)
-            if names and inside and top.tag in READ[:2]:
+            inside = (e.text or "").strip() or "".join(f"<{part.tag}>" for part in e)
+            if names and inside and known:
                 raise wrong(f"expected <{e.tag} {names[0]}=...>, found '{inside}' in it", key=key)
             for k in (k for k in e.attrib if names and k not in names):
                 close = [SHORT[k]] if k in SHORT else get_close_matches(k.lower(), names, 1, 0.8)
@@ -218,8 +228,7 @@ def _origin(e: xml.Element, wrong: Wrong) -> Pose:
     if found is not None and other:
         raise wrong(f"origin: expected xyz and rpy, found {other[0]}='{found.get(other[0])}'")
     angles = _numbers(found, "rpy", np.zeros(3), wrong)
-    turns = np.abs(angles)
-    if found is not None and ((turns > MOST) | (turns > TURN) & (turns % 0.5 == 0)).any():
+    if found is not None and any(a > MOST or (a > TURN and a % 0.5 == 0) for a in np.abs(angles)):
         raise wrong(f"rpy: expected radians, found '{found.get('rpy')}', as degrees are")
     roll, pitch, yaw = angles
     turned = rotation_about(Z, yaw) @ rotation_about(Y, pitch) @ rotation_about(X, roll)
