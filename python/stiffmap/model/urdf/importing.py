@@ -205,10 +205,9 @@ def doubts(model: UrdfModel) -> Iterator[str]:
     each = {j.name: j.limits[1] - j.limits[0] for j in model.moving if j.kind == "prismatic" and j.limits}
     strokes = {name: length for name, length in each.items() if length <= 1e3 * FARTHEST}  # beyond: no limit
     size = lengths[far] + max(sum(strokes.get(j.name, 0.0) for j in way) for way in ways.values())
-    nearest = min(FARTHEST, OFF * max(size, SMALLEST))
     for place, length, most in (
         *((f"joint {j.name}: origin", lengths[far], FARTHEST) for j in ways[far][-1:]),
-        *((place, length, nearest) for place, length in off.items()),
+        *((place, length, min(FARTHEST, OFF * max(size, SMALLEST))) for place, length in off.items()),
         *((f"joint {name}: limit", length, FARTHEST) for name, length in strokes.items()),
     ):
         if length > most:

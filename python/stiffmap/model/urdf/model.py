@@ -109,7 +109,7 @@ TOOLS = (r"tool_?0", r"tcp|tool_cent(er|re)_point", r"tool\d*", r"eef?|end_?effe
 """Names of tools as makers write them, alone or as words of a longer name; the first is the surest."""
 
 
-JAW, TURNS = r"grip|jaw|claw", r"wrist|rot|roll|pitch|yaw|tilt"
+JAW = r"(?!.*(wrist|rot|roll|pitch|yaw|tilt)).*(grip|jaw|claw)"
 
 
 def rank(link: str) -> int:
@@ -175,7 +175,7 @@ def _jaws(model: UrdfModel) -> set[str]:
 def _opens(model: UrdfModel, joint: str) -> bool:
     """True for a joint that is named like a gripper's, does not turn one, and hangs on a joint of another name."""
     way = [j.name.lower() for j in model.way(model.joints[joint].child) if j.kind != "fixed"][-2:]
-    return [bool(re.search(JAW, n)) and not re.search(TURNS, n) for n in way] == [False, True]
+    return [bool(re.match(JAW, name)) for name in way] == [False, True]
 
 
 def _independent(model: UrdfModel, link: str) -> int:

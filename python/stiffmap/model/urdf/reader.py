@@ -75,11 +75,8 @@ def read_urdf(path: Path) -> UrdfModel:
 def _parsed(text: bytes, wrong: Wrong) -> xml.Element:
     """Root element; prefixes need no explanation, which XML asks for and readers of URDF do not."""
     tree, parser = xml.TreeBuilder(), expat.ParserCreate()
-    parser.StartElementHandler, parser.EndElementHandler, parser.CharacterDataHandler = (
-        tree.start,
-        tree.end,
-        tree.data,
-    )
+    parser.StartElementHandler, parser.EndElementHandler = tree.start, tree.end
+    parser.CharacterDataHandler = tree.data
     try:
         parser.Parse(tolerated(text), True)
     except (expat.ExpatError, LookupError, ValueError) as error:  # the latter two: no such encoding
@@ -92,7 +89,7 @@ def tolerated(text: bytes) -> bytes:
     lines before the declaration, an & in the name of a mesh, letters of another encoding in comments."""
     text = re.sub(rb"<!--.*?-->", lambda found: re.sub(rb"[^\n]", b" ", found[0]), text, flags=re.DOTALL)
     text = re.sub(rb"^(\s+)(<\?xml.*?\?>)", rb"\2\1", text, flags=re.DOTALL)
-    return re.sub(rb"&(?!#?\w+;|\0)", b"_", text)
+    return re.sub(rb"&(?!#?\w+;|\0)", b"_", text)  # a zero follows in UTF-16
 
 
 def _is_xacro(e: xml.Element) -> bool:
@@ -149,9 +146,8 @@ def _check_tree(links: list[str], joints: list[UrdfJoint], wrong: Wrong) -> None
         raise wrong(f"link '{twice}' hangs on two joints; loops belong in the sidecar")
     roots = [link for link in links if link not in children]
     if len(roots) != 1:
-        raise wrong(
-            f"expected one root link, found {len(roots)}: {first_of(roots) or 'none'}; a joint, fixed say, carries every other"
-        )
+        found = f"found {len(roots)}: {first_of(roots) or 'none'}"
+        raise wrong(f"expected one root link, {found}; every other hangs on a joint, which may be fixed")
     reached = set(roots)
     while more := {j.child for j in joints if j.parent in reached} - reached:
         reached |= more
