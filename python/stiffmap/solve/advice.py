@@ -196,9 +196,12 @@ def _trial(machine: Machine) -> list[str]:
 
 def _numbers(machine: Machine, path: str | PathLike[str]) -> Iterator[str]:
     heaviest = STEEL * machine.compiled.length**3
-    for name, e in all_elements(machine.description):
-        if isinstance(e, Body) and e.mass > heaviest:
-            yield f"{name}: {e.mass:g} kg is more than solid steel of the machine's size ({heaviest:.3g} kg)"
+    masses = {name: e.mass for name, e in all_elements(machine.description) if isinstance(e, Body)}
+    if any(machine.description.gravity or ()) and not any(masses.values()):
+        yield "gravity pulls on nothing: no body has a mass"
+    for name, mass in masses.items():
+        if mass > heaviest:
+            yield f"{name}: {mass:g} kg is more than solid steel of the machine's size ({heaviest:.3g} kg)"
     data = read(find(path)).data
     units = data.get("units", {}) if isinstance(data, dict) else {}
     system = UnitSystem(**units)

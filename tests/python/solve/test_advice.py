@@ -24,6 +24,7 @@ def test_shipped_machines_are_left_in_peace(name: str) -> None:
     assert advice(sm.load_machine(name), name) == []
 
 
+TRIPTERON = (machine_folder() / "tripteron.yaml").read_text(encoding="utf-8")
 COLUMN = (machine_folder() / "travelling-column.yaml").read_text(encoding="utf-8")
 CASES = {
     "ram": (
@@ -70,6 +71,7 @@ CASES = {
         "range: [0, 200]",
         "left.drive: home lies at the end of its range",
     ),
+    "weightless": (TRIPTERON, "units: ", "gravity: [0, 0, -9.81]\nunits: ", "gravity pulls on nothing"),
     "no task": (FIVE_BAR, "task: [x, y]", "", "2 drives, 6 components commanded; name those that are"),
 }
 

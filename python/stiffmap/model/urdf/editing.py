@@ -14,6 +14,7 @@ from stiffmap.common.errors import FileError
 from stiffmap.common.number_text import number_in
 from stiffmap.common.rotations import rotation_about
 from stiffmap.model.description import Pose
+from stiffmap.model.urdf.reader import tolerated
 
 SAME = 1e-14  # m, and of a rotation matrix
 LOCKED = 1e-12  # cosine of the pitch: below it roll and yaw turn about one axis
@@ -55,7 +56,7 @@ def _tags(text: bytes) -> dict[tuple[str, str], int]:
             at.setdefault((above[2], tag), parser.CurrentByteIndex)
 
     parser.StartElementHandler, parser.EndElementHandler = start, lambda tag: above.pop()
-    parser.Parse(text, True)
+    parser.Parse(tolerated(text), True)
     return at
 
 

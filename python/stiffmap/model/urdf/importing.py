@@ -34,6 +34,8 @@ class Imported:
     """Motors without a compliance."""
     tip: str = ""
     """The link that is the tool."""
+    massless: tuple[str, ...] = ()
+    """Moving links whose body, with all that stays with it, has no mass."""
     choice: str = ""
     """The ends that it was chosen from, in words; empty where it was named, or is the only one."""
 
@@ -76,7 +78,9 @@ def import_urdf(
     for doubt in doubts(model):
         warnings.warn(f"{model.file}: {doubt}", stacklevel=frames_of_this_package())
     left_out = tuple(n for n in model.links if model.body_of(n) not in {*chains.heads, model.root})
-    return Imported(description, left_out, tuple(sorted(motors - set(side.actuators))), end, choice)
+    heavy = {chains.carrier(n) for n, body in model.links.items() if body}
+    massless = tuple(n for n in model.links if n in chains.heads - heavy)
+    return Imported(description, left_out, tuple(sorted(motors - set(side.actuators))), end, massless, choice)
 
 
 def _check_file(description: MachineDescription, file: str) -> None:
@@ -178,7 +182,9 @@ def _loops(model: UrdfModel, side: Sidecar, tip: str, file: str) -> tuple[list[t
 
 
 FARTHEST = 100.0
-"""m: of a way from the first moving joint on, beyond those of cranes."""
+"""m: of a way from the first moving joint on, or of a stroke, beyond those of cranes."""
+OFF = 10.0
+"""Of the machine's length: a centre of mass beyond it."""
 DENSEST, SMALLEST = 2000.0, 0.7
 """kg/m³ and m: as much of all that moves in a cube of the machine's length; known robots have a fiftieth of it."""
 WIDEST = 50.0
@@ -196,15 +202,18 @@ def doubts(model: UrdfModel) -> Iterator[str]:
     bodies = [(link, body) for link, body in model.links.items() if body and ways[link]]
     off = {f"link {link}: inertial": float(np.linalg.norm(body.com)) for link, body in bodies}
     far = max(lengths, key=lambda link: lengths[link])
-    for place, length in [(f"joint {j.name}: origin", lengths[far]) for j in ways[far][-1:]] + [*off.items()]:
-        if length > FARTHEST:
-            yield f"{place}: found it {length:.4g} m off; expected metres, {length / 1e3:.3g} m if these are millimetres"
+    each = {j.name: j.limits[1] - j.limits[0] for j in model.moving if j.kind == "prismatic" and j.limits}
+    strokes = {name: length for name, length in each.items() if length <= 1e3 * FARTHEST}  # beyond: no limit
+    size = lengths[far] + max(sum(strokes.get(j.name, 0.0) for j in way) for way in ways.values())
+    for place, length, most in (
+        *((f"joint {j.name}: origin", lengths[far], FARTHEST) for j in ways[far][-1:]),
+        *((place, length, min(FARTHEST, OFF * max(size, SMALLEST))) for place, length in off.items()),
+        *((f"joint {name}: limit", length, FARTHEST) for name, length in strokes.items()),
+    ):
+        if length > most:
+            yield f"{place}: found {length:.4g} m; expected metres, {length / 1e3:.3g} m if these are millimetres"
             break
     mass = sum(body.mass for _, body in bodies)
-    size = lengths[far] + max(
-        sum(j.limits[1] - j.limits[0] for j in way if j.kind == "prismatic" and j.limits)
-        for way in ways.values()
-    )
     if mass > DENSEST * max(size, SMALLEST) ** 3:
         link, heavy = max(bodies, key=lambda one: one[1].mass)
         yield (

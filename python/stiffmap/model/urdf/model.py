@@ -109,6 +109,9 @@ TOOLS = (r"tool_?0", r"tcp|tool_cent(er|re)_point", r"tool\d*", r"eef?|end_?effe
 """Names of tools as makers write them, alone or as words of a longer name; the first is the surest."""
 
 
+JAW = r"(?!.*(wrist|rot|roll|pitch|yaw|tilt)).*(grip|jaw|claw)"
+
+
 def rank(link: str) -> int:
     """Place of a link's name in TOOLS; that after the last for a name that says nothing."""
     words = re.sub(r"([a-z])([A-Z])", r"\1_\2", link).lower()
@@ -125,7 +128,7 @@ def find_tip(model: UrdfModel) -> tuple[str, str]:
     ends = [n for n in model.leaves if model.body_of(n) != model.root]
     if not ends:
         raise FileError("no joint moves, so there is no machine", file=model.file)
-    if len(ends) == 1:
+    if len(ends) == 1 and not _jaws(model):
         return ends[0], ""
     found = _named(ends) or _by_bodies(model, ends)
     longest = max((model.way(n) for n in found), key=len)
@@ -159,14 +162,20 @@ def _by_bodies(model: UrdfModel, ends: list[str]) -> list[str]:
 
 def _jaws(model: UrdfModel) -> set[str]:
     """Joints of jaws and rods: on a moving body with other joints, and behind each at most one joint that follows no
-    other; two such are jaws, one that mimics is a rod."""
+    other; two such are jaws, one that mimics is a rod. A joint alone is a jaw where its name says so."""
     below: dict[str, list[str]] = {}
     for joint in model.moving:
         if model.body_of(joint.parent) != model.root and _independent(model, joint.child) <= 1:
             below.setdefault(model.body_of(joint.parent), []).append(joint.name)
     on = [model.body_of(j.parent) for j in model.moving]
     return {name for body, names in below.items() for name in names
-            if len(names) > 1 or (on.count(body) > 1 and model.joints[name].mimic)}  # fmt: skip
+            if len(names) > 1 or (on.count(body) > 1 and model.joints[name].mimic) or _opens(model, name)}  # fmt: skip
+
+
+def _opens(model: UrdfModel, joint: str) -> bool:
+    """True for a joint that is named like a gripper's, does not turn one, and hangs on a joint of another name."""
+    way = [j.name.lower() for j in model.way(model.joints[joint].child) if j.kind != "fixed"][-2:]
+    return [bool(re.match(JAW, name)) for name in way] == [False, True]
 
 
 def _independent(model: UrdfModel, link: str) -> int:

@@ -8,11 +8,12 @@ from collections import Counter
 from difflib import get_close_matches
 from functools import partial
 from pathlib import Path
+from xml.parsers import expat
 
 import numpy as np
 
 from stiffmap.common.broadcasting import Floats
-from stiffmap.common.errors import FileError, reading
+from stiffmap.common.errors import FileError, reading, suggestion
 from stiffmap.common.number_text import LARGEST, number_in
 from stiffmap.common.rotations import rotation_about
 from stiffmap.common.short import first_of
@@ -21,13 +22,21 @@ from stiffmap.model.description.pose import vector
 from stiffmap.model.urdf.model import Mimic, UrdfJoint, UrdfModel, tensor
 
 KINDS = {"revolute": "revolute", "continuous": "revolute", "prismatic": "prismatic", "fixed": "fixed"}
-READ = ("link", "joint", "inertial", "mass", "inertia", "origin", "axis", "parent", "child", "limit", "mimic")
-"""Elements whose content counts."""
-ATTRIBUTES = {"limit": ("lower", "upper", "effort", "velocity"), "mimic": ("joint", "multiplier", "offset")}
-SHORT = {"min": "lower", "max": "upper"}
+ATTRIBUTES = {
+    "mass": ("value",), "inertia": ("ixx", "iyy", "izz", "ixy", "ixz", "iyz"), "origin": ("xyz", "rpy"), "axis": ("xyz",),
+    "parent": ("link",), "child": ("link",), "limit": ("lower", "upper", "effort", "velocity"),
+    "mimic": ("joint", "multiplier", "offset"),
+}  # fmt: skip
+HOLDS = {"robot": ("link", "joint"), "link": ("inertial", "origin"), "inertial": ("origin", "mass", "inertia"),
+         "joint": ("origin", "axis", "parent", "child", "limit", "mimic")}  # fmt: skip
+READ = ("link", "joint", "inertial", *ATTRIBUTES)
+"""Elements whose content counts, in those that hold them; the origin of a link says nothing."""
+SHORT = {"min": "lower", "max": "upper", "iyx": "ixy", "izx": "ixz", "izy": "iyz", "pose": "origin", "transform": "origin",
+         "position": "origin"}  # fmt: skip
 X, Y, Z = np.eye(3)
-MOST = 4 * np.pi
-"""Angle of an origin, two turns, beyond which none is in radians."""
+MOST, TURN = 4 * np.pi, 3.2
+"""Angle of an origin, two turns, beyond which none is in radians; and one beyond which whole and half ones are in degrees."""
+OTHERS = {"mujoco": "MuJoCo's format", "sdf": "SDF", "gazebo": "SDF", "COLLADA": "COLLADA"}
 Wrong = partial[FileError]
 """Makes the error of a place of the file from a message."""
 
@@ -38,19 +47,24 @@ def read_urdf(path: Path) -> UrdfModel:
     wrong = partial(FileError, file=file)
     with reading(path):
         text = path.read_bytes()
-    try:
-        robot = xml.fromstring(_with_prefixes(text))
-    except (xml.ParseError, LookupError, ValueError) as error:  # the latter two: no such encoding
-        raise wrong(f"not XML: {error}") from None
+    if text.startswith(b"version https://git-lfs"):
+        raise wrong("this is a pointer of Git LFS and not the file itself, fetch that with: git lfs pull")
+    if b"<html" in text[:1000].lower():
+        raise wrong("this is a web page and not the file that it shows; download the raw file")
+    robot = _parsed(text, wrong)
     if path.suffix == ".xacro" or any(_is_xacro(e) for e in robot.iter()):
         plain = path.name.removesuffix(".xacro").removesuffix(".urdf")
         out = f"{plain}.urdf" if f"{plain}.urdf" != path.name else f"{plain}_expanded.urdf"
         raise wrong(f"this is xacro, expand it with: xacro {path.name} > {out}")
-    if robot.tag.rpartition("}")[2] != "robot":
-        raise wrong(f"expected a URDF, whose root element is <robot>; found <{robot.tag}>")
-    namespace = robot.tag.removesuffix("robot")
-    for e in robot.iter():  # one that has no prefix says nothing
-        e.tag = e.tag.removeprefix(namespace)
+    if robot.tag != "robot":
+        other = (
+            f", which is {OTHERS[robot.tag]}: give a URDF, or convert this first"
+            if robot.tag in OTHERS
+            else ""
+        )
+        raise wrong(f"expected a URDF, whose root element is <robot>; found <{robot.tag}>{other}")
+    if robot.find("link") is None:
+        raise wrong("the robot has no <link>, as in an SRDF or in macros of xacro; expected its URDF")
     _check_tags(robot, wrong)
     links = [(_name(e, wrong), _body(e, wrong)) for e in robot.findall("link")]
     joints = [_joint(e, wrong) for e in robot.findall("joint")]
@@ -58,17 +72,30 @@ def read_urdf(path: Path) -> UrdfModel:
     return UrdfModel(file, robot.get("name") or path.stem, dict(links), {j.child: j for j in joints})
 
 
-def _with_prefixes(text: bytes) -> bytes:
-    """The file with every prefix of an element explained, which XML asks for and readers of URDF do not."""
-    missing = {*re.findall(rb"<([A-Za-z_][\w.-]*):", text)} - {*re.findall(rb"xmlns:([\w.-]+)", text)}
-    names = b"".join(b' xmlns:%b="%b"' % (n, n) for n in sorted(missing))
-    return re.sub(rb"<robot\b", b"<robot" + names, text, count=1)
+def _parsed(text: bytes, wrong: Wrong) -> xml.Element:
+    """Root element; prefixes need no explanation, which XML asks for and readers of URDF do not."""
+    tree, parser = xml.TreeBuilder(), expat.ParserCreate()
+    parser.StartElementHandler, parser.EndElementHandler = tree.start, tree.end
+    parser.CharacterDataHandler = tree.data
+    try:
+        parser.Parse(tolerated(text), True)
+    except (expat.ExpatError, LookupError, ValueError) as error:  # the latter two: no such encoding
+        raise wrong(f"not XML: {error}") from None
+    return tree.close()
+
+
+def tolerated(text: bytes) -> bytes:
+    """The file, as long as it was, without what readers of URDF pass over and XML does not allow: dashes in comments,
+    lines before the declaration, an & in the name of a mesh, letters of another encoding in comments."""
+    text = re.sub(rb"<!--.*?-->", lambda found: re.sub(rb"[^\n]", b" ", found[0]), text, flags=re.DOTALL)
+    text = re.sub(rb"^(\s+)(<\?xml.*?\?>)", rb"\2\1", text, flags=re.DOTALL)
+    return re.sub(rb"&(?!#?\w+;|\0)", b"_", text)  # a zero follows in UTF-16
 
 
 def _is_xacro(e: xml.Element) -> bool:
     """An element of xacro, or a number or name that xacro fills in."""
     texts = [str(v) for k, v in e.attrib.items() if k != "filename"]
-    return "xacro" in str(e.tag).partition("}")[0] or any("${" in t or "$(" in t for t in texts)
+    return "xacro" in str(e.tag).partition(":")[0] or any("${" in t or "$(" in t for t in texts)
 
 
 def _check_tags(robot: xml.Element, wrong: Wrong) -> None:
@@ -77,11 +104,20 @@ def _check_tags(robot: xml.Element, wrong: Wrong) -> None:
         if top.tag == "robot":
             raise wrong(f"expected one <robot>, found another in it: '{top.get('name', '')}'")
         key = f"{top.tag} {top.get('name', '')}"
-        for e in (top, *top, *(e for inner in top.findall("inertial") for e in inner)):
+        inner = [("inertial", e) for inertial in top.findall("inertial") for e in inertial]
+        for within, e in (("robot", top), *((top.tag, e) for e in top), *inner):
+            known = HOLDS.get(within, ())
+            if known and e.tag in READ and e.tag not in known:
+                place = " or ".join(f"<{name}>" for name, tags in HOLDS.items() if e.tag in tags)
+                raise wrong(f"expected <{e.tag}> in {place}, found it in <{within}>", key=key)
             meant = [] if e.tag in READ else get_close_matches(e.tag.lower(), READ, 1, 0.8)
+            meant = meant or [name for name in known if name == SHORT.get(e.tag)]
             if meant:
                 raise wrong(f"expected <{meant[0]}>, found <{e.tag}>", key="" if e is top else key)
             names = ATTRIBUTES.get(e.tag, ())
+            inside = (e.text or "").strip() or "".join(f"<{part.tag}>" for part in e)
+            if names and inside and known:
+                raise wrong(f"expected <{e.tag} {names[0]}=...>, found '{inside}' in it", key=key)
             for k in (k for k in e.attrib if names and k not in names):
                 close = [SHORT[k]] if k in SHORT else get_close_matches(k.lower(), names, 1, 0.8)
                 if close:
@@ -103,14 +139,15 @@ def _check_tree(links: list[str], joints: list[UrdfJoint], wrong: Wrong) -> None
     for joint in joints:
         for end in (joint.parent, joint.child):
             if end not in links:
-                raise wrong(f"no link '{end}'", key=f"joint {joint.name}")
+                raise wrong(f"no link '{end}'{suggestion(end, links)}", key=f"joint {joint.name}")
     children = [j.child for j in joints]
     twice = next((c for c in children if children.count(c) > 1), None)
     if twice:
         raise wrong(f"link '{twice}' hangs on two joints; loops belong in the sidecar")
     roots = [link for link in links if link not in children]
     if len(roots) != 1:
-        raise wrong(f"expected one root link, found {len(roots)}: {', '.join(roots) or 'none'}")
+        found = f"found {len(roots)}: {first_of(roots) or 'none'}"
+        raise wrong(f"expected one root link, {found}; every other hangs on a joint, which may be fixed")
     reached = set(roots)
     while more := {j.child for j in joints if j.parent in reached} - reached:
         reached |= more
@@ -141,7 +178,7 @@ def _joint(e: xml.Element, wrong: Wrong) -> UrdfJoint:
         limits=(lower, upper) if ranged else None,
         effort=_largest(limit, "effort", wrong),
         velocity=_largest(limit, "velocity", wrong),
-        mimic=None if mimic is None else Mimic(mimic.get("joint", "?"), _number(
+        mimic=None if mimic is None or kind == "fixed" else Mimic(mimic.get("joint", "?"), _number(
             mimic, "multiplier", wrong, 1.0), _number(mimic, "offset", wrong)),
     )  # fmt: skip
 
@@ -187,7 +224,7 @@ def _origin(e: xml.Element, wrong: Wrong) -> Pose:
     if found is not None and other:
         raise wrong(f"origin: expected xyz and rpy, found {other[0]}='{found.get(other[0])}'")
     angles = _numbers(found, "rpy", np.zeros(3), wrong)
-    if found is not None and np.abs(angles).max() > MOST:
+    if found is not None and any(a > MOST or (a > TURN and a % 0.5 == 0) for a in np.abs(angles)):
         raise wrong(f"rpy: expected radians, found '{found.get('rpy')}', as degrees are")
     roll, pitch, yaw = angles
     turned = rotation_about(Z, yaw) @ rotation_about(Y, pitch) @ rotation_about(X, roll)

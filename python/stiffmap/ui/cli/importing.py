@@ -72,6 +72,7 @@ def _remarks(found: Imported, assumed: bool) -> Iterator[Text]:
     for head, text, there in (
         ("tip", f" {found.tip}, {found.choice}; --tip LINK takes another", found.choice),
         ("left out", f"{AWAY if found.tip else ''}: {', '.join(found.left_out)}", found.left_out),
+        ("no mass", f" (gravity does not pull on these links): {', '.join(found.massless)}", found.massless),
         ("rigid", f" (no compliance in the sidecar): {', '.join(found.rigid)}", found.rigid),
     ):  # fmt: skip
         if there:

@@ -10,7 +10,10 @@ import pytest
 from tests.python.model.urdf import robots
 
 import stiffmap as sm
+from stiffmap.model.description import Pose
 from stiffmap.model.urdf import import_urdf
+from stiffmap.model.urdf.editing import with_origins
+from stiffmap.model.urdf.reader import read_urdf
 from stiffmap.ui.cli import main
 
 
@@ -115,33 +118,49 @@ BAD_URDF = {
         '<parent link="base"/>',
         '<parent link="fore"/>',
     ),
-    "link shoulder: has no <mass value=...>": ('<mass value="4"/>', "<mass>4</mass>"),
+    "link shoulder: expected <mass value=...>, found '4' in it": ('<mass value="4"/>', "<mass>4</mass>"),
     "link upper: has no <mass value=...>": ('<mass value="3"/>', ""),
     "link slide: has no <inertia iyy=...>": ('iyy="0.01"', ""),
     "link slide: expected one <inertial>, found 2": ('<link name="slide">', '<link name="slide"><inertial/>'),
     "joint q1: expected one <origin>, found 2": ('<axis xyz="0 0 1"/>', '<origin rpy="0 0 1"/>'),
-    "joint q1: origin: expected xyz and rpy, found quat_xyzw='0 0 0 1'": (
-        'rpy="0 0 0.2"',
-        'quat_xyzw="0 0 0 1"',
-    ),
+    "joint q1: origin: expected xyz and rpy, found quat_xyzw='0 0 0 1'": ('rpy="0 0 0.2"', 'quat_xyzw="0 0 0 1"'),
     "joint q4: rpy: expected radians, found '0 90 0', as degrees are": ('rpy="0 0.4 0"', 'rpy="0 90 0"'),
     "joint q4: a zero-length axis": ('<axis xyz="1 0 0"/>', '<axis rpy="1 0 0"/>'),
     "joint q1: expected <origin>, found <Origin>": ('<origin xyz="0 0 0.3"', '<Origin xyz="0 0 0.3"'),
     "joint q4: expected <origin>, found <orgin>": ('<origin xyz="0.1 0 0"', '<orgin xyz="0.1 0 0"'),
-    "link fore: expected <inertial>, found <Inertial>": (
-        '<link name="fore"/>',
-        '<link name="fore"><Inertial/></link>',
-    ),
+    "link fore: expected <inertial>, found <Inertial>": ('<link name="fore"/>', '<link name="fore"><Inertial/></link>'),
     "link upper: expected <mass>, found <Mass>": ('<mass value="3"/>', '<Mass value="3"/>'),
     "robot.urdf: expected <link>, found <Link>": ('<link name="fore"/>', '<Link name="fore"/>'),
     "expected one <robot>, found another in it: 'b'": ("</robot>", '<robot name="b"/></robot>'),
-    "joint q2: limit: expected lower, found min='-2'": (
-        'lower="-2" upper="2" effort="100"',
-        'min="-2" max="2" effort="100"',
-    ),
+    "joint q2: limit: expected lower, found min='-2'": ('lower="-2" upper="2" effort="100"', 'min="-2" max="2" effort="100"'),
     "joint q3: limit: expected upper, found Uper='2'": ('upper="2" effort="80"', 'Uper="2" effort="80"'),
+    "joint q3: expected <origin xyz=...>, found '0.4 0 0' in it": (
+        '<origin xyz="0.4 0 0" rpy="0 0 0"/>',
+        "<origin>0.4 0 0</origin>",
+    ),
+    "joint q3: expected <limit lower=...>, found '<lower><upper>' in it": (
+        '<limit lower="-2" upper="2" effort="80" velocity="2"/>',
+        "<limit><lower>-2</lower><upper>2</upper></limit>",
+    ),
+    "link shoulder: inertia: expected ixy, found iyx='0.001'": ('ixy="0.001"', 'iyx="0.001"'),
+    "joint q4: rpy: expected radians, found '0 12 0', as degrees are": ('rpy="0 0.4 0"', 'rpy="0 12 0"'),
+    "joint q4: rpy: expected radians, found '0 3.5 0', as degrees are": ('rpy="0 0.4 0"', 'rpy="0 3.5 0"'),
+    "joint q3: expected <origin>, found <pose>": ('<origin xyz="0.4 0 0" rpy="0 0 0"/>', "<pose>0.4 0 0 0 0 0</pose>"),
+    "joint q3: expected <origin>, found <transform>": (
+        '<origin xyz="0.4 0 0" rpy="0 0 0"/>',
+        '<transform><origin xyz="0.4 0 0"/></transform>',
+    ),
+    "link fore: expected <mass> in <inertial>, found it in <link>": (
+        '<link name="fore"/>',
+        '<link name="fore"><mass value="2"/></link>',
+    ),
+    "link fore: expected <link> in <robot>, found it in <link>": (
+        '<link name="fore"/>',
+        '<link name="fore"><link name="hand"/></link>',
+    ),
+    "joint q3: no link 'Fore' (did you mean 'fore'?)": ('<child link="fore"/>', '<child link="Fore"/>'),
     "expected one root link, found 2": ('<link name="fore"/>', '<link name="fore"/><link name="loose"/>'),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("message", BAD_URDF)
@@ -181,6 +200,57 @@ def test_any_link_or_joint_may_have_a_name_that_the_import_makes_up(
     assert sm.load_machine(tmp_path / "m.yaml") == m
     as_it_was = machine(tmp_path, robots.FIVE_BAR, robots.FIVE_BAR_SIDECAR)
     assert (m.solve([0.05, 0.4, 0]).compliance == as_it_was.solve([0.05, 0.4, 0]).compliance).all()
+
+
+NO_URDF = {
+    "found <mujoco>, which is MuJoCo's format: give a URDF, or convert this first": "<mujoco><worldbody/></mujoco>",
+    "found <sdf>, which is SDF: give a URDF": '<sdf version="1.7"><model name="a"/></sdf>',
+    "found <COLLADA>, which is COLLADA: give": '<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema"/>',
+    "the robot has no <link>, as in an SRDF": '<robot name="arm"><group name="hand"/></robot>',
+    "this is a web page": "<!DOCTYPE html>\n<HTML><head><br></head></HTML>",
+    "fetch that with: git lfs pull": "version https://git-lfs.github.com/spec/v1\noid sha256:0\n",
+    "not XML: no element found: line 1": "",
+}
+
+
+@pytest.mark.parametrize("message", NO_URDF)
+def test_what_is_no_urdf_says_what_it_is(
+    message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    urdf, _ = written(tmp_path, NO_URDF[message])
+    assert main(["import", str(urdf), "-o", str(tmp_path / "m.yaml")]) == 2
+    error = capsys.readouterr().err
+    assert message in error and str(urdf) in error and error.count("\n") == 1
+
+
+HEAD = '<?xml version="1.0"?>'
+TOLERATED = {
+    "dashes in comments": robots.ARM.replace('<link name="fore"/>', '<!-- -- <axis/> ---- --><link name="fore"/>').encode(),
+    "lines before the declaration": ("\n \n" + HEAD + robots.ARM).encode(),
+    "an & in the name of a mesh": robots.ARM.replace(
+        '<link name="fore"/>', '<link name="fore"><visual><geometry><mesh filename="a&b.stl"/></geometry></visual></link>').encode(),
+    "letters of another encoding in comments": ("<!-- für -->" + robots.ARM).encode("latin-1"),
+    "an origin of a link": robots.ARM.replace('<link name="fore"/>', '<link name="fore"><origin xyz="1 2 3"/></link>').encode(),
+    "a prefix of an attribute": robots.ARM.replace("<limit ", '<limit drake:acceleration="2" ').encode(),
+    "an & in UTF-16": robots.ARM.replace('name="arm"', 'name="&#97;rm"').encode("utf-16"),
+    "a mark, and lines of another system": ("\ufeff" + HEAD + robots.ARM).replace("\n", "\r\n").encode(),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", TOLERATED)
+def test_what_readers_of_urdf_pass_over(name: str, tmp_path: Path) -> None:
+    urdf = tmp_path / "robot.urdf"
+    urdf.write_bytes(TOLERATED[name])
+    (tmp_path / "b").mkdir()
+    assert import_urdf(urdf).description == import_urdf(*written(tmp_path / "b", robots.ARM)).description
+
+
+def test_origins_are_edited_in_a_file_that_xml_does_not_allow(tmp_path: Path) -> None:
+    text = "\n" + HEAD + robots.ARM.replace("<joint", "<!-- -- <joint> & --><joint")
+    (tmp_path / "robot.urdf").write_text(text)
+    joint = read_urdf(tmp_path / "robot.urdf").joints["q3"]
+    edited = with_origins(tmp_path / "robot.urdf", {"q3": (joint.origin, Pose((0.5, 0.0, 0.0)))})
+    assert edited.decode() == text.replace('xyz="0.4 0 0"', 'xyz="0.5 0 0"')
 
 
 def test_a_namespace_and_an_empty_name_say_nothing(tmp_path: Path) -> None:

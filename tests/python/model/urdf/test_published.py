@@ -74,6 +74,11 @@ TIPS = {
     "tcp between fingers": (robot(arm(), HAND, FINGERS, joint("t", "hand", "r_hand_tcp")), "r_hand_tcp"),
     "two fingers": (robot(arm(), HAND, FINGERS), "hand"),
     "a finger that mimics": (robot(arm(), HAND, MIMIC), "hand"),
+    "a jaw alone": (robot(arm(), HAND, joint("jointGripper", "hand", "mover", "revolute")), "hand"),
+    "a jaw alone, before a frame": (robot(arm(), HAND, joint("jaw", "hand", "mover", "prismatic"), joint("m", "mover", "pad")),
+                                    "hand"),
+    "a jaw alone behind a tool": (robot(arm(), joint("t", "c", "tool0"), HAND.replace('"c"', '"tool0"'),
+                                        joint("claw", "hand", "mover", "revolute")), "tool0"),
     "tool0 before a gripper": (robot(arm(), joint("t", "c", "tool0"), joint("h", "tool0", "hand"), FINGERS), "tool0"),
     "tool0 before a hand": (robot(arm(), joint("t", "c", "tool0"), joint("h", "tool0", "hand"), *(
         joint(f"{f}{k}", ("hand", f"{f}1")[k - 1], f"{f}{k}", "revolute") for f in "xyz" for k in (1, 2))), "tool0"),
@@ -98,6 +103,14 @@ def test_tip(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> N
     assert main(["import", str(tmp_path / "arm.urdf"), "-o", str(tmp_path / "arm.yaml")]) == 0
     assert (f"tip {tip}, chosen from the ends" in capsys.readouterr().out) == bool(found.choice)
     assert sm.load_machine(tmp_path / "arm.yaml") == sm.import_urdf(tmp_path / "arm.urdf")
+
+
+@pytest.mark.parametrize("name", ["gripper_roll", "wrist_to_gripper", "joint_4"])
+def test_a_last_joint_that_turns_a_gripper_is_a_drive(name: str, tmp_path: Path) -> None:
+    found = imported(tmp_path, robot(arm(), joint(name, "c", "gripper", "revolute")))
+    assert (found.tip, found.choice, len(found.rigid)) == ("gripper", "", 4)
+    of_a_gripper = robot(joint("jaw_1", "base", "a", "revolute"), joint("jaw_2", "a", "b", "revolute"))
+    assert imported(tmp_path, of_a_gripper).tip == "b"
 
 
 MANY = {
@@ -217,6 +230,30 @@ def test_jaws_follow_a_home_and_each_other(tmp_path: Path) -> None:
     np.testing.assert_allclose(c, centre, atol=1e-14)
 
 
+def test_links_without_a_mass_are_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    bare = re.sub("<inertial>.*?</inertial>", "", robot(arm()))
+    text = bare.replace('<link name="b">', '<link name="b"><inertial><mass value="0"/></inertial>')
+    frame = joint("t", "c", "tool")  # its mass stays with c
+    for parts, said in ((text, "a, b, c"), (text.replace("</robot>", frame + "</robot>"), "a, b")):
+        (tmp_path / "arm.urdf").write_text(parts)
+        out = tmp_path / "arm.yaml"
+        assert main(["import", str(tmp_path / "arm.urdf"), "-o", str(out), "--overwrite"]) == 0
+        assert f"no mass (gravity does not pull on these links): {said}\n" in capsys.readouterr().out
+    assert not imported(tmp_path, robot(arm())).massless
+
+
+def test_a_fixed_joint_follows_nothing(tmp_path: Path) -> None:
+    """Exporters fix the fingers of a gripper, and leave their <mimic> in the file."""
+    text = robot(
+        arm(), joint("f", "c", "finger", "fixed", '<mimic joint="q2" multiplier="-1" offset="0.2"/>')
+    )
+    (tmp_path / "side.yaml").write_text("home: {q2: 0.7}\n")
+    (tmp_path / "arm.urdf").write_text(text)
+    found = bodies(import_urdf(tmp_path / "arm.urdf", tmp_path / "side.yaml"))["q2"]
+    mass, centre, _ = Robot(text).masses("c", set())
+    np.testing.assert_allclose(sum(b.mass * np.array(b.com) for b in found) / mass, centre, atol=1e-14)
+
+
 def test_dust_of_a_tensor_is_zero(tmp_path: Path) -> None:
     upper = bodies(imported(tmp_path, DUST))["shoulder"][0]
     wanted = ((0.0123, 0.0, 0.0011), (0.0, 0.061, -0.0007), (0.0011, -0.0007, 0.067))
@@ -301,9 +338,13 @@ def tensors(text: str, moment: float) -> str:
 
 
 DOUBTS = {
-    "millimetres": (machine_of(400.0, 5), "joint q2: origin: found it 800 m off; expected metres, 0.8 m if these are millimetres"),
+    "millimetres": (machine_of(400.0, 5), "joint q2: origin: found 800 m; expected metres, 0.8 m if these are millimetres"),
     "inertial in millimetres": (machine_of(0.4, 5).replace('xyz="0 0 0.2"', 'xyz="0 0 200"'),
-                                "link a: inertial: found it 200 m off; expected metres, 0.2 m if these are millimetres"),
+                                "link a: inertial: found 200 m; expected metres, 0.2 m if these are millimetres"),
+    "inertial of a small arm in millimetres": (machine_of(0.03, 0.1).replace('xyz="0 0 0.015"', 'xyz="0 0 15"'),
+                                               "link a: inertial: found 15 m; expected metres, 0.015 m if these are millimetres"),
+    "stroke in millimetres": (machine_of(0.4, 5, '<limit lower="-50" upper="350"/>', "prismatic"),
+                              "joint q0: limit: found 400 m; expected metres, 0.4 m if these are millimetres"),
     "degrees": (machine_of(0.4, 5, '<limit lower="-180" upper="92.5"/>'),
                 "joint q0: limit: found -180 to 92.5 rad; expected radians, -3.142 to 1.614 if these are degrees"),
     "grams": (machine_of(0.4, 2500), "link a: mass: found 2500 kg, and 7500 kg in all that moves, in a machine of 0.8 m; expected "
@@ -334,12 +375,12 @@ def test_numbers_that_no_machine_has_are_warned_of(name: str, tmp_path: Path) ->
     [
         machine_of(30.0, 9e4), machine_of(1.3, 1600), machine_of(0.02, 0.1), tensors(machine_of(0.4, 1e-3), 1.0),
         machine_of(0.4, 5, '<limit lower="-12.56" upper="12.56"/>'), machine_of(0.4, 5, '<limit lower="-1e16" upper="1e16"/>'),
-        machine_of(0.01, 1500, '<limit lower="0" upper="0.6"/>', "prismatic"),
+        machine_of(0.01, 1500, '<limit lower="0" upper="0.6"/>', "prismatic"), machine_of(0.4, 5, '<limit lower="-1e6" upper="1e6"/>', "prismatic"),
         machine_of(0.4, 5).replace('izz="0.008', 'izz="0.01605'),
         robot(arm()).replace('<link name="base"/>', '<link name="map"/><link name="base"/><joint name="m" type="fixed"><parent '
                              'link="map"/><child link="base"/><origin xyz="691000 5334000 0"/></joint>'),
     ],
-    ids=["crane", "heavy arm", "finger", "moments of one", "four turns", "no limit", "machine tool", "flat plate, rounded", "place on a map"],
+    ids=["crane", "heavy arm", "finger", "moments of one", "four turns", "no limit", "machine tool", "no end of a rail", "flat plate, rounded", "place on a map"],
 )  # fmt: skip
 def test_real_machines_are_not_doubted(text: str, tmp_path: Path) -> None:
     with warnings.catch_warnings():
