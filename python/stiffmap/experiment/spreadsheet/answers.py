@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from copy import deepcopy
 from dataclasses import dataclass, field, fields
@@ -14,10 +15,16 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.tables.header import stated_unit, with_unit
 from stiffmap.common.tables.table import Table, column_letter
-from stiffmap.common.units import Unit, known, unit_of
+from stiffmap.common.units import QUANTITIES, Unit, known, unit_of
 from stiffmap.experiment.files.fields import quantity_of
 from stiffmap.experiment.spreadsheet.guess import READINGS, Column, find_column, guess
 
+IN_SI = re.compile(
+    r"(?i)(actual|target)_(q|tcp_pose|tcp_force)_\d|.*[./](position|point|translation|force|torque)[./][xyz]|.*[./]position\[?\d+\]?|"
+    r".*/joint_states/.*/position"
+)
+"""Fields of logs that are in SI by their format: messages of ROS, and UR's RTDE."""
+SI = {q: unit for unit, q in QUANTITIES.items()}
 USUAL = {"length": "mm", "force": "N", "moment": "N*m", "angle": "deg", "temperature": "degC"}
 
 
@@ -114,9 +121,15 @@ class Meant(Answers):
 
     def written_unit(self, column: int, *names: str, quantity: str = "") -> str:
         """What --unit says of one of these names, else the header, else the column next to it, else --unit of the quantity, else a
-        line above the table."""
+        line above the table, else the format of a log."""
+        quantity = quantity or quantity_of(names[0]) or "length"
         own = next((self.units[n] for n in names if self.units.get(n)), "") or self.sheet.unit(column)
-        return own or self._next_to(column) or self.usual_unit(quantity or quantity_of(names[0]) or "length")
+        own = own or self._next_to(column) or self.usual_unit(quantity)
+        if own or not IN_SI.fullmatch(name := self.sheet.names[column]):
+            return own
+        said = f"'{name}' is in {(own := SI.get(quantity, ''))}, as such logs are"
+        self.said += [said] if own and said not in self.said else []
+        return own
 
     def usual_unit(self, quantity: str) -> str:
         """Of columns that have none: what --unit says of the quantity, else a line above the table."""
