@@ -151,7 +151,8 @@ def fits(cells: Sequence[str], width: int) -> bool:
 
 
 def _bare(cell: str) -> str:
-    return cell.strip().strip("[]()").strip()
+    inside = re.fullmatch(r"\[(.*)\]|\(((?:[^()]|\([^()]*\))*)\)", text := cell.strip())
+    return (inside[1] or inside[2] or "").strip() if inside else text
 
 
 def _is_unit(text: str) -> bool:

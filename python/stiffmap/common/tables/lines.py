@@ -279,7 +279,7 @@ def _text(path: Path) -> tuple[str, Lines, str]:
     sample = list(islice(lines_, SAMPLE))
     well = {s: _numbers_between(s, sample) for s in SEPARATORS}
     best = max(SEPARATORS, key=lambda s: well[s][:2])  # the first of equals
-    if best == " " and well["\t"][2] == well[" "][2]:  # blanks within cells, as in SMR 1
+    if best == " " and 2 * well["\t"][2] > well[" "][2]:  # blanks within cells, as in SMR 1
         best = "\t"
 
     def lines() -> Iterator[tuple[int, list[str]]]:
