@@ -121,15 +121,9 @@ class Meant(Answers):
 
     def written_unit(self, column: int, *names: str, quantity: str = "") -> str:
         """What --unit says of one of these names, else the header, else the column next to it, else --unit of the quantity, else a
-        line above the table, else the format of a log."""
-        quantity = quantity or quantity_of(names[0]) or "length"
+        line above the table."""
         own = next((self.units[n] for n in names if self.units.get(n)), "") or self.sheet.unit(column)
-        own = own or self._next_to(column) or self.usual_unit(quantity)
-        if own or not IN_SI.fullmatch(name := self.sheet.names[column]):
-            return own
-        said = f"'{name}' is in {(own := SI.get(quantity, ''))}, as such logs are"
-        self.said += [said] if own and said not in self.said else []
-        return own
+        return own or self._next_to(column) or self.usual_unit(quantity or quantity_of(names[0]) or "length")
 
     def usual_unit(self, quantity: str) -> str:
         """Of columns that have none: what --unit says of the quantity, else a line above the table."""
@@ -139,6 +133,9 @@ class Meant(Answers):
         """Of a column, by its names for --unit: the first one is shown, by the last one it is to be said. Raises Question."""
         quantity = quantity or quantity_of(names[0]) or "length"
         text = self.written_unit(column, *names, quantity=quantity)
+        if not text and quantity in SI and IN_SI.fullmatch(name := self.sheet.names[column]):
+            text, said = SI[quantity], f"'{name}' is in {SI[quantity]}, as such logs are"
+            self.said += [said] if said not in self.said else []
         found = unit_of(text, quantity) if text else None
         if found is not None:
             return found

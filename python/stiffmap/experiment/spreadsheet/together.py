@@ -56,7 +56,7 @@ TURNS = (
     ),
 )
 """Names of three angles, how they turn, and that in words."""
-WXYZ = tuple(rf"(.*\.)?(q|quat(ernion)?|rot(ation)?|orientation)[ _.]?{a}" for a in "wxyz")
+WXYZ = tuple(rf"(.*[./])?(q|quat(ernion)?|rot(ation)?|orientation)[ _./]?{a}" for a in "wxyz")
 ROUNDED = 0.01
 """By how much digits of a table may change the length of a quaternion."""
 
@@ -243,7 +243,11 @@ def _turns(m: Meant, taken: set[int]) -> None:
     behind = min(columns, default=0) == meanings.get("z", -1) + 1
     seen = set(SEEN) <= set(meanings) and not (behind and set(POSE) <= set(meanings))
     position = SEEN if seen else POSE
-    if not columns or not set(position) <= {*meanings, *([] if turns else m.constants)}:
+    if (
+        not columns
+        or (m.columns and not seen)
+        or not set(position) <= {*meanings, *([] if turns else m.constants)}
+    ):
         return
     of_pose = {"": QUATERNION, "rotvec": VECTOR}.get(turns, EULER)
     of_seen = SEEN_TURNED if turns else [f"p{c}" for c in QUATERNION]

@@ -810,3 +810,23 @@ def test_a_pose_of_a_log_is_commanded_with_its_orientation(tmp_path: Path) -> No
     np.testing.assert_allclose(found.position, LOGGED[:, :3], atol=1e-12)
     assert found.rotation is not None
     np.testing.assert_allclose(found.rotation, Rotation.from_rotvec(LOGGED[:, 3:6]).as_matrix(), atol=1e-12)
+    turned = Rotation.from_rotvec(LOGGED[:, 3:6])
+    parts = [*(f"/robot/pose/position/{a}" for a in "xyz"), *(f"/robot/pose/orientation/{a}" for a in "xyzw")]
+    rows = np.column_stack([LOGGED[:, :3], turned.as_quat(), LOGGED[:, 6:]])
+    found = of_log(tmp_path, ",".join([*parts, PLACES]), rows).experiment
+    assert found.rotation is not None
+    np.testing.assert_allclose(found.rotation, turned.as_matrix(), atol=1e-5)
+
+
+def test_a_controllers_own_pose_next_to_joints_is_a_note(tmp_path: Path) -> None:
+    """And joints that cannot be radians are degrees, also in a log that has radians by its format."""
+    heads = [
+        *(f"actual_q_{k}" for k in range(6)),
+        *(f"{a} [mm]" for a in "XYZ"),
+        "A [deg],B [deg],C [deg]",
+        PLACES,
+    ]
+    rows = np.column_stack([90 * LOGGED[:, :6], 500 * LOGGED[:, :6], 1e3 * LOGGED[:, 6:]])
+    found = of_log(tmp_path, ",".join(heads), rows).experiment
+    np.testing.assert_allclose(found.command, np.radians(90 * LOGGED[:, :6]), atol=1e-6)
+    assert found.rotation is None and found.seen is not None
