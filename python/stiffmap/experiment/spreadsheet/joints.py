@@ -56,7 +56,7 @@ def commanded(m: Meant, drives: Mapping[str, bool], alone: bool = False) -> None
     numbers = dict(zip(drives, _numbered(m, len(drives), len(given) == len(drives)), strict=True))
     own = {name: _own(name, number) for name, number in numbers.items()}
     said = {} if len(given) == len(drives) else _said(m, own)
-    at = {name: _find(m, name, own[name], given.get(name), said) for name in drives}
+    at = {n: m.index(given[n]) if n in given else _find(m, n, own[n], said) for n in drives}
     lost = [n for n, i in at.items() if i is None]
     if len(lost) == len(at) and not alone:
         return
@@ -106,21 +106,16 @@ def _own(name: str, number: str) -> list[str]:
 
 
 def _said(m: Meant, own: Mapping[str, Sequence[str]]) -> dict[int, str]:
-    """Columns of a message with the names of their joints, where these are in another order than the drives, or none that is known.
-
-    Raises StiffmapError where a row has other names than the first one.
-    """
+    """Columns of a message with the names of their joints, where these are in another order than the drives, or none that is known;
+    StiffmapError where a row has others than the first one."""
     said: dict[int, str] = {}
     for i, header in enumerate(m.sheet.header):
         part = OF_MESSAGE.fullmatch(header)
         k = m.sheet.find(re.escape(f"{part[1]}name{part[2]}")) if part else None
         if k is not None:
-            name, cells = m.sheet.header[k], [*m.sheet.columns[k]]
-            same, wanted = (
-                [c == cells[0] for c in cells],
-                f"'{name}': expected the joint {cells[0]} in all rows",
-            )
-            m.sheet.check(same, lambda row: f"{wanted}; found {cells[row]}")  # noqa: B023
+            cells = [*m.sheet.columns[k]]
+            wanted = f"'{m.sheet.header[k]}': expected the joint {cells[0]} in all rows; found"
+            m.sheet.check([c == cells[0] for c in cells], lambda row: f"{wanted} {cells[row]}")  # noqa: B023
             said[i] = cells[0]
     known = [[k for k, p in enumerate(own.values()) if _is_one(w, p)] for w in said.values()]
     in_order = any(known) and all(not k or k[0] == i for i, k in enumerate(known))
@@ -131,9 +126,7 @@ def _is_one(text: str, patterns: Sequence[str]) -> bool:
     return any(re.fullmatch(p, text, re.IGNORECASE) for p in patterns)
 
 
-def _find(m: Meant, name: str, own: Sequence[str], header: str | None, said: Mapping[int, str]) -> int | None:
-    if header is not None:
-        return m.index(header)
+def _find(m: Meant, name: str, own: Sequence[str], said: Mapping[int, str]) -> int | None:
     if said:
         return next((i for i, w in said.items() if _is_one(w, own)), None)
     turns = quaternion(m.sheet)
