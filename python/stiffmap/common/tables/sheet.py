@@ -240,7 +240,7 @@ def _begun(
         counted = [d for d in data[:-1] if _counts(d[1], spelling)]
         for over in ([*above], *([sorted([*above, *counted])] if counted else ())):
             found = header_of(over, data[-1][1], layout.known, layout.repeated) if data else None
-            if found and len(data) > skip and (not skip or found[0] > data[-2][0]):
+            if found and len(data) > skip and (not skip or found[0] >= data[-2][0]):
                 names = _checked(found[1], file, found[0])
                 behind = any(is_finite(c, spelling) for c in data[-1][1][len(names) :])
                 if not behind and (layout.repeated or len({*names}) == len(names)):

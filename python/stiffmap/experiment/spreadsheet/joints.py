@@ -53,9 +53,13 @@ def commanded(m: Meant, drives: Mapping[str, bool], alone: bool = False) -> None
     """
     short = {n.split(".")[-1] for n in drives}
     given = _given(m.chosen, drives, short)
-    numbers = dict(zip(drives, _numbered(m, len(drives), len(given) == len(drives)), strict=True))
-    own = {name: _own(name, number) for name, number in numbers.items()}
-    said = {} if len(given) == len(drives) else _said(m, own)
+    said = {} if len(given) == len(drives) else _said(m)
+    numbers = _numbered(m, len(drives), len(given) == len(drives) or bool(said))
+    own = {name: _own(name, number) for name, number in zip(drives, numbers, strict=True)}
+    known = [[k for k, p in enumerate(own.values()) if _is_one(w, p)] for w in said.values()]
+    in_order = all(not k or k[0] == i for i, k in enumerate(known))
+    if in_order if any(known) and len(said) == len(drives) else not any(known) and len(said) != len(drives):
+        said = {}  # in the order of the drives, or of another machine
     at = {n: m.index(given[n]) if n in given else _find(m, n, own[n], said) for n in drives}
     lost = [n for n, i in at.items() if i is None]
     if len(lost) == len(at) and not alone:
@@ -105,9 +109,8 @@ def _own(name: str, number: str) -> list[str]:
     return [*(rf"(?:.*[/.])?{n}(?:_joint)?{BEHIND}" for n in own), number]
 
 
-def _said(m: Meant, own: Mapping[str, Sequence[str]]) -> dict[int, str]:
-    """Columns of a message with the names of their joints, where these are in another order than the drives, or none that is known;
-    StiffmapError where a row has others than the first one."""
+def _said(m: Meant) -> dict[int, str]:
+    """Columns of a message with the names of their joints; StiffmapError where a row has others than the first one."""
     said: dict[int, str] = {}
     for i, header in enumerate(m.sheet.header):
         part = OF_MESSAGE.fullmatch(header)
@@ -117,9 +120,7 @@ def _said(m: Meant, own: Mapping[str, Sequence[str]]) -> dict[int, str]:
             wanted = f"'{m.sheet.header[k]}': expected the joint {cells[0]} in all rows; found"
             m.sheet.check([c == cells[0] for c in cells], lambda row: f"{wanted} {cells[row]}")  # noqa: B023
             said[i] = cells[0]
-    known = [[k for k, p in enumerate(own.values()) if _is_one(w, p)] for w in said.values()]
-    in_order = any(known) and all(not k or k[0] == i for i, k in enumerate(known))
-    return {} if in_order else said
+    return said
 
 
 def _is_one(text: str, patterns: Sequence[str]) -> bool:

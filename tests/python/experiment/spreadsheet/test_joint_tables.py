@@ -772,7 +772,8 @@ def test_a_message_says_whose_its_numbers_are(tmp_path: Path) -> None:
     heads = [*(f"field.name{k}" for k in range(6)), *(f"field.position{k}" for k in range(6)), PLACES]
 
     def read(words: list[list[str]], *columns: str) -> sm.FromTable:
-        rows = [[*w, *map(str, r)] for w, r in zip(words, LOGGED, strict=True)]
+        numbers = np.column_stack([LOGGED[:, : len(words[0]) - 6], LOGGED])
+        rows = [[*w, *map(str, r)] for w, r in zip(words, numbers, strict=True)]
         text = "\n".join(map(",".join, [heads, *rows]))
         file = write(tmp_path, "t.csv", text)
         return sm.experiment_from_table(
@@ -791,6 +792,13 @@ def test_a_message_says_whose_its_numbers_are(tmp_path: Path) -> None:
     np.testing.assert_allclose(found.command, LOGGED[:, [2, 1, 0, 3, 4, 5]])
     known = read([[n.replace("_lift", "").replace("shoulder_pan", "base") for n in names]] * 4).experiment
     np.testing.assert_allclose(known.command, found.command)
+    arm_, gripper = (
+        ["base", "shoulder", "elbow", *names[3:]],
+        ["finger_joint"],
+    )  # which is no drive of the arm
+    heads[:] = [*(f"field.name{k}" for k in range(7)), *(f"field.position{k}" for k in range(7)), PLACES]
+    for words, drives in ((gripper + arm_, [0, 1, 2, 3, 4, 5]), (arm_ + gripper, [0, 0, 1, 2, 3, 4])):
+        np.testing.assert_allclose(read([words] * 4).experiment.command, LOGGED[:, drives])
 
 
 def test_places_of_messages_are_in_metres_and_asked_for_next_to_joints(tmp_path: Path) -> None:
