@@ -267,3 +267,17 @@ def test_numbers_of_columns_in_brackets_are_no_readings() -> None:
     plain = Spelling(False)
     assert [is_finite(c, plain) for c in ("0.33 + 0.42", "2*0.15", "-π/2")] == [True] * 3
     assert [is_finite(c, plain) for c in ("(3)", "90°", "1/2", "0 - 1")] == [False] * 4
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "Radius: 150 mm\nFeed: 1000 mm/min\nAngle (deg)\tRadial error (um)\tRun\n0\t1.5\t1\n30\t2.5\t1\n",
+        "Temp: 20.1 C\nTarget\tX [mm]\tY [mm]\nSMR 1\t1,5\t2\nSMR 1\t2,5\t3\n",
+    ],
+)
+def test_tabs_part_cells_that_have_blanks(text: str, tmp_path: Path) -> None:
+    (tmp_path / "t.txt").write_text(text)
+    t = read_sheet(tmp_path / "t.txt")
+    assert len(t.header) == 3
+    np.testing.assert_array_equal(t.numbers(1), [1.5, 2.5])

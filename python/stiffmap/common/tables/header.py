@@ -17,6 +17,8 @@ from stiffmap.common.units import SHORT_TIMES, TIMES, name_and_unit, unit_of
 Line = tuple[int, list[str]]
 MOST_LINES = 4
 """Lines above the data that may be of the header."""
+DIRECTIONS = re.compile(r"\+|[-−–]|[↑↓←→]")
+"""Of travel, in a line of their own above the names."""
 BEHIND = [
     re.compile(pattern)
     for pattern in (
@@ -53,6 +55,9 @@ def header_of(
         return None
     number, names = lines[-1]
     names = [*names, *[""] * (len(units) - len(names))]
+    if len(lines) > 1 and (marks := [c for c in lines[-2][1] if c]) and all(map(DIRECTIONS.fullmatch, marks)):
+        each = zip_longest(names, lines.pop(-2)[1], fillvalue="")
+        names = [" ".join(filter(None, pair)) for pair in each]
     if len(lines) > 1 and not repeated and _needs_group(names, lines[-2][1], first):
         names = _grouped(lines[-2][1], names, known)
     elif len(lines) > 1:  # Position [mm] over x y z
@@ -146,7 +151,8 @@ def fits(cells: Sequence[str], width: int) -> bool:
 
 
 def _bare(cell: str) -> str:
-    return cell.strip().strip("[]()").strip()
+    inside = re.fullmatch(r"\[(.*)\]|\(((?:[^()]|\([^()]*\))*)\)", text := cell.strip())
+    return (inside[1] or inside[2] or "").strip() if inside else text
 
 
 def _is_unit(text: str) -> bool:
@@ -242,8 +248,8 @@ DEFLECTION = (
     "defl|deflection|displ?\\.?|displacement|déplacement|flèche|verschiebung|verlagerung|verformung|durchbiegung|"
     "spostamento|freccia|desplazamiento|deflexión|flecha"
 )
-COMMANDED = "target|cmd|nom|nominal|command|commanded|ref|desired|soll"
-MEASURED = "act|actual|meas|measured|achieved|attained|ist"
+COMMANDED = "target|cmd|nom|nominal|command|commanded|ref|desired|r?soll?"
+MEASURED = "act|actual|meas|measured|achieved|attained|r?ist|gemessen"
 PATTERNS: tuple[tuple[str, str], ...] = (
     ("id", r"#|id|nr\.?|no\.?|lfd\.? ?nr\.?|number|nummer|row|zeile|punkt|messpunkt|point|messpunkt nr\.?|point no\.?|punto"),
     ("temperature", r"t|temp|temperature|temperatur"),
@@ -253,12 +259,12 @@ PATTERNS: tuple[tuple[str, str], ...] = (
     *((f"f{a}", rf"f ?_?{a}|({FORCE})[ _.]?(in |en |f[ _]?)?{a}|{a} ?({FORCE})") for a in "xyz"),
     *((f"m{a}", rf"m ?_?{a}|({MOMENT})[ _.]?(in |en |m[ _]?)?{a}") for a in "xyz"),
     *((f"u_d{a}", rf"(u|±|sigma|std|uncertainty) ?_?d?{a}") for a in "xyz"),
-    *((f"d{a}", rf"(d|delta|δ|{DEFLECTION}|abweichung|error|dev|(dial )?gau?ge|dial|indicator|(mess)?uhr|reading|auslenkung|weg|dehnung)[ _.]?(in |en |[dδ][ _]?)?{a}|{a} ?_?(dif|diff|difference|dev|deviation|err|error|abweichung)|{a}[ _-]?({DEFLECTION}|dial|gau?ge|uhr|reading)") for a in "xyz"),
+    *((f"d{a}", rf"(d|delta|δ|{DEFLECTION}|abweichung|error|dev|deviation|écart|(dial )?gau?ge|dial|indicator|(mess)?uhr|reading|auslenkung|weg|dehnung)[ _.]?(in |en |[dδ][ _]?)?{a}|{a} ?_?(dif|diff|difference|dev|deviation|err|error|abweichung)|{a}[ _-]?({DEFLECTION}|dial|gau?ge|uhr|reading)") for a in "xyz"),
     *((f"p{a}", rf"p_?{a}") for a in "xyz"),
     *((f"approach_{a}", rf"(approach|travel|anfahrt|anfahrrichtung|fahrrichtung)[ _.-]?(in |dir(ection)?[ _.-]?)?{a}") for a in "xyz"),
     ("ll", r"l|ll|(measured |gemessene )?(length|länge|laenge)|(draw[ -]?)?wire( ?length)?|(cable|string|ball-?bar|bar) ?length|seil(zug)?(länge)?|distance|abstand"),
     *((f"r{a}", rf"r ?_?{a}|rotation ?_?{a}") for a in "xyz"),
-    *((a, rf"{a}|pos\.?[ _-]?{a}|{a}[ _-]?pos\.?|position ?_?{a}|(pose|punkt|messpunkt|tcp|ort|lage|koordinate|coordinate) ?_?{a}|{a}[ _-]?(t|{COMMANDED})|({COMMANDED})[ _-]?{a}") for a in "xyz"),
+    *((a, rf"{a}|(.*[./])?(position|point|translation)[./]{a}|target_tcp_pose_{i}|pos\.?[ _-]?{a}|{a}[ _-]?pos\.?|position ?_?{a}|(pose|punkt|messpunkt|tcp|ort|lage|koordinate|coordinate) ?_?{a}|{a}[ _-]?(t|{COMMANDED})|({COMMANDED})[ _-]?{a}") for i, a in enumerate("xyz")),
 )  # fmt: skip
 
 

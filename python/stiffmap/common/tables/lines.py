@@ -277,7 +277,10 @@ def _text(path: Path) -> tuple[str, Lines, str]:
     text = LATEX.sub("", text) if "\\begin{" in text else text
     lines_ = (line for line in io.StringIO(text) if line.strip() and not line.strip().startswith(COMMENTS))
     sample = list(islice(lines_, SAMPLE))
-    best = max(SEPARATORS, key=lambda s: _numbers_between(s, sample))  # the first of equals
+    well = {s: _numbers_between(s, sample) for s in SEPARATORS}
+    best = max(SEPARATORS, key=lambda s: well[s][:2])  # the first of equals
+    if best == " " and 2 * well["\t"][2] > well[" "][2]:  # blanks within cells, as in SMR 1
+        best = "\t"
 
     def lines() -> Iterator[tuple[int, list[str]]]:
         if best == " ":
@@ -293,17 +296,19 @@ def _text(path: Path) -> tuple[str, Lines, str]:
     return "", lines, best
 
 
-def _numbers_between(separator: str, lines: Sequence[str]) -> tuple[int, int]:
-    """How well it parts the cells: quotations and brackets that it breaks, negative, and cells that are numbers then."""
+def _numbers_between(separator: str, lines: Sequence[str]) -> tuple[int, int, int]:
+    """How well it parts the cells: quotations and brackets that it breaks, negative, numbers in rows of them, and those rows."""
     with suppress(csv.Error):  # the reader of the whole says where
         rows = map(_cut, lines) if separator == " " else csv.reader(lines, delimiter=separator)
-        cells = list(chain.from_iterable(rows))
-        numbers = sum(NUMBER.fullmatch(c) is not None or parted(c)[1] != "" for c in cells)
+        each = [[c for c in row if c.strip()] for row in rows]
+        cells = list(chain.from_iterable(each))
+        counts = [sum(NUMBER.fullmatch(c) is not None or parted(c)[1] != "" for c in row) for row in each]
+        counts = [n for n, row in zip(counts, each, strict=True) if n and 2 * n >= len(row)]
         broken = sum(
             '"' in c or c == "|" or any(c.count(a) != c.count(b) for a, b in ("[]", "{}")) for c in cells
         )
-        return -broken, numbers
-    return -len(lines), 0
+        return -broken, sum(counts), len(counts)
+    return -len(lines), 0, 0
 
 
 def _cut(line: str) -> list[str]:

@@ -237,15 +237,23 @@ def _begun(
         above = list[Line]()
         rows = iter(lines() if layout.table is None else _one_table(lines(), spelling, layout, file))
         data = list(islice(_above(rows, spelling, above), skip + 1))
-        found = header_of(above, data[-1][1], layout.known, layout.repeated) if data else None
-        if found and len(data) > skip and (not skip or found[0] > data[-2][0]):
-            names = _checked(found[1], file, found[0])
-            behind = any(is_finite(c, spelling) for c in data[-1][1][len(names) :])
-            if not behind and (layout.repeated or len({*names}) == len(names)):
-                break
+        counted = [d for d in data[:-1] if _counts(d[1], spelling)]
+        for over in ([*above], *([sorted([*above, *counted])] if counted else ())):
+            found = header_of(over, data[-1][1], layout.known, layout.repeated) if data else None
+            if found and len(data) > skip and (not skip or found[0] >= data[-2][0]):
+                names = _checked(found[1], file, found[0])
+                behind = any(is_finite(c, spelling) for c in data[-1][1][len(names) :])
+                if not behind and (layout.repeated or len({*names}) == len(names)):
+                    return rows, over, [d for d in data if d not in over], found
         if not skip and (found is None or any(layout.known(split_unit(n)[0]) for n in found[1])):
             break
     return rows, above, data, found
+
+
+def _counts(cells: Sequence[str], spelling: Spelling) -> bool:
+    """Whether the numbers of a line count runs: 1, 2, 3 below one another's names, or over arrows."""
+    numbers = [number(c, spelling) for c in cells if is_finite(c, spelling)]
+    return [*dict.fromkeys(numbers)] == [*range(1, len({*numbers}) + 1)]
 
 
 def _all_readings(rows: Sequence[Line]) -> bool:

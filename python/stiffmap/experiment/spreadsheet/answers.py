@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from copy import deepcopy
 from dataclasses import dataclass, field, fields
@@ -14,10 +15,16 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.tables.header import stated_unit, with_unit
 from stiffmap.common.tables.table import Table, column_letter
-from stiffmap.common.units import Unit, known, unit_of
+from stiffmap.common.units import QUANTITIES, Unit, known, unit_of
 from stiffmap.experiment.files.fields import quantity_of
 from stiffmap.experiment.spreadsheet.guess import READINGS, Column, find_column, guess
 
+IN_SI = re.compile(
+    r"(?i)(actual|target)_(q|tcp_pose|tcp_force)_\d|.*[./](position|point|translation|force|torque)[./][xyz]|.*[./]position\[?\d+\]?|"
+    r".*/joint_states/.*/position"
+)
+"""Fields of logs that are in SI by their format: messages of ROS, and UR's RTDE."""
+SI = {q: unit for unit, q in QUANTITIES.items()}
 USUAL = {"length": "mm", "force": "N", "moment": "N*m", "angle": "deg", "temperature": "degC"}
 
 
@@ -126,6 +133,9 @@ class Meant(Answers):
         """Of a column, by its names for --unit: the first one is shown, by the last one it is to be said. Raises Question."""
         quantity = quantity or quantity_of(names[0]) or "length"
         text = self.written_unit(column, *names, quantity=quantity)
+        if not text and quantity in SI and IN_SI.fullmatch(name := self.sheet.names[column]):
+            text, said = SI[quantity], f"'{name}' is in {SI[quantity]}, as such logs are"
+            self.said += [said] if said not in self.said else []
         found = unit_of(text, quantity) if text else None
         if found is not None:
             return found

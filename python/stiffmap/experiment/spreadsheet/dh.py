@@ -139,10 +139,8 @@ def read_dh(given: Table, units: Mapping[str, str], convention: str) -> list[DHR
     count = len(sheet.lines)
     said = [*sheet.columns[at["name"]]] if "name" in at else [""] * count
     if "type" not in at:
-        whole = [
-            w != "" or not (any(types) or FIXED.fullmatch(n.strip()))
-            for w, n in zip(types, said, strict=True)
-        ]
+        each = zip(types, said, strict=True)
+        whole = [w != "" or not (any(types) or FIXED.fullmatch(n.strip())) for w, n in each]
         why = "no joint's coordinate, which others have" if any(types) else "a name that no joint has"
         sheet.check(whole, lambda _: f"{why}: leave a fixed frame out, or say R or P in a column 'type'")
     slides = [re.fullmatch(SLIDES, w) is not None for w in types]

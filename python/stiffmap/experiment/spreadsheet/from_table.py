@@ -144,9 +144,7 @@ def experiment_from_table(
             return loaded
         return Machine(arm(rows, dh_convention, output.name, f"from {Path(dh).name}", m.middle()))
 
-    alone = rows is not None
-    understood = partial(
-        _understood,
+    wanted = _Wanted(
         file,
         layout,
         drives,
@@ -155,9 +153,9 @@ def experiment_from_table(
         quantity == "deflection",
         given,
         declared_for,
-        alone,
+        rows is not None,
     )
-    m, found = _fitting(file, sheet, understood, ask)
+    m, found = _fitting(file, sheet, wanted.understood, ask)
     own = m.sheet
     _refuse_units(given.units, m, drives, () if rows is None else QUANTITIES)
     quantity = "position" if m.placed or "ll" in found.units else quantity
@@ -183,8 +181,7 @@ def experiment_from_table(
 
 def _refuse_units(units: Mapping[str, str], m: Meant, drives: Iterable[str], more: Iterable[str]) -> None:
     """StiffmapError for a unit that nobody knows, or of nothing that is there."""
-    names = {
-        *(c.meaning for c in m.guessed),
+    names = {c.meaning for c in m.guessed} | {
         *m.sheet.names,
         *m.sheet.header,
         *SPELLINGS,
@@ -222,62 +219,66 @@ def _fitting(
     raise StiffmapError(f"{file}: none of its {len(names)} sheets fits (--sheet NAME reads one). {lines}")
 
 
-def _understood(
-    file: Path,
-    layout: Layout,
-    drives: Mapping[str, bool],
-    wrote: Instrument | None,
-    difference: str,
-    deflection: bool,
-    given: Answers,
-    declared: Callable[[Meant], Machine],
-    alone: bool,
-    name: str | None,
-    ask: dialogue.Ask | None,
-) -> tuple[Meant, ImportedSheet]:
-    """One sheet: `drives` (name -> whether it slides) it may command, what `wrote` it, the sign of its `difference`; rows of a
-    `deflection` need a load; `declared`: the machine that it commands, by its joints `alone`."""
-    form = read_sheet(file, name, layout)
-    kept = dialogue.remembered(form)
-    m = Meant.of_sheet(form, given if kept is None else kept.below(given))
-    if kept is not None:
-        m.said.append(f"answers of an earlier sheet of this form are used: {dialogue.profile_file(form)}")
-    together(m, deflection)
-    approached(m)
-    commanded(m, drives, alone)
-    one_point_a_row(m)
-    measured = (wrote or load_instrument("tracker")).measured
-    without_lost(m, wrote.columns if wrote else {}, measured)
-    same = partial(compared, m, difference, measured, deflection)
-    less: set[str] = set()
-    if m.columns:
-        dialogue.asked(m, ask, partial(seated, m))
-        dialogue.asked(m, ask, same)
-        as_seen(m, difference)
-    elif wrote is not None:
-        if less := as_readings(m, wrote):
-            compared(m, difference, measured, deflection, less)
-    else:
-        dialogue.asked(m, ask, same)
-    dialogue.asked(m, ask, partial(in_base_axes, m, partial(declared, m)))
-    oriented(m)
-    if not m.placed:
-        turned(m, difference, less)
-    dialogue.asked(m, ask, partial(seen_next_to_commands, m))
-    try:
-        found = dialogue.ask_all(m, ask, deflection and not m.placed)
-    except dialogue.Unanswered as left:
-        said = m.to_remember(form, given)
-        if said == given:
-            raise
-        raise StiffmapError(
-            f"{left}; the answers so far are remembered: {dialogue.remember(form, said)}"
-        ) from None
-    if m.answered:
-        kept_in = dialogue.remember(form, m.to_remember(form, given))
-        m.said.append(f"the answers are remembered for sheets of this form: {kept_in}")
-    m.said += found.said
-    return m, found
+@dataclass(frozen=True)
+class _Wanted:
+    """What is wanted of each sheet."""
+
+    file: Path
+    layout: Layout
+    drives: Mapping[str, bool]
+    """That it may command: name -> whether it slides."""
+    wrote: Instrument | None
+    difference: str
+    deflection: bool
+    """Rows of a deflection need a load."""
+    given: Answers
+    declared: Callable[[Meant], Machine]
+    """The machine that it commands, by its joints `alone`."""
+    alone: bool
+
+    def understood(self, name: str | None, ask: dialogue.Ask | None) -> tuple[Meant, ImportedSheet]:
+        """One sheet."""
+        form = read_sheet(self.file, name, self.layout)
+        kept = dialogue.remembered(form)
+        m = Meant.of_sheet(form, self.given if kept is None else kept.below(self.given))
+        if kept is not None:
+            m.said.append(f"answers of an earlier sheet of this form are used: {dialogue.profile_file(form)}")
+        together(m, self.deflection)
+        approached(m)
+        commanded(m, self.drives, self.alone)
+        one_point_a_row(m)
+        measured = (self.wrote or load_instrument("tracker")).measured
+        without_lost(m, self.wrote.columns if self.wrote else {}, measured)
+        same = partial(compared, m, self.difference, measured, self.deflection)
+        less: set[str] = set()
+        if m.columns:
+            dialogue.asked(m, ask, partial(seated, m))
+            dialogue.asked(m, ask, same)
+            as_seen(m, self.difference)
+        elif self.wrote is not None:
+            if less := as_readings(m, self.wrote):
+                compared(m, self.difference, measured, self.deflection, less)
+        else:
+            dialogue.asked(m, ask, same)
+        dialogue.asked(m, ask, partial(in_base_axes, m, partial(self.declared, m)))
+        oriented(m)
+        if not m.placed:
+            turned(m, self.difference, less)
+        dialogue.asked(m, ask, partial(seen_next_to_commands, m))
+        try:
+            found = dialogue.ask_all(m, ask, self.deflection and not m.placed)
+        except dialogue.Unanswered as left:
+            said = m.to_remember(form, self.given)
+            if said == self.given:
+                raise
+            raise StiffmapError(
+                f"{left}; the answers so far are remembered: {dialogue.remember(form, said)}"
+            ) from None
+        if m.answered:
+            kept_in = dialogue.remember(form, m.to_remember(form, self.given))
+            m.said.append(f"the answers are remembered for sheets of this form: {kept_in}")
+        m.said += found.said
+        return m, found
 
 
 def _of_sheet(error: FileError, found: ImportedSheet, sheet: Table, fresh: Path) -> FileError:
@@ -293,11 +294,7 @@ def _of_sheet(error: FileError, found: ImportedSheet, sheet: Table, fresh: Path)
     if isinstance(error, MissingColumnError):
         lost = re.match(r"missing column '(\w+)'", error.reason)
         reason += f"; say which by --map {lost[1] if lost else 'fx'}='HEADER'; columns: {', '.join(repr(h) for h in sheet.header)}"
-    at = None
-    if (
-        error.line is not None
-        and error.file.endswith("data.csv")
-        and 2 <= error.line < len(found.rows.lines) + 2
-    ):
-        at = found.rows.lines[error.line - 2]
+    row = (error.line or 0) - 2
+    within = error.file.endswith("data.csv") and 0 <= row < len(found.rows.lines)
+    at = found.rows.lines[row] if within else None
     return FileError(reason, file=sheet.file, line=at, key=error.key)

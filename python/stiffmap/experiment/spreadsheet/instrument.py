@@ -134,10 +134,11 @@ def _of_circle(m: Meant, instrument: Instrument) -> None:
         raise StiffmapError(f"a ball bar needs --set {lost[0]}=NUMBER (mm)")
     at: dict[str, int] = {}
     for key in ("angle", "deviation"):
-        found = m.sheet.find(instrument.circle[key])
+        own = m.chosen.pop(key, None)
+        found = m.index(own[0]) if own else m.sheet.find(instrument.circle[key])
         if found is None:
             raise StiffmapError(
-                f"{m.sheet.file}: no column is the {key}; there are: {', '.join(m.sheet.header)}"
+                f"{m.sheet.file}: no column is the {key}; say --map {key}='HEADER'; there are: {', '.join(m.sheet.header)}"
             )
         at[key] = found
     angles, deviation = (_si(m, i, key, instrument) for key, i in at.items())

@@ -19,9 +19,13 @@ from stiffmap.experiment.spreadsheet.guess import READINGS, Column, guess
 from stiffmap.experiment.spreadsheet.together import quaternion
 from stiffmap.solve.machine import Machine
 
-NUMBERED = r"(?!.*(?:veloc|accel|effort|torque|current))(?:(?:.*[/.\[])?{}(?:joint|axis|achse|gelenk|theta|θ|关节|q|j|a)|.*[/.]position)[ _.-]?\[?{}\]?(?:[/._](?:position|pos))?"
+BEFORE = r"(?:.*[/.\[]|rob_?\d+ |(?:(?:ist|soll|act(?:ual)?|cmd)[ _-]?)?(?:pos(?:ition)?|angle|winkel)[ _])?"
+BEHIND = r"(?:[/._ ](?:position|pos|angle|winkel))?"
+NUMBERED = rf"(?!.*(?:veloc|accel|effort|torque|current))(?:{BEFORE}{{}}(?:joint_a|joint|axis|achse|gelenk|theta|θ|关节|rax|q|j|a)|.*[/.]position)[ _.-]?\[?{{}}\]?{BEHIND}"
 """Also as logs have them: ``/joint_states/joint_1/position``, ``field.position0``, ``position[0]`` of a message."""
-MEASURED = r"([xyz])[ _.-]?meas(?:ured|\.)?"
+OF_MESSAGE = re.compile(r"(?i)(.*[/.])position(\[?\d+\]?)")
+"""A joint of a message that names its joints next to it: ``field.name0`` says whose ``field.position0`` is."""
+MEASURED = r"([xyz])[ _.-]?(?:meas(?:ured|\.)?|gemessen|mesuré|misurat[oa]|medid[oa])"
 """A header of a measured position, next to joints."""
 MOST_TURNS = 4.0 * math.pi
 """Of a joint; larger numbers are degrees."""
@@ -49,15 +53,21 @@ def commanded(m: Meant, drives: Mapping[str, bool], alone: bool = False) -> None
     """
     short = {n.split(".")[-1] for n in drives}
     given = _given(m.chosen, drives, short)
-    numbers = zip(drives, _numbered(m, len(drives), len(given) == len(drives)), strict=True)
-    at = {name: _find(m, name, number, given.get(name)) for name, number in numbers}
+    said = {} if len(given) == len(drives) else _said(m)
+    numbers = _numbered(m, len(drives), len(given) == len(drives) or bool(said))
+    own = {name: _own(name, number) for name, number in zip(drives, numbers, strict=True)}
+    known = [[k for k, p in enumerate(own.values()) if _is_one(w, p)] for w in said.values()]
+    in_order = all(not k or k[0] == i for i, k in enumerate(known))
+    if in_order if any(known) and len(said) == len(drives) else not any(known) and len(said) != len(drives):
+        said = {}  # in the order of the drives, or of another machine
+    at = {n: m.index(given[n]) if n in given else _find(m, n, own[n], said) for n in drives}
     lost = [n for n, i in at.items() if i is None]
     if len(lost) == len(at) and not alone:
         return
     if lost:
-        m.ask_column(
-            f"which column commands {(n := lost[0])}? Say --map {n}='HEADER', or --set {n}=NUMBER", n
-        )
+        n, words = lost[0], ", ".join(f"{w} in '{m.sheet.header[i]}'" for i, w in said.items())
+        seen = f" (the table names {words})" if words else ""
+        m.ask_column(f"which column commands {n}{seen}? Say --map {n}='HEADER', or --set {n}=NUMBER", n)
     m.chosen = {k: v for k, v in m.chosen.items() if k not in drives and k not in short}
     for k, (name, slides) in enumerate(drives.items(), 1):
         index = at[name]
@@ -93,16 +103,38 @@ def _numbered(m: Meant, count: int, given: bool) -> list[str]:
     return names[1:]
 
 
-def _find(m: Meant, name: str, number: str, header: str | None) -> int | None:
-    if header is not None:
-        return m.index(header)
+def _own(name: str, number: str) -> list[str]:
+    """Regular expressions of the headers of a drive: its names, also of a message, and its number."""
     own = [re.escape(n) for n in (name, name.split(".")[-1]) if n.lower() not in ("x", "y", "z")]
+    return [*(rf"(?:.*[/.])?{n}(?:_joint)?{BEHIND}" for n in own), number]
+
+
+def _said(m: Meant) -> dict[int, str]:
+    """Columns of a message with the names of their joints; StiffmapError where a row has others than the first one."""
+    said: dict[int, str] = {}
+    for i, header in enumerate(m.sheet.header):
+        part = OF_MESSAGE.fullmatch(header)
+        k = m.sheet.find(re.escape(f"{part[1]}name{part[2]}")) if part else None
+        if k is not None:
+            cells = [*m.sheet.columns[k]]
+            wanted = f"'{m.sheet.header[k]}': expected the joint {cells[0]} in all rows; found"
+            m.sheet.check([c == cells[0] for c in cells], lambda row: f"{wanted} {cells[row]}")  # noqa: B023
+            said[i] = cells[0]
+    return said
+
+
+def _is_one(text: str, patterns: Sequence[str]) -> bool:
+    return any(re.fullmatch(p, text, re.IGNORECASE) for p in patterns)
+
+
+def _find(m: Meant, name: str, own: Sequence[str], said: Mapping[int, str]) -> int | None:
+    if said:
+        return next((i for i, w in said.items() if _is_one(w, own)), None)
     turns = quaternion(m.sheet)
-    found = (m.sheet.find(pattern, turns) for pattern in (*own, number))
-    index = next((i for i in found if i is not None), None)
-    if index is not None and m.sheet.find(number, (*turns, index)) is not None:
+    index = next((i for p in own if (i := m.sheet.find(p, turns)) is not None), None)
+    if index is not None and m.sheet.find(own[-1], (*turns, index)) is not None:
         m.ask_column(f"which of two columns commands {name}? Say --map {name}='HEADER'", name)
-    if index is None and (same := _set(m, *own, number)):
+    if index is None and (same := _set(m, *own)):
         index = len(m.sheet.header)
         m.sheet = m.sheet.with_column(same[0], np.full(len(m.sheet), m.spend(same[0])))
     return index

@@ -11,6 +11,7 @@ from stiffmap.common.tables.header import split_unit
 from stiffmap.experiment.channels import AXES
 from stiffmap.experiment.files.fields import APPROACH, POSE
 from stiffmap.experiment.spreadsheet.answers import Meant
+from stiffmap.experiment.spreadsheet.guess import guessed
 from stiffmap.experiment.spreadsheet.together import DIRECTION, way_of
 
 UP = r"[+↑→]|\+?1(\.0*)?|forwards?|fwd|up|pos(itive)?|plus|vor(wärts)?|hin|auf(wärts)?"
@@ -26,12 +27,18 @@ def side_of(text: str) -> float:
     return float(bool(re.fullmatch(UP, text, re.I))) - float(bool(re.fullmatch(DOWN, text, re.I)))
 
 
-def side_of_run(header: str) -> float:
-    """The same of a header: ``Run 1 +``, ``2 down [µm]``."""
+def _run(header: str) -> tuple[str, float]:
+    """A header without its direction of travel, and that: ``Run 1 +``, ``2 down [µm]``."""
     name = re.sub(r"(?<=\w)(?=[+−–-]$)", " ", split_unit(header)[0])
-    words = [w for w in re.split(r"[\s_,;/()]+", name) if not re.search(r"\d", w)]
-    sides = {side_of(w) for w in words} - {0.0}
-    return sides.pop() if len(sides) == 1 else 0.0
+    words = re.split(r"[\s_,;/()]+", name)
+    sides = [0.0 if re.search(r"\d", w) else side_of(w) for w in words]
+    several = len({*sides} - {0.0}) > 1
+    return " ".join(w for w, s in zip(words, sides, strict=True) if not s), 0.0 if several else sum({*sides})
+
+
+def side_of_run(header: str) -> float:
+    """1 or -1 of a header that names one direction of travel, else 0."""
+    return _run(header)[1]
 
 
 def approached(m: Meant) -> None:
@@ -62,6 +69,11 @@ def approached(m: Meant) -> None:
                 m.add(f"{header} along {name[-1]}", "", parts, name)
         m.said.append(f"'{header}' is the direction of the last travel{axis and f', along {axis}'}")
         return
+    sided = {} if loads else {c.index: _run(m.sheet.header[c.index]) for c in columns if c.meaning == "note"}
+    for meaning in {*AXES} - {c.meaning for c in columns}:
+        own = [i for i, (name, side) in sided.items() if side and guessed(name) == meaning]
+        if {sided[i][1] for i in own} == {1.0, -1.0}:
+            m.chosen[meaning] = [m.sheet.header[i] for i in own]
     runs = next((v for k, v in m.chosen.items() if k in AXES and len(v) > 1 and all(map(side_of_run, v))), [])
     if runs and not {*APPROACH} & {*m.chosen}:
         name = f"approach_{_axis(m, runs[0])}"

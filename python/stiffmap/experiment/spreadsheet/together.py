@@ -49,10 +49,14 @@ TURNS = (
     ("a b c", "ZYX", "turns about z, the new y, the new x (KUKA's A, B, C; degrees where no unit is given)"),
     ("w p r", "xyz", "turns about the fixed x, y, z (Fanuc's W, P, R; degrees where no unit is given)"),
     ("roll pitch yaw", "xyz", "turns about the fixed x, y, z (degrees where no unit is given)"),
-    ("rx ry rz", "rotvec", "a rotation vector (UR's RX, RY, RZ)"),
+    (
+        "(rx|target_tcp_pose_3) (ry|target_tcp_pose_4) (rz|target_tcp_pose_5)",
+        "rotvec",
+        "a rotation vector (UR's RX, RY, RZ)",
+    ),
 )
 """Names of three angles, how they turn, and that in words."""
-WXYZ = tuple(rf"(.*\.)?(q|quat(ernion)?|rot(ation)?|orientation)[ _.]?{a}" for a in "wxyz")
+WXYZ = tuple(rf"(.*[./])?(q|quat(ernion)?|rot(ation)?|orientation)[ _./]?{a}" for a in "wxyz")
 ROUNDED = 0.01
 """By how much digits of a table may change the length of a quaternion."""
 
@@ -233,12 +237,17 @@ def quaternion(sheet: Table) -> list[int]:
 def _turns(m: Meant, taken: set[int]) -> None:
     """An orientation that stands with X Y Z."""
     meanings = {c.meaning: c.index for c in m.guessed}
-    seen = set(SEEN) <= set(meanings)
-    position = SEEN if seen else POSE
     forms = [(quaternion(m.sheet), "", "quaternions, w first")]
     forms += [(_angles(m.sheet, names), turns, words) for names, turns, words in TURNS]
     columns, turns, words = next((f for f in forms if f[0] and not taken & {*f[0]}), ([], "", ""))
-    if not columns or not set(position) <= {*meanings, *([] if turns else m.constants)}:
+    behind = min(columns, default=0) == meanings.get("z", -1) + 1
+    seen = set(SEEN) <= set(meanings) and not (behind and set(POSE) <= set(meanings))
+    position = SEEN if seen else POSE
+    if (
+        not columns
+        or (m.columns and not seen)
+        or not set(position) <= {*meanings, *([] if turns else m.constants)}
+    ):
         return
     of_pose = {"": QUATERNION, "rotvec": VECTOR}.get(turns, EULER)
     of_seen = SEEN_TURNED if turns else [f"p{c}" for c in QUATERNION]

@@ -11,28 +11,36 @@ import numpy as np
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError, StiffmapError, needed, refuse_folder
+from stiffmap.common.tables.header import split_unit
 from stiffmap.common.tables.lines import complex_number
 from stiffmap.common.tables.named import WORD, Known, read_named
 from stiffmap.common.tables.workbook import TABLES
 from stiffmap.workspace.vibration.response import Complex
 from stiffmap.workspace.vibration.response_units import FREQUENCIES, ResponseUnit, response_unit
 
-PREFIX = re.compile(r"(frf|h[12]?)_(?=.)")
-"""Before the part of a response, as in ``H1 Real [m/N]``."""
+PREFIX = re.compile(r"((frf|h[12]?|\w+/\w+|dyn(amic|amische|\.)?)_)+(?=.)")
+"""Before the part of a response, as in ``H1 Ch2/Ch1 Real [m/N]``."""
 COLUMNS = Known(
     {**dict.fromkeys(("frequency", "real", "imag", "magnitude", "coherence"), ""), "phase": "rad", "response": WORD},
     {"frequency": "frequency_Hz", **{n: f"{n}_m/N" for n in ("real", "imag", "magnitude")}, "phase": "phase_deg"},
     {
         **dict.fromkeys(("freq", "f", "hz", "frequenz"), "frequency"), **dict.fromkeys(("coh", "kohärenz"), "coherence"),
         **dict.fromkeys(("phase_angle", "arg(h)", "arg_h"), "phase"), **dict.fromkeys(("h", "frf", "h1", "h2", "h(f)", "complex"), "response"),
+        **dict.fromkeys(("n", "drehzahl", "speed", "rotational_speed", "omega", "ω", "kreisfrequenz", "angular_frequency"), "frequency"),
         **dict.fromkeys(("re", "re(h)", "re(frf)", "real_part", "realteil"), "real"),
         **dict.fromkeys(("im", "im(h)", "im(frf)", "imaginary", "imaginary_part", "imag_part", "imaginärteil"), "imag"),
-        **dict.fromkeys(("mag", "amplitude", "|h|", "|frf|", "accelerance", "inertance", "mobility", "receptance", "compliance", "betrag", "nachgiebigkeit"), "magnitude"),
+        **dict.fromkeys(("mag", "amplitude", "|h|", "|frf|", "accelerance", "inertance", "mobility", "receptance", "compliance", "betrag", "nachgiebigkeit", "gain"), "magnitude"),
+        **dict.fromkeys(("stiffness", "steifigkeit", "impedance", "apparent_mass"), "magnitude"),
     },
     lambda name, unit: (PREFIX.sub("", name), unit),
 )  # fmt: skip
+MEANT = {
+    "accelerance": (2, 1), "inertance": (2, 1), "mobility": (1, 1), "receptance": (0, 1), "compliance": (0, 1), "nachgiebigkeit": (0, 1),
+    "stiffness": (0, -1), "steifigkeit": (0, -1), "impedance": (1, -1), "apparent_mass": (2, -1),
+}  # fmt: skip
+"""Names of responses -> derivatives of the displacement, and 1 by force or -1 of a force by it."""
 FORMS = (("real", "imag"), ("magnitude", "phase"))
-EXAMPLES = "m/N, mm/N, um/N, m/s/N, m/s2/N, g/N and the like"
+EXAMPLES = "m/N, mm/N, um/N, m/s/N, m/s2/N, g/N and the like, N/m, N/um"
 HEAD = "frequency_Hz, real_UNIT, imag_UNIT (or magnitude_UNIT, phase_deg) and, where there is one, coherence"
 
 
@@ -55,7 +63,7 @@ class MeasuredResponse:
 
 
 def read_responses(path: str | PathLike[str]) -> list[MeasuredResponse]:
-    """All responses of a file: a table (.csv, .tsv, workbook), or .uff, .unv (data sets 58).
+    """All responses of a file: a table (a text or a workbook), or a universal file (.uff, .unv, or marks -1; data sets 58).
 
     Raises FileError naming file, row and what was expected: frequencies that do not rise, a coherence outside 0 to 1, units.
     """
@@ -64,7 +72,8 @@ def read_responses(path: str | PathLike[str]) -> list[MeasuredResponse]:
     if not p.is_file():
         raise FileError("no such file of frequency responses", file=str(path))
     try:
-        found = [_table(p)] if p.suffix.lower() in TABLES else _universal(p)
+        universal = p.suffix.lower() in UNIVERSAL or MARK.search(p.read_bytes())
+        found = _universal(p) if universal and p.suffix.lower() not in TABLES else [_table(p)]
         for one in found:
             _check(one)
     except StiffmapError as problem:
@@ -86,16 +95,19 @@ def _table(path: Path) -> MeasuredResponse:
             t.values[n], t.units[n] = getattr(np.array(parts, complex), n), t.units["response"]
     form = next((pair for pair in FORMS if {*pair, "frequency"} == {*t.values} - {"coherence"}), ("", ""))
     unit = t.units.get(form[0], "")
-    if form == FORMS[1] and (level := re.fullmatch(r"(?i)db(?: re:?)? ?(?:1 ?)?(.*)", unit)):
+    if form == FORMS[1] and (level := re.fullmatch(r"(?i)db(?: rel?[.:]?)? ?(?:1 ?)?(.*)", unit)):
         unit = level[1] or t.fail("expected what 0 dB is, as in [dB re 1 m/N]", "magnitude")
         t.values["magnitude"] = 10 ** (t.values["magnitude"] / 20)
     t.check("magnitude", lambda v: v >= 0, "a size of zero or more ([dB re 1 m/N] where it is in decibels)")
     known = response_unit(unit)
-    kind = None if known is None else _derivatives(known)
+    kind, power = (None, 1) if known is None else _kind(known)
     if known is None or kind is None or t.units.get("imag", unit) != unit:
         t.fail(f"expected the columns {HEAD}, UNIT one of {EXAMPLES}; found {', '.join(t.header.values())}")
+    name = PREFIX.sub("", re.sub(r"\W+", "_", split_unit(t.header.get(form[0], ""))[0].lower()))
+    if MEANT.get(name, (kind, power)) != (kind, power):
+        t.fail(f"expected a unit of {name.replace('_', ' ')}; found {unit}", form[0])
     if t.units.get("coherence", "").endswith(("%", "percent")):
-        t.fail("expected a coherence from 0 to 1, not in percent", "coherence")
+        t.values["coherence"] = t.values["coherence"] / 100
     if len(t.lines) < 2:
         t.fail("expected two rows or more below the header")
     hertz = FREQUENCIES.get(t.units["frequency"].lower())
@@ -103,8 +115,17 @@ def _table(path: Path) -> MeasuredResponse:
         t.fail("expected frequencies in Hz, kHz, rad/s or rpm, as in frequency_Hz", "frequency")
     f, (a, b) = hertz * t.values["frequency"], (t.values[n] for n in form)
     values = np.asarray(known.size * (a + 1j * b if "real" in form else a * np.exp(1j * b)), complex)
+    if power < 0:
+        t.check(form[0], lambda _: values != 0, "a force by a motion above zero")
+        values = 1 / values
     coherence = t.values.get("coherence", np.full(len(f), np.nan))
     return MeasuredResponse(path.stem, f, _receptance(f, values, kind), coherence)
+
+
+def _kind(unit: ResponseUnit) -> tuple[int | None, int]:
+    """The derivatives, and 1 of a motion by force, -1 of a force by motion: dynamic stiffness, impedance, apparent mass."""
+    inverse = _derivatives(ResponseUnit().over(unit))
+    return (_derivatives(unit), 1) if inverse is None else (inverse, -1)
 
 
 def _derivatives(unit: ResponseUnit, length: int = 1) -> int | None:
@@ -120,6 +141,7 @@ def _receptance(frequency: Floats, values: Complex, derivatives: int) -> Complex
         return np.asarray(np.where(w == 0, np.nan, values / w**derivatives))
 
 
+UNIVERSAL = (".uff", ".unv", ".uf", ".u58")
 DataSet = dict[str, int | float | str | np.ndarray]
 """A data set of a universal file, as pyuff names its fields."""
 MOTIONS = {8: 0, 11: 1, 12: 2}  # of universal files: displacement, velocity, acceleration

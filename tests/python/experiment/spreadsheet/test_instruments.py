@@ -134,13 +134,15 @@ def test_a_ball_bar_is_a_distance_from_its_centre(tmp_path: Path) -> None:
         ("Angle (deg),R (in)", 25.4, ""),
         ("phi,R", 10.0, "deviation=cm"),
         ("Winkel,R", 1.0, ""),
+        ("Angle,CW", 1.0, "--map=deviation=CW"),
+        ("Angle,Radius error", 1.0, ""),
     ],
 )
 def test_radii_of_a_circle_are_no_deviations(header: str, size: float, unit: str, tmp_path: Path) -> None:
     circle = [f"--set={k}" for k in ("centre_x=0", "centre_y=420", "centre_z=0", "radius=50")]
     rows = (f"{t},{(50 + d) / size!r}" for t, d in ((0, 0.0015), (90, -0.002), (180, 0.00025)))
     text = "\n".join([header, *rows]) + "\n"
-    said = ["--unit", unit] if unit else []
+    said = [unit if unit[:2] == "--" else f"--unit={unit}"] if unit else []
     e = made(tmp_path, "ball-bar", text, *circle, *said, "--noise", "dd=0.0005")
     np.testing.assert_allclose(e.reading[:, -1], [1.5e-6, -2e-6, 0.25e-6], atol=1e-12)
 

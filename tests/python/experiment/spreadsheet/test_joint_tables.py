@@ -725,3 +725,116 @@ def test_two_logs_of_one_joint_are_asked_for(tmp_path: Path) -> None:
         sm.experiment_from_table(
             None, tmp_path / "t.csv", tmp_path / "o", dh=tmp_path / "dh.csv", units=units, noise=noise
         )
+
+
+def of_log(tmp_path: Path, head: str, rows: np.ndarray, *columns: str) -> sm.FromTable:
+    sep = next(c for c in ",; " if c in head)
+    text = "\n".join([head, *(sep.join(f"{v:.6g}" for v in row) for row in rows)])
+    (tmp_path / "t.csv").write_text(text, encoding="utf-8")
+    said = dict(c.split("=") for c in columns)
+    noise = {"px": 0.1, "py": 0.1, "pz": 0.1}
+    return sm.experiment_from_table(
+        "ur10", tmp_path / "t.csv", tmp_path / "o", columns=said, noise=noise, overwrite=True
+    )
+
+
+LOGGED = np.round(np.sin(np.arange(4 * 9).reshape(4, 9) ** 2), 4)
+PLACES = "px [mm],py [mm],pz [mm]"
+
+
+@pytest.mark.parametrize(
+    ("form", "scale"),
+    [
+        ("field.position{0}", 1.0),
+        ("joint_states.position[{0}]", 1.0),
+        ("actual_q_{0}", 1.0),
+        ("rax_{1} [deg]", 180 / math.pi),
+        ("Ist-Position A{1} [°]", 180 / math.pi),
+        ("ROB_1 Axis {1} Position [deg]", 180 / math.pi),
+    ],
+)
+def test_logs_of_controllers_have_joints_in_their_own_units(form: str, scale: float, tmp_path: Path) -> None:
+    """ROS and RTDE are in SI by their format, which is said."""
+    head = ",".join([*(form.format(k, k + 1) for k in range(6)), PLACES])
+    found = of_log(tmp_path, head, LOGGED * ([scale] * 6 + [1.0] * 3))
+    np.testing.assert_allclose(found.experiment.command, LOGGED[:, :6], atol=1e-6)
+    assert any("is in rad, as such logs are" in r for r in found.remarks) == (scale == 1.0)
+
+
+def test_a_message_says_whose_its_numbers_are(tmp_path: Path) -> None:
+    """Where its joints come in another order than the drives, by their names or not at all."""
+    names = [
+        "elbow_joint",
+        "shoulder_lift_joint",
+        "shoulder_pan_joint",
+        *(f"wrist_{k}_joint" for k in (1, 2, 3)),
+    ]
+    heads = [*(f"field.name{k}" for k in range(6)), *(f"field.position{k}" for k in range(6)), PLACES]
+
+    def read(words: list[list[str]], *columns: str) -> sm.FromTable:
+        numbers = np.column_stack([LOGGED[:, : len(words[0]) - 6], LOGGED])
+        rows = [[*w, *map(str, r)] for w, r in zip(words, numbers, strict=True)]
+        text = "\n".join(map(",".join, [heads, *rows]))
+        file = write(tmp_path, "t.csv", text)
+        return sm.experiment_from_table(
+            "ur10", file, tmp_path / "o", columns=dict(c.split("=") for c in columns), overwrite=True
+        )
+
+    with pytest.raises(
+        StiffmapError, match=r"commands arm.base \(the table names elbow_joint in 'field.position0'"
+    ):
+        read([names] * 4)
+    with pytest.raises(
+        StiffmapError, match=r"line 5: 'field\.name0': expected the joint elbow_joint in all rows"
+    ):
+        read([*[names] * 3, names[::-1]])
+    found = read([names] * 4, "base=field.position2", "shoulder=field.position1").experiment
+    np.testing.assert_allclose(found.command, LOGGED[:, [2, 1, 0, 3, 4, 5]])
+    known = read([[n.replace("_lift", "").replace("shoulder_pan", "base") for n in names]] * 4).experiment
+    np.testing.assert_allclose(known.command, found.command)
+    arm_, gripper = (
+        ["base", "shoulder", "elbow", *names[3:]],
+        ["finger_joint"],
+    )  # which is no drive of the arm
+    heads[:] = [*(f"field.name{k}" for k in range(7)), *(f"field.position{k}" for k in range(7)), PLACES]
+    for words, drives in ((gripper + arm_, [0, 1, 2, 3, 4, 5]), (arm_ + gripper, [0, 0, 1, 2, 3, 4])):
+        np.testing.assert_allclose(read([words] * 4).experiment.command, LOGGED[:, drives])
+
+
+def test_places_of_messages_are_in_metres_and_asked_for_next_to_joints(tmp_path: Path) -> None:
+    head = ",".join(
+        [*(f"/joint_states/position[{k}]" for k in range(6)), *(f"/leica/pose/position/{a}" for a in "xyz")]
+    )
+    with pytest.raises(StiffmapError, match="say --map px='/leica/pose/position/x'"):
+        of_log(tmp_path, head, LOGGED)
+    found = of_log(tmp_path, head, LOGGED, *(f"p{a}=/leica/pose/position/{a}" for a in "xyz"))
+    np.testing.assert_allclose(found.experiment.seen, LOGGED[:, 6:])
+
+
+def test_a_pose_of_a_log_is_commanded_with_its_orientation(tmp_path: Path) -> None:
+    """Also next to places that were seen."""
+    head = " ".join([*(f"target_TCP_pose_{k}" for k in range(6)), "px_mm py_mm pz_mm"])
+    found = of_log(tmp_path, head, LOGGED).experiment
+    np.testing.assert_allclose(found.position, LOGGED[:, :3], atol=1e-12)
+    assert found.rotation is not None
+    np.testing.assert_allclose(found.rotation, Rotation.from_rotvec(LOGGED[:, 3:6]).as_matrix(), atol=1e-12)
+    turned = Rotation.from_rotvec(LOGGED[:, 3:6])
+    parts = [*(f"/robot/pose/position/{a}" for a in "xyz"), *(f"/robot/pose/orientation/{a}" for a in "xyzw")]
+    rows = np.column_stack([LOGGED[:, :3], turned.as_quat(), LOGGED[:, 6:]])
+    found = of_log(tmp_path, ",".join([*parts, PLACES]), rows).experiment
+    assert found.rotation is not None
+    np.testing.assert_allclose(found.rotation, turned.as_matrix(), atol=1e-5)
+
+
+def test_a_controllers_own_pose_next_to_joints_is_a_note(tmp_path: Path) -> None:
+    """And joints that cannot be radians are degrees, also in a log that has radians by its format."""
+    heads = [
+        *(f"actual_q_{k}" for k in range(6)),
+        *(f"{a} [mm]" for a in "XYZ"),
+        "A [deg],B [deg],C [deg]",
+        PLACES,
+    ]
+    rows = np.column_stack([90 * LOGGED[:, :6], 500 * LOGGED[:, :6], 1e3 * LOGGED[:, 6:]])
+    found = of_log(tmp_path, ",".join(heads), rows).experiment
+    np.testing.assert_allclose(found.command, np.radians(90 * LOGGED[:, :6]), atol=1e-6)
+    assert found.rotation is None and found.seen is not None

@@ -159,6 +159,27 @@ def test_runs_in_both_directions_side_by_side_keep_them(names: str, runs: str, t
 
 
 @pytest.mark.parametrize(
+    "head",
+    [
+        "x;dx 1;dx 1;dx 2;dx 2\n;+;-;+;-\nmm;um;um;um;um",
+        "Position x;Deviation x 1;;Deviation x 2;\n;↑;↓;↑;↓\n[mm];[µm];[µm];[µm];[µm]",
+        ";→;←;→;←\nx;dx 1;dx 2;dx 3;dx 4\nmm;um;um;um;um",
+        "Target x;1;;2;\n;up;down;up;down\nmm;um;um;um;um",
+    ],
+)
+def test_directions_in_a_line_of_the_header(head: str, tmp_path: Path) -> None:
+    """Above the names, or between names and units, as sheets of ISO 230-2 have them."""
+    values = np.arange(12.0).reshape(3, 4)
+    same = {"constants": {"y": 0, "z": 0}, "noise": {"dx": 1.0}}
+    if "x;1;;2;" in head:
+        same |= {"columns": {"dx": "1 up|1 down|2 up|2 down"}}
+    found = made(tmp_path, f"ISO 230-2;Axis X;;;\n{head}", LINE[::2, 0], values, **same).experiment
+    assert found.approach is not None
+    np.testing.assert_array_equal(found.approach[:, 0], BOTH * 6)
+    np.testing.assert_allclose(found.reading[:, 0], 1e-6 * values.ravel())
+
+
+@pytest.mark.parametrize(
     ("signs", "way", "said"),
     [
         (BOTH * 9, {}, "along which axis is 'Approach'. Say --map approach_x='Approach'"),

@@ -36,6 +36,11 @@ TURN = 2 * np.pi
         ("Frequency [Hz],Magnitude [dB re 1 m/s2/N],Phase [deg]", lambda f, r: (f, 20 * np.log10(abs(r)), np.degrees(np.angle(r)))),
         ("f [Hz],Mag [dB mm/s²/N],Phase [rad]", lambda f, r: (f, 20 * np.log10(1e3 * abs(r)), np.angle(r))),
         ("f [Hz],Mag [dB re: 1 g/N],Phase [rad]", lambda f, r: (f, 20 * np.log10(abs(r) / 9.80665), np.angle(r))),
+        ("n [U/min];Betrag [dB rel. 1 m/s²/N];Phase [°]", lambda f, r: (60 * f, 20 * np.log10(abs(r)), np.degrees(np.angle(r)))),
+        ("omega [rad/s];H1 Ch2/Ch1 Real [m/s²/N];H1 Ch2/Ch1 Imag [m/s²/N]", lambda f, r: (TURN * f, r.real, r.imag)),
+        ("Drehzahl [1/min];Apparent mass [kg];Phase [rad]", lambda f, r: (60 * f, 1 / abs(r), -np.angle(r))),
+        ("f [Hz];Real [N/(m/s²)];Imag [N/(m/s²)];Coherence [%]", lambda f, r: (f, (1 / r).real, (1 / r).imag, 0 * f + 90)),
+        ("f [Hz];Dyn. Steifigkeit [N/µm];Phase [°]", lambda f, r: (f, 1e-6 * (TURN * f) ** 2 / abs(r), np.degrees(np.angle(-1 / r)))),
         ("Frequency [rpm];Amplitude [g/N];Phase [°]", lambda f, r: (60 * f, abs(r) / 9.80665, np.degrees(np.angle(r)))),
     ],
 )  # fmt: skip
@@ -90,8 +95,20 @@ def test_bad_files_are_one_message(tmp_path, text, message):
         read_responses(path)
 
 
-def test_a_table_by_another_ending_is_told_so(tmp_path):
-    path = tmp_path / "tap.txt"
+@pytest.mark.parametrize("ending", ["txt", "asc", "dat"])
+def test_an_analyser_writes_texts(ending, tmp_path):
+    path = tmp_path / f"tap.{ending}"
+    head = (
+        "Project: A\nAverages: 16\n\nFrequenz\tRealteil\tImaginärteil\tKohärenz\nHz\t(m/s²)/N\t(m/s²)/N\t-\n"
+    )
+    path.write_text(head + "10,5\t-0,5\t0,25\t0,98\n20\t1,5\t-0,25\t0,97\n", encoding="utf-8")
+    (one,) = read_responses(path)
+    expected = np.array([-0.5 + 0.25j, 1.5 - 0.25j]) / -((TURN * np.array([10.5, 20])) ** 2)
+    np.testing.assert_allclose(one.receptance, expected)
+
+
+def test_a_universal_file_without_marks_is_none(tmp_path):
+    path = tmp_path / "tap.unv"
     path.write_text("frequency_Hz,real_m/N,imag_m/N\n1,1,0\n2,1,0\n")
     with pytest.raises(sm.StiffmapError, match=r"universal file .* no mark -1 in it; a table ends in \.csv"):
         read_responses(path)
@@ -346,10 +363,24 @@ def test_a_function_without_phase_is_no_response(values, head, message, tmp_path
 
 
 @pytest.mark.parametrize("head", ["coherence [%]", "coherence_%", "coherence in percent"])
-def test_a_coherence_in_percent_is_none(head, tmp_path):
-    (tmp_path / "f.csv").write_text(f"frequency_Hz,real_m/N,imag_m/N,{head}\n10,1,0,0.5\n20,2,-1,0.9\n")
-    with pytest.raises(sm.StiffmapError, match=r"line 1: .*expected a coherence from 0 to 1, not in percent"):
-        read_responses(tmp_path / "f.csv")
+def test_a_coherence_in_percent_is_read(head, tmp_path):
+    (tmp_path / "tap.csv").write_text(f"frequency_Hz,real_m/N,imag_m/N,{head}\n1,1,0,90\n2,1,0,95\n")
+    np.testing.assert_allclose(read_responses(tmp_path / "tap.csv")[0].coherence, [0.9, 0.95])
+
+
+@pytest.mark.parametrize(
+    ("columns", "message"),
+    [
+        ("accelerance [m/N],phase [deg]", "expected a unit of accelerance; found m/N"),
+        ("dynamic stiffness [um/N],phase [deg]", "expected a unit of stiffness; found um/N"),
+        ("real [N/m],imag [N/m]", "line 2: real .*expected a force by a motion above zero"),
+        ("gain [dB],phase [deg]", "expected what 0 dB is"),
+    ],
+)
+def test_a_response_that_contradicts_its_name_is_refused(columns, message, tmp_path):
+    (tmp_path / "tap.csv").write_text(f"frequency_Hz,{columns}\n1,0,0\n2,1,0\n")
+    with pytest.raises(sm.StiffmapError, match=message):
+        read_responses(tmp_path / "tap.csv")
 
 
 @pytest.mark.parametrize(
