@@ -33,6 +33,15 @@ Index rank_of(const MatX& A, double threshold) {
   return qr.rank();
 }
 
+MatX congruent(const MatX& A, const MatX& X) {
+  const MatX transposed = X.transpose();
+  MatX product = MatX::Zero(X.cols(), A.rows());  // of A and X, transposed: its columns lie together
+  for (Index j = 0; j < A.cols(); ++j)
+    for (Index i = 0; i < A.rows(); ++i)
+      if (A(i, j) != 0) product.col(i) += A(i, j) * transposed.col(j);
+  return transposed * product.transpose();
+}
+
 MatX left_null_vectors(const MatX& A, double threshold) {
   Eigen::ColPivHouseholderQR<MatX> qr;
   qr.setThreshold(threshold);

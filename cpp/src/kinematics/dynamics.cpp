@@ -169,7 +169,7 @@ void drive_dynamics(const Mechanism& m, const Inertias& inertias, const VecX& x,
   }
   add_force(m, frames, m.tip, frames.at(m.tip).p, -in.wrench, force);
   out.effort = motion.rates.transpose() * force;
-  out.mass = motion.rates.transpose() * coordinate_mass(m, inertias, frames) * motion.rates;
+  out.mass = congruent(coordinate_mass(m, inertias, frames), motion.rates);
 }
 
 }  // namespace stiffmap

@@ -12,6 +12,7 @@ namespace {
 
 constexpr double no_mass = 1e-13;    // relative to the largest inverse square of a frequency
 constexpr double no_damper = 1e-12;  // relative to the largest damping of a motion without mass
+constexpr double closed = 1e-12;     // a gap of the loops, of the length: at rest without forces
 constexpr double negligible = 1e-9;  // of a tangent and of its eigenvalues, relative
 
 /// Motions that keep all loops closed, their tangent and mass.
@@ -28,15 +29,19 @@ bool reduced_pose(const Mechanism& m, const Inertias& inertias, const PoseInput&
   found.status = closure.status;
   found.flags = closure.flags;
   if (closure.status != Status::converged) return false;
-  const EquilibriumResult eq = solve_equilibrium(m, ws.problem, {}, ws.equilibrium, ws.state);
-  found.status = eq.status;
-  found.flags |= eq.flags;
-  if (eq.status != Status::converged) return false;
   const Linearization& lin = ws.equilibrium.lin;
+  linearize(m, ws.problem, ws.state, ws.equilibrium.lin);
+  const bool at_rest = !m.floating && !has_knots(m) && lin.r.isZero(0) && lin.e.norm() < closed * m.length;
+  if (!at_rest) {
+    const EquilibriumResult eq = solve_equilibrium(m, ws.problem, {}, ws.equilibrium, ws.state);
+    found.status = eq.status;
+    found.flags |= eq.flags;
+    if (eq.status != Status::converged) return false;
+  }
   found.x = lin.x;
   out.Z = closed_motions(m, lin);
   out.K = reduced_tangent(m, lin, out.Z);
-  out.M = out.Z.transpose() * coordinate_mass(m, inertias, lin.frames) * out.Z;
+  out.M = congruent(coordinate_mass(m, inertias, lin.frames), out.Z);
   out.S = 0.5 * (out.K + out.K.transpose());
   if (out.K.rows() == 0) return true;
   const bool definite = out.cholesky.compute(out.S);
@@ -87,7 +92,7 @@ EigenX symmetric(const Reduced& pose) {
 /// Columns of X without mass, turned so that those with dampers come first; their number.
 Index damped_first(const MatX& D, MatX& X) {
   if (X.cols() == 0 || D.isZero(0)) return 0;
-  const EigenX found = symmetric_eigen(MatX(X.transpose() * D * X));
+  const EigenX found = symmetric_eigen(congruent(D, X));
   const double largest = found.values[X.cols() - 1];
   if (!(largest > 0)) return 0;
   X = (X * found.vectors.rowwise().reverse()).eval();
@@ -143,7 +148,7 @@ void lowest_modes(const Mechanism& m, const Inertias& inertias, const Damping& d
   out.tip.leftCols(k) = tip.leftCols(k);
   const MatX kept = X.leftCols(k);
   out.viscous.topLeftCorner(k, k) = kept.transpose() * damping.viscous.asDiagonal() * kept;
-  out.loss.topLeftCorner(k, k) = kept.transpose() * lossy * kept;
+  out.loss.topLeftCorner(k, k) = congruent(lossy, kept);
   out.rest = tip.rightCols(n - k) * tip.rightCols(n - k).transpose();
 }
 

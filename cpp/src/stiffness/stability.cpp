@@ -44,7 +44,7 @@ MatX springs_only(const Mechanism& m, const Linearization& lin) {
 }
 
 MatX reduced_tangent(const Mechanism& m, const Linearization& lin, const MatX& Z) {
-  return Z.transpose() * (springs_only(m, lin) - lin.H) * Z;
+  return congruent(springs_only(m, lin) - lin.H, Z);
 }
 
 bool grows(const Mechanism& m, const Linearization& lin) {

@@ -49,6 +49,9 @@ struct Singular {
 };
 Singular singular_vectors(const MatX& A);
 Index rank_of(const MatX& A, double threshold);
+/// X' A X of a matrix that has many zeros.
+MatX congruent(const MatX& A, const MatX& X);
+
 /// Orthonormal vectors x with A'x = 0, by pivoted QR of A.
 MatX left_null_vectors(const MatX& A, double threshold);
 

@@ -70,6 +70,22 @@ def test_at_rest_it_is_the_loaded_compliance(name):
     assert np.linalg.eigvalsh(c - sum_of_modes).min() > -1e-9 * np.abs(c).max()
 
 
+@pytest.mark.parametrize("effect", ["preload", "external_spring", ""])
+def test_modes_stand_on_the_equilibrium_of_what_acts_without_a_wrench(effect):
+    machine = sm.load_machine("orthoglide-revised")
+    if effect == "preload":
+        machine = machine.with_effect("preload", element="foot", legs=["x"], rest_x=5e-3)
+    if effect == "external_spring":
+        machine = machine.with_effect(
+            "external_spring", element="tcp", anchor_x=0.0, anchor_y=0.0, anchor_z=1.0, stiffness=2e3
+        )
+    p = middle(machine)
+    barely = tip_modes(
+        machine, p, [1e-9, 0, 0, 0, 0, 0]
+    )  # too little to move anything, but found as an equilibrium
+    assert tip_modes(machine, p).square == pytest.approx(barely.square, rel=1e-9)
+
+
 def test_published_arm_of_six_joints():
     machine = sm.load_machine(ARM)
     p = machine.description.home.p
