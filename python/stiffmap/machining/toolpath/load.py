@@ -104,22 +104,26 @@ def read_points(path: Path) -> Toolpath:
 
 
 SILENT = (
-    "PARTNO", "PPRINT", "REMARK", "TOOLNO", "LOADTL", "LOAD", "CUTTER", "COOLNT", "MACHIN", "MULTAX", "CLRSRF", "STOP", "OPSTOP",
+    "PARTNO", "PPRINT", "REMARK", "TOOLNO", "LOADTL", "LOAD", "CUTTER", "COOLNT", "MACHIN", "CLRSRF", "STOP", "OPSTOP",
+    "TOOL PATH", "TLDATA", "PAINT", "END-OF-PATH",
 )  # fmt: skip
 TEXTS = ("PARTNO", "PPRINT", "REMARK", "TPRINT")
 """Words that text follows, with or without a slash."""
+UPRIGHT = [0.0, 0.0, 1.0]
 ENDS = ("FINI", "END", "REWIND")
 UNITS = {"MM": 1e-3, "INCHES": 25.4e-3, "INCH": 25.4e-3, "CM": 1e-2}
 Fail = Callable[[str], NoReturn]
 
 
 def read_cl(path: Path) -> Toolpath:
-    """A CL file of APT: UNITS, GOTO (with the tool's axis where it has six numbers), FROM, FEDRAT, RAPID, SPINDL.
+    """A CL file of APT: UNITS, GOTO (with the tool's axis where it has six numbers, which holds until the next), FROM, FEDRAT, RAPID, SPINDL.
 
     Raises FileError naming the line; what is not understood is refused.
     """
     unit, feed, spindle, rapid = 0.0, nan, nan, False
     number, pending, remark = 0, "", False
+    axis: list[float] | None = [*UPRIGHT]
+    origin: list[str] = []
     rows: list[tuple[list[float], list[float], float, float, int, bool]] = []
 
     def fail(message: str) -> NoReturn:
@@ -150,7 +154,9 @@ def read_cl(path: Path) -> Toolpath:
             v = [_number(t, word, fail) for t in values]
             if len(v) not in (3, 6):
                 fail(f"{word}: expected 3 or 6 numbers, found {len(v)}")
-            axis = v[3:] or [0.0, 0.0, 1.0]
+            axis = v[3:] or axis
+            if axis is None:
+                fail(f"{word}: expected 6 numbers, since MULTAX/OFF came with the tool tilted; found 3")
             if not any(axis):
                 fail(f"{word}: expected a direction of the tool that is not zero")
             rows.append(([unit * c for c in v[:3]], axis, feed, spindle, number, rapid or word == "FROM"))
@@ -161,6 +167,14 @@ def read_cl(path: Path) -> Toolpath:
             feed = _feedrate(values, unit, fail)
         elif word == "SPINDL":
             spindle = _spindle(values, spindle, fail)
+        elif word == "MULTAX":
+            axis = None if values == ["OFF"] and axis and axis[:2] != UPRIGHT[:2] else axis
+        elif word == "MSYS":
+            if origin and values != origin:
+                fail("MSYS: a second origin or other axes; expected one file for each")
+            origin = values
+        elif word == "CIRCLE":
+            fail("CIRCLE: expected lines (GOTO): let the CAM system write arcs as lines")
         else:
             fail(f"unknown word {word[:30]!r}")
     if len(rows) < 2:
