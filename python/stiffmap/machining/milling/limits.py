@@ -151,6 +151,13 @@ def must_reach(job: Setting) -> None:
         return
     lost = np.flatnonzero(~ok)
     lines = job.path.line[job.points.move[lost]]
+    upright = job.machine.solve(job.position[lost], stiffness=False, threads=job.threads)
+    if (upright.status != Status.UNREACHABLE).all():
+        tilt = np.degrees(np.arccos(np.clip(job.tool[lost, 2], -1.0, 1.0))).max()
+        raise StiffmapError(
+            f"{job.machine.name} cannot hold the tool as the path asks, tilted by up to {tilt:.4g} deg: {lost.size} of {len(job)} points, "
+            f"from line {lines[0]} of the path on; it reaches all of them with the tool as at home"
+        )
     text = (
         f"the path leaves the workspace of {job.machine.name}: {lost.size} of {len(job)} points, the first at {place_text(job.position[lost[0]], '.1f')}, "
         f"line {lines[0]} of the path"

@@ -15,6 +15,10 @@ from stiffmap.common.errors import StiffmapError
 Integers = NDArray[np.int64]
 
 
+FULL_TURN = 2 * np.pi
+"""rad: above, degrees were meant."""
+
+
 class Kind(IntEnum):
     """How a move goes."""
 
@@ -134,11 +138,13 @@ class Toolpath:
     def placed(self, at: ArrayLike = (0.0, 0.0, 0.0), turn: float = 0.0) -> Placement:
         """Where the part's origin lies (m, base axes) and how it is turned about z (rad)."""
         where, turn = real_array(at, "at"), real_number(turn, "turn", "an angle (rad)")
-        if where.shape != (3,) or not np.isfinite(where).all() or not np.isfinite(turn):
+        if where.shape != (3,) or not np.isfinite(where).all():
+            raise StiffmapError(f"at: expected three finite numbers (m), got {at!r}")
+        if not abs(turn) <= FULL_TURN:
             raise StiffmapError(
-                f"placement: expected three finite numbers (m) and an angle, got {at!r}, {turn!r}"
+                f"turn: expected at most a full turn ({FULL_TURN:.6g} rad), got {turn:.6g} rad"
             )
-        return Placement(where, float(turn))
+        return Placement(where, turn)
 
     def only(self, chosen: ArrayLike) -> Toolpath:
         """Some of the moves, by a mask (n,) or by their numbers in any order; the arrays are copies."""
