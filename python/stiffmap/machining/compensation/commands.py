@@ -15,7 +15,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
-from stiffmap.common.broadcasting import Floats, names_of, one_of, refused, trailing, wrench_array
+from stiffmap.common.broadcasting import (
+    Floats,
+    names_of,
+    one_of,
+    refused,
+    trailing,
+    whole_number,
+    wrench_array,
+)
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs import number_cells, write_rows
 from stiffmap.common.short import short_repr
@@ -25,7 +33,7 @@ from stiffmap.experiment.poses.commanded import against_base
 from stiffmap.experiment.poses.configuration import coordinates_of, drive_jacobian
 from stiffmap.experiment.prediction.equilibria import motions
 from stiffmap.model.description import TASK
-from stiffmap.solve.closing import of_drives
+from stiffmap.solve.closing import commanded, of_drives
 from stiffmap.solve.kinematics import Kinematics, forward_kinematics, inverse_kinematics, must_take
 from stiffmap.solve.machine import Machine, takes_machine
 from stiffmap.solve.validity import Validity
@@ -148,6 +156,9 @@ def compensate(
         For bad input.
     """
     ids = None
+    if threads is not None:
+        whole_number(threads, "threads", 1)
+    one_of(point, machine.points, "point")
     if approach is not None:
         approach = trailing(approach, (3,), "approach", "directions")
         lost = approach[~(np.linalg.norm(approach, axis=-1) > 0)]
@@ -212,8 +223,8 @@ def _plan(
             machine, np.atleast_2d(trailing(actuators, (count,), "actuators", "actuator coordinates"))
         )
     else:
-        p = np.atleast_2d(trailing(position, (3,), "position", "positions (m)"))  # type: ignore[arg-type]
-        r = None if rotation is None else trailing(rotation, (3, 3), "rotation", "rotation matrices")
+        p, turned = commanded(machine.compiled, position, rotation)  # type: ignore[arg-type]
+        p, r = np.atleast_2d(p), None if rotation is None else turned
         must_take(machine, p, r)
         at = inverse_kinematics(machine, p, r)
     names, n = machine.compiled.names, len(at.position)
@@ -246,6 +257,8 @@ def _components(machine: Machine, given: tuple[str, ...] | None) -> list[int]:
     given = None if given is None else names_of(given, "components")
     for c in given or ():
         one_of(c, TASK, "components")
+    if given == ():
+        raise refused("components", f"one or more of {', '.join(TASK)}", "none")
     task = [i for i, c in enumerate(TASK) if c in (given or machine.description.task)]
     return task if given else task[: len(machine.actuators)]
 
