@@ -15,15 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
-from stiffmap.common.broadcasting import (
-    Floats,
-    names_of,
-    one_of,
-    refused,
-    trailing,
-    whole_number,
-    wrench_array,
-)
+from stiffmap.common.broadcasting import Floats, names_of, one_of, refused, trailing, wrench_array
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs import number_cells, write_rows
 from stiffmap.common.short import short_repr
@@ -156,8 +148,6 @@ def compensate(
         For bad input.
     """
     ids = None
-    if threads is not None:
-        whole_number(threads, "threads", 1)
     one_of(point, machine.points, "point")
     if approach is not None:
         approach = trailing(approach, (3,), "approach", "directions")
@@ -168,7 +158,7 @@ def compensate(
         read = against_base(load_plan(Path(position), machine, "position"), machine.description.home.r)
         position, rotation, approach, ids = read.position, read.rotation, read.approach, read.ids
         wrench = read.wrench if read.wrench.any() else wrench
-    plan = _plan(machine, position, rotation, actuators, wrench, approach, gravity, point)
+    plan = _plan(machine, position, rotation, actuators, wrench, approach, gravity, point, threads)
     assert plan.rotation is not None  # as the kinematics has it
     chosen = _components(machine, components)
     start = coordinates_of(machine, plan)
@@ -213,6 +203,7 @@ def _plan(
     approach: Floats | None,
     gravity: ArrayLike | None,
     point: str,
+    threads: int | None,
 ) -> Experiment:
     """What is wanted, as a plan of positions."""
     if (position is None) == (actuators is None):
@@ -226,7 +217,7 @@ def _plan(
         p, turned = commanded(machine.compiled, position, rotation)  # type: ignore[arg-type]
         p, r = np.atleast_2d(p), None if rotation is None else turned
         must_take(machine, p, r)
-        at = inverse_kinematics(machine, p, r)
+        at = inverse_kinematics(machine, p, r, threads=threads)
     names, n = machine.compiled.names, len(at.position)
     return Experiment(
         name="commands",

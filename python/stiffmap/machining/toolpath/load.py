@@ -104,7 +104,7 @@ def read_points(path: Path) -> Toolpath:
 
 
 SILENT = (
-    "PARTNO", "PPRINT", "REMARK", "TOOLNO", "LOADTL", "LOAD", "CUTTER", "COOLNT", "MACHIN", "CLRSRF", "STOP", "OPSTOP",
+    "PARTNO", "PPRINT", "REMARK", "TOOLNO", "LOADTL", "LOAD", "CUTTER", "COOLNT", "MACHIN", "CLRSRF", "STOP", "OPSTOP", "DELAY",
     "TOOL PATH", "TLDATA", "PAINT", "END-OF-PATH",
 )  # fmt: skip
 TEXTS = ("PARTNO", "PPRINT", "REMARK", "TPRINT")
@@ -139,7 +139,10 @@ def read_cl(path: Path) -> Toolpath:
             continue
         pending = ""
         word, _, rest = text.partition("/")
-        word, values = word.strip().upper(), [v.strip().upper() for v in rest.split(",") if v.strip()]
+        word, values = (
+            word.strip().upper(),
+            [v.strip().upper() for v in rest.split(",")] if rest.strip() else [],
+        )
         if not word or word in SILENT or word.split()[0] in TEXTS:
             continue
         if word in ENDS:
@@ -175,7 +178,7 @@ def read_cl(path: Path) -> Toolpath:
             origin = values
         elif word == "CIRCLE":
             fail("CIRCLE: expected lines (GOTO): let the CAM system write arcs as lines")
-        else:
+        elif values != ["OFF"]:  # which ends what would be refused
             fail(f"unknown word {word[:30]!r}")
     if len(rows) < 2:
         raise FileError("expected two or more points (GOTO)", file=str(path))

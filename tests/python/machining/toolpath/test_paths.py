@@ -206,6 +206,11 @@ BAD = [
     ("p.csv", "x_mm,y_mm,z_mm,i,j,k\n0,0,0,0,0,1\n1,0,0,0,0,0\n", "not zero"),
     ("p.cl", "GOTO/0,0,0\nGOTO/1,0,0\n", "UNITS/MM"),
     ("p.cl", "UNITS/MM\nGOTO/0,0\n", "3 or 6 numbers"),
+    (
+        "p.cl",
+        "UNITS/MM\nCUTCOM/OFF\nDELAY/2\nGOTO/1,,0,5\n",
+        "line 4: GOTO: expected 3 or 6 numbers, found 4",
+    ),
     ("p.cl", "UNITS/MM\nCYCLE/DRILL\n", "unknown word 'CYCLE'"),
     ("p.cl", "UNITS/MM\nFEDRAT/0,MMPM\n", "above zero"),
     ("p.cl", "UNITS/MM\nCIRCLE/0,0,0,0,0,1,5\n", "CIRCLE: expected lines (GOTO)"),

@@ -26,24 +26,8 @@ TRACKING = {"G64": "PQ", "G187": "PE", "G5": "P", "G5.1": "Q", "G8": "P"}
 SPLINES = {"G5": "P", "G5.1": "Q"}
 """What makes a mode of tracking of them."""
 IGNORED_G = {
-    5.0,
-    5.1,
-    8.0,
-    15.0,
-    40.0,
-    49.0,
-    61.0,
-    61.1,
-    64.0,
-    67.0,
-    69.0,
-    187.0,
-    92.1,
-    92.2,
-    97.0,
-    98.0,
-    99.0,
-}
+    5.0, 5.1, 8.0, 15.0, 40.0, 49.0, 61.0, 61.1, 64.0, 67.0, 69.0, 187.0, 92.1, 92.2, 97.0, 98.0, 99.0,
+}  # fmt: skip
 """Without meaning for the path: modes of tracking; cancelled compensation, offsets, cycles and what is refused (`REFUSED_G`)."""
 IGNORED_M = {7.0, 8.0, 9.0, 48.0, 49.0}
 BREAKS_M = {0.0, 1.0, 6.0, 60.0}
