@@ -209,7 +209,7 @@ BAD = [
     (
         "p.cl",
         "UNITS/MM\nCUTCOM/OFF\nDELAY/2\nGOTO/1,,0,5\n",
-        "line 4: GOTO: expected 3 or 6 numbers, found 4",
+        "line 4: GOTO: expected a number, found ''",
     ),
     ("p.cl", "UNITS/MM\nCYCLE/DRILL\n", "unknown word 'CYCLE'"),
     ("p.cl", "UNITS/MM\nFEDRAT/0,MMPM\n", "above zero"),
