@@ -96,8 +96,16 @@ def corners(job: Setting, ds: xr.Dataset) -> list[Warned]:
     return [Warned("outside corner", none, text, finding=False)]
 
 
+def slots(job: Setting, ds: xr.Dataset) -> list[Warned]:
+    """Where the stock ends within the width of a slot, whose force does not follow that."""
+    e, cut = job.engaged, job.process.cut
+    part = (e.radial < cut.radial * (1 - 1e-9)) & (e.axial > 0) & (cut.side == "slot")
+    text = f"The stock is narrower than the slot at {part.sum()} of {part.size} points, where the force is still that of a full slot."
+    return [Warned("slot", part, text, finding=False)]
+
+
 AT_CORNERS = ("error_normal", "error_normal_after")
-SOURCES: tuple[Callable[[Setting, xr.Dataset], list[Warned]], ...] = (limits, chatter, corners)
+SOURCES: tuple[Callable[[Setting, xr.Dataset], list[Warned]], ...] = (limits, chatter, corners, slots)
 
 
 def warned(job: Setting, ds: xr.Dataset) -> tuple[Warned, ...]:

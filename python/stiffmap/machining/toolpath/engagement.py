@@ -176,6 +176,8 @@ def engagement(
     radial = np.full(
         m, process.cut.radial if thickness is None else within_tool(thickness, "thickness", process)
     )
+    if thickness is not None and process.cut.side == "slot":
+        raise StiffmapError("thickness: a slot is as wide as its tool; expected a climb or conventional cut")
     axial = np.full(m, process.cut.axial)
     if stock is not None:
         radial, axial = _in_box(points, process, stock, side)

@@ -15,10 +15,6 @@ from stiffmap.common.errors import StiffmapError
 Integers = NDArray[np.int64]
 
 
-FULL_TURN = 2 * np.pi
-"""rad: above, degrees were meant."""
-
-
 class Kind(IntEnum):
     """How a move goes."""
 
@@ -140,10 +136,8 @@ class Toolpath:
         where, turn = real_array(at, "at"), real_number(turn, "turn", "an angle (rad)")
         if where.shape != (3,) or not np.isfinite(where).all():
             raise StiffmapError(f"at: expected three finite numbers (m), got {at!r}")
-        if not abs(turn) <= FULL_TURN:
-            raise StiffmapError(
-                f"turn: expected at most a full turn ({FULL_TURN:.6g} rad), got {turn:.6g} rad"
-            )
+        if not abs(turn) <= 2 * np.pi:  # else degrees were meant
+            raise StiffmapError(f"turn: expected at most a full turn (2 pi rad), got {turn:.6g} rad")
         return Placement(where, turn)
 
     def only(self, chosen: ArrayLike) -> Toolpath:

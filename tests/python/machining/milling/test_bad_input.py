@@ -62,7 +62,7 @@ def test_a_chip_thicker_than_its_tool() -> None:
         ({"at": (0, 0)}, "at: expected three finite numbers"),
         ({"step": 0.0}, "step: expected a positive number"),
         ({"true_machine": sm.load_machine("ur10")}, "true_machine: expected the actuators"),
-        ({"turn": 90}, r"turn: expected at most a full turn \(6.28319 rad\), got 90 rad"),
+        ({"turn": 90}, r"turn: expected at most a full turn \(2 pi rad\), got 90 rad"),
         ({"step": 2}, "step: expected at most 1000 mm, got 2000 mm"),
         ({"within": 0.05}, "within: expected at most the tool's diameter of 12 mm, got 50 mm"),
         ({"tolerance": 0.25}, "tolerance: expected at most the tool's diameter of 12 mm, got 250 mm"),
@@ -74,6 +74,15 @@ def test_a_chip_thicker_than_its_tool() -> None:
 def test_arguments(argument: dict[str, object], message: str) -> None:
     with pytest.raises(StiffmapError, match=message):
         mill_job(M, LINE, "trimming", **{"at": (0, 0, 0.3), **argument})
+
+
+def test_a_slot_is_as_wide_as_its_tool() -> None:
+    with pytest.raises(StiffmapError, match="thickness: a slot is as wide as its tool"):
+        mill_job(M, LINE, "slot", at=(0, 0, 0.3), thickness=2e-3)
+    for low, count in ((-0.02, 0), (0.0, 11)):
+        stock = [-1, low, -0.1, 0, 0.02, 0.1]
+        found = mill_job(M, LINE, "slot", at=(0, 0, 0.3), stock=stock)
+        assert [w.points.sum() for w in found.warnings if w.name == "slot"] == [count] * bool(count)
 
 
 def test_files_that_are_not_there() -> None:

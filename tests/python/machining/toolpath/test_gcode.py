@@ -153,7 +153,7 @@ BAD = [
     ("G154 P3", HEAD, "offsets beyond G59 (write G54)"),
     ("G71", HEAD, "Siemens's mm (write G21)"),
     ("M98 P100", HEAD, "subprograms"),
-    ("M66", HEAD, "unknown word: M66"),
+    ("M66", HEAD, "M66: unknown word"),
     ("o100 call", HEAD, "subprograms"),
     ("#1=5", HEAD, "parameters"),
     ("G1 X[1+2]", HEAD, "expressions"),

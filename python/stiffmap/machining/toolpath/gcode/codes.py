@@ -23,12 +23,8 @@ STARTS = {"distance": "G90", "feed mode": "G94", "plane": "G17", "centres": "G91
 """What is taken where a program says nothing; a controller may stand otherwise, so that a written program says it."""
 TRACKING = {"G64": "PQ", "G187": "PE", "G5": "P", "G5.1": "Q", "G8": "P"}
 """Modes of how closely corners are tracked, and their words (LinuxCNC; Haas; Fanuc, where other words make two of them splines)."""
-SPLINES = {"G5": "P", "G5.1": "Q"}
-"""What makes a mode of tracking of them."""
-IGNORED_G = {
-    5.0, 5.1, 8.0, 15.0, 40.0, 49.0, 61.0, 61.1, 64.0, 67.0, 69.0, 187.0, 92.1, 92.2, 97.0, 98.0, 99.0,
-}  # fmt: skip
-"""Without meaning for the path: modes of tracking; cancelled compensation, offsets, cycles and what is refused (`REFUSED_G`)."""
+IGNORED_G = {15.0, 40.0, 49.0, 67.0, 69.0, 92.1, 92.2, 97.0, 98.0, 99.0}
+"""Without meaning for the path: cancelled compensation, offsets, cycles and what is refused (`REFUSED_G`)."""
 IGNORED_M = {7.0, 8.0, 9.0, 48.0, 49.0}
 BREAKS_M = {0.0, 1.0, 6.0, 60.0}
 """Stops and the change of a tool: somebody may move the axes meanwhile."""
@@ -54,7 +50,7 @@ REFUSED_G = {
     68.0: "rotations of the axes", 68.2: "tilted planes", 43.4: "positions of a tilted tool (write G43)", 95.0: "feed per revolution (write G94)", 96.0: "constant surface speed",
     **dict.fromkeys((73.0, 76.0, 81.0, 82.0, 83.0, 84.0, 85.0, 86.0, 87.0, 88.0, 89.0), "drilling cycles"),
 }  # fmt: skip
-REFUSED_M = {98.0: "subprograms", 99.0: "subprograms", 97.0: "subprograms"}
+REFUSED_M = dict.fromkeys((97.0, 98.0, 99.0), "subprograms are not read")
 
 
 @dataclass
@@ -193,7 +189,9 @@ class Codes:
                 what = "rotary and secondary axes are not read" if letter in "ABUVW" else "unknown word"
                 self.fail(f"{what}: {letter}{value:g}")
         tracking = groups.get("tracking", "")
-        if tracking in SPLINES and (SPLINES[tracking] not in values or not values.keys().isdisjoint(MOVING)):
+        if tracking in ("G5", "G5.1") and (
+            TRACKING[tracking] not in values or not values.keys().isdisjoint(MOVING)
+        ):
             self.fail(f"{tracking}: splines are not read")
         for letter in [w for w in "QE" if w in values and w not in TRACKING.get(tracking, "")]:
             self.fail(f"unknown word: {letter}{values[letter]:g}")
@@ -226,13 +224,13 @@ class Codes:
                 self.fail(f"no work offset {s.offset}; given: {', '.join(self.offsets)}")
         elif value in (4.0, 28.0, 30.0, 43.0, 50.0, 53.0):
             own.add(f"G{value:g}")
+        elif GROUPS.get(value) == "tracking":
+            self.note(f"G{value:g}: how closely the controller tracks corners is not simulated")
         elif value not in IGNORED_G:
             why = REFUSED_G.get(value)
             self.fail(
-                f"G{value:g}: {why or 'unknown word'}{' are not read' if why and '(' not in why else ''}",
+                f"G{value:g}: {why or 'unknown word'}{' are not read' if why and '(' not in why else ''}"
             )
-        elif GROUPS.get(value) == "tracking":
-            self.note(f"G{value:g}: how closely the controller tracks corners is not simulated")
         if (group := GROUPS.get(value)) in STARTS:
             s.said.add(group)
 
@@ -249,10 +247,8 @@ class Codes:
             self.state.breaks += 1
             if value == 6.0 and self.state.spindle and not turning:
                 self.state.spindle = 0  # a change of tool stops it, unless its line turns it on
-        elif value in REFUSED_M:
-            self.fail(f"M{value:g}: {REFUSED_M[value]} are not read")
         elif value not in IGNORED_M:
-            self.fail(f"unknown word: M{value:g}")
+            self.fail(f"M{value:g}: {REFUSED_M.get(value, 'unknown word')}")
 
     def _numbers(self, values: dict[str, float], own: set[str], motion: str, groups: dict[str, str]) -> None:
         s = self.state
