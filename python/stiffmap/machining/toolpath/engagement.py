@@ -18,8 +18,6 @@ CORNER = np.radians(15.0)
 """Turn of a polyline from which on it is a corner and not a curve."""
 ALONG = 1e-3
 """Share of the travel across the tool below which a move goes along it."""
-LARGEST_STEP = 1.0
-"""m: above, millimetres were meant."""
 MOST = 20_000_000
 """Points of a path."""
 
@@ -73,8 +71,8 @@ class Points:
 
 def sampled(path: Toolpath, step: float = 2e-3) -> Points:
     """Points no further apart than `step` (m); every cut has its two ends. Raises StiffmapError where nothing cuts."""
-    if magnitude(step, "step", "m") > LARGEST_STEP:
-        raise StiffmapError(f"step: expected at most {1e3 * LARGEST_STEP:g} mm, got {1e3 * step:g} mm")
+    if magnitude(step, "step", "m") > 1.0:  # millimetres were meant
+        raise StiffmapError(f"step: expected at most 1000 mm, got {1e3 * step:g} mm")
     cuts = path.cutting()
     length = path.length[cuts]
     count = np.maximum(1, np.ceil(length / step - 1e-9))
@@ -173,9 +171,8 @@ def engagement(
     """Width and depth at each point: the process's own, or a `thickness` to trim (m), or what a box of stock holds."""
     m = len(points)
     side = part_side(process)
-    radial = np.full(
-        m, process.cut.radial if thickness is None else within_tool(thickness, "thickness", process)
-    )
+    own = process.cut.radial if thickness is None else within_tool(thickness, "thickness", process)
+    radial = np.full(m, own)
     if thickness is not None and process.cut.side == "slot":
         raise StiffmapError("thickness: a slot is as wide as its tool; expected a climb or conventional cut")
     axial = np.full(m, process.cut.axial)

@@ -109,7 +109,6 @@ SILENT = (
 )  # fmt: skip
 TEXTS = ("PARTNO", "PPRINT", "REMARK", "TPRINT")
 """Words that text follows, with or without a slash."""
-UPRIGHT = [0.0, 0.0, 1.0]
 ENDS = ("FINI", "END", "REWIND")
 UNITS = {"MM": 1e-3, "INCHES": 25.4e-3, "INCH": 25.4e-3, "CM": 1e-2}
 Fail = Callable[[str], NoReturn]
@@ -122,7 +121,7 @@ def read_cl(path: Path) -> Toolpath:
     """
     unit, feed, spindle, rapid = 0.0, nan, nan, False
     number, pending, remark = 0, "", False
-    axis: list[float] | None = [*UPRIGHT]
+    axis: list[float] | None = [0.0, 0.0, 1.0]
     origin: list[str] = []
     rows: list[tuple[list[float], list[float], float, float, int, bool]] = []
 
@@ -139,16 +138,13 @@ def read_cl(path: Path) -> Toolpath:
             continue
         pending = ""
         word, _, rest = text.partition("/")
-        word, values = (
-            word.strip().upper(),
-            [v.strip().upper() for v in rest.split(",")] if rest.strip() else [],
-        )
+        word, values = word.strip().upper(), [v.strip().upper() for v in rest.split(",")]
         if not word or word in SILENT or word.split()[0] in TEXTS:
             continue
         if word in ENDS:
             break
         if word == "UNITS":
-            if not values or values[0] not in UNITS:
+            if values[0] not in UNITS:
                 fail(f"UNITS: expected MM or INCHES, found {rest[:20]!r}")
             unit = UNITS[values[0]]
         elif word in ("GOTO", "FROM"):
@@ -171,7 +167,7 @@ def read_cl(path: Path) -> Toolpath:
         elif word == "SPINDL":
             spindle = _spindle(values, spindle, fail)
         elif word == "MULTAX":
-            axis = None if values == ["OFF"] and axis and axis[:2] != UPRIGHT[:2] else axis
+            axis = None if values == ["OFF"] and axis and any(axis[:2]) else axis
         elif word == "MSYS":
             if origin and values != origin:
                 fail("MSYS: a second origin or other axes; expected one file for each")
@@ -211,7 +207,7 @@ def _feedrate(values: list[str], unit: float, fail: Fail) -> float:
 
 
 def _spindle(values: list[str], before: float, fail: Fail) -> float:
-    if values in (["OFF"], []):
+    if values in (["OFF"], [""]):
         return 0.0
     if values == ["ON"]:
         return before
