@@ -6,10 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import stiffmap as sm
 from stiffmap.common.errors import StiffmapError
 from stiffmap.machining.milling import mill_job
+from stiffmap.machining.milling.choices import choices
+from stiffmap.machining.milling.limits import SOURCES, slots
 from stiffmap.machining.toolpath import path_of
 from stiffmap.machining.toolpath.gcode.load import load_gcode
 
@@ -81,8 +84,11 @@ def test_a_slot_is_as_wide_as_its_tool() -> None:
         mill_job(M, LINE, "slot", at=(0, 0, 0.3), thickness=2e-3)
     for low, count in ((-0.02, 0), (0.0, 11)):
         stock = [-1, low, -0.1, 0, 0.02, 0.1]
-        found = mill_job(M, LINE, "slot", at=(0, 0, 0.3), stock=stock)
-        assert [w.points.sum() for w in found.warnings if w.name == "slot"] == [count] * bool(count)
+        job = choices(
+            M, LINE, "slot", at=(0, 0, 0.3), stock=stock, step=2e-3, thickness=None, threads=None
+        ).job
+        assert [w.points.sum() for w in slots(job, xr.Dataset())] == [count]
+    assert slots in SOURCES
 
 
 def test_files_that_are_not_there() -> None:
