@@ -93,7 +93,9 @@ def must_take(machine: Machine, position: Floats, rotation: Floats | None = None
     asked = np.zeros((len(position), 6))
     asked[:, :3] = position - home.p
     if rotation is not None:
-        asked[:, 3:] = Rotation.from_matrix(home.r.T @ rotation).as_rotvec()
+        turn = home.r.T @ rotation
+        turn[~np.isfinite(turn).all(axis=(-1, -2))] = np.eye(3)
+        asked[:, 3:] = Rotation.from_matrix(turn).as_rotvec()
     still = np.array([axis not in task for axis in TASK]) & (np.abs(asked) <= SAME)
     gap = np.where(still, 0.0, missed(machine, position, rotation))
     words = missed_words(machine, gap)

@@ -25,7 +25,7 @@ from stiffmap.experiment.poses.commanded import against_base
 from stiffmap.experiment.poses.configuration import coordinates_of, drive_jacobian
 from stiffmap.experiment.prediction.equilibria import motions
 from stiffmap.model.description import TASK
-from stiffmap.solve.closing import of_drives
+from stiffmap.solve.closing import commanded, of_drives
 from stiffmap.solve.kinematics import Kinematics, forward_kinematics, inverse_kinematics, must_take
 from stiffmap.solve.machine import Machine, takes_machine
 from stiffmap.solve.validity import Validity
@@ -148,6 +148,7 @@ def compensate(
         For bad input.
     """
     ids = None
+    one_of(point, machine.points, "point")
     if approach is not None:
         approach = trailing(approach, (3,), "approach", "directions")
         lost = approach[~(np.linalg.norm(approach, axis=-1) > 0)]
@@ -157,7 +158,7 @@ def compensate(
         read = against_base(load_plan(Path(position), machine, "position"), machine.description.home.r)
         position, rotation, approach, ids = read.position, read.rotation, read.approach, read.ids
         wrench = read.wrench if read.wrench.any() else wrench
-    plan = _plan(machine, position, rotation, actuators, wrench, approach, gravity, point)
+    plan = _plan(machine, position, rotation, actuators, wrench, approach, gravity, point, threads)
     assert plan.rotation is not None  # as the kinematics has it
     chosen = _components(machine, components)
     start = coordinates_of(machine, plan)
@@ -202,6 +203,7 @@ def _plan(
     approach: Floats | None,
     gravity: ArrayLike | None,
     point: str,
+    threads: int | None,
 ) -> Experiment:
     """What is wanted, as a plan of positions."""
     if (position is None) == (actuators is None):
@@ -212,10 +214,10 @@ def _plan(
             machine, np.atleast_2d(trailing(actuators, (count,), "actuators", "actuator coordinates"))
         )
     else:
-        p = np.atleast_2d(trailing(position, (3,), "position", "positions (m)"))  # type: ignore[arg-type]
-        r = None if rotation is None else trailing(rotation, (3, 3), "rotation", "rotation matrices")
+        p, turned = commanded(machine.compiled, position, rotation)  # type: ignore[arg-type]
+        p, r = np.atleast_2d(p), None if rotation is None else turned
         must_take(machine, p, r)
-        at = inverse_kinematics(machine, p, r)
+        at = inverse_kinematics(machine, p, r, threads=threads)
     names, n = machine.compiled.names, len(at.position)
     return Experiment(
         name="commands",
@@ -246,6 +248,8 @@ def _components(machine: Machine, given: tuple[str, ...] | None) -> list[int]:
     given = None if given is None else names_of(given, "components")
     for c in given or ():
         one_of(c, TASK, "components")
+    if given == ():
+        raise refused("components", f"one or more of {', '.join(TASK)}", "none")
     task = [i for i, c in enumerate(TASK) if c in (given or machine.description.task)]
     return task if given else task[: len(machine.actuators)]
 

@@ -20,10 +20,9 @@ from stiffmap.machining.milling.setting import Setting, setting
 from stiffmap.machining.process.description import Process
 from stiffmap.machining.process.load import GivenProcess, as_process
 from stiffmap.machining.toolpath import Toolpath, box, load_path, sampled
-from stiffmap.machining.toolpath.engagement import part_side
+from stiffmap.machining.toolpath.engagement import part_side, within_tool
 from stiffmap.machining.toolpath.outlines import entered_at, outline_of, turned_round
 from stiffmap.solve.machine import Machine
-from stiffmap.workspace.maps.inputs import magnitude
 
 OFFSETS = tuple(f"G{n}" for n in range(54, 60))
 """Work offsets that a program can name."""
@@ -76,7 +75,7 @@ def choices(
     """In this order: the sense, the placement, the entry, the turns; arguments as of `mill`. Raises StiffmapError."""
     cut = as_process(process)
     if tolerance is not None:
-        cut = replace(cut, tolerance=magnitude(tolerance, "tolerance", "m"))
+        cut = replace(cut, tolerance=within_tool(tolerance, "tolerance", cut))
     if isinstance(path, Toolpath):
         if size is not None or offset:
             raise StiffmapError(

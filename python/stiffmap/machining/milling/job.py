@@ -21,10 +21,10 @@ from stiffmap.machining.milling.speed import Feeds, PathStability, best_feeds, p
 from stiffmap.machining.process.force import cutting_force
 from stiffmap.machining.process.load import GivenProcess
 from stiffmap.machining.toolpath import Toolpath
+from stiffmap.machining.toolpath.engagement import within_tool
 from stiffmap.solve.machine import Machine, as_machine
 from stiffmap.solve.options import keywords_of
 from stiffmap.solve.status import Status
-from stiffmap.workspace.maps.inputs import magnitude
 from stiffmap.workspace.performance.motion.inertia import natural_frequencies
 
 BAND = 0.2
@@ -78,9 +78,9 @@ def mill_job(
 ) -> Milled:
     """The same with the program and all states, for reports."""
     whole_number(passes, "passes", 1)
-    magnitude(within, "within", "m")
     made_of = choices(machine, path, process, step=step, thickness=thickness, threads=threads, **chosen)
     job = made_of.job
+    within_tool(within, "within", job.process)
     must_reach(job)
     best = best_feeds(job) if feeds else None
     if best is not None:

@@ -96,8 +96,16 @@ def corners(job: Setting, ds: xr.Dataset) -> list[Warned]:
     return [Warned("outside corner", none, text, finding=False)]
 
 
+def slots(job: Setting, ds: xr.Dataset) -> list[Warned]:
+    """Where the stock ends within the width of a slot, whose force does not follow that."""
+    e, cut = job.engaged, job.process.cut
+    part = (e.radial < cut.radial * (1 - 1e-9)) & (e.axial > 0) & (cut.side == "slot")
+    text = f"The stock is narrower than the slot at {part.sum()} of {part.size} points, where the force is still that of a full slot."
+    return [Warned("slot", part, text, finding=False)]
+
+
 AT_CORNERS = ("error_normal", "error_normal_after")
-SOURCES: tuple[Callable[[Setting, xr.Dataset], list[Warned]], ...] = (limits, chatter, corners)
+SOURCES: tuple[Callable[[Setting, xr.Dataset], list[Warned]], ...] = (limits, chatter, corners, slots)
 
 
 def warned(job: Setting, ds: xr.Dataset) -> tuple[Warned, ...]:
@@ -151,6 +159,13 @@ def must_reach(job: Setting) -> None:
         return
     lost = np.flatnonzero(~ok)
     lines = job.path.line[job.points.move[lost]]
+    upright = job.machine.solve(job.position[lost], stiffness=False, threads=job.threads)
+    if (upright.status != Status.UNREACHABLE).all():
+        tilt = np.degrees(np.arccos(np.clip(job.tool[lost, 2], -1.0, 1.0))).max()
+        raise StiffmapError(
+            f"{job.machine.name} cannot hold the tool as the path asks, tilted by up to {tilt:.4g} deg: {lost.size} of {len(job)} points, "
+            f"from line {lines[0]} of the path on; it reaches all of them with the tool as at home"
+        )
     text = (
         f"the path leaves the workspace of {job.machine.name}: {lost.size} of {len(job)} points, the first at {place_text(job.position[lost[0]], '.1f')}, "
         f"line {lines[0]} of the path"

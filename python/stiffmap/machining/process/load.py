@@ -57,7 +57,8 @@ UNITS = {
     **dict.fromkeys(("Kte", "Kre", "Kae"), EDGE),
 }
 MAIN = ("Ktc", "kc11", "specific_energy")
-"""Numbers of a law that are above zero."""
+"""Numbers of a law that are above zero, and what they may be, N/m²: from foam to beyond any metal."""
+PRESSURES = (1e5, 1e11)
 LONGEST = 1.0
 """m of a tool or a cut: above, millimetres were meant."""
 
@@ -111,7 +112,7 @@ def process_of(document: Document, file: str) -> Process:
     r = NumberReader(document, file)
     tool, spindle = _tool(m, r), r.rate(m.spindle, "spindle")
     feed, cut, law = _feed(m.feed, tool, spindle, r), _cut(m, tool, r), _law(m, tool, r)
-    tolerance = None if m.tolerance is None else r.positive(m.tolerance, "m", "tolerance")
+    tolerance = None if m.tolerance is None else r.positive(m.tolerance, "m", "tolerance", most=tool.diameter)
     process = Process(m.name, tool, law, spindle, feed, cut, tolerance, m.title, m.source, r.uncertainty)
     if tool.teeth and process.chip > tool.diameter / 2:
         r.fail(
@@ -183,6 +184,9 @@ def _law(m: ProcessFile, tool: Tool, r: NumberReader) -> Law:
     for k in type(model).model_fields:
         number, unit, keys = getattr(model, k), UNITS.get(k, ""), ("law", name, k)
         values[k] = (r.positive if k in MAIN else r.si)(number.value, unit, *keys)
+        if k in MAIN and not PRESSURES[0] <= values[k] <= PRESSURES[1]:
+            low, high = (p / 1e6 for p in PRESSURES)
+            r.fail(f"expected {low:g} to {high:g} N/mm2 (J/cm3), found {number.value!r}", *keys)
         if number.u is not None:
             r.uncertainty[k] = r.si(number.u, unit, *keys, "u")
             if r.uncertainty[k] < 0:

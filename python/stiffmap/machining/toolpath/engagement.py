@@ -7,8 +7,9 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from stiffmap.common.broadcasting import Floats, real_array, real_number
+from stiffmap.common.broadcasting import Floats, real_array
 from stiffmap.common.errors import StiffmapError
+from stiffmap.common.number_text import place_text
 from stiffmap.machining.process.description import Process
 from stiffmap.machining.toolpath.path import Integers, Kind, Toolpath
 from stiffmap.workspace.maps.inputs import magnitude
@@ -70,7 +71,8 @@ class Points:
 
 def sampled(path: Toolpath, step: float = 2e-3) -> Points:
     """Points no further apart than `step` (m); every cut has its two ends. Raises StiffmapError where nothing cuts."""
-    magnitude(step, "step", "m")
+    if magnitude(step, "step", "m") > 1.0:  # millimetres were meant
+        raise StiffmapError(f"step: expected at most 1000 mm, got {1e3 * step:g} mm")
     cuts = path.cutting()
     length = path.length[cuts]
     count = np.maximum(1, np.ceil(length / step - 1e-9))
@@ -149,6 +151,16 @@ def part_side(process: Process) -> float:
     return -1.0 if process.cut.side == "climb" else 1.0
 
 
+def within_tool(value: float, name: str, process: Process) -> float:
+    """A length (m) above zero and at most the tool's diameter: above, millimetres were meant. Raises StiffmapError."""
+    out, most = magnitude(value, name, "m"), process.tool.diameter
+    if out > most:
+        raise StiffmapError(
+            f"{name}: expected at most the tool's diameter of {1e3 * most:g} mm, got {1e3 * out:g} mm"
+        )
+    return out
+
+
 def engagement(
     points: Points,
     path: Toolpath,
@@ -159,12 +171,10 @@ def engagement(
     """Width and depth at each point: the process's own, or a `thickness` to trim (m), or what a box of stock holds."""
     m = len(points)
     side = part_side(process)
-    radial = np.full(m, process.cut.radial if thickness is None else real_number(thickness, "thickness"))
-    if thickness is not None and not 0 < thickness <= process.tool.diameter:
-        raise StiffmapError(
-            f"thickness: expected above zero and at most the tool's diameter of {1e3 * process.tool.diameter:g} mm, "
-            f"got {1e3 * thickness:g} mm"
-        )
+    own = process.cut.radial if thickness is None else within_tool(thickness, "thickness", process)
+    radial = np.full(m, own)
+    if thickness is not None and process.cut.side == "slot":
+        raise StiffmapError("thickness: a slot is as wide as its tool; expected a climb or conventional cut")
     axial = np.full(m, process.cut.axial)
     if stock is not None:
         radial, axial = _in_box(points, process, stock, side)
@@ -193,17 +203,26 @@ def _over_contact(points: Points, process: Process, curvature: Floats) -> Floats
 
 
 def _in_box(points: Points, process: Process, stock: Floats, side: float) -> tuple[Floats, Floats]:
-    """From the wall of the part away from it until the stock ends; from the tip up to its top."""
-    out, (low, high) = -side * points.normal, stock
-    wall = points.position - process.tool.diameter / 2 * out
+    """From the wall of the part away from it until the stock ends, no further than the tool reaches where there is a gap; from the tip
+    up to its top. Raises StiffmapError where nothing is cut."""
+    out, (low, high), across = -side * points.normal, stock, process.tool.diameter
+    wall = points.position - across / 2 * out
     with np.errstate(divide="ignore", invalid="ignore"):
         t = np.stack([(low - wall) / out, (high - wall) / out])
     far = np.where(np.abs(out) < 1e-12, np.inf, t.max(axis=0)).min(axis=1)
     near = np.where(np.abs(out) < 1e-12, -np.inf, t.min(axis=0)).max(axis=1)
     inside = ((wall >= low - 1e-9) & (wall <= high + 1e-9)) | (np.abs(out) > 1e-12)
-    width = np.where(inside[:, :2].all(axis=1), far - np.maximum(near, 0.0), 0.0)
-    height = (high[2] - points.position[:, 2]).clip(0.0, high[2] - low[2])
-    return width.clip(0.0), height.clip(0.0, process.cut.axial)
+    far = np.where(near > 0, np.minimum(far, across), far)
+    width = np.where(inside[:, :2].all(axis=1), far - np.maximum(near, 0.0), 0.0).clip(0.0)
+    height = (high[2] - points.position[:, 2]).clip(0.0, high[2] - low[2]).clip(0.0, process.cut.axial)
+    height[width == 0] = 0.0  # of a slot the width does not count
+    if not height.any():
+        first, last = points.position.min(axis=0), points.position.max(axis=0)
+        raise StiffmapError(
+            f"stock: the tool cuts nothing of it, which reaches from {place_text(low, '.1f')} to {place_text(high, '.1f')}; the tip goes "
+            f"from {place_text(first, '.1f')} to {place_text(last, '.1f')} (axes of the part)"
+        )
+    return width, height
 
 
 def _corners(

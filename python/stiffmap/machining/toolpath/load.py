@@ -104,7 +104,8 @@ def read_points(path: Path) -> Toolpath:
 
 
 SILENT = (
-    "PARTNO", "PPRINT", "REMARK", "TOOLNO", "LOADTL", "LOAD", "CUTTER", "COOLNT", "MACHIN", "MULTAX", "CLRSRF", "STOP", "OPSTOP",
+    "PARTNO", "PPRINT", "REMARK", "TOOLNO", "LOADTL", "LOAD", "CUTTER", "COOLNT", "MACHIN", "CLRSRF", "STOP", "OPSTOP", "DELAY",
+    "TOOL PATH", "TLDATA", "PAINT", "END-OF-PATH",
 )  # fmt: skip
 TEXTS = ("PARTNO", "PPRINT", "REMARK", "TPRINT")
 """Words that text follows, with or without a slash."""
@@ -114,12 +115,14 @@ Fail = Callable[[str], NoReturn]
 
 
 def read_cl(path: Path) -> Toolpath:
-    """A CL file of APT: UNITS, GOTO (with the tool's axis where it has six numbers), FROM, FEDRAT, RAPID, SPINDL.
+    """A CL file of APT: UNITS, GOTO (with the tool's axis where it has six numbers, which holds until the next), FROM, FEDRAT, RAPID, SPINDL.
 
     Raises FileError naming the line; what is not understood is refused.
     """
     unit, feed, spindle, rapid = 0.0, nan, nan, False
     number, pending, remark = 0, "", False
+    axis: list[float] | None = [0.0, 0.0, 1.0]
+    origin: list[str] = []
     rows: list[tuple[list[float], list[float], float, float, int, bool]] = []
 
     def fail(message: str) -> NoReturn:
@@ -135,13 +138,13 @@ def read_cl(path: Path) -> Toolpath:
             continue
         pending = ""
         word, _, rest = text.partition("/")
-        word, values = word.strip().upper(), [v.strip().upper() for v in rest.split(",") if v.strip()]
+        word, values = word.strip().upper(), [v.strip().upper() for v in rest.split(",")]
         if not word or word in SILENT or word.split()[0] in TEXTS:
             continue
         if word in ENDS:
             break
         if word == "UNITS":
-            if not values or values[0] not in UNITS:
+            if values[0] not in UNITS:
                 fail(f"UNITS: expected MM or INCHES, found {rest[:20]!r}")
             unit = UNITS[values[0]]
         elif word in ("GOTO", "FROM"):
@@ -150,7 +153,9 @@ def read_cl(path: Path) -> Toolpath:
             v = [_number(t, word, fail) for t in values]
             if len(v) not in (3, 6):
                 fail(f"{word}: expected 3 or 6 numbers, found {len(v)}")
-            axis = v[3:] or [0.0, 0.0, 1.0]
+            axis = v[3:] or axis
+            if axis is None:
+                fail(f"{word}: expected 6 numbers, since MULTAX/OFF came with the tool tilted; found 3")
             if not any(axis):
                 fail(f"{word}: expected a direction of the tool that is not zero")
             rows.append(([unit * c for c in v[:3]], axis, feed, spindle, number, rapid or word == "FROM"))
@@ -161,7 +166,15 @@ def read_cl(path: Path) -> Toolpath:
             feed = _feedrate(values, unit, fail)
         elif word == "SPINDL":
             spindle = _spindle(values, spindle, fail)
-        else:
+        elif word == "MULTAX":
+            axis = None if values == ["OFF"] and axis and any(axis[:2]) else axis
+        elif word == "MSYS":
+            if origin and values != origin:
+                fail("MSYS: a second origin or other axes; expected one file for each")
+            origin = values
+        elif word == "CIRCLE":
+            fail("CIRCLE: expected lines (GOTO): let the CAM system write arcs as lines")
+        elif values != ["OFF"]:  # which ends what would be refused
             fail(f"unknown word {word[:30]!r}")
     if len(rows) < 2:
         raise FileError("expected two or more points (GOTO)", file=str(path))
@@ -194,7 +207,7 @@ def _feedrate(values: list[str], unit: float, fail: Fail) -> float:
 
 
 def _spindle(values: list[str], before: float, fail: Fail) -> float:
-    if values in (["OFF"], []):
+    if values in (["OFF"], [""]):
         return 0.0
     if values == ["ON"]:
         return before

@@ -122,7 +122,7 @@ def outline_text(
     make, usual, words = SHAPES[name]
     given = usual if size is None else tuple(np.atleast_1d(real_array(size, "size")).tolist())
     if len(given) != len(usual) or not all(isfinite(v) for v in given):
-        raise StiffmapError(f"{name}: expected the size {words}, got {len(given)} numbers")
+        raise StiffmapError(f"{name}: expected the size {words}, got {list(given)}")
     for word, value in zip(words.split(","), given, strict=True):
         if word != "corner" and not value > 0:
             raise StiffmapError(f"{word}: expected a length above zero, got {value}")

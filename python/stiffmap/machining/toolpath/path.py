@@ -134,11 +134,11 @@ class Toolpath:
     def placed(self, at: ArrayLike = (0.0, 0.0, 0.0), turn: float = 0.0) -> Placement:
         """Where the part's origin lies (m, base axes) and how it is turned about z (rad)."""
         where, turn = real_array(at, "at"), real_number(turn, "turn", "an angle (rad)")
-        if where.shape != (3,) or not np.isfinite(where).all() or not np.isfinite(turn):
-            raise StiffmapError(
-                f"placement: expected three finite numbers (m) and an angle, got {at!r}, {turn!r}"
-            )
-        return Placement(where, float(turn))
+        if where.shape != (3,) or not np.isfinite(where).all():
+            raise StiffmapError(f"at: expected three finite numbers (m), got {at!r}")
+        if not abs(turn) <= 2 * np.pi:  # else degrees were meant
+            raise StiffmapError(f"turn: expected at most a full turn (2 pi rad), got {turn:.6g} rad")
+        return Placement(where, turn)
 
     def only(self, chosen: ArrayLike) -> Toolpath:
         """Some of the moves, by a mask (n,) or by their numbers in any order; the arrays are copies."""

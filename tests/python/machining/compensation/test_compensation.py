@@ -109,13 +109,29 @@ def test_out_of_reach_is_nan_beside_good_rows() -> None:
     assert found.ok.tolist() == [True, False]
     assert np.isnan(found.actuators[1]).all()
 
+    home = machine.description.home
+    found = compensate(machine, [home.p, home.p], np.stack([home.r, np.full((3, 3), np.nan)]))
+    assert found.ok.tolist() == [True, False]
 
-def test_bad_input() -> None:
-    machine = sm.load_machine("ur10")
-    with pytest.raises(sm.StiffmapError, match="either position or actuators"):
-        compensate(machine)
-    with pytest.raises(sm.StiffmapError, match="got 'q'"):
-        compensate(machine, [0, 0, 0], components=("q",))
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"position": None}, "either position or actuators"),
+        ({"components": ("q",)}, "got 'q'"),
+        ({"components": ()}, "components: expected one or more of x, y, z, rx, ry, rz, got none"),
+        ({"rotation": np.ones((3, 3))}, r"rotation: expected rotation matrices, got one with"),
+        ({"point": "foo"}, "point: expected one of tcp"),
+        ({"threads": 0}, "threads: expected 1 or more, got 0"),
+    ],
+    ids=str,
+)
+def test_bad_input(arguments: dict[str, object], message: str) -> None:
+    with pytest.raises(sm.StiffmapError, match=message):
+        compensate(sm.load_machine("ur10"), **{"position": [0, 0, 0], **arguments})
+
+
+def test_a_machine_with_three_legs_has_no_denavit_and_hartenberg_list() -> None:
     with pytest.raises(sm.StiffmapError, match="3 legs"):
         dh_list(sm.load_machine("linear-delta").description)
 

@@ -6,10 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import stiffmap as sm
 from stiffmap.common.errors import StiffmapError
 from stiffmap.machining.milling import mill_job
+from stiffmap.machining.milling.choices import choices
+from stiffmap.machining.milling.limits import SOURCES, slots
 from stiffmap.machining.toolpath import path_of
 from stiffmap.machining.toolpath.gcode.load import load_gcode
 
@@ -55,16 +58,49 @@ def test_a_chip_thicker_than_its_tool() -> None:
         mill_job(M, path, "slot", at=(0, 0, 0.3))
 
 
-def test_arguments() -> None:
-    with pytest.raises(StiffmapError, match="passes: expected 1 or more"):
-        mill_job(M, LINE, "trimming", at=(0, 0, 0.3), passes=0)
-    with pytest.raises(StiffmapError, match="placement: expected three finite numbers"):
-        mill_job(M, LINE, "trimming", at=(0, 0))
-    with pytest.raises(StiffmapError, match="step: expected a positive number"):
-        mill_job(M, LINE, "trimming", at=(0, 0, 0.3), step=0.0)
-    with pytest.raises(StiffmapError, match="true_machine: expected the actuators"):
-        mill_job(M, LINE, "trimming", at=(0, 0, 0.3), true_machine=sm.load_machine("ur10"))
+@pytest.mark.parametrize(
+    ("argument", "message"),
+    [
+        ({"passes": 0}, "passes: expected 1 or more"),
+        ({"at": (0, 0)}, "at: expected three finite numbers"),
+        ({"step": 0.0}, "step: expected a positive number"),
+        ({"true_machine": sm.load_machine("ur10")}, "true_machine: expected the actuators"),
+        ({"turn": 90}, r"turn: expected at most a full turn \(2 pi rad\), got 90 rad"),
+        ({"step": 2}, "step: expected at most 1000 mm, got 2000 mm"),
+        ({"within": 0.05}, "within: expected at most the tool's diameter of 12 mm, got 50 mm"),
+        ({"tolerance": 0.25}, "tolerance: expected at most the tool's diameter of 12 mm, got 250 mm"),
+        ({"thickness": 4}, "thickness: expected at most the tool's diameter of 12 mm, got 4000 mm"),
+        ({"thickness": -1}, "thickness: expected a positive number"),
+    ],
+    ids=str,
+)
+def test_arguments(argument: dict[str, object], message: str) -> None:
+    with pytest.raises(StiffmapError, match=message):
+        mill_job(M, LINE, "trimming", **{"at": (0, 0, 0.3), **argument})
+
+
+def test_a_slot_is_as_wide_as_its_tool() -> None:
+    with pytest.raises(StiffmapError, match="thickness: a slot is as wide as its tool"):
+        mill_job(M, LINE, "slot", at=(0, 0, 0.3), thickness=2e-3)
+    for low, count in ((-0.02, 0), (0.0, 11)):
+        stock = [-1, low, -0.1, 0, 0.02, 0.1]
+        job = choices(
+            M, LINE, "slot", at=(0, 0, 0.3), stock=stock, step=2e-3, thickness=None, threads=None
+        ).job
+        assert [w.points.sum() for w in slots(job, xr.Dataset())] == [count]
+    assert slots in SOURCES
+
+
+def test_files_that_are_not_there() -> None:
     with pytest.raises(StiffmapError, match="no such process"):
         mill_job(M, LINE, "trim", at=(0, 0, 0.3))
     with pytest.raises(StiffmapError, match="no such file"):
         mill_job(M, Path("nowhere.ngc"), "trimming")
+
+
+def test_a_tilt_that_the_machine_does_not_have() -> None:
+    path = path_of([[-0.02, 0, 0], [0, 0, 0], [0.02, 0, 0]], tool=[[0, 0, 1], [0, 0, 1], [0, 0.5, 1]])
+    with pytest.raises(
+        StiffmapError, match=r"cannot hold the tool .* tilted by up to 26.57 deg: 10 of 21 points"
+    ):
+        mill_job(M, path, "trimming", at=(0, 0, 0.3))

@@ -11,6 +11,7 @@ import pytest
 import stiffmap as sm
 from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.machining.toolpath import (
+    Engagement,
     box,
     engagement,
     load_path,
@@ -139,6 +140,59 @@ def test_stock_says_width_and_depth() -> None:
     assert engagement(q, p, process, thickness=2e-3).radial[0] == 2e-3
 
 
+NX = """TOOL PATH/CAVITY,TOOL,MILL10
+TLDATA/MILL,10.0000,0.0000,75.0000,0.0000,0.0000
+MSYS/0.0,0.0,0.0,1.0,0.0,0.0,0.0,1.0,0.0
+PAINT/SPEED,10
+LOAD/TOOL,1
+UNITS/MM
+SPINDL/RPM,3000,CLW
+RAPID
+GOTO/0.0,0.0,10.0,0.0,0.6,0.8
+PAINT/COLOR,31
+FEDRAT/MMPM,250.0
+GOTO/0.0,0.0,-1.0
+END-OF-PATH
+TOOL PATH/FINISH,TOOL,MILL10
+MSYS/0.0,0.0,0.0,1.0,0.0,0.0,0.0,1.0,0.0
+GOTO/10.0,0.0,-1.0,0.0,0.0,1.0
+MULTAX/OFF
+GOTO/20.0,0.0,-1.0
+END-OF-PATH
+"""
+
+
+def test_a_cl_file_of_nx_says_the_axis_of_the_tool_where_it_changes(tmp_path: Path) -> None:
+    p = load_path(write(tmp_path, "p.cls", NX))
+    assert p.tool == pytest.approx(np.array([[0, 0.6, 0.8], [0, 0, 1], [0, 0, 1]]))
+    assert (1e3 * p.end).tolist() == [[0, 0, -1], [10, 0, -1], [20, 0, -1]]
+
+
+@pytest.mark.parametrize("name", ["trimming", "slot"])
+def test_stock_that_the_tool_does_not_reach_is_not_cut(name: str) -> None:
+    """The part lies right of the path, the stock left of it: next to the wall, behind a gap, beyond the tool, or only ahead."""
+    process = sm.load_process(name)
+    d = process.tool.diameter
+    p = path_of([[-0.2, 0, 0], [0.2, 0, 0]])
+    q = sampled(p, 0.01)
+    near, far = (-d / 2, d / 2) if name == "trimming" else (d / 2, -d / 2)  # of the tool, y
+
+    def cut(y0: float, y1: float, x: float = 1.0) -> Engagement:
+        low, high = sorted((y0, y1))
+        return engagement(q, p, process, np.array([[-1.0, low, -0.1], [x, high, 5e-3]]))
+
+    assert (cut(2 * near, 0.9 * far).axial > 0).all()
+    gap = cut(0.5 * near, 9 * far)
+    assert gap.radial == pytest.approx(np.full(len(q), 0.75 * d))
+    ahead = cut(2 * near, 2 * far, x=0.0)
+    assert (ahead.axial[q.position[:, 0] > 1e-9] == 0).all()
+    for y0, y1 in ((1.1 * far, 9 * far), (9 * near, 1.1 * near)):
+        with pytest.raises(
+            StiffmapError, match=r"stock: the tool cuts nothing of it, .* mm; the tip goes from \(-200.0"
+        ):
+            cut(y0, y1)
+
+
 BAD = [
     ("p.csv", "x,y_mm,z_mm\n0,0,0\n1,0,0\n", "unit is missing"),
     ("p.csv", "x_mm,y_mm\n0,0\n1,0\n", "missing column z_mm"),
@@ -152,8 +206,24 @@ BAD = [
     ("p.csv", "x_mm,y_mm,z_mm,i,j,k\n0,0,0,0,0,1\n1,0,0,0,0,0\n", "not zero"),
     ("p.cl", "GOTO/0,0,0\nGOTO/1,0,0\n", "UNITS/MM"),
     ("p.cl", "UNITS/MM\nGOTO/0,0\n", "3 or 6 numbers"),
+    (
+        "p.cl",
+        "UNITS/MM\nCUTCOM/OFF\nDELAY/2\nGOTO/1,,0,5\n",
+        "line 4: GOTO: expected a number, found ''",
+    ),
     ("p.cl", "UNITS/MM\nCYCLE/DRILL\n", "unknown word 'CYCLE'"),
     ("p.cl", "UNITS/MM\nFEDRAT/0,MMPM\n", "above zero"),
+    ("p.cl", "UNITS/MM\nCIRCLE/0,0,0,0,0,1,5\n", "CIRCLE: expected lines (GOTO)"),
+    (
+        "p.cl",
+        "UNITS/MM\nMULTAX/ON\nGOTO/0,0,0,0,1,1\nMULTAX/OFF\nGOTO/1,0,0\n",
+        "line 5: GOTO: expected 6 numbers",
+    ),
+    (
+        "p.cls",
+        "MSYS/0,0,0,1,0,0,0,1,0\nTLDATA/MILL,10\nMSYS/0,0,5,1,0,0,0,1,0\n",
+        "line 3: MSYS: a second origin",
+    ),
     ("p.txt", "hello", "unknown kind of path"),
 ]
 

@@ -21,10 +21,10 @@ CENTRES = {2: "IJ", 1: "IK", 0: "JK"}
 """Words of an arc's centre by the axis that it turns about."""
 STARTS = {"distance": "G90", "feed mode": "G94", "plane": "G17", "centres": "G91.1", "offset": "G54"}
 """What is taken where a program says nothing; a controller may stand otherwise, so that a written program says it."""
-TRACKING = {"G64": "PQ", "G187": "PE", "G5.1": "Q"}
-"""Modes of how closely corners are tracked, and their words (LinuxCNC; Haas; Fanuc, where other words make it a spline)."""
-IGNORED_G = {5.1, 40.0, 49.0, 61.0, 61.1, 64.0, 187.0, 92.1, 92.2, 97.0, 98.0, 99.0}
-"""Without meaning for the path: modes of tracking, cancelled compensation, offsets and cycles."""
+TRACKING = {"G64": "PQ", "G187": "PE", "G5": "P", "G5.1": "Q", "G8": "P"}
+"""Modes of how closely corners are tracked, and their words (LinuxCNC; Haas; Fanuc, where other words make two of them splines)."""
+IGNORED_G = {15.0, 40.0, 49.0, 67.0, 69.0, 92.1, 92.2, 97.0, 98.0, 99.0}
+"""Without meaning for the path: cancelled compensation, offsets, cycles and what is refused (`REFUSED_G`)."""
 IGNORED_M = {7.0, 8.0, 9.0, 48.0, 49.0}
 BREAKS_M = {0.0, 1.0, 6.0, 60.0}
 """Stops and the change of a tool: somebody may move the axes meanwhile."""
@@ -34,8 +34,8 @@ REFERENCES = {"G28", "G30"}
 GROUPS = {
     **dict.fromkeys(MOTIONS, "motion"), **dict.fromkeys(PLANES, "plane"), **dict.fromkeys(OFFSETS, "offset"),
     20.0: "unit", 21.0: "unit", 90.0: "distance", 91.0: "distance", 90.1: "centres", 91.1: "centres",
-    93.0: "feed mode", 94.0: "feed mode", 61.0: "tracking", 61.1: "tracking", 64.0: "tracking", 187.0: "tracking", 5.1: "tracking", 43.0: "length", 49.0: "length",
-    40.0: "compensation", 97.0: "speed", 98.0: "return", 99.0: "return", 4.0: "one line", 28.0: "one line", 30.0: "one line", 53.0: "one line",
+    93.0: "feed mode", 94.0: "feed mode", **dict.fromkeys((5.0, 5.1, 8.0, 61.0, 61.1, 64.0, 187.0), "tracking"), 43.0: "length", 49.0: "length",
+    40.0: "compensation", 97.0: "speed", 98.0: "return", 99.0: "return", 4.0: "one line", 28.0: "one line", 30.0: "one line", 50.0: "one line", 53.0: "one line",
 }  # fmt: skip
 """Of two G words of one group in a line nobody knows which one holds."""
 GROUPS_M = {
@@ -43,13 +43,14 @@ GROUPS_M = {
     **dict.fromkeys((7.0, 8.0, 9.0), "coolant"), **dict.fromkeys((48.0, 49.0), "override"), 6.0: "tool",
 }  # fmt: skip
 REFUSED_G = {
-    54.1: "offsets beyond G59 (write G54)", 154.0: "offsets beyond G59 (write G54)", 70.0: "Siemens's inches (write G20)", 71.0: "Siemens's mm (write G21)", 5.0: "splines", 5.2: "NURBS", 10.0: "tables set by the program", 28.1: "reference points set by the program",
+    54.1: "offsets beyond G59 (write G54)", 154.0: "offsets beyond G59 (write G54)", 70.0: "Siemens's inches (write G20)", 71.0: "Siemens's mm (write G21)", 5.2: "NURBS", 10.0: "tables set by the program", 16.0: "polar coordinates", 28.1: "reference points set by the program",
     30.1: "reference points set by the program", 33.0: "threads", 38.2: "probing", 41.0: "cutter radius compensation (write the path of the centre, G40)",
     42.0: "cutter radius compensation (write the path of the centre, G40)", 92.0: "offsets set by the program",
-    95.0: "feed per revolution (write G94)", 96.0: "constant surface speed",
+    51.0: "scaling", 51.1: "mirror images", 52.0: "offsets set by the program", 65.0: "macros", 66.0: "macros",
+    68.0: "rotations of the axes", 68.2: "tilted planes", 43.4: "positions of a tilted tool (write G43)", 95.0: "feed per revolution (write G94)", 96.0: "constant surface speed",
     **dict.fromkeys((73.0, 76.0, 81.0, 82.0, 83.0, 84.0, 85.0, 86.0, 87.0, 88.0, 89.0), "drilling cycles"),
 }  # fmt: skip
-REFUSED_M = {98.0: "subprograms", 99.0: "subprograms", 97.0: "subprograms"}
+REFUSED_M = dict.fromkeys((97.0, 98.0, 99.0), "subprograms are not read")
 
 
 @dataclass
@@ -138,6 +139,8 @@ class Codes:
             self.fail("G53 needs absolute positions (G90)")
         if "G53" in own and moving and not self.offsets:
             self.note("G53 and no work offset is given: the machine's origin is taken to lie at the part's")
+        if "G50" in own and (moving or "S" in values):
+            self.fail("G50 with other words: origins and largest speeds set by the program are not read")
         if "G4" in own:
             if not values.get("P", -1.0) >= 0:
                 self.fail("G4 needs the time of the dwell: P of zero or more")
@@ -186,8 +189,10 @@ class Codes:
                 what = "rotary and secondary axes are not read" if letter in "ABUVW" else "unknown word"
                 self.fail(f"{what}: {letter}{value:g}")
         tracking = groups.get("tracking", "")
-        if tracking == "G5.1" and ("Q" not in values or not values.keys().isdisjoint(MOVING)):
-            self.fail("G5.1: splines are not read")
+        if tracking in ("G5", "G5.1") and (
+            TRACKING[tracking] not in values or not values.keys().isdisjoint(MOVING)
+        ):
+            self.fail(f"{tracking}: splines are not read")
         for letter in [w for w in "QE" if w in values and w not in TRACKING.get(tracking, "")]:
             self.fail(f"unknown word: {letter}{values[letter]:g}")
         if "unit" in groups and "F" in values:
@@ -217,15 +222,15 @@ class Codes:
             s.offset = f"G{value:g}"
             if self.offsets and s.offset not in self.offsets:
                 self.fail(f"no work offset {s.offset}; given: {', '.join(self.offsets)}")
-        elif value in (4.0, 28.0, 30.0, 43.0, 53.0):
+        elif value in (4.0, 28.0, 30.0, 43.0, 50.0, 53.0):
             own.add(f"G{value:g}")
+        elif GROUPS.get(value) == "tracking":
+            self.note(f"G{value:g}: how closely the controller tracks corners is not simulated")
         elif value not in IGNORED_G:
             why = REFUSED_G.get(value)
             self.fail(
-                f"G{value:g}: {why or 'unknown word'}{' are not read' if why and '(' not in why else ''}",
+                f"G{value:g}: {why or 'unknown word'}{' are not read' if why and '(' not in why else ''}"
             )
-        elif GROUPS.get(value) == "tracking":
-            self.note(f"G{value:g}: how closely the controller tracks corners is not simulated")
         if (group := GROUPS.get(value)) in STARTS:
             s.said.add(group)
 
@@ -242,10 +247,8 @@ class Codes:
             self.state.breaks += 1
             if value == 6.0 and self.state.spindle and not turning:
                 self.state.spindle = 0  # a change of tool stops it, unless its line turns it on
-        elif value in REFUSED_M:
-            self.fail(f"M{value:g}: {REFUSED_M[value]} are not read")
         elif value not in IGNORED_M:
-            self.fail(f"unknown word: M{value:g}")
+            self.fail(f"M{value:g}: {REFUSED_M.get(value, 'unknown word')}")
 
     def _numbers(self, values: dict[str, float], own: set[str], motion: str, groups: dict[str, str]) -> None:
         s = self.state

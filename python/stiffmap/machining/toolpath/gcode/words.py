@@ -17,6 +17,8 @@ _REFUSED = (
     ("#", "parameters (#) are not read: expand them in the program that wrote the file"),
     ("[", "expressions in brackets are not read: write numbers"),
 )
+names_program = re.compile(r"%?|[O:%]\d+|%_N_\w+", re.ASCII).fullmatch
+"""Whether a bare line holds at most the number or name of the program."""
 OWN_LANGUAGE = "of Heidenhain, KRL, RAPID, Siemens's words (X=IC(5)) and the like, export G-code (ISO), APT or points (.csv)"
 LARGEST = 1e9
 LONGEST = 10_000
@@ -69,7 +71,7 @@ def read_block(text: str, file: str, number: int) -> ProgramBlock:
     if len(text) > LONGEST:
         fail(file, number, f"expected at most {LONGEST} characters, found {len(text)}")
     line = bare(text)
-    if not line or line == "%":
+    if names_program(line.lstrip("/")):
         return ProgramBlock((), False)
     if "(" in line or ")" in line:
         fail(file, number, "a comment is not closed, or closed twice")
@@ -79,8 +81,6 @@ def read_block(text: str, file: str, number: int) -> ProgramBlock:
     optional = line[0] == "/"
     line = line[1:] if optional else line
     if line[:1] == "O":
-        if line[1:].isdecimal():  # the number of the program
-            return ProgramBlock((), optional)
         fail(file, number, f"subprograms and loops (O words) are not read: {text.strip()[:40]!r}")
     parts = _WORD.split(line)
     if any(parts[::3]):

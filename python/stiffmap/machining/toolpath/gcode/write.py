@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from stiffmap.common.broadcasting import Floats
 from stiffmap.machining.toolpath.gcode.codes import AXES, CENTRES, INCH, STARTS, TRACKING, ModalState
 from stiffmap.machining.toolpath.gcode.read import ProgramReader, read_moves
-from stiffmap.machining.toolpath.gcode.words import bare, decimal, plain, tokens_of
+from stiffmap.machining.toolpath.gcode.words import bare, decimal, names_program, plain, tokens_of
 from stiffmap.machining.toolpath.path import Kind, Toolpath
 from stiffmap.machining.toolpath.pieces import MovedPiece
 
@@ -46,7 +46,7 @@ def rewritten(
         if reader.state.ended:
             out.append(text)
             continue
-        if starts and bare(text).lstrip("%")[:1] not in ("", "O"):
+        if starts and not names_program(bare(text)):
             out.append(starts)
             starts = ""
         tokens = list(tokens_of(text))
