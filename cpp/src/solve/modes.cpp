@@ -10,10 +10,10 @@
 namespace stiffmap {
 namespace {
 
-constexpr double no_mass = 1e-13;    // relative to the largest inverse square of a frequency
-constexpr double no_damper = 1e-12;  // relative to the largest damping of a motion without mass
-constexpr double closed = 1e-12;     // a gap of the loops, of the length: at rest without forces
-constexpr double negligible = 1e-9;  // of a tangent and of its eigenvalues, relative
+constexpr double no_mass = 1e-13;      // relative to the largest inverse square of a frequency
+constexpr double no_damper = 1e-12;    // relative to the largest damping of a motion without mass
+constexpr double gap_at_rest = 1e-12;  // a gap of the loops, of the length: at rest without forces
+constexpr double negligible = 1e-9;    // of a tangent and of its eigenvalues, relative
 
 /// Motions that keep all loops closed, their tangent and mass.
 struct Reduced {
@@ -31,7 +31,7 @@ bool reduced_pose(const Mechanism& m, const Inertias& inertias, const PoseInput&
   if (closure.status != Status::converged) return false;
   const Linearization& lin = ws.equilibrium.lin;
   linearize(m, ws.problem, ws.state, ws.equilibrium.lin);
-  const bool at_rest = !m.floating && !has_knots(m) && lin.r.isZero(0) && lin.e.norm() < closed * m.length;
+  const bool at_rest = !m.floating && !has_knots(m) && lin.r.isZero(0) && lin.e.norm() < gap_at_rest * m.length;
   if (!at_rest) {
     const EquilibriumResult eq = solve_equilibrium(m, ws.problem, {}, ws.equilibrium, ws.state);
     found.status = eq.status;
