@@ -159,6 +159,13 @@ def test_a_turn_that_changes_nothing_is_not_determined() -> None:
         ("tilt", (1e9, 1.0, 2.0), (1e9, 0.1, 0.1), "angle_x", "angle_x"),
         ("tilt", (1e9, 1.0, 2.0), (1.0, 0.1, 0.1), "", None),  # more than is looked for, and certainly there
         ("tilt", (1e9, 1e9, 1e9), (1.0, 1.0, 1.0), "", "angle_x"),
+        (
+            "tilt",
+            (1e9, 0.1, -0.2),
+            (1.0, 0.1, 0.2),
+            "",
+            "angle_x",
+        ),  # the one strength that is there is at its bound
         ("hysteresis", (5.0, 1e9, 3.0), (0.1, 0.1, 0.1), "", None),
         ("tilt", (3.0, 1.0, 2.0), (0.1, 0.1, 0.1), "", None),
     ],

@@ -172,17 +172,24 @@ def next_step(d: Any) -> str:
             "Look at where the difference is largest (What is left), check the instrument's frame and the tool "
             "first, and read again there."
         )
-    if d.verdict == "ambiguous" and d.separations:
-        return f"One more measurement decides: {separation_text(d.separations[0])}."
     if d.verdict == "ambiguous" and not d.alternatives:
         return "Inspect this place, and read more poses or other loads: numbers within tolerance explain these nearly as well."
+    if d.verdict == "ambiguous" and d.separations:
+        best = min(d.separations, key=lambda s: s.readings or float("inf"))
+        if best.readings and best.readings <= d.before.n:  # no more than all that was read
+            return f"One more measurement decides: {separation_text(best)}."
+        return "Inspect all of these places: no reading that this machine can show distinguishes them with a sensible effort."
+    if all(registry.get(e.kind).measurement for e in d.effects) and d.effects:
+        return "Check the instrument and how the load was applied, correct the readings and diagnose again: this is no fault of the machine."
+    if d.which == "calibrated":
+        return "Inspect this place. machine.yaml has the machine's numbers adjusted in its stead: it predicts unseen readings better."
+    if d.which == "declared":
+        return "Inspect this place, and read more poses: no corrected machine predicts unseen readings better than the declared one yet."
     if any(e.aliases for e in d.effects):
         return (
             "Inspect this place and the others that fit the readings as well (the report lists them). The corrected machine file "
             "predicts the tool equally well, whichever of them it is."
         )
-    if d.which == "declared":
-        return "Inspect this place, and read more poses: no corrected machine predicts unseen readings better than the declared one yet."
     return "Inspect this place; until it is mended, plan and compensate with machine.yaml."
 
 
