@@ -70,6 +70,8 @@ def answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, cross
     clock.say("readings that no fit saw")
     made = written(models, base, predictor, sigma, listed, seed, lambda: clock.over or not cross_validate)
     held, late = made.held_out, made.over_time
+    if len(v.refused) > len(nameless) and made.lacks(fit.noise):
+        v = replace(v, rest=v.rest or v.refused[-1][1])  # those that stand do not stand for it
     each, gap = shares(columns, fit), gap_of(columns, fit)
     effects = _effects(v, best, each, fit)
     others = list(_alternatives(found, v, best, clock)) if best and effects else []

@@ -205,3 +205,13 @@ def test_a_fold_is_the_fit_of_its_own_readings() -> None:
     sd = own.terms[0].sd
     np.testing.assert_allclose(fold.terms[0].values, own.terms[0].values, atol=1e-2 * sd.min())
     assert np.abs(fold.terms[0].values - whole.terms[0].values).max() > 0.1 * sd.min()
+
+
+@pytest.mark.parametrize(
+    ("ratio", "noise", "lacks"), [(1.1, 1.0, False), (2.5, 1.0, True), (2.5, 2.4, False)]
+)
+def test_what_a_machine_leaves_is_compared_with_noise_as_it_is(
+    ratio: float, noise: float, lacks: bool
+) -> None:
+    made: Any = SimpleNamespace(sizes=(None, SimpleNamespace(n=100, ratio=ratio)))
+    assert machines.Written.lacks(made, noise) is lacks

@@ -11,6 +11,7 @@ from stiffmap.identification.candidates.candidates import words
 from stiffmap.identification.diagnosis.report.findings import Effect
 from stiffmap.identification.diagnosis.report.separation import Separation
 from stiffmap.identification.diagnosis.slips.axes import Slip
+from stiffmap.identification.inference.verdict import CLEARLY, NOISIER
 from stiffmap.model.effects import registry
 
 DISPLAY_UNITS = {"m": (1e3, "mm"), "m/N": (1e3, "mm/N"), "rad": (1e3, "mrad"), "1/m": (1e-3, "1/mm")}
@@ -102,6 +103,16 @@ def off_as_a_group(d: Any) -> bool:
     return bool(not d.unexplained and d.calibration and d.calibration.wide and not d.calibration.beyond)
 
 
+def not_as_stated(d: Any) -> bool:
+    """Whether the readings differ from a machine that is as declared by clearly more than their noise: the first limitation says why."""
+    return bool(d.limitations and d.before.size[0] > CLEARLY * d.noise_size / max(1.0, d.noise.scale))
+
+
+def only_noise(d: Any) -> bool:
+    """Whether all that has no name is noise of another size than stated."""
+    return bool(d.unexplained) and all(p.what == NOISIER for p in d.unexplained)
+
+
 def _upper(text: str) -> str:
     return text[:1].upper() + text[1:]
 
@@ -137,7 +148,10 @@ def _of_machine(d: Any, verdict: str) -> str:
     if verdict == "none" and d.stopped:
         return f"The diagnosis was stopped before it found anything ({size})."
     if verdict == "none":
-        return f"The machine agrees with its file within what these readings can show ({size})."
+        but = f"; {d.limitations[0]}" if not_as_stated(d) else ""
+        return f"The machine agrees with its file within what these readings can show ({size}){but}."
+    if verdict == "unattributed" and only_noise(d):
+        return f"The readings scatter {d.noise.scale:.2g} times as much as is stated ({size}), and show nothing else for certain."
     if verdict == "unattributed" and off_as_a_group(d):
         return f"The machine differs from its file ({size}) by more than its numbers are uncertain, and none of them alone can be named."
     if verdict == "unattributed":
@@ -160,6 +174,12 @@ def next_step(d: Any) -> str:
         return "Nothing to mend. machine.yaml holds the machine that predicts readings best which it has not seen."
     if d.verdict == "none" and d.stopped:
         return "Let it come to its end."
+    if d.verdict == "none" and not_as_stated(d):
+        return "Nothing to correct at the machine. Check the instrument and read again before you keep these readings as a record."
+    if d.verdict == "unattributed" and only_noise(d):
+        return (
+            "State the noise that the instrument has here, or read every condition twice, and diagnose again."
+        )
     if d.verdict == "none":
         return "Nothing to correct. Keep the readings as the record of this state."
     if d.verdict == "unattributed" and off_as_a_group(d):
