@@ -21,7 +21,16 @@ from stiffmap.experiment.noise.outliers import without_suspects
 from stiffmap.experiment.noise.whitening import LinearProblem
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.identification.candidates.sensitivity import CandidatePlan, Variant
-from stiffmap.identification.diagnosis.slips.axes import Hypothesis, Slip, gauges, loads, moved, shifts, steps
+from stiffmap.identification.diagnosis.slips.axes import (
+    Hypothesis,
+    Slip,
+    gauges,
+    in_setup,
+    loads,
+    moved,
+    shifts,
+    steps,
+)
 from stiffmap.identification.diagnosis.slips.factors import factors
 from stiffmap.identification.inference.places import Shape, shape_of
 from stiffmap.model.effects import get
@@ -155,7 +164,7 @@ def _judged(s: SlipReadings, problem: LinearProblem) -> Iterator[JudgedSlip]:
 def _beside(s: SlipReadings, h: Hypothesis) -> float:
     """Share of the misfit beyond noise that stays with a mistake in the readings and the best part of the machine."""
     problem, e = s.problem, s.experiment
-    if h.undo is None or h.keep is not None:
+    if h.undo is None or h.keep is not None or h.setup is not None:
         return 1.0
     there = h.undo(e)
     gap = there.reading - s.base
@@ -213,10 +222,9 @@ def best_part(s: SlipReadings, freedom: float) -> float:
     return _excess(s.screen.left(residual), float(residual @ residual), freedom)
 
 
-def left_beside(s: SlipReadings, factor: float, axes: tuple[int, ...]) -> float:
+def left_beside(s: SlipReadings, factor: float, axes: tuple[int, ...], setup: str | None) -> float:
     """Chi-square that the best single part of the machine leaves where some channels read `factor` times too much."""
-    prediction = s.base.copy()
-    prediction[:, axes] *= factor
+    prediction = np.where(in_setup(s.experiment, axes, setup), factor * s.base, s.base)
     return s.screen.left(s.problem.residual(prediction))
 
 
