@@ -16,6 +16,7 @@ from stiffmap.identification.diagnosis.report.findings import Effect
 from stiffmap.identification.diagnosis.report.sentences import next_step, opening
 from stiffmap.identification.diagnosis.report.separation import Separation
 from stiffmap.identification.inference.chosen import Chosen
+from stiffmap.identification.inference.kernels import WANDER
 from stiffmap.identification.inference.names import terms
 
 
@@ -77,6 +78,13 @@ def test_the_next_step_is_one_that_a_workshop_can_take(
         (4e-5, 4.0, "", "; it goes on", "Check the instrument"),
         (4e-5, 4.0, "noise larger than declared", "scatter 4 times as much as is stated", "State the noise"),
         (4e-5, 4.0, "a field", "no single cause", "Look at where"),
+        (
+            4e-5,
+            1.0,
+            f"{WANDER} over 1 session",
+            "goes on from row to row over time",
+            "Let machine and instrument warm up",
+        ),
     ],
 )
 def test_the_first_line_says_why_readings_differ_from_a_machine_that_is_as_declared(

@@ -11,6 +11,7 @@ from stiffmap.identification.candidates.candidates import words
 from stiffmap.identification.diagnosis.report.findings import Effect
 from stiffmap.identification.diagnosis.report.separation import Separation
 from stiffmap.identification.diagnosis.slips.axes import Slip
+from stiffmap.identification.inference.kernels import WANDER
 from stiffmap.identification.inference.verdict import CLEARLY, NOISIER
 from stiffmap.model.effects import registry
 
@@ -113,6 +114,11 @@ def only_noise(d: Any) -> bool:
     return bool(d.unexplained) and all(p.what == NOISIER for p in d.unexplained)
 
 
+def goes_on(d: Any) -> bool:
+    """Whether all that has no name goes on over time, whatever the pose and the load."""
+    return bool(d.unexplained) and all(p.what.startswith(WANDER) for p in d.unexplained)
+
+
 def _upper(text: str) -> str:
     return text[:1].upper() + text[1:]
 
@@ -152,6 +158,8 @@ def _of_machine(d: Any, verdict: str) -> str:
         return f"The machine agrees with its file within what these readings can show ({size}){but}."
     if verdict == "unattributed" and only_noise(d):
         return f"The readings scatter {d.noise.scale:.2g} times as much as is stated ({size}), and show nothing else for certain."
+    if verdict == "unattributed" and goes_on(d):
+        return f"What the readings differ by from the file ({size}) goes on from row to row over time, as a drift of the instrument or of the machine does."
     if verdict == "unattributed" and off_as_a_group(d):
         return f"The machine differs from its file ({size}) by more than its numbers are uncertain, and none of them alone can be named."
     if verdict == "unattributed":
@@ -187,10 +195,12 @@ def next_step(d: Any) -> str:
             "Read more poses and other loads, which tell numbers apart; or give the uncertainties that they have (u in the machine's "
             "file, or --tolerance). Until then plan and compensate with machine.yaml."
         )
+    if d.verdict == "unattributed" and goes_on(d):
+        return "Let machine and instrument warm up, and read one pose again and again between the others: it shows the drift alone."
     if d.verdict == "unattributed":
         return (
-            "Look at where the difference is largest (What is left), check the instrument's frame and the tool "
-            "first, and read again there."
+            "Look at where the difference is largest (What is left), check the instrument's frame, the tool and "
+            "where the load acts first, and read again there."
         )
     if d.verdict == "ambiguous" and not d.alternatives:
         return "Inspect this place, and read more poses or other loads: numbers within tolerance explain these nearly as well."

@@ -90,9 +90,7 @@ def _hypothesis(
     base: Floats, here: Mask, axes: tuple[int, ...], setup: str | None,
     what: str, quantity: str, value: float, u: float, left: Left,
 ) -> Hypothesis | None:  # fmt: skip
-    known = _known(value, u, quantity) or _beside_a_part(
-        value, quantity, partial(left, axes=axes, setup=setup)
-    )
+    known = _known(value, u, quantity) or _beside_a_part(value, quantity, lambda f: left(f, axes, setup))
     small = 1 / PHYSICAL < abs(value) < PHYSICAL
     if not known and small:
         return None
