@@ -109,14 +109,9 @@ def not_as_stated(d: Any) -> bool:
     return bool(d.limitations and d.before.size[0] > CLEARLY * d.noise_size / max(1.0, d.noise.scale))
 
 
-def only_noise(d: Any) -> bool:
-    """Whether all that has no name is noise of another size than stated."""
-    return bool(d.unexplained) and all(p.what == NOISIER for p in d.unexplained)
-
-
-def goes_on(d: Any) -> bool:
-    """Whether all that has no name goes on over time, whatever the pose and the load."""
-    return bool(d.unexplained) and all(p.what.startswith(WANDER) for p in d.unexplained)
+def left_is(d: Any, what: str) -> bool:
+    """Whether something is left without a name, and nothing else than this."""
+    return bool(d.unexplained) and all(p.what.startswith(what) for p in d.unexplained)
 
 
 def _upper(text: str) -> str:
@@ -156,9 +151,9 @@ def _of_machine(d: Any, verdict: str) -> str:
     if verdict == "none":
         but = f"; {d.limitations[0]}" if not_as_stated(d) else ""
         return f"The machine agrees with its file within what these readings can show ({size}){but}."
-    if verdict == "unattributed" and only_noise(d):
+    if verdict == "unattributed" and left_is(d, NOISIER):
         return f"The readings scatter {d.noise.scale:.2g} times as much as is stated ({size}), and show nothing else for certain."
-    if verdict == "unattributed" and goes_on(d):
+    if verdict == "unattributed" and left_is(d, WANDER):
         return f"What the readings differ by from the file ({size}) goes on from row to row over time, as a drift of the instrument or of the machine does."
     if verdict == "unattributed" and off_as_a_group(d):
         return f"The machine differs from its file ({size}) by more than its numbers are uncertain, and none of them alone can be named."
@@ -184,7 +179,7 @@ def next_step(d: Any) -> str:
         return "Let it come to its end."
     if d.verdict == "none" and not_as_stated(d):
         return "Nothing to correct at the machine. Check the instrument and read again before you keep these readings as a record."
-    if d.verdict == "unattributed" and only_noise(d):
+    if d.verdict == "unattributed" and left_is(d, NOISIER):
         return (
             "State the noise that the instrument has here, or read every condition twice, and diagnose again."
         )
@@ -195,7 +190,7 @@ def next_step(d: Any) -> str:
             "Read more poses and other loads, which tell numbers apart; or give the uncertainties that they have (u in the machine's "
             "file, or --tolerance). Until then plan and compensate with machine.yaml."
         )
-    if d.verdict == "unattributed" and goes_on(d):
+    if d.verdict == "unattributed" and left_is(d, WANDER):
         return "Let machine and instrument warm up, and read one pose again and again between the others: it shows the drift alone."
     if d.verdict == "unattributed":
         return (

@@ -44,8 +44,8 @@ PHYSICAL = 4.0
 """Factors below may be a soft part; no machine is softer than its file by more, everywhere and alike."""
 
 
-Left = Callable[[float, tuple[int, ...], str | None], float]
-"""Chi-square that the best part of the machine leaves together with a factor of some channels, of one set-up or of all."""
+Left = Callable[[Floats], float]
+"""Chi-square that the best part of the machine leaves next to a prediction (n, c)."""
 
 
 def factors(e: Experiment, problem: LinearProblem, base: Floats, left: Left) -> Iterator[Hypothesis]:
@@ -90,7 +90,9 @@ def _hypothesis(
     base: Floats, here: Mask, axes: tuple[int, ...], setup: str | None,
     what: str, quantity: str, value: float, u: float, left: Left,
 ) -> Hypothesis | None:  # fmt: skip
-    known = _known(value, u, quantity) or _beside_a_part(value, quantity, lambda f: left(f, axes, setup))
+    known = _known(value, u, quantity) or _beside_a_part(
+        value, quantity, lambda f: left(np.where(here, f * base, base))
+    )
     small = 1 / PHYSICAL < abs(value) < PHYSICAL
     if not known and small:
         return None
@@ -102,11 +104,9 @@ def _hypothesis(
         return Hypothesis("factor", seen, check, 2, prediction, None, factor=value, setup=setup)
     factor, name, of_load = known[0]
     whole = float(np.sign(value)) * factor
-    undo = (
-        partial(pushed, factor=whole, setup=setup)
-        if of_load
-        else partial(times, factor=whole, axes=axes, setup=setup)
-    )
+    undo = partial(pushed, factor=whole, setup=setup)
+    if not of_load:
+        undo = partial(times, factor=whole, axes=axes, setup=setup)
     others = "".join(f", or {n}" for _, n, _ in known[1:])
     near = f"near {factor:.4g}" if factor >= 1 else f"near 1/{1 / factor:.4g}"
     return Hypothesis("factor", f"{seen} ({near})", f"check first: {name}{others}{sign}", 1 + (value < 0) + (setup is not None),

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -21,16 +21,7 @@ from stiffmap.experiment.noise.outliers import without_suspects
 from stiffmap.experiment.noise.whitening import LinearProblem
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.identification.candidates.sensitivity import CandidatePlan, Variant
-from stiffmap.identification.diagnosis.slips.axes import (
-    Hypothesis,
-    Slip,
-    gauges,
-    in_setup,
-    loads,
-    moved,
-    shifts,
-    steps,
-)
+from stiffmap.identification.diagnosis.slips.axes import Hypothesis, Slip, gauges, loads, moved, shifts, steps
 from stiffmap.identification.diagnosis.slips.factors import factors
 from stiffmap.identification.inference.places import Shape, shape_of
 from stiffmap.model.effects import get
@@ -200,7 +191,7 @@ def _hypotheses(s: SlipReadings, problem: LinearProblem) -> Iterator[Hypothesis]
         yield from gauges(e, s.base)
         yield from shifts(e, s.base)
     if e.quantity == "deflection":
-        yield from factors(e, problem, s.base, partial(left_beside, s))
+        yield from factors(e, problem, s.base, lambda p: s.screen.left(s.problem.residual(p)))
         if e.wrench[:, :3].any():
             yield from loads(s.predictor)
 
@@ -220,12 +211,6 @@ def best_part(s: SlipReadings, freedom: float) -> float:
     """Share of the misfit beyond noise that the best single part of the machine leaves."""
     residual = s.problem.residual(s.base)
     return _excess(s.screen.left(residual), float(residual @ residual), freedom)
-
-
-def left_beside(s: SlipReadings, factor: float, axes: tuple[int, ...], setup: str | None) -> float:
-    """Chi-square that the best single part of the machine leaves where some channels read `factor` times too much."""
-    prediction = np.where(in_setup(s.experiment, axes, setup), factor * s.base, s.base)
-    return s.screen.left(s.problem.residual(prediction))
 
 
 def _evidence(before: Experiment, after: Experiment) -> tuple[str, ...]:
