@@ -98,7 +98,7 @@ def answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, cross
         checks_after=checks(e, e.reading - made.prediction, sigma, ~listed),
         unexplained=rest,
         limitations=[
-            *_first(fit, v, bool((found.noise.declared > 0).any())),
+            *_first(fit, v, bool((found.noise.declared >= found.noise.floor).any())),
             *notes,
             *(_or_numbers(n) for n in v.named if n.numbers or n.against_numbers < np.log(ODDS)),
             *limitations(e, found.noise, predictor.machine),
@@ -253,7 +253,7 @@ def _rest(columns: Columns, fit: Fit, v: Verdict, each: dict[str, float], gap: F
 
 def _first(fit: Fit, v: Verdict, stated: bool) -> list[str]:
     """What must be known of the noise before anything else."""
-    out = [t if stated else t.replace("is stated", "repeats show") for t in not_as_stated(fit.noise)]
+    out = [t if stated else t.replace("is stated", "repeats or steps show") for t in not_as_stated(fit.noise)]
     if np.any(fit.weights != 1.0):
         out.append("some readings lie far from the others and count less")
     if v.time:

@@ -160,9 +160,9 @@ def _of_machine(d: Any, verdict: str) -> str:
     if verdict == "unattributed":
         nothing = "nothing that was tried" if d.stopped else "no single cause known to stiffmap"
         return f"The machine differs from its file ({size}), and {nothing} explains how."
+    rest = " Part of the difference remains unexplained." if d.unexplained else ""
     if verdict == "ambiguous":
-        return f"The readings are explained by more than one cause. First of them: {named}."
-    rest = " Part of the difference remains unexplained." if "unattributed" in verdict else ""
+        return f"The readings are explained by more than one cause. First of them: {named}.{rest}"
     return f"{named}.{rest}"
 
 
