@@ -41,7 +41,7 @@ def limitations(experiment: Experiment, noise: Noise, machine: Machine) -> list[
     e = experiment
     out = [f"left out: {told}" for told in e.out_of_reach]
     out += saturated(e)
-    out += [f"contradictory repeats: {c}" for c in noise.contradictions()]
+    out += [*noise.coarse(), *(f"contradictory repeats: {c}" for c in noise.contradictions())]
     if int(e.read.sum()) < FEWEST:
         out.append(
             f"{int(e.read.sum())} readings show a residual, but are too few for a diagnosis ({FEWEST})"

@@ -1,4 +1,4 @@
-"""The noise floor: the larger of what repeats show and what the instrument declares."""
+"""The noise floor: the largest of what repeats show, what the instrument declares, and what the step of its readings leaves open."""
 
 from __future__ import annotations
 
@@ -13,8 +13,12 @@ from stiffmap.experiment.experiment import Experiment, Floats, Integers, Mask, n
 from stiffmap.experiment.poses.handeye import ERROR, own_frame
 
 CONTRADICTION = 1e-4
+UNIFORM = 12.0**-0.5
+"""Standard deviation of a number that is rounded, in steps."""
+DIGITS, WHOLE = 1e-12, 1e-3
+"""Of the largest reading, to which numbers are the same whatever their unit; of a step, to which a multiple is whole."""
 ENOUGH = 5
-"""Degrees of freedom of repeats that show the noise without a declaration."""
+"""Degrees of freedom of repeats that show the noise without a declaration; half as many as the readings that show a step."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,14 +36,24 @@ class Noise:
     consistency: Floats
     """p-value of repeats that differ at least this much from what is stated (two-sided chi-square)."""
     floor: Floats
-    """The larger of the two."""
+    """The larger of the two, or what the step leaves open."""
     sigma: Floats
     """(n, c) standard deviation of every reading, at the floor."""
+    step: Floats
+    """Step in which the readings are written; 0 where none shows."""
 
     @property
     def rms(self) -> float:
         """Floor of the lengths together, m; NaN where none was read."""
         return rms(self.floor[metres(self.channels)])
+
+    def coarse(self) -> list[str]:
+        """Channels that are written in steps too coarse for the declared noise, described in words."""
+        return [
+            f"{c.name} is read in steps of {1e3 * s:.3g} m{c.unit}: its noise is at least {1e3 * s * UNIFORM:.2g} m{c.unit}, whatever is stated"
+            for c, s, d in zip(self.channels, self.step, self.declared, strict=True)
+            if s * UNIFORM > d
+        ]
 
     def contradictions(self) -> list[str]:
         """Axes whose repeats scatter more than the declaration allows, described in words."""
@@ -68,12 +82,29 @@ def noise_of(experiment: Experiment, keep: Mask | None = None) -> Noise:
             f"{experiment.name}: the noise of {', '.join(lost)} is zero or unknown; declare it (noise: in "
             f"experiment.yaml) or repeat readings at {ENOUGH} or more conditions"
         )
+    step = np.array([_step(v[r]) for v, r in zip(experiment.reading.T, experiment.read.T, strict=True)])
     floor = np.fmax(declared, np.where(freedom >= ENOUGH, repeats, np.nan))
+    floor = np.where(floor > 0, np.fmax(floor, UNIFORM * step), floor)
     factor = np.where(declared > 0, floor / np.where(declared > 0, declared, 1.0), np.nan)
     sigma = experiment.sigma * factor
     np.copyto(sigma, floor, where=~(experiment.sigma > 0))
     sigma[~experiment.read] = np.nan
-    return Noise(experiment.channels, declared, repeats, freedom, p, floor, sigma)
+    many = sums(experiment.read, experiment.conditions)[experiment.conditions]
+    shared = np.where(
+        UNIFORM * step > np.nan_to_num(repeats), UNIFORM * step, 0.0
+    )  # repeats are rounded alike
+    sigma = np.sqrt(sigma**2 + np.maximum(many - 1, 0) * shared**2) if shared.any() else sigma
+    return Noise(experiment.channels, declared, repeats, freedom, p, floor, sigma, step)
+
+
+def _step(values: Floats) -> float:
+    """The step of which all readings (n,) are whole multiples; 0 where there is none, or too few to show it."""
+    most = float(np.abs(values).max(initial=0.0))
+    known = np.unique(np.round(values / (DIGITS * most))) * DIGITS * most if most > 0.0 else values[:0]
+    if len(known) < 3 or len(values) < 2 * ENOUGH:
+        return 0.0
+    size = float(np.ptp(known) / np.round(np.ptp(known) / np.diff(known).min()))
+    return size if np.abs(known / size - np.round(known / size)).max() < WHOLE else 0.0
 
 
 def unknown(experiment: Experiment, rows: Mask | None = None) -> list[str]:

@@ -32,7 +32,8 @@ class Predictor:
     """Readings of one plan for any set of effects; remembers what it has solved.
 
     machine
-        The declared machine; `terms` of a call come on top of the effects that it already has.
+        The declared machine; `terms` of a call come on top of the effects that it already has. Of these, too, the rows say what
+        its file leaves open: the temperature, the branch.
     """
 
     def __init__(self, machine: Machine, experiment: Experiment, *, threads: int | None = None) -> None:
@@ -72,6 +73,8 @@ class Predictor:
         unmoved
             For each of `moved`, terms of the same parts with nothing off: effects at their null.
         """
+        if self._own:
+            return [None] * len(moved)
         keys = [(base, m) for m in moved]
         out = [self._changes.get(k) for k in keys]
         left = [i for i, m in enumerate(moved) if out[i] is None and _only_numbers(base, m)]
@@ -94,7 +97,16 @@ class Predictor:
         return Near(other, None if unmoved is None else partial(self._described, unmoved))
 
     def _described(self, terms: Terms) -> MachineDescription:
-        return apply_records(self.machine.description, _parts(terms)[0])
+        d, mechanical = self.machine.description, _parts(terms)[0]
+        places = [(t.kind, t.element, t.legs) for t in mechanical]
+        kept = [t for t in d.effects if t not in self._own or (t.kind, t.element, t.legs) not in places]
+        bare = d.declared if len(kept) < len(d.effects) else None
+        return apply_records(bare or d, [*(kept if bare else ()), *mechanical])
+
+    @property
+    def _own(self) -> Terms:
+        """Effects of the machine itself of which the rows say what its file leaves open."""
+        return tuple(t for t in self.machine.description.effects if _left_open(t, self.experiment))
 
     def changes_of_machines(self, others: Sequence[Near], terms: Terms = ()) -> list[Floats | None]:
         """The same of other machines near this one, of which nothing is kept; `terms` of the measurement belong to all."""
@@ -132,7 +144,7 @@ class Predictor:
     def under(self, wrench: Floats) -> Floats:
         """(n, c) m, rad: the same readings under other wrenches (n, 6); NaN where the machine fails under them."""
         plan = replace(self.experiment, wrench=wrench)
-        return readings(plan, at_records(plan, (), self._branches), ())
+        return readings(plan, at_records(plan, self._own, self._branches), ())
 
     def _set_aside(self) -> None:
         """Leaves out the rows that the declared machine has no equilibrium for, and names them."""
@@ -170,7 +182,7 @@ class Predictor:
         """(n, c) of the machine, remembered."""
         motion = self._memory.get((mechanical, load))
         if motion is None:
-            motion = at_records(self._plan_under(load), mechanical, self._branches)
+            motion = at_records(self._plan_under(load), (*self._own, *mechanical), self._branches)
             self._memory.put((mechanical, load), motion, motion.nbytes)
         return motion
 
@@ -248,6 +260,14 @@ def _only_numbers(base: Terms, moved: Terms) -> bool:
     rows = any(_has_branch(t) or effects.get(t.kind).drive for t in every) or records_of(every)
     (machine, load), (other, same) = _parts(base), _parts(moved)
     return machine != other and load == same and not rows
+
+
+def _left_open(term: AppliedEffect, e: Experiment) -> bool:
+    """Whether the rows say something of an effect that it does not say itself."""
+    said = dict((*term.parameters, *term.options))
+    asked = [(p.name, p.recorded) for p in effects.get(term.kind).parameters if p.recorded]
+    asked += [("branch", "branch")] if _has_branch(term) else []
+    return any(name not in said and getattr(e, column) is not None for name, column in asked)
 
 
 def _has_branch(term: AppliedEffect) -> bool:

@@ -70,6 +70,8 @@ def answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, cross
     clock.say("readings that no fit saw")
     made = written(models, base, predictor, sigma, listed, seed, lambda: clock.over or not cross_validate)
     held, late = made.held_out, made.over_time
+    if len(v.refused) > len(nameless) and made.lacks(fit.noise):
+        v = replace(v, rest=v.rest or v.refused[-1][1])  # those that stand do not stand for it
     each, gap = shares(columns, fit), gap_of(columns, fit)
     effects = _effects(v, best, each, fit)
     others = list(_alternatives(found, v, best, clock)) if best and effects else []
@@ -96,7 +98,7 @@ def answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, cross
         checks_after=checks(e, e.reading - made.prediction, sigma, ~listed),
         unexplained=rest,
         limitations=[
-            *_first(fit, v, bool((found.noise.declared > 0).any())),
+            *_first(fit, v, bool((found.noise.declared >= found.noise.floor).any())),
             *notes,
             *(_or_numbers(n) for n in v.named if n.numbers or n.against_numbers < np.log(ODDS)),
             *limitations(e, found.noise, predictor.machine),
@@ -251,7 +253,7 @@ def _rest(columns: Columns, fit: Fit, v: Verdict, each: dict[str, float], gap: F
 
 def _first(fit: Fit, v: Verdict, stated: bool) -> list[str]:
     """What must be known of the noise before anything else."""
-    out = [t if stated else t.replace("is stated", "repeats show") for t in not_as_stated(fit.noise)]
+    out = [t if stated else t.replace("is stated", "repeats or steps show") for t in not_as_stated(fit.noise)]
     if np.any(fit.weights != 1.0):
         out.append("some readings lie far from the others and count less")
     if v.time:

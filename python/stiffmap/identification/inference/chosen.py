@@ -231,12 +231,18 @@ class Term:
 
     @property
     def undetermined(self) -> Mask:
-        """(q,) parameters whose interval is all that they can be, shapes at a bound, and strengths if all are at one."""
+        """(q,) parameters whose interval is all that they can be, shapes at a bound, and strengths if all but idle ones are at one."""
         (low, high), (least, most) = self.bounds, self.ends
         shape = np.isnan(self.nulls)
         near = [(np.abs(self.values - b) < AT_BOUND) & (b != self.nulls) for b in (low, high)]
         at = near[0] | near[1]
-        return np.asarray(((least <= low) & (most >= high)) | (at & (shape | at[~shape].all())))
+        return np.asarray(((least <= low) & (most >= high)) | (at & (shape | (at | self.idle)[~shape].all())))
+
+    @property
+    def idle(self) -> Mask:
+        """(q,) strengths whose interval includes none at all."""
+        least, most = self.ends
+        return np.asarray((least <= self.nulls) & (self.nulls <= most))
 
     @property
     def spare(self) -> Mask:
@@ -244,8 +250,7 @@ class Term:
         p, vector = self.candidate.parameters, get(self.candidate.kind).vector
         may = [q.default is not None or q.name in vector for q in p]
         shape = np.isnan(self.nulls)
-        least, most = self.ends
-        idle = (least <= self.nulls) & (self.nulls <= most) & (len(self.candidate.linear) > 1)
+        idle = self.idle & (len(self.candidate.linear) > 1)
         return np.asarray(self.undetermined & may & (shape | idle))
 
     def without(self, k: int) -> Term:

@@ -231,8 +231,17 @@ def columns(
         tuple((kind, name, k * len(k) / np.trace(k)) for kind, name, k in found if np.trace(k) > NULL),
         places(plan, free, noise, use, predictor.machine.description),
         tuple(_along_travel(predictor, s, index, noise, free)),
-        (float(within @ within), float(len(rows) - mean.shape[1])),
+        repeated(within, mean),
     )
+
+
+def repeated(within: Floats, mean: Floats) -> tuple[float, float]:
+    """Sum of squares within repeats (N,) whose averages are `mean` (N, M), and its degrees of freedom; none where most repeats are
+    the same number: they are rounded alike, and say nothing of the noise."""
+    own = np.abs(within[np.sum(mean**2, axis=1) < 1.0 - NULL])
+    if not len(own) or np.median(own) < NULL:
+        return 0.0, 0.0
+    return float(within @ within), float(len(within) - mean.shape[1])
 
 
 def _along_travel(

@@ -23,6 +23,8 @@ LENGTHS = (0.6, 2.0)
 """Of the workspace's half: one bend, three bends (Matérn-5/2)."""
 SESSIONS = (0.07, 1.0)
 """Correlation times, in sessions."""
+WANDER = "wander"
+"""With what the names of parts begin that go on over time."""
 FEW_DRIVES = 3
 """Drives up to which the place of the tool says what their coordinates do."""
 TOUCHED = 0.1
@@ -74,7 +76,7 @@ def gaps(machine: Machine, e: Experiment, points: ReadingPoints) -> Iterator[Ker
         longest = max((float(np.ptp(when[e.runs == k])) for k in np.unique(e.runs)), default=0.0)
         t = when / (longest or 1.0)  # in shares of the longest session
         for length in SESSIONS:
-            yield _wander(f"wander over {length:g} session", t / length, e.runs)
+            yield _wander(f"{WANDER} over {length:g} session", t / length, e.runs)
 
 
 def _field(name: str, here: Mask, x: Floats, load: Floats | None) -> Kernel:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
+from scipy.special import chdtrc
 
 from stiffmap.experiment.channels import metres
 from stiffmap.experiment.comparison.residual import Summary, summary
@@ -17,7 +18,7 @@ from stiffmap.experiment.noise.whitening import LinearProblem, folds, left_unsee
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.identification.inference.amplitudes import Fit
 from stiffmap.identification.inference.columns import MOST_READINGS, Columns, drawn
-from stiffmap.identification.inference.constants import DEGREES, STANDS_OUT
+from stiffmap.identification.inference.constants import DEGREES, RARE, STANDS_OUT
 from stiffmap.identification.inference.corrected import Corrected, columns_of, machine_of, without
 from stiffmap.identification.validity import covered
 from stiffmap.solve.machine import Machine
@@ -64,6 +65,11 @@ class Written:
     """The same in numbers, rows that stand alone left out."""
     over_time: OverTime | None
     """What this machine leaves over time; None where no times were recorded."""
+
+    def lacks(self, noise: float) -> bool:
+        """Whether this machine leaves more than noise, in what is stated, does once in a thousand times."""
+        left = self.sizes[1]
+        return float(chdtrc(left.n, left.n * (left.ratio / noise) ** 2)) < RARE
 
 
 def written(

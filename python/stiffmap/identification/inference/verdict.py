@@ -22,6 +22,7 @@ from stiffmap.identification.numbers.unknowns import Unknown
 DETERMINED = 0.5
 """Posterior standard deviation, in standard uncertainties, of a number that the readings determine."""
 TOLERABLE = "declared numbers within their tolerances show the same"
+NOISIER = "noise larger than declared"
 ONE_POSE = "it rests on the readings of one pose"
 CLEARLY = 1.15
 """Noise over what is stated, or under it, from which it is said."""
@@ -275,7 +276,7 @@ def left(fit: Fit) -> tuple[str, str]:
     rest, time = largest(gaps), largest(over)
     centre, sd = noise_prior(fit.columns)
     if float(fit.t[0]) - centre > KAPPA_SDS * sd:
-        rest = rest or "noise larger than declared"
+        rest = rest or NOISIER
     rest = rest or largest([p for p in over if on[p] > LARGEST_TIME])
     if not rest and not time and gaps and over:
         rest = largest([*gaps, *over], len(gaps) + len(over))  # either may be the noise, not both

@@ -48,6 +48,32 @@ def test_deflection_subtracts_the_unloaded_state(machine: sm.Machine, plan: sm.E
     assert np.abs(predict(machine, still, (term,))[:, 0]).min() > 5e-5
 
 
+@pytest.mark.parametrize(
+    ("kind", "element", "value"),
+    [("friction", "actuator", {"force": 40.0}), ("thermal_growth", "bar", {"coefficient": 1.2e-5})],
+)
+def test_rows_say_what_an_effect_leaves_open_in_a_file_as_on_a_command_line(
+    machine: sm.Machine, plan: sm.Experiment, kind: str, element: str, value: dict[str, float]
+) -> None:
+    """A corrected machine shows the readings that it was corrected by: on the way down, and warm."""
+    e = replace(
+        plan.rows(np.arange(8)), branch=("loading", "unloading") * 4, temperature=np.linspace(20, 28, 8)
+    )
+    e = replace(e, quantity="position" if kind == "thermal_growth" else "deflection")
+    term = AppliedEffect(kind, element, ("x",), tuple(value.items()))
+    own = machine.with_effect(kind, element=element, legs=["x"], **value)
+    shown = predict(machine, e, (term,))
+    assert np.abs(shown - predict(machine, e)).max() > 1e-6
+    np.testing.assert_allclose(predict(own, e), shown, rtol=0, atol=1e-12)
+    more = AppliedEffect("compliance", "actuator", ("y",), (("scale", 1.5),))
+    np.testing.assert_allclose(
+        predict(own, e, (more,)), predict(machine, e, (term, more)), rtol=0, atol=1e-12
+    )
+    said = {"temperature_difference": 5.0} if kind == "thermal_growth" else {"branch": "loading"}
+    fixed = machine.with_effect(kind, element=element, legs=["x"], **value, **said)
+    assert np.abs(predict(fixed, e) - shown).max() > 1e-6  # the file's own word holds
+
+
 def test_measurement_effects_act_on_loads_and_readings(plan: sm.Experiment) -> None:
     gain = AppliedEffect("load_gain", "load", (), (("gain", 1.1),))
     np.testing.assert_allclose(true_wrench(plan, [gain]), 1.1 * plan.wrench)

@@ -12,7 +12,11 @@ import stiffmap as sm
 from stiffmap.experiment import Predictor, random_plan
 from stiffmap.identification.candidates.candidates import candidates
 from stiffmap.identification.diagnosis.answer import _change
+from stiffmap.identification.diagnosis.report.findings import Effect
+from stiffmap.identification.diagnosis.report.sentences import next_step, opening
+from stiffmap.identification.diagnosis.report.separation import Separation
 from stiffmap.identification.inference.chosen import Chosen
+from stiffmap.identification.inference.kernels import WANDER
 from stiffmap.identification.inference.names import terms
 
 
@@ -33,3 +37,71 @@ def test_an_effect_that_the_machine_cannot_have_adds_nothing(slope: float, there
         with pytest.raises(sm.StiffmapError):
             p(terms([c]))
     assert bool(np.abs(_change(p, c)).max() > 0.0) is there
+
+
+@pytest.mark.parametrize(
+    ("kind", "element", "which", "readings", "words"),
+    [
+        ("sensor_gain", "sensor", "corrected", (), "no fault of the machine"),
+        ("compliance", "actuator", "calibrated", (), "numbers adjusted in its stead"),
+        ("compliance", "actuator", "corrected", (603, None), "no reading that this machine can show"),
+        ("compliance", "actuator", "corrected", (None, 20), "decides: read dx"),
+    ],
+)
+def test_the_next_step_is_one_that_a_workshop_can_take(
+    kind: str, element: str, which: str, readings: tuple[int | None, ...], words: str
+) -> None:
+    """A faulty gauge is not mended at the machine, and no one reads six hundred times what a whole experiment did not show."""
+    found = SimpleNamespace(
+        slips=[],
+        verdict="ambiguous" if readings else "effects",
+        effects=[Effect(kind, element, (), {}, [{"kind": kind}], {})],
+        alternatives=list(readings),
+        separations=[Separation((0, 0, 0), (0, 0, 0), "dx", 1e-4, n) for n in readings],
+        before=SimpleNamespace(n=252),
+        which=which,
+    )
+    assert words in next_step(found)
+
+
+@pytest.mark.parametrize(
+    ("rms", "scale", "what", "words", "then"),
+    [
+        (
+            2e-5,
+            1.0,
+            "",
+            "within what these readings can show (20.0 µm rms, noise 10.0 µm); it goes on",
+            "Check the instrument",
+        ),
+        (1e-5, 1.0, "", "noise 10.0 µm).", "Keep the readings"),
+        (4e-5, 4.0, "", "; it goes on", "Check the instrument"),
+        (4e-5, 4.0, "noise larger than declared", "scatter 4 times as much as is stated", "State the noise"),
+        (4e-5, 4.0, "a field", "no single cause", "Look at where"),
+        (
+            4e-5,
+            1.0,
+            f"{WANDER} over 1 session",
+            "goes on from row to row over time",
+            "Let machine and instrument warm up",
+        ),
+    ],
+)
+def test_the_first_line_says_why_readings_differ_from_a_machine_that_is_as_declared(
+    rms: float, scale: float, what: str, words: str, then: str
+) -> None:
+    found = SimpleNamespace(
+        slips=[],
+        verdict="unattributed" if what else "none",
+        effects=[],
+        calibration=None,
+        stopped=False,
+        unexplained=[SimpleNamespace(what=what)] if what else [],
+        limitations=["it goes on"],
+        before=SimpleNamespace(size=(rms, "m"), n=100),
+        noise=SimpleNamespace(scale=scale),
+        noise_size=1e-5 * scale,
+    )
+    assert words in opening(found) and next_step(found).startswith(
+        (then, "Nothing to correct. " + then, "Nothing to correct at the machine. " + then)
+    )

@@ -80,6 +80,13 @@ def shifted(step: int) -> Change:
     return lambda e: replace(e, reading=np.roll(e.reading, step, axis=0))
 
 
+def one_setup(e: Experiment) -> Experiment:
+    """The second of two set-ups, half of the rows, is written in inches."""
+    late = np.arange(len(e)) >= len(e) // 2
+    by = np.where(late, 1 / 25.4, 1.0)[:, None]
+    return replace(e, setup=tuple(np.where(late, "B", "A").tolist()), reading=e.reading * by)
+
+
 def mirrored(w: np.ndarray) -> np.ndarray:
     w[:, 1] *= -1
     return w
@@ -100,6 +107,7 @@ CASES: dict[str, tuple[Change, str, str]] = {
     "inch as mm": (gauges(1 / 25.4), "factor", "inch and mm"),
     "µm as mm": (gauges(1000.0), "factor", "µm and mm"),
     "inch of one gauge": (gauges(1 / 25.4, (1,)), "factor", "inch and mm"),
+    "inch of one set-up": (one_setup, "factor", "inch and mm"),
     "sign of a force": (forces(mirrored), "sign", "check the sign of y of the force"),
     "forces swapped": (forces(exchanged), "swap", "check which force is x and which is y"),
     "one row down": (shifted(1), "shift", "shifted by one row"),

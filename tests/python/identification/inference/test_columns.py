@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stiffmap.identification.inference.columns import drawn
+from stiffmap.identification.inference.columns import drawn, repeated
 
 
 @pytest.mark.parametrize(
@@ -27,3 +27,13 @@ def test_of_few_poses_with_many_readings_each_all_are_kept() -> None:
     pose = np.arange(2112) // 264
     found = drawn(pose, 0, 600)
     assert len(found) == 600 and np.array_equal(np.bincount(pose[found]), np.full(8, 75))
+
+
+def test_repeats_that_are_rounded_to_the_same_number_say_nothing_of_the_noise() -> None:
+    """Of four conditions read twice and one read once."""
+    mean = np.kron(np.eye(4), np.full((2, 1), 0.5**0.5))
+    mean = np.block([[mean, np.zeros((8, 1))], [np.zeros((1, 4)), np.ones((1, 1))]])
+    apart = np.array([0.5, -0.5])
+    assert repeated(np.append(np.kron([0, 0, 0, 1], apart), 0.0), mean) == (0.0, 0.0)
+    assert repeated(np.append(np.kron([0, 2, 1, 1], apart), 0.0), mean) == (3.0, 4.0)
+    assert repeated(np.zeros(4), np.eye(4)) == (0.0, 0.0)

@@ -159,6 +159,13 @@ def test_a_turn_that_changes_nothing_is_not_determined() -> None:
         ("tilt", (1e9, 1.0, 2.0), (1e9, 0.1, 0.1), "angle_x", "angle_x"),
         ("tilt", (1e9, 1.0, 2.0), (1.0, 0.1, 0.1), "", None),  # more than is looked for, and certainly there
         ("tilt", (1e9, 1e9, 1e9), (1.0, 1.0, 1.0), "", "angle_x"),
+        (
+            "tilt",
+            (1e9, 0.1, -0.2),
+            (1.0, 0.1, 0.2),
+            "",
+            "angle_x",
+        ),  # the one strength that is there is at its bound
         ("hysteresis", (5.0, 1e9, 3.0), (0.1, 0.1, 0.1), "", None),
         ("tilt", (3.0, 1.0, 2.0), (0.1, 0.1, 0.1), "", None),
     ],
@@ -198,3 +205,13 @@ def test_a_fold_is_the_fit_of_its_own_readings() -> None:
     sd = own.terms[0].sd
     np.testing.assert_allclose(fold.terms[0].values, own.terms[0].values, atol=1e-2 * sd.min())
     assert np.abs(fold.terms[0].values - whole.terms[0].values).max() > 0.1 * sd.min()
+
+
+@pytest.mark.parametrize(
+    ("ratio", "noise", "lacks"), [(1.1, 1.0, False), (2.5, 1.0, True), (2.5, 2.4, False)]
+)
+def test_what_a_machine_leaves_is_compared_with_noise_as_it_is(
+    ratio: float, noise: float, lacks: bool
+) -> None:
+    made: Any = SimpleNamespace(sizes=(None, SimpleNamespace(n=100, ratio=ratio)))
+    assert machines.Written.lacks(made, noise) is lacks

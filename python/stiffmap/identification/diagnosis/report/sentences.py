@@ -11,6 +11,8 @@ from stiffmap.identification.candidates.candidates import words
 from stiffmap.identification.diagnosis.report.findings import Effect
 from stiffmap.identification.diagnosis.report.separation import Separation
 from stiffmap.identification.diagnosis.slips.axes import Slip
+from stiffmap.identification.inference.kernels import WANDER
+from stiffmap.identification.inference.verdict import CLEARLY, NOISIER
 from stiffmap.model.effects import registry
 
 DISPLAY_UNITS = {"m": (1e3, "mm"), "m/N": (1e3, "mm/N"), "rad": (1e3, "mrad"), "1/m": (1e-3, "1/mm")}
@@ -102,6 +104,16 @@ def off_as_a_group(d: Any) -> bool:
     return bool(not d.unexplained and d.calibration and d.calibration.wide and not d.calibration.beyond)
 
 
+def not_as_stated(d: Any) -> bool:
+    """Whether the readings differ from a machine that is as declared by clearly more than their noise: the first limitation says why."""
+    return bool(d.limitations and d.before.size[0] > CLEARLY * d.noise_size / max(1.0, d.noise.scale))
+
+
+def left_is(d: Any, what: str) -> bool:
+    """Whether something is left without a name, and nothing else than this."""
+    return bool(d.unexplained) and all(p.what.startswith(what) for p in d.unexplained)
+
+
 def _upper(text: str) -> str:
     return text[:1].upper() + text[1:]
 
@@ -137,15 +149,20 @@ def _of_machine(d: Any, verdict: str) -> str:
     if verdict == "none" and d.stopped:
         return f"The diagnosis was stopped before it found anything ({size})."
     if verdict == "none":
-        return f"The machine agrees with its file within what these readings can show ({size})."
+        but = f"; {d.limitations[0]}" if not_as_stated(d) else ""
+        return f"The machine agrees with its file within what these readings can show ({size}){but}."
+    if verdict == "unattributed" and left_is(d, NOISIER):
+        return f"The readings scatter {d.noise.scale:.2g} times as much as is stated ({size}), and show nothing else for certain."
+    if verdict == "unattributed" and left_is(d, WANDER):
+        return f"What the readings differ by from the file ({size}) goes on from row to row over time, as a drift of the instrument or of the machine does."
     if verdict == "unattributed" and off_as_a_group(d):
         return f"The machine differs from its file ({size}) by more than its numbers are uncertain, and none of them alone can be named."
     if verdict == "unattributed":
         nothing = "nothing that was tried" if d.stopped else "no single cause known to stiffmap"
         return f"The machine differs from its file ({size}), and {nothing} explains how."
+    rest = " Part of the difference remains unexplained." if d.unexplained else ""
     if verdict == "ambiguous":
-        return f"The readings are explained by more than one cause. First of them: {named}."
-    rest = " Part of the difference remains unexplained." if "unattributed" in verdict else ""
+        return f"The readings are explained by more than one cause. First of them: {named}.{rest}"
     return f"{named}.{rest}"
 
 
@@ -160,6 +177,12 @@ def next_step(d: Any) -> str:
         return "Nothing to mend. machine.yaml holds the machine that predicts readings best which it has not seen."
     if d.verdict == "none" and d.stopped:
         return "Let it come to its end."
+    if d.verdict == "none" and not_as_stated(d):
+        return "Nothing to correct at the machine. Check the instrument and read again before you keep these readings as a record."
+    if d.verdict == "unattributed" and left_is(d, NOISIER):
+        return (
+            "State the noise that the instrument has here, or read every condition twice, and diagnose again."
+        )
     if d.verdict == "none":
         return "Nothing to correct. Keep the readings as the record of this state."
     if d.verdict == "unattributed" and off_as_a_group(d):
@@ -167,22 +190,31 @@ def next_step(d: Any) -> str:
             "Read more poses and other loads, which tell numbers apart; or give the uncertainties that they have (u in the machine's "
             "file, or --tolerance). Until then plan and compensate with machine.yaml."
         )
+    if d.verdict == "unattributed" and left_is(d, WANDER):
+        return "Let machine and instrument warm up, and read one pose again and again between the others: it shows the drift alone."
     if d.verdict == "unattributed":
         return (
-            "Look at where the difference is largest (What is left), check the instrument's frame and the tool "
-            "first, and read again there."
+            "Look at where the difference is largest (What is left), check the instrument's frame, the tool and "
+            "where the load acts first, and read again there."
         )
-    if d.verdict == "ambiguous" and d.separations:
-        return f"One more measurement decides: {separation_text(d.separations[0])}."
     if d.verdict == "ambiguous" and not d.alternatives:
         return "Inspect this place, and read more poses or other loads: numbers within tolerance explain these nearly as well."
+    if d.verdict == "ambiguous" and d.separations:
+        best = min(d.separations, key=lambda s: s.readings or float("inf"))
+        if best.readings and best.readings <= d.before.n:  # no more than all that was read
+            return f"One more measurement decides: {separation_text(best)}."
+        return "Inspect all of these places: no reading that this machine can show distinguishes them with a sensible effort."
+    if all(registry.get(e.kind).measurement for e in d.effects) and d.effects:
+        return "Check the instrument and how the load was applied, correct the readings and diagnose again: this is no fault of the machine."
+    if d.which == "calibrated":
+        return "Inspect this place. machine.yaml has the machine's numbers adjusted in its stead: it predicts unseen readings better."
+    if d.which == "declared":
+        return "Inspect this place, and read more poses: no corrected machine predicts unseen readings better than the declared one yet."
     if any(e.aliases for e in d.effects):
         return (
             "Inspect this place and the others that fit the readings as well (the report lists them). The corrected machine file "
             "predicts the tool equally well, whichever of them it is."
         )
-    if d.which == "declared":
-        return "Inspect this place, and read more poses: no corrected machine predicts unseen readings better than the declared one yet."
     return "Inspect this place; until it is mended, plan and compensate with machine.yaml."
 
 

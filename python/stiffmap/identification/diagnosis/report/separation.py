@@ -51,7 +51,7 @@ def separation(
     top = float(clear[row, axis])
     number = int(np.ceil((WANTED / top) ** 2)) if top > WANTED / 100 else None
     x, y, z = (float(v) for v in trial.position[row])
-    fx, fy, fz = (float(v) for v in trial.wrench[row, :3])
+    fx, fy, fz = (float(v) + 0.0 for v in trial.wrench[row, :3])  # no -0
     name = trial.channels[int(axis)].name
     return Separation((x, y, z), (fx, fy, fz), name, float(gap[row, axis]), number)
 

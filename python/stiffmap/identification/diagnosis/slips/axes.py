@@ -52,6 +52,8 @@ class Hypothesis:
     factor: float | None = None
     physical: bool = False
     """Whether a part of the machine may show the same: it is then named only where none does."""
+    setup: str | None = None
+    """The set-up that it is of; None: all."""
 
 
 AXES = "xyz"
@@ -129,12 +131,16 @@ def mounted(e: Experiment, turn: Turn) -> Experiment:
     return replace(e, reading=reading - where, sigma=sigma)
 
 
-def times(e: Experiment, factor: float, axes: tuple[int, ...]) -> Experiment:
-    """Some channels divided by a factor, noise included."""
-    reading, sigma = e.reading.copy(), e.sigma.copy()
-    reading[:, axes] /= factor
-    sigma[:, axes] /= abs(factor)
-    return replace(e, reading=reading, sigma=sigma)
+def times(e: Experiment, factor: float, axes: tuple[int, ...], setup: str | None = None) -> Experiment:
+    """Some channels divided by a factor, noise included, or of one set-up without its noise, which is stated for all."""
+    by = np.where(in_setup(e, axes, setup), factor, 1.0)
+    return replace(e, reading=e.reading / by, sigma=e.sigma / (np.abs(by) if setup is None else 1.0))
+
+
+def in_setup(e: Experiment, axes: tuple[int, ...], setup: str | None) -> Mask:
+    """(n, c) the readings of some channels, of one set-up or of all."""
+    rows = np.array([setup is None or s == setup for s in e.setup or ("",) * len(e)])
+    return np.asarray(rows[:, None] & np.isin(np.arange(len(e.channels)), axes))
 
 
 def loads(predictor: Predictor) -> Iterator[Hypothesis]:

@@ -8,9 +8,9 @@ from functools import partial
 
 import numpy as np
 
-from stiffmap.experiment.experiment import Experiment, Floats
+from stiffmap.experiment.experiment import Experiment, Floats, Mask
 from stiffmap.experiment.noise.whitening import LinearProblem
-from stiffmap.identification.diagnosis.slips.axes import Hypothesis, times
+from stiffmap.identification.diagnosis.slips.axes import Hypothesis, in_setup, times
 
 LENGTHS = (
     (1000.0, "µm and mm, or mm and m, mixed up"),
@@ -44,12 +44,12 @@ PHYSICAL = 4.0
 """Factors below may be a soft part; no machine is softer than its file by more, everywhere and alike."""
 
 
-Left = Callable[[float, tuple[int, ...]], float]
-"""Chi-square that the best part of the machine leaves together with a factor of some channels."""
+Left = Callable[[Floats], float]
+"""Chi-square that the best part of the machine leaves next to a prediction (n, c)."""
 
 
 def factors(e: Experiment, problem: LinearProblem, base: Floats, left: Left) -> Iterator[Hypothesis]:
-    """One factor of all readings, of one gauge, of all rotations."""
+    """One factor of all readings, of one gauge, of all rotations; each of all set-ups or of one."""
     linear = [int(a) for a in np.flatnonzero(e.axis_read[:3])]
     angular = [i for i in range(3, 6) if e.axis_read[i]]
     sets: list[tuple[tuple[int, ...], str, str]] = []
@@ -62,18 +62,20 @@ def factors(e: Experiment, problem: LinearProblem, base: Floats, left: Left) -> 
         sets.append((tuple(angular), "all readings of rotations are", "turn"))
     if len(linear) > 1:
         sets += [((a,), f"the readings of {e.channels[a].name[1:]} are", "length") for a in linear]
+    names = sorted(set(e.setup or ()))
     for axes, what, quantity in sets:
-        found = _factor(problem, base, axes)
-        h = None if found is None else _hypothesis(base, axes, what, quantity, *found, left)
-        if h is not None:
-            yield h
+        for setup in (None, *(names if len(names) > 1 else ())):
+            here = in_setup(e, axes, setup)
+            found = _factor(problem, np.where(here, base, 0.0))
+            said = what if setup is None else f"{what.rsplit(' ', 1)[0]} of set-up {setup} are"
+            if found is not None:
+                h = _hypothesis(base, here, axes, setup, said, quantity, *found, left)
+                yield from () if h is None else (h,)
 
 
-def _factor(problem: LinearProblem, base: Floats, axes: tuple[int, ...]) -> tuple[float, float] | None:
-    """Reading over prediction in some channels by least squares, and its standard uncertainty."""
-    here = np.zeros_like(base)
-    here[:, axes] = base[:, axes]
-    column = problem.white(here)
+def _factor(problem: LinearProblem, base: Floats) -> tuple[float, float] | None:
+    """Reading over prediction by least squares where a prediction (n, c) is not zero, and its standard uncertainty."""
+    column = problem.white(base)
     size = float(column @ column)
     if size <= 0.0:
         return None
@@ -85,26 +87,30 @@ def _factor(problem: LinearProblem, base: Floats, axes: tuple[int, ...]) -> tupl
 
 
 def _hypothesis(
-    base: Floats, axes: tuple[int, ...], what: str, quantity: str, value: float, u: float, left: Left
-) -> Hypothesis | None:
-    known = _known(value, u, quantity) or _beside_a_part(value, quantity, axes, left)
+    base: Floats, here: Mask, axes: tuple[int, ...], setup: str | None,
+    what: str, quantity: str, value: float, u: float, left: Left,
+) -> Hypothesis | None:  # fmt: skip
+    known = _known(value, u, quantity) or _beside_a_part(
+        value, quantity, lambda f: left(np.where(here, f * base, base))
+    )
     small = 1 / PHYSICAL < abs(value) < PHYSICAL
     if not known and small:
         return None
-    prediction = base.copy()
-    prediction[:, axes] *= value
+    prediction = np.where(here, value * base, base)
     sign = "; check the sign as well" if value < 0 else ""
     seen = f"{what} {abs(value):.4g} times what the file predicts{', with the opposite sign' if value < 0 else ''}"
     if not known:
         check = f"check the units of force and gauge, and any lever{sign}"
-        return Hypothesis("factor", seen, check, 2, prediction, None, factor=value)
+        return Hypothesis("factor", seen, check, 2, prediction, None, factor=value, setup=setup)
     factor, name, of_load = known[0]
     whole = float(np.sign(value)) * factor
-    undo = partial(pushed, factor=whole) if of_load else partial(times, factor=whole, axes=axes)
+    undo = partial(pushed, factor=whole, setup=setup)
+    if not of_load:
+        undo = partial(times, factor=whole, axes=axes, setup=setup)
     others = "".join(f", or {n}" for _, n, _ in known[1:])
     near = f"near {factor:.4g}" if factor >= 1 else f"near 1/{1 / factor:.4g}"
-    return Hypothesis("factor", f"{seen} ({near})", f"check first: {name}{others}{sign}", 1 + (value < 0),
-                      prediction, undo, factor=value, physical=small)  # fmt: skip
+    return Hypothesis("factor", f"{seen} ({near})", f"check first: {name}{others}{sign}", 1 + (value < 0) + (setup is not None),
+                      prediction, undo, factor=value, physical=small, setup=setup)  # fmt: skip
 
 
 def _named(quantity: str) -> list[tuple[float, str, bool]]:
@@ -137,21 +143,21 @@ def _known(value: float, u: float, quantity: str) -> list[tuple[float, str, bool
 
 
 def _beside_a_part(
-    value: float, quantity: str, axes: tuple[int, ...], left: Left
+    value: float, quantity: str, left: Callable[[float], float]
 ) -> list[tuple[float, str, bool]]:
     """The known factor near a value together with which one part of the machine explains the readings best, if it does so well."""
     near = [n for n in _named(quantity) if abs(float(np.log(abs(value) / n[0]))) < BESIDE]
     if 1 / PHYSICAL < abs(value) < PHYSICAL or not near:
         return []
-    misfits = {f: left(float(np.sign(value)) * f, axes) for f in {n[0] for n in near}}
+    misfits = {f: left(float(np.sign(value)) * f) for f in {n[0] for n in near}}
     best = min(misfits, key=lambda f: misfits[f])
     others = [m for f, m in misfits.items() if abs(np.log(f / best)) > 1e-6]
-    if misfits[best] > CLEAR * left(value, axes) or (others and misfits[best] > CLEAR * min(others)):
+    if misfits[best] > CLEAR * left(value) or (others and misfits[best] > CLEAR * min(others)):
         return []
     return [n for n in near if abs(np.log(n[0] / best)) < 1e-6]
 
 
-def pushed(e: Experiment, factor: float) -> Experiment:
-    """The wrenches times a factor."""
-    asked = None if e.asked is None else e.asked * factor
-    return replace(e, wrench=e.wrench * factor, asked=asked)
+def pushed(e: Experiment, factor: float, setup: str | None = None) -> Experiment:
+    """The wrenches times a factor, of one set-up or of all."""
+    by = np.where(in_setup(e, (0,), setup)[:, :1], factor, 1.0)
+    return replace(e, wrench=e.wrench * by, asked=None if e.asked is None else e.asked * by)

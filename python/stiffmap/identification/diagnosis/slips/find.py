@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -155,7 +155,7 @@ def _judged(s: SlipReadings, problem: LinearProblem) -> Iterator[JudgedSlip]:
 def _beside(s: SlipReadings, h: Hypothesis) -> float:
     """Share of the misfit beyond noise that stays with a mistake in the readings and the best part of the machine."""
     problem, e = s.problem, s.experiment
-    if h.undo is None or h.keep is not None:
+    if h.undo is None or h.keep is not None or h.setup is not None:
         return 1.0
     there = h.undo(e)
     gap = there.reading - s.base
@@ -191,7 +191,7 @@ def _hypotheses(s: SlipReadings, problem: LinearProblem) -> Iterator[Hypothesis]
         yield from gauges(e, s.base)
         yield from shifts(e, s.base)
     if e.quantity == "deflection":
-        yield from factors(e, problem, s.base, partial(left_beside, s))
+        yield from factors(e, problem, s.base, lambda p: s.screen.left(s.problem.residual(p)))
         if e.wrench[:, :3].any():
             yield from loads(s.predictor)
 
@@ -211,13 +211,6 @@ def best_part(s: SlipReadings, freedom: float) -> float:
     """Share of the misfit beyond noise that the best single part of the machine leaves."""
     residual = s.problem.residual(s.base)
     return _excess(s.screen.left(residual), float(residual @ residual), freedom)
-
-
-def left_beside(s: SlipReadings, factor: float, axes: tuple[int, ...]) -> float:
-    """Chi-square that the best single part of the machine leaves where some channels read `factor` times too much."""
-    prediction = s.base.copy()
-    prediction[:, axes] *= factor
-    return s.screen.left(s.problem.residual(prediction))
 
 
 def _evidence(before: Experiment, after: Experiment) -> tuple[str, ...]:
