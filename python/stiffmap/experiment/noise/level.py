@@ -84,15 +84,14 @@ def noise_of(experiment: Experiment, keep: Mask | None = None) -> Noise:
         )
     step = np.array([_step(v[r]) for v, r in zip(experiment.reading.T, experiment.read.T, strict=True)])
     floor = np.fmax(declared, np.where(freedom >= ENOUGH, repeats, np.nan))
-    floor = np.where(floor > 0, np.fmax(floor, UNIFORM * step), floor)
+    rounding = UNIFORM * step
+    floor = np.where(floor > 0, np.fmax(floor, rounding), floor)
     factor = np.where(declared > 0, floor / np.where(declared > 0, declared, 1.0), np.nan)
     sigma = experiment.sigma * factor
     np.copyto(sigma, floor, where=~(experiment.sigma > 0))
     sigma[~experiment.read] = np.nan
     many = sums(experiment.read, experiment.conditions)[experiment.conditions]
-    shared = np.where(
-        UNIFORM * step > np.nan_to_num(repeats), UNIFORM * step, 0.0
-    )  # repeats are rounded alike
+    shared = np.where(rounding > np.nan_to_num(repeats), rounding, 0.0)  # repeats are rounded alike
     sigma = np.sqrt(sigma**2 + np.maximum(many - 1, 0) * shared**2) if shared.any() else sigma
     return Noise(experiment.channels, declared, repeats, freedom, p, floor, sigma, step)
 

@@ -41,6 +41,7 @@ class Predictor:
         check_joints(machine, experiment)
         self.threads = threads
         self.machine, self.experiment = resolved(machine, located(machine, experiment))
+        self._own = _left_open(self.machine, self.experiment)
         self.solved = 0
         self._memory: Kept[tuple[Terms, Terms], Floats] = Kept()
         self._changes: Kept[tuple[Terms, Terms], Floats] = Kept()
@@ -99,14 +100,10 @@ class Predictor:
     def _described(self, terms: Terms) -> MachineDescription:
         d, mechanical = self.machine.description, _parts(terms)[0]
         places = [(t.kind, t.element, t.legs) for t in mechanical]
-        kept = [t for t in d.effects if t not in self._own or (t.kind, t.element, t.legs) not in places]
-        bare = d.declared if len(kept) < len(d.effects) else None
-        return apply_records(bare or d, [*(kept if bare else ()), *mechanical])
-
-    @property
-    def _own(self) -> Terms:
-        """Effects of the machine itself of which the rows say what its file leaves open."""
-        return tuple(t for t in self.machine.description.effects if _left_open(t, self.experiment))
+        said_again = [t for t in self._own if (t.kind, t.element, t.legs) in places]
+        if not said_again or d.declared is None:
+            return apply_records(d, mechanical)
+        return apply_records(d.declared, [*(t for t in d.effects if t not in said_again), *mechanical])
 
     def changes_of_machines(self, others: Sequence[Near], terms: Terms = ()) -> list[Floats | None]:
         """The same of other machines near this one, of which nothing is kept; `terms` of the measurement belong to all."""
@@ -132,6 +129,7 @@ class Predictor:
         out = copy.copy(self)
         out.machine = machine or self.machine
         out.experiment = self.experiment if rows is None else self.experiment.rows(rows)
+        out._own = self._own if machine is None else _left_open(machine, self.experiment)
         room = MOST_BYTES // OTHERS  # all that are kept together need no more than one predictor may
         out._memory, out._changes, out._machines = Kept(room), Kept(room), Kept(MACHINES)
         out._others, out._drives = Kept(OTHERS), {}
@@ -262,12 +260,16 @@ def _only_numbers(base: Terms, moved: Terms) -> bool:
     return machine != other and load == same and not rows
 
 
-def _left_open(term: AppliedEffect, e: Experiment) -> bool:
-    """Whether the rows say something of an effect that it does not say itself."""
-    said = dict((*term.parameters, *term.options))
-    asked = [(p.name, p.recorded) for p in effects.get(term.kind).parameters if p.recorded]
-    asked += [("branch", "branch")] if _has_branch(term) else []
-    return any(name not in said and getattr(e, column) is not None for name, column in asked)
+def _left_open(machine: Machine, e: Experiment) -> Terms:
+    """Effects of the machine itself of which the rows say what its file leaves open."""
+
+    def is_open(term: AppliedEffect) -> bool:
+        said = dict((*term.parameters, *term.options))
+        asked = [(p.name, p.recorded) for p in effects.get(term.kind).parameters if p.recorded]
+        asked += [("branch", "branch")] if _has_branch(term) else []
+        return any(name not in said and getattr(e, column) is not None for name, column in asked)
+
+    return tuple(filter(is_open, machine.description.effects))
 
 
 def _has_branch(term: AppliedEffect) -> bool:

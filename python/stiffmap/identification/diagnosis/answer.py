@@ -253,7 +253,7 @@ def _rest(columns: Columns, fit: Fit, v: Verdict, each: dict[str, float], gap: F
 
 def _first(fit: Fit, v: Verdict, stated: bool) -> list[str]:
     """What must be known of the noise before anything else."""
-    out = [t if stated else t.replace("is stated", "repeats or steps show") for t in not_as_stated(fit.noise)]
+    out = not_as_stated(fit.noise, "is stated" if stated else "repeats or steps show")
     if np.any(fit.weights != 1.0):
         out.append("some readings lie far from the others and count less")
     if v.time:

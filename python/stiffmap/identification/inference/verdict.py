@@ -283,11 +283,11 @@ def left(fit: Fit) -> tuple[str, str]:
     return rest, time
 
 
-def not_as_stated(noise: float) -> list[str]:
-    """What must be said of noise that is so many times what is stated; nothing where that is near enough."""
+def not_as_stated(noise: float, source: str = "is stated") -> list[str]:
+    """What must be said of noise that is so many times what is stated, or what another `source` has; nothing where that is near enough."""
     if 1.0 / CLEARLY < noise < CLEARLY:
         return []
-    return [f"the noise is {noise:.2g} times what is stated, and is taken so"]
+    return [f"the noise is {noise:.2g} times what {source}, and is taken so"]
 
 
 def _significant(fit: Fit, names: Sequence[str], freedom: int = 0) -> bool:

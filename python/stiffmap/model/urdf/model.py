@@ -110,6 +110,7 @@ TOOLS = (r"tool_?0", r"tcp|tool_cent(er|re)_point", r"tool\d*", r"eef?|end_?effe
 
 
 JAW = r"(?!.*(wrist|rot|roll|pitch|yaw|tilt)).*(grip|jaw|claw)"
+"""Names of joints that open a gripper, not of those that turn one."""
 
 
 def rank(link: str) -> int:

@@ -20,6 +20,11 @@ from stiffmap.workspace.vibration.response_units import FREQUENCIES, ResponseUni
 
 PREFIX = re.compile(r"((frf|h[12]?|\w+/\w+|dyn(amic|amische|\.)?)_)+(?=.)")
 """Before the part of a response, as in ``H1 Ch2/Ch1 Real [m/N]``."""
+MEANT = {
+    "accelerance": (2, 1), "inertance": (2, 1), "mobility": (1, 1), "receptance": (0, 1), "compliance": (0, 1), "nachgiebigkeit": (0, 1),
+    "stiffness": (0, -1), "steifigkeit": (0, -1), "impedance": (1, -1), "apparent_mass": (2, -1),
+}  # fmt: skip
+"""Names of responses -> derivatives of the displacement, and 1 by force or -1 of a force by it."""
 COLUMNS = Known(
     {**dict.fromkeys(("frequency", "real", "imag", "magnitude", "coherence"), ""), "phase": "rad", "response": WORD},
     {"frequency": "frequency_Hz", **{n: f"{n}_m/N" for n in ("real", "imag", "magnitude")}, "phase": "phase_deg"},
@@ -29,16 +34,10 @@ COLUMNS = Known(
         **dict.fromkeys(("n", "drehzahl", "speed", "rotational_speed", "omega", "ω", "kreisfrequenz", "angular_frequency"), "frequency"),
         **dict.fromkeys(("re", "re(h)", "re(frf)", "real_part", "realteil"), "real"),
         **dict.fromkeys(("im", "im(h)", "im(frf)", "imaginary", "imaginary_part", "imag_part", "imaginärteil"), "imag"),
-        **dict.fromkeys(("mag", "amplitude", "|h|", "|frf|", "accelerance", "inertance", "mobility", "receptance", "compliance", "betrag", "nachgiebigkeit", "gain"), "magnitude"),
-        **dict.fromkeys(("stiffness", "steifigkeit", "impedance", "apparent_mass"), "magnitude"),
+        **dict.fromkeys(("mag", "amplitude", "|h|", "|frf|", "betrag", "gain", *MEANT), "magnitude"),
     },
     lambda name, unit: (PREFIX.sub("", name), unit),
 )  # fmt: skip
-MEANT = {
-    "accelerance": (2, 1), "inertance": (2, 1), "mobility": (1, 1), "receptance": (0, 1), "compliance": (0, 1), "nachgiebigkeit": (0, 1),
-    "stiffness": (0, -1), "steifigkeit": (0, -1), "impedance": (1, -1), "apparent_mass": (2, -1),
-}  # fmt: skip
-"""Names of responses -> derivatives of the displacement, and 1 by force or -1 of a force by it."""
 FORMS = (("real", "imag"), ("magnitude", "phase"))
 EXAMPLES = "m/N, mm/N, um/N, m/s/N, m/s2/N, g/N and the like, N/m, N/um"
 HEAD = "frequency_Hz, real_UNIT, imag_UNIT (or magnitude_UNIT, phase_deg) and, where there is one, coherence"

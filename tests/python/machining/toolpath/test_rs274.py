@@ -24,13 +24,15 @@ OFFSETS = {
     "G59": (0.001, 0.002, 0.003), "G59.1": (0.004, 0, 0), "G59.2": (0, 0.004, 0), "G59.3": (0, 0, 0.004),
 }  # fmt: skip
 PROGRAMS = [json.loads(line) for line in Path(__file__).with_name("rs274.jsonl").read_text().splitlines()]
+ENDS = {f"{word}\nG1 X50\nM2": [[1, 50, 0, 0, 600, 6000]] for word in ("G15", "G50", "G69")}
+"""Fanuc's ends of what is refused, which rs274 does not know: they change no way."""
 PRINTED = 3e-3
 """mm: rs274 prints four decimals, of inches too."""
 
 
 @pytest.mark.parametrize(("text", "offset", "moves"), PROGRAMS, ids=[repr(t) for t, _, _ in PROGRAMS])
 def test_same_way_or_both_refuse(text: str, offset: int, moves: list[list[float]] | None) -> None:
-    lines = (HEAD + text).split("\n")
+    lines, moves = (HEAD + text).split("\n"), ENDS.get(text, moves)
     if moves is None:
         with pytest.raises(FileError, match=r"p, line \d+: "):
             load_gcode(lines, name="p", offsets=OFFSETS if offset else None)

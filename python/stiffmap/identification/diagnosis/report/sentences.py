@@ -104,7 +104,7 @@ def off_as_a_group(d: Any) -> bool:
     return bool(not d.unexplained and d.calibration and d.calibration.wide and not d.calibration.beyond)
 
 
-def not_as_stated(d: Any) -> bool:
+def beyond_noise(d: Any) -> bool:
     """Whether the readings differ from a machine that is as declared by clearly more than their noise: the first limitation says why."""
     return bool(d.limitations and d.before.size[0] > CLEARLY * d.noise_size / max(1.0, d.noise.scale))
 
@@ -149,7 +149,7 @@ def _of_machine(d: Any, verdict: str) -> str:
     if verdict == "none" and d.stopped:
         return f"The diagnosis was stopped before it found anything ({size})."
     if verdict == "none":
-        but = f"; {d.limitations[0]}" if not_as_stated(d) else ""
+        but = f"; {d.limitations[0]}" if beyond_noise(d) else ""
         return f"The machine agrees with its file within what these readings can show ({size}){but}."
     if verdict == "unattributed" and left_is(d, NOISIER):
         return f"The readings scatter {d.noise.scale:.2g} times as much as is stated ({size}), and show nothing else for certain."
@@ -177,7 +177,7 @@ def next_step(d: Any) -> str:
         return "Nothing to mend. machine.yaml holds the machine that predicts readings best which it has not seen."
     if d.verdict == "none" and d.stopped:
         return "Let it come to its end."
-    if d.verdict == "none" and not_as_stated(d):
+    if d.verdict == "none" and beyond_noise(d):
         return "Nothing to correct at the machine. Check the instrument and read again before you keep these readings as a record."
     if d.verdict == "unattributed" and left_is(d, NOISIER):
         return (

@@ -139,8 +139,12 @@ def times(e: Experiment, factor: float, axes: tuple[int, ...], setup: str | None
 
 def in_setup(e: Experiment, axes: tuple[int, ...], setup: str | None) -> Mask:
     """(n, c) the readings of some channels, of one set-up or of all."""
-    rows = np.array([setup is None or s == setup for s in e.setup or ("",) * len(e)])
-    return np.asarray(rows[:, None] & np.isin(np.arange(len(e.channels)), axes))
+    return np.asarray(of_setup(e, setup)[:, None] & np.isin(np.arange(len(e.channels)), axes))
+
+
+def of_setup(e: Experiment, setup: str | None) -> Mask:
+    """(n,) the rows of one set-up, or all."""
+    return np.array([setup is None or s == setup for s in e.setup or ("",) * len(e)])
 
 
 def loads(predictor: Predictor) -> Iterator[Hypothesis]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from stiffmap.experiment.experiment import Experiment, Floats, Mask
 from stiffmap.experiment.noise.whitening import LinearProblem
-from stiffmap.identification.diagnosis.slips.axes import Hypothesis, in_setup, times
+from stiffmap.identification.diagnosis.slips.axes import Hypothesis, in_setup, of_setup, times
 
 LENGTHS = (
     (1000.0, "µm and mm, or mm and m, mixed up"),
@@ -159,5 +159,5 @@ def _beside_a_part(
 
 def pushed(e: Experiment, factor: float, setup: str | None = None) -> Experiment:
     """The wrenches times a factor, of one set-up or of all."""
-    by = np.where(in_setup(e, (0,), setup)[:, :1], factor, 1.0)
+    by = np.where(of_setup(e, setup), factor, 1.0)[:, None]
     return replace(e, wrench=e.wrench * by, asked=None if e.asked is None else e.asked * by)
