@@ -65,6 +65,7 @@ def test_rows_say_what_an_effect_leaves_open_in_a_file_as_on_a_command_line(
     shown = predict(machine, e, (term,))
     assert np.abs(shown - predict(machine, e)).max() > 1e-6
     np.testing.assert_allclose(predict(own, e), shown, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(Predictor(machine, e).beside(machine=own)(), shown, rtol=0, atol=1e-12)
     more = AppliedEffect("compliance", "actuator", ("y",), (("scale", 1.5),))
     np.testing.assert_allclose(
         predict(own, e, (more,)), predict(machine, e, (term, more)), rtol=0, atol=1e-12
