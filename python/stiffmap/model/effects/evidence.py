@@ -81,6 +81,10 @@ class Plan(Protocol):
         """(n, 3) m, commanded."""
 
     @property
+    def rotation(self) -> Floats | None:
+        """(n, 3, 3) commanded; None: that of home."""
+
+    @property
     def wrench(self) -> Floats:
         """(n, 6) N, N·m, noted."""
 

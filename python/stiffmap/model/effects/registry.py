@@ -121,6 +121,7 @@ SYNONYMS = {
     "sensor_gain": ("calibration factor", "scale of the sensor", "Kalibrierfaktor"),
     "load_gain": ("force sensor calibration", "wrong force", "Kraftsensor"),
     "load_direction": ("skewed force", "oblique pull", "Schrägzug"),
+    "load_offset": ("lever of the load", "eccentric load", "Hebelarm", "Exzentrizität"),
 }
 
 

@@ -87,6 +87,15 @@ def test_measurement_effects_act_on_loads_and_readings(plan: sm.Experiment) -> N
     assert readings(plan, motion, [drift])[-1, 0] == pytest.approx(1e-5 + 1e-8 * (len(plan) - 1))
 
 
+def test_a_force_at_another_point_has_a_moment(plan: sm.Experiment) -> None:
+    pulled = replace(plan, wrench=np.tile([0.0, 0.0, -100.0, 0.0, 0.0, 2.0], (len(plan), 1)))
+    arm = AppliedEffect("load_offset", "load", (), (("offset_x", 0.05),))
+    np.testing.assert_allclose(true_wrench(pulled, [arm]), [[0, 0, -100, 0, 5, 2]] * len(plan), atol=1e-12)
+    quarter = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # tool x along base y
+    turned = replace(pulled, rotation=np.tile(quarter, (len(plan), 1, 1)))
+    np.testing.assert_allclose(true_wrench(turned, [arm]), [[0, 0, -100, -5, 0, 2]] * len(plan), atol=1e-12)
+
+
 def test_noise_floor_is_the_larger_and_contradictions_are_told(
     machine: sm.Machine, plan: sm.Experiment
 ) -> None:

@@ -193,3 +193,14 @@ def test_drive_and_foot_are_aliases(machine: sm.Machine) -> None:
     foot = variants[("compliance", "foot.k11", ("x",))]
     cosine = drive @ foot / np.linalg.norm(drive) / np.linalg.norm(foot)
     assert cosine > 1 - 1e-5
+
+
+@pytest.mark.parametrize("name", ["linear-delta", "ur10"])
+def test_a_lever_of_the_load_is_named_with_its_length(name: str) -> None:
+    """As that, not as a soft part or a skewed force."""
+    machine, offset = sm.load_machine(name), {"offset_x": 0.02, "offset_y": -0.03, "offset_z": 0.0}
+    lever = AppliedEffect("load_offset", "load", (), tuple(offset.items()))
+    e = simulate(machine, random_plan(machine, "deflection", poses=8, seed=2), [lever], seed=3)
+    d = sm.diagnose(machine, e, cross_validate=False)
+    assert only(d) == ("load_offset", "load", [])
+    assert all(holds(d, at, true) for at, true in offset.items())

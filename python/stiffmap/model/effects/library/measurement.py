@@ -88,6 +88,37 @@ LOAD_DIRECTION = EffectType(
 )
 
 
+LEVER = tuple(
+    Parameter(
+        f"offset_{a}",
+        "m",
+        -5.0,
+        5.0,
+        0.0,
+        0.01,
+        f"of the point where the force acts, {a}",
+        plausible=(-0.5, 0.5),
+    )
+    for a in AXES
+)
+
+
+def with_lever(wrench: Floats, plan: Plan, term: AppliedEffect) -> Floats:
+    """(n, 6) with the moment, about the noted point, of a force that acts at another one."""
+    arm = translation_of(dict(term.parameters), "offset_")
+    turned_arm = arm if plan.rotation is None else plan.rotation @ arm
+    return np.hstack([wrench[:, :3], wrench[:, 3:] + np.cross(turned_arm, wrench[:, :3])])
+
+
+LOAD_OFFSET = EffectType(
+    **measured("load_offset", "load", LEVER),
+    title="point where the force acts",
+    doc="The force acts at the noted point plus offset: there it has the moment offset × force, too.",
+    frame="base axes; the tool's where poses turn it",
+    load=with_lever,
+)
+
+
 LOAD_GAIN = EffectType(
     **measured("load_gain", "load", gains("acting force over declared force")),
     title="gain of the force measurement",
