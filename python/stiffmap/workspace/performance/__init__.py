@@ -3,12 +3,15 @@
 from stiffmap.workspace.performance.box.box import largest_box
 from stiffmap.workspace.performance.box.workspace import workspace_volume
 from stiffmap.workspace.performance.limits.deflection import worst_deflection
-from stiffmap.workspace.performance.motion.efforts import drive_efforts
-from stiffmap.workspace.performance.motion.force import accuracy_transmission, force_transmission
+from stiffmap.workspace.performance.motion.efforts import drive_efforts, force_transmission
 from stiffmap.workspace.performance.motion.inertia import natural_frequencies
 from stiffmap.workspace.performance.motion.motion_files import load_motion
 from stiffmap.workspace.performance.motion.trajectory import circle, fastest, line, through, timed
-from stiffmap.workspace.performance.motion.velocity import velocity_section, velocity_transmission
+from stiffmap.workspace.performance.motion.velocity import (
+    accuracy_transmission,
+    velocity_section,
+    velocity_transmission,
+)
 from stiffmap.workspace.performance.pieces import in_pieces
 from stiffmap.workspace.performance.requirements import load_requirements
 from stiffmap.workspace.performance.table import MeasuresTable, measures

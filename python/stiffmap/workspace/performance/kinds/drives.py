@@ -11,11 +11,9 @@ import numpy as np
 
 from stiffmap.workspace.maps.inputs import plane_axes
 from stiffmap.workspace.performance.motion.closing import drive_values
-from stiffmap.workspace.performance.motion.efforts import acceleration_of
-from stiffmap.workspace.performance.motion.force import accuracy_of
-from stiffmap.workspace.performance.motion.inertia import PUSHES, held, in_cables, rest_efforts
+from stiffmap.workspace.performance.motion.efforts import acceleration_of, held_forces
 from stiffmap.workspace.performance.motion.many_drives import inner_radius
-from stiffmap.workspace.performance.motion.velocity import distances
+from stiffmap.workspace.performance.motion.velocity import accuracy_of, distances
 from stiffmap.workspace.performance.registry import Case, Found, Measure, over_poses
 
 TYPES = (
@@ -57,15 +55,13 @@ def velocity(case: Case) -> Found:
 def force(case: Case) -> Found:
     """Over all poses of the box, drives within the efforts that the machine file declares."""
     most = drive_values(case.machine, "force", None, "N or N·m")
-    if (h := in_cables(case.machine, "the force that is held")) is not None:
-        rows, limits, offset = held(case.machine, h, case.coarse_kinematics, PUSHES, most, case.gravity)
-        radii = inner_radius(rows[..., list(plane_axes(case.plane))], limits, offset)
-        return over_poses(
-            case.coarse_positions, radii, "high", note="cables: over the coarse grid, any tensions"
-        )
-    bias = rest_efforts(case.machine, case.kinematics, gravity=case.gravity, velocity=None)
-    needed = -np.swapaxes(case.kinematics.jacobian[..., list(plane_axes(case.plane)), :], -1, -2)
-    return over_poses(case.positions, inner_radius(needed, most, bias), "high")
+    positions, k, note = case.positions, case.kinematics, ""
+    if case.machine.compiled.names.cables:
+        positions, k = case.coarse_positions, case.coarse_kinematics
+        note = "cables: over the coarse grid, any tensions"
+    rows, limits, offset = held_forces(case.machine, k, most, case.gravity)
+    radii = inner_radius(rows[..., list(plane_axes(case.plane))], limits, offset)
+    return over_poses(positions, radii, "high", note)
 
 
 def acceleration(case: Case) -> Found:

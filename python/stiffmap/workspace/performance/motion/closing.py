@@ -17,7 +17,7 @@ from stiffmap.solve.closing import commanded
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.status import Status
 from stiffmap.workspace.maps.inputs import magnitude
-from stiffmap.workspace.performance.motion.many_drives import FLAT, drive_weights, motions
+from stiffmap.workspace.performance.motion.many_drives import FLAT, drive_weights, of_motions
 
 PARTS = {"all": slice(0, 6), "translation": slice(0, 3), "rotation": slice(3, 6)}
 
@@ -211,9 +211,7 @@ def _crossed(machine: Machine, jacobian: Floats, together: NDArray[np.int32]) ->
     j = jacobian[ok]
     if redundancy or (together[ok] < j.shape[-1]).any():
         values = np.asarray(np.linalg.svd(j, compute_uv=False), dtype=float)
-        last = motions(together[ok], values, redundancy) - 1
-        least = np.take_along_axis(values, np.maximum(last, 0)[:, None], axis=-1)[:, 0]
-        out[ok] = least < FLAT * values[:, 0]
+        out[ok] = of_motions(together[ok], values, redundancy)[1] < FLAT * values[:, 0]
         return out
     # a smooth change of sign is a drive that stops moving the tool; a jump is one that runs away
     turn = np.linalg.det(np.swapaxes(j[:-1], 1, 2) @ j[1:])

@@ -1,25 +1,36 @@
-"""Efforts of the drives along a trajectory, equation (4) of the paper (docs/theory.md D4-D6)."""
+"""Efforts of the drives: what they hold at the tool, equation (2) of the paper, and what a trajectory asks of them, equation (4)
+(docs/measures.md, docs/theory.md D4-D6)."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import xarray as xr
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from stiffmap.common.broadcasting import Floats, instance_of
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import place_text
+from stiffmap.common.short import short_repr
+from stiffmap.solve.labels import OverPoses
 from stiffmap.solve.machine import Machine, takes_machine
+from stiffmap.workspace.maps.inputs import plane_axes
 from stiffmap.workspace.performance.motion.closing import (
     DriveKinematics,
+    characteristic_length,
     declared,
     drive_kinematics,
+    drive_limits,
     drive_table,
     drive_values,
     refuse_failed,
     revolute_drives,
+    weighted,
 )
 from stiffmap.workspace.performance.motion.inertia import (
+    PUSHES,
+    Held,
     as_tensions,
     held,
     in_cables,
@@ -29,8 +40,15 @@ from stiffmap.workspace.performance.motion.inertia import (
     rest_efforts,
     rigid_dynamics,
 )
-from stiffmap.workspace.performance.motion.many_drives import inner_radius, inverse_rows
+from stiffmap.workspace.performance.motion.many_drives import (
+    Polygon,
+    inner_radius,
+    inverse_rows,
+    of_motions,
+    section_polygon,
+)
 from stiffmap.workspace.performance.motion.trajectory import Trajectory
+from stiffmap.workspace.performance.motion.velocity import singular_values
 
 IMPOSSIBLE = 1e-6  # relative part of a motion that the machine cannot do: above it, the trajectory is refused
 
@@ -148,3 +166,82 @@ def acceleration_of(
     mass = rigid_dynamics(machine, flat, zero, zero, zero, np.zeros(3))["mass"].reshape((*shape, n, n))
     needed = mass @ inverse_rows(k.jacobian)[..., :3]  # effort per acceleration of the TCP
     return inner_radius(needed, most, bias)
+
+
+@short_repr
+@dataclass(frozen=True, eq=False)
+class ForceTransmission(OverPoses):
+    """Holdable forces at the TCP at poses (...); NaN where the pose failed."""
+
+    sphere_min: Floats
+    """(...) smallest singular value of J^-T, weighted as the velocity's: force per unit norm of efforts."""
+    sphere_max: Floats
+    """(...) largest."""
+    force_min: Floats
+    """(...) N, force that the drives hold in every direction of space, no moment. Cables: by any tensions from 0 to the limits."""
+    plane: Polygon
+    """Forces that the drives hold in the plane: N, or per unit effort."""
+    bias: Floats
+    """(..., drives) N or N·m, effort that each drive needs without a force on the tool; NaN where cables do not hold it."""
+    limits: Floats
+    """(drives,) effort limit of each drive."""
+    status: NDArray[np.uint8]
+
+
+@takes_machine
+def force_transmission(
+    machine: Machine,
+    position: ArrayLike,
+    rotation: ArrayLike | None = None,
+    *,
+    plane: str = "xy",
+    limits: ArrayLike | str = "declared",
+    gravity: ArrayLike | None = None,
+    velocity: ArrayLike | None = None,
+    length: float | None = None,
+    sharing: str = "least_norm",
+    threads: int | None = None,
+) -> ForceTransmission:
+    """Smallest and largest force that the drives hold, at rest or at speed, at poses (..., 3) m.
+
+    A force f on the tool requires the drive efforts -J^T f (virtual work; the paper's (2) has the force that
+    the machine exerts). Limits: ``declared`` in the machine file, ``unit``, or numbers (N, N·m).
+
+    gravity
+        (3,) m/s²; None: what the machine file says. Its efforts count against the limits.
+    velocity
+        (..., 3) m/s of the TCP, no acceleration, no rotation: inertia and friction at that speed count
+        against the limits too; None: at rest, without friction.
+    sharing
+        Of drives that outnumber the freedoms: ``least_norm`` or ``stiffness`` (docs/measures.md).
+
+    Raises StiffmapError for bad input, never for a pose.
+    """
+    k = drive_kinematics(machine, position, rotation, sharing=sharing, threads=threads)
+    most = drive_limits(machine, "force", limits, "N or N·m")
+    rows, room, bias = found = held_forces(machine, k, most, gravity, velocity, sharing)
+    section = section_polygon(rows[..., list(plane_axes(plane))], room, k.status, bias)
+    if (h := in_cables(machine, HELD)) is not None:
+        still = rest_efforts(machine, k, gravity=gravity, velocity=None)
+        bias = as_tensions(machine, h, k, still, most, sharing)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        j = weighted(machine, k.jacobian, characteristic_length(machine, length), "all")
+        s, last = of_motions(k.together, singular_values(j), machine.compiled.redundancy)
+        least, largest = 1 / s[..., 0], 1 / last
+    return ForceTransmission(least, largest, inner_radius(*found), section, bias, most, k.status)
+
+
+HELD = "the force that is held"
+
+
+def held_forces(
+    machine: Machine, k: DriveKinematics, most: Floats, gravity: ArrayLike | None, velocity: ArrayLike | None = None,
+    sharing: str = "least_norm",
+) -> Held:  # fmt: skip
+    """Forces (3,) on the tool that efforts up to `most` (drives,) hold next to those that the machine itself needs."""
+    if (h := in_cables(machine, HELD)) is None:
+        bias = rest_efforts(machine, k, gravity=gravity, velocity=velocity, sharing=sharing)
+        return -np.swapaxes(k.jacobian[..., :3, :], -1, -2), most, bias  # effort per force on the tool
+    if velocity is not None:
+        raise StiffmapError(f"{machine.name}: velocity: for cables the force is known at rest alone")
+    return held(machine, h, k, PUSHES, most, gravity)

@@ -218,6 +218,16 @@ def motions(together: NDArray[np.int32], values: Floats, redundancy: int) -> NDA
     return np.minimum(most, whole) if whole else most
 
 
+def of_motions(together: NDArray[np.int32], values: Floats, redundancy: int) -> tuple[Floats, Floats]:
+    """Singular values (..., n), those beyond the tool's `motions` NaN, and the last one that counts.
+
+    Drives that go together, or that leave the tool where it is, have none of their own.
+    """
+    count = motions(together, values, redundancy)
+    last = np.take_along_axis(values, np.maximum(count - 1, 0)[..., None], axis=-1)[..., 0]
+    return np.where(np.arange(values.shape[-1]) < count[..., None], values, np.nan), last
+
+
 def facets(j: Floats, rank: int) -> tuple[Floats, Floats]:
     """Unit normals (..., f, rows) and distances (..., f) of the facets of the image of the unit cube under (..., rows,
     drives) of this rank, pairs of opposite ones once: the cube's image is all t in the range of j with

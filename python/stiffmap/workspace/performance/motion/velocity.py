@@ -1,8 +1,9 @@
-"""Velocity transmission of §3.1: sphere, cube and hexagon of Figure 1 (docs/measures.md)."""
+"""Velocity transmission of §3.1: sphere, cube and hexagon of Figure 1, and equation (1) of the paper: what errors of encoders
+do to the tool (docs/measures.md)."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.short import short_repr
 from stiffmap.model.files.load import Source
+from stiffmap.solve.kinematics import forward_kinematics
 from stiffmap.solve.labels import OverPoses
 from stiffmap.solve.machine import Machine, as_machine, takes_machine
 from stiffmap.solve.options import keywords_of
@@ -20,17 +22,20 @@ from stiffmap.workspace.performance.motion.closing import (
     characteristic_length,
     drive_kinematics,
     drive_limits,
+    drive_values,
     weighted,
 )
 from stiffmap.workspace.performance.motion.many_drives import (
     Polygon,
+    corners,
     facets,
     farthest_vertex,
     inverse_rows,
-    motions,
+    of_motions,
     rows_limit,
     section_polygon,
     sides,
+    worst_corner,
 )
 
 
@@ -77,7 +82,7 @@ def transmission_of(
     size = characteristic_length(machine, length)
     j = weighted(machine, k.jacobian, size, part)
     driven = j * speeds
-    s, low = of_motions(machine, k, singular_values(j))
+    s, low = of_motions(k.together, singular_values(j), machine.compiled.redundancy)
     high = s[..., 0]
     if part == "translation" or (part == "all" and machine.compiled.redundancy):
         rank = 3 if part == "translation" else _rank(s)
@@ -141,19 +146,6 @@ def velocity_transmission(
     return transmission_of(machine, drive_kinematics(machine, position, rotation, threads=threads), **how)
 
 
-def of_motions(machine: Machine, k: DriveKinematics, values: Floats) -> tuple[Floats, Floats]:
-    """Singular values (..., n), those beyond the tool's motions NaN, and the last one that counts.
-
-    Drives that go together, or that leave the tool where it is, have none of their own.
-    """
-    redundancy, drives = machine.compiled.redundancy, k.jacobian.shape[-1]
-    if not redundancy and not (k.together < drives).any():
-        return values, values[..., -1]
-    count = motions(k.together, values, redundancy)
-    last = np.take_along_axis(values, np.maximum(count - 1, 0)[..., None], axis=-1)[..., 0]
-    return np.where(np.arange(values.shape[-1]) < count[..., None], values, np.nan), last
-
-
 def _rank(values: Floats) -> int:
     """The most singular values (..., n) that a pose has above zero."""
     return int((np.isfinite(values) & (values > 0)).sum(axis=-1).max(initial=1))
@@ -192,7 +184,77 @@ def velocity_section(
     j = weighted(machine, k.jacobian, 1.0, "all")
     axes = list(plane_axes(plane))
     if machine.compiled.redundancy:
-        rank = _rank(of_motions(machine, k, singular_values(j))[0])
+        rank = _rank(of_motions(k.together, singular_values(j), machine.compiled.redundancy)[0])
         rows, most = sides(k.jacobian * speeds, rank)
         return section_polygon(rows[..., axes], most, k.status)
     return section_polygon(inverse_rows(j)[..., axes], speeds, k.status)
+
+
+@short_repr
+@dataclass(frozen=True, eq=False)
+class AccuracyTransmission(OverPoses):
+    """Largest tool error over the box of encoder errors, at poses (...); NaN where the pose failed."""
+
+    translation: Floats
+    """(...) m, largest distance of the TCP from its command, first order, exact over the box."""
+    rotation: Floats
+    """(...) rad, largest rotation of the platform."""
+    plane: Floats
+    """(...) m, largest distance in the plane asked for."""
+    components: Floats
+    """(..., 6) m, rad: largest error of each component of the twist."""
+    corner: Floats
+    """(..., drives) signs of the encoder errors with the largest translation."""
+    nonlinear: Floats | None
+    """(...) m, the largest translation over all corners by forward kinematics; None: not asked for."""
+    errors: Floats
+    """(drives,) m or rad, half-width of each encoder's error."""
+    status: NDArray[np.uint8]
+
+
+@takes_machine
+def accuracy_transmission(
+    machine: Machine,
+    position: ArrayLike,
+    rotation: ArrayLike | None = None,
+    *,
+    errors: ArrayLike | None = None,
+    plane: str = "xy",
+    nonlinear: bool = False,
+    sharing: str = "least_norm",
+    threads: int | None = None,
+) -> AccuracyTransmission:
+    """Worst tool error when every encoder may be wrong by up to ± its error, at poses (..., 3) m.
+
+    The norm being convex, its largest value over the box of errors lies at a corner, so all corners
+    are the exact worst case of the first-order model. `errors`: one or one each, m or rad; None: the
+    machine file's ``encoder_error``. `nonlinear` also closes the machine at every corner, without
+    linearising. `sharing`: what errors of drives that outnumber the freedoms do to the tool, ``least_norm`` or
+    ``stiffness`` (docs/measures.md). Raises StiffmapError for bad input, never for a pose.
+    """
+    k = drive_kinematics(machine, position, rotation, sharing=sharing, threads=threads)
+    out = accuracy_of(machine, k, errors=errors, plane=plane)
+    return replace(out, nonlinear=_by_closing(machine, k, out.errors, threads)) if nonlinear else out
+
+
+def accuracy_of(
+    machine: Machine, k: DriveKinematics, *, errors: ArrayLike | None = None, plane: str = "xy"
+) -> AccuracyTransmission:
+    """The same from kinematics that are at hand, first order."""
+    e = drive_values(machine, "encoder_error", errors, "m or rad", "errors")
+    j = k.jacobian * e
+    parts = (slice(0, 3), slice(3, 6), list(plane_axes(plane)))
+    translation, rotation, in_plane = (farthest_vertex(j[..., rows, :]) for rows in parts)
+    return AccuracyTransmission(
+        translation, rotation, in_plane, components=np.abs(j).sum(axis=-1), corner=worst_corner(j[..., :3, :]), nonlinear=None, errors=e, status=k.status
+    )  # fmt: skip
+
+
+def _by_closing(machine: Machine, k: DriveKinematics, errors: Floats, threads: int | None) -> Floats:
+    worst = np.zeros(k.status.shape)
+    signs = corners(len(errors))
+    for s in (*signs, *-signs):
+        moved = (k.sharing @ (s * errors)[:, None])[..., 0]  # drives that go together move together
+        there = forward_kinematics(machine, k.actuators + moved, threads=threads)
+        worst = np.maximum(worst, np.linalg.norm(there.position - k.position, axis=-1))
+    return worst
