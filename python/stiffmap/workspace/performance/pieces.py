@@ -9,6 +9,7 @@ import numpy as np
 
 from stiffmap.common.broadcasting import Floats, whole_number
 from stiffmap.common.errors import StiffmapError
+from stiffmap.model.beams import cantilever_compliance
 from stiffmap.model.description import Body, Offset, Pose, Spring
 from stiffmap.model.description.elements import Element
 from stiffmap.model.description.tree import Elements, edit_all, edit_sequences
@@ -74,30 +75,25 @@ def _is_beam(spring: Spring, way: Floats) -> bool:
     if spring.compliance is None or spring.laws or any(spring.rest) or spring.stroke is not None:
         return False
     c = np.asarray(spring.compliance, dtype=float)
-    pattern = _beam(way, np.diag(c)[3:], float(c[np.argmax(np.abs(way)), np.argmax(np.abs(way))]))
+    pattern = _piece(way, c, 1)
     size = np.sqrt(np.outer(np.diag(c), np.diag(c)))
     return bool((np.abs(c - pattern) <= LIKE * size).all())
 
 
-def _beam(way: Floats, turning: Floats, stretching: float) -> Floats:
-    """(6, 6) cantilever along `way` from its compliances about the three axes and along it."""
+def _piece(way: Floats, compliance: Floats, count: int) -> Floats:
+    """(6, 6) of one of so many equal pieces of a cantilever along `way` that has this diagonal."""
     length, a = float(np.linalg.norm(way)), int(np.argmax(np.abs(way)))
-    b, c, sign = (a + 1) % 3, (a + 2) % 3, float(np.sign(way[a]))
-    out = np.zeros((6, 6))
-    out[a, a] = stretching
-    out[3:, 3:] = np.diag(turning)
-    out[b, b], out[c, c] = length**2 / 3 * turning[c], length**2 / 3 * turning[b]
-    out[b, 3 + c] = out[3 + c, b] = sign * length / 2 * turning[c]
-    out[c, 3 + b] = out[3 + b, c] = -sign * length / 2 * turning[b]
-    return out
+    along = "-" * bool(way[a] < 0) + "xyz"[a]
+    of = [a, *(3 + (a + k) % 3 for k in range(3))]  # along it, about it, about the axes that follow
+    with np.errstate(divide="ignore"):
+        products = length / np.diag(compliance)[of]
+    return cantilever_compliance(length / count, along, *products)
 
 
 def _pieces(offset: Offset, body: Body, spring: Spring, count: int) -> list[Element]:
     way = np.asarray(offset.nominal.p, dtype=float)
-    c, a = np.asarray(spring.compliance, dtype=float), int(np.argmax(np.abs(way)))
-    step = way / count
-    small = _beam(step, np.diag(c)[3:] / count, float(c[a, a]) / count)
-    length = float(np.linalg.norm(way))
+    small = _piece(way, np.asarray(spring.compliance, dtype=float), count)
+    step, length, a = way / count, float(np.linalg.norm(way)), int(np.argmax(np.abs(way)))
     move = replace(offset.nominal, translation=tuple(step.tolist()))
     inertia = np.array(body.inertia, dtype=float)
     spread = body.mass * length**2 / 12 * (1 - 1 / count**2)  # what the places along the bar make up for

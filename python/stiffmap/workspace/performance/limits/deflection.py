@@ -92,19 +92,18 @@ def worst_deflection(
     """
     force = magnitude(force, "force", "N")
     whole_number(turns, "turns", 0)
-    axes = (0, 1, 2) if plane is None else plane_axes(plane)
+    axes = [0, 1, 2] if plane is None else list(plane_axes(plane))
     loading = Loading(machine, rotation=rotation, gravity=gravity, threads=threads)
-    ask = _Ask(loading, force, axes, direction, linear, turns)
+    ask = _Ask(loading, force, plane, axes, direction, linear, turns)
     if position is not None:
         if box is not None:
             raise StiffmapError("worst_deflection: expected position or box, got both")
         p = trailing(position, (3,), "position", "positions (m)").reshape(-1, 3)
         if not len(p):
             raise StiffmapError("position: expected at least one, got none")
-        return _result(ask, p, *ask.at(p), plane)
+        return ask.worst(p)
     low, high = read_box(machine, box)
-    p = box_nodes(low, high, nodes)
-    out = _result(ask, p, *ask.at(p), plane)
+    out = ask.worst(box_nodes(low, high, nodes))
     return _refined(ask, out, low, high, nodes) if refine and direction is None else out
 
 
@@ -112,7 +111,8 @@ def worst_deflection(
 class _Ask:
     loading: Loading
     force: float
-    axes: tuple[int, ...]
+    plane: str | None
+    axes: list[int]
     direction: ArrayLike | None
     linear: bool
     turns: int
@@ -121,9 +121,20 @@ class _Ask:
         wrench = np.concatenate([self.force * unit, np.zeros_like(unit)], axis=1)
         return self.loading.solve(p, wrench, stiffness=stiffness)
 
-    def at(self, p: Floats) -> tuple[Floats, Floats, NDArray[np.uint8]]:
+    def worst(self, p: Floats) -> WorstDeflection:
+        """The largest deflection at poses (n, 3), and that of each."""
+        value, unit, status = self._at(p)
+        good = (status == Status.CONVERGED) & np.isfinite(value)
+        value, unit = np.where(good, value, np.nan), np.where(good[:, None], unit, np.nan)
+        i = int(np.argmax(value))  # the first that failed, if any did: NaN comes before all numbers
+        worst = float(value[i])
+        return WorstDeflection(
+            worst, p[i], unit[i], value, p, unit, status, self.force, self.plane, self.linear
+        )
+
+    def _at(self, p: Floats) -> tuple[Floats, Floats, NDArray[np.uint8]]:
         """Largest deflections, their directions and the status at poses (n, 3)."""
-        axes, unit = list(self.axes), np.zeros((len(p), 3))
+        axes, unit = self.axes, np.zeros((len(p), 3))
         start = self._solve(p, unit, stiffness=True)
         if self.direction is not None:
             unit = trailing(self.direction, (3,), "direction", "directions")
@@ -151,13 +162,13 @@ class _Ask:
         else:
             s = self._solve(p, unit, stiffness=False)
             d, status = s.displacement[:, :3], np.maximum(start.status, s.status)
-        return np.linalg.norm(d[:, list(self.axes)], axis=1), unit, status
+        return np.linalg.norm(d[:, self.axes], axis=1), unit, status
 
     def _turned(
         self, p: Floats, value: Floats, unit: Floats, status: NDArray[np.uint8]
     ) -> tuple[Floats, Floats, NDArray[np.uint8]]:
         """Turns each force to where the loaded compliance says that the deflection grows."""
-        axes = list(self.axes)
+        axes = self.axes
         for _ in range(self.turns):
             s = self._solve(p, unit, stiffness=True)
             d = s.displacement[:, axes]
@@ -176,16 +187,6 @@ class _Ask:
         return value, unit, status
 
 
-def _result(
-    ask: _Ask, p: Floats, value: Floats, unit: Floats, status: NDArray[np.uint8], plane: str | None
-) -> WorstDeflection:
-    good = (status == Status.CONVERGED) & np.isfinite(value)
-    value, unit = np.where(good, value, np.nan), np.where(good[:, None], unit, np.nan)
-    i = int(np.argmax(value))  # the first that failed, if any did: NaN comes before all numbers
-    worst = float(value[i])
-    return WorstDeflection(worst, p[i], unit[i], value, p, unit, status, ask.force, plane, ask.linear)
-
-
 def _refined(ask: _Ask, out: WorstDeflection, low: Floats, high: Floats, nodes: int) -> WorstDeflection:
     if not np.isfinite(out.value):
         return out
@@ -195,7 +196,7 @@ def _refined(ask: _Ask, out: WorstDeflection, low: Floats, high: Floats, nodes: 
     for _ in range(REFINEMENTS):
         h = h / 2
         p = np.unique(np.clip(at + around * h, low, high), axis=0)
-        tried = _result(ask, p, *ask.at(p), out.plane)
+        tried = ask.worst(p)
         if not tried.value <= best:
             best, at, unit = tried.value, tried.position, tried.direction
         if not np.isfinite(best):  # a pose of the box has no equilibrium

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
-from stiffmap.common.broadcasting import Floats, instance_of, one_of, real_array, real_number
+from stiffmap.common.broadcasting import Floats, instance_of, one_of, real_array, real_number, refused
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.rotations import as_rotations
 from stiffmap.model.description.machine import TASK
@@ -76,14 +76,10 @@ class Bounds:
         if self.rotation is not None:
             object.__setattr__(self, "rotation", as_rotations(real_array(self.rotation, "rotation")))
         if self.transmission is not None:
-            ends = real_array(self.transmission, "transmission", "(lowest, highest)")
-            if ends.shape != (2,):
-                raise StiffmapError(f"transmission: expected (lowest, highest), got {self.transmission!r}")
-            low, high = ends
-            if not 0 <= low < high:
-                raise StiffmapError(
-                    f"transmission: expected (lowest, highest) with 0 <= lowest < highest, got ({low}, {high})"
-                )
+            what = "(lowest, highest) with 0 <= lowest < highest"
+            ends = real_array(self.transmission, "transmission", what)
+            if ends.shape != (2,) or not 0 <= ends[0] < ends[1]:
+                raise refused("transmission", what, repr(self.transmission))
         one_of(self.norm, ("sphere", "cube"), "norm")
         if self.clearance is not None:
             magnitude(self.clearance, "clearance", "m")

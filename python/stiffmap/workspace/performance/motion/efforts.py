@@ -107,12 +107,6 @@ def drive_efforts(
                 f"{place_text(t.position[i], '.1f')}, t = {t.time[i]:.4g} s"
             )
     friction_effort = motion_friction(machine, out["rate"]) if friction else np.zeros_like(out["rate"])
-    return _dataset(machine, t, k, out, friction_effort)
-
-
-def _dataset(
-    machine: Machine, t: Trajectory, k: DriveKinematics, out: dict[str, Floats], friction_effort: Floats
-) -> xr.Dataset:
     effort = out["effort"] + friction_effort
     power = effort * out["rate"]
     span = t.time[-1] - t.time[0]
