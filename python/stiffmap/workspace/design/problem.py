@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from pydantic import Field
@@ -51,7 +51,7 @@ class VariableModel(FileModel):
 class SearchModel(FileModel):
     """How to search."""
 
-    method: str = "nsga2"
+    method: Literal["nsga2", "nsga3"] = "nsga2"
     population: int = Field(default=40, ge=4)
     generations: int = Field(default=30, ge=1)
     seed: int = 1

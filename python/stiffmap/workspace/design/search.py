@@ -266,14 +266,10 @@ def _algorithm(problem: DesignProblem, generations: int) -> Algorithm:
     task = Problem(**counts, xl=low_high[0], xu=low_high[1])
     if search.method == "nsga2":
         algorithm = NSGA2(pop_size=search.population)
-    elif search.method == "nsga3":
+    else:
         algorithm = NSGA3(
             ref_dirs=get_reference_directions("energy", goals, search.population, seed=search.seed),
             pop_size=search.population,
-        )
-    else:
-        raise StiffmapError(
-            f"{problem.file}: search.method: expected nsga2 or nsga3, found '{search.method}'"
         )
     algorithm.setup(task, termination=("n_gen", generations), seed=search.seed, verbose=False)
     return algorithm

@@ -116,7 +116,7 @@ class _Deflection:
             if first or not self.most[plane, c] >= value:
                 self.most[plane, c], self.place[plane, c] = value, place
 
-    def variables(self, name: str, percentiles: Floats) -> dict[str, object]:
+    def variables(self, name: str, percentiles: Floats) -> dict[str, xr.Variable]:
         """Variables of the Dataset."""
         p = self.plan
         iy, ix = np.divmod(self.place, p.x.size)
@@ -138,13 +138,8 @@ class _Deflection:
             "percentile_map": (("percentile", "case"), both.T, "m", f"percentiles {of} over the whole map"),
             "column_max": (("y", "x", "case"), self.column, "m", f"largest value {of} over z"),
         }
-        return {f"{name}_{n}": (*self._own(dims, v), meaning(*what)) for n, (dims, v, *what) in table.items()}
-
-    def _own(self, dims: tuple[str, ...], values: Floats) -> tuple[tuple[str, ...], Floats]:
-        """Without the dimension of the cases where the deflection has none."""
-        if self.case:
-            return dims, values
-        return tuple(d for d in dims if d != "case"), np.squeeze(values, axis=dims.index("case"))
+        made = {f"{name}_{n}": xr.Variable(dims, v, meaning(*what)) for n, (dims, v, *what) in table.items()}
+        return made if self.case else {n: v.isel(case=0) for n, v in made.items()}
 
 
 def cells(axis: Floats) -> Floats:

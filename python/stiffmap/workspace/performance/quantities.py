@@ -32,6 +32,14 @@ def quantity(value: object, unit: str) -> float:
     return read_value(text, unit)
 
 
+def positive(value: object, unit: str, what: str) -> float:
+    """The same of what must be above zero, by its name."""
+    number = quantity(value, unit)
+    if not number > 0:
+        raise StiffmapError(f"expected a positive {what}, found {value}")
+    return number
+
+
 @contextmanager
 def under(document: Document, file: str, *keys: str | int) -> Iterator[None]:
     """What is wrong with the value under these keys of a file is a `FileError` with its line."""
@@ -45,6 +53,7 @@ def under(document: Document, file: str, *keys: str | int) -> Iterator[None]:
 
 Length = Annotated[float, BeforeValidator(partial(quantity, unit="m"))]
 Force = Annotated[float, BeforeValidator(partial(quantity, unit="N"))]
-Time = Annotated[float, BeforeValidator(partial(quantity, unit="s"))]
-Speed = Annotated[float, BeforeValidator(partial(quantity, unit="m/s"))]
+PositiveLength = Annotated[float, BeforeValidator(partial(positive, unit="m", what="length"))]
+Duration = Annotated[float, BeforeValidator(partial(positive, unit="s", what="duration"))]
+Speed = Annotated[float, BeforeValidator(partial(positive, unit="m/s", what="speed"))]
 """Fields of a file's schema, written with a unit and read as SI values."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Literal
 
-from pydantic import BeforeValidator, Field
+from pydantic import Field
 
 from stiffmap.common.broadcasting import given_path
 from stiffmap.common.errors import FileError, StiffmapError
@@ -16,21 +16,10 @@ from stiffmap.common.yaml_text import Document, read
 from stiffmap.model.files.report import validated
 from stiffmap.model.files.schema.base import FileModel, Name
 from stiffmap.workspace.performance.motion.motion_files import given_or_shipped, near_or_shipped
-from stiffmap.workspace.performance.quantities import Force, Length, quantity, under
+from stiffmap.workspace.performance.quantities import Force, Length, PositiveLength, quantity, under
 from stiffmap.workspace.performance.registry import get_measure
 
 Written = str | float | int
-
-
-def positive_length(value: object) -> float:
-    """m, of a text with its unit."""
-    length = quantity(value, "m")
-    if length <= 0:
-        raise StiffmapError(f"expected a positive length, found {value}")
-    return length
-
-
-PositiveLength = Annotated[float, BeforeValidator(positive_length)]
 
 
 class RequiredBoxModel(FileModel):

@@ -30,7 +30,7 @@ from stiffmap.workspace.performance.motion.trajectory import (
     timed,
     way_along,
 )
-from stiffmap.workspace.performance.quantities import Force, Length, Speed, Time, under
+from stiffmap.workspace.performance.quantities import Duration, Force, Length, Speed, under
 
 LEAST_ROWS = 6  # of a table over time: its spline of degree 5 wants that many
 
@@ -58,7 +58,7 @@ class MotionFile(FileModel):
     circle: CircleModel | None = None
     points: list[list[Length]] | None = None
     samples: int = Field(default=401, ge=5)
-    duration: Time | None = None
+    duration: Duration | None = None
     speed: Speed | None = None
     force: list[Force] = Field(default=[0.0, 0.0, 0.0], min_length=3, max_length=3)
 
@@ -159,9 +159,6 @@ def _described(document: Document, file: str) -> Motion:
             path = circle(m.circle.centre, m.circle.radius, m.circle.plane, m.samples)
         else:
             path = through(m.points or [], m.samples)
-    for name, value in (("duration", m.duration), ("speed", m.speed)):
-        if value is not None and not value > 0:
-            raise FileError(f"expected a positive {name}", file=file, line=document.line((name,)), key=name)
     speed = np.inf if m.speed is None else m.speed
     return Motion(m.name, path, None, m.duration, speed, np.array(m.force))
 
