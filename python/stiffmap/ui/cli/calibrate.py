@@ -4,7 +4,6 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 
-from stiffmap.common.outputs import write_rows
 from stiffmap.common.outputs.option import written
 from stiffmap.identification.calibration import Calibration, calibrate
 from stiffmap.identification.inference.travel import Profile
@@ -53,9 +52,8 @@ def write(result: Calibration, folder: Path) -> None:
     """All files of a calibration; raises `FileError` where the folder cannot be written."""
     text = "\n".join([*result.lines(), "", *result.table()]) + "\n"
     contents = {"calibration.json": result.as_plain(), "table.txt": text, "machine.yaml": result.machine}
-    write_files(folder, contents.items())
-    if result.profiles:
-        write_rows(folder / "travel.csv", *profiles(result.profiles))
+    travel = {"travel.csv": profiles(result.profiles)} if result.profiles else {}
+    write_files(folder, (contents | travel).items())
 
 
 def profiles(found: Sequence[Profile]) -> tuple[list[str], list[list[str]]]:

@@ -13,7 +13,7 @@ from rich.text import Text
 from rich.tree import Tree
 
 from stiffmap.common.json_text import json_text
-from stiffmap.common.outputs import make_folder, write_text, writing
+from stiffmap.common.outputs import make_folder, write_rows, write_text, writing
 
 if TYPE_CHECKING:
     import numpy as np
@@ -45,7 +45,8 @@ def show(as_json: bool, data: Any, told: Iterable[Any], files: Iterable[str | Pa
 
 
 def write_files(folder: Path | None, contents: Iterable[tuple[str, Any]]) -> list[Path]:
-    """Write named datasets (.nc), data (.json), machines (.yaml), texts, bytes and figures, each of them made when its turn comes; no folder: nothing."""
+    """Write named datasets (.nc), data (.json), machines (.yaml), tables (.csv: head and rows), texts, bytes and figures, each of them made
+    when its turn comes; no folder: nothing."""
     if folder is None:
         return []
     return [_written(make_folder(folder) / name, content) for name, content in contents]
@@ -59,6 +60,9 @@ def _written(path: Path, content: Any) -> Path:
     if isinstance(content, bytes):
         with writing(path) as fresh:
             fresh.write_bytes(content)
+        return path
+    if path.suffix == ".csv":
+        write_rows(path, *content)
         return path
     if path.suffix == ".nc":
         from stiffmap.workspace.maps.files import write_dataset
