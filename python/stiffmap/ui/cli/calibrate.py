@@ -4,14 +4,12 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 
-from stiffmap.common.outputs.option import written
 from stiffmap.identification.calibration import Calibration, calibrate
 from stiffmap.identification.inference.travel import Profile
 from stiffmap.identification.numbers import Tolerances
 from stiffmap.ui.cli import options
-from stiffmap.ui.cli.inputs import finish
-from stiffmap.ui.cli.options import option
-from stiffmap.ui.cli.output import show, write_files
+from stiffmap.ui.cli.options import option, written
+from stiffmap.ui.cli.output import Answer, write_files
 
 
 def command(
@@ -24,8 +22,7 @@ def command(
     rows: int = option("Unknowns to list.", 20),
     seed: int = option("Seed of the folds.", 0),
     threads: options.Threads = None,
-    as_json: options.Json = False,
-) -> None:
+) -> Answer:
     """All uncertain numbers of a machine from readings at once, and which of them the readings can determine.
 
     Exit codes: 0 as declared or within tolerance, 1 beyond tolerance or unattributed, 2 bad input.
@@ -44,8 +41,8 @@ def command(
     more = len(result.rows) - (len(table) - 1)
     if more:
         table.append(f"… {more} more, which the readings determine less well (--rows {len(result.rows)})")
-    show(as_json, result.as_plain(), [*result.lines(), "", *table])
-    finish(result.verdict not in ("as declared", "adjusted within tolerance"))
+    beyond = result.verdict not in ("as declared", "adjusted within tolerance")
+    return Answer(result.as_plain(), [*result.lines(), "", *table], finding=beyond)
 
 
 def write(result: Calibration, folder: Path) -> None:

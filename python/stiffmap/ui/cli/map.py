@@ -14,15 +14,14 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import length_text, place_text
 from stiffmap.common.outputs import make_folder
-from stiffmap.common.outputs.option import written
 from stiffmap.solve.kinematics import must_take
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.status import Status
 from stiffmap.ui.cli import options
-from stiffmap.ui.cli.inputs import MM, finish, force_given, gravity, machine_with, refuse_unused
+from stiffmap.ui.cli.inputs import MM, force_given, gravity, machine_with, refuse_unused
 from stiffmap.ui.cli.map_summary import MapSummary, assumptions, write_map_files
-from stiffmap.ui.cli.options import flag, option
-from stiffmap.ui.cli.output import failed_in_words, show, table, write_files
+from stiffmap.ui.cli.options import flag, option, written
+from stiffmap.ui.cli.output import Answer, failed_in_words, table, write_files
 from stiffmap.workspace.maps.inputs import magnitude, plane_axes
 from stiffmap.workspace.maps.statistics import statistics_rows
 
@@ -71,7 +70,7 @@ def command(
     method: options.Method = "fast",
     threads: options.Threads = None,
     as_json: options.Json = False,
-) -> None:
+) -> Answer:
     """Error maps of z-planes: how far a force in the plane pushes the tool off its commanded position.
 
     The default is the paper's Figure 7: 300 N, z = -200, 0 and 300 mm over the whole xy workspace,
@@ -101,27 +100,23 @@ def command(
     m = machine_with(machine, effect)
     how: dict[str, Any] = {"gravity": gravity(gravity_), "method": method, "threads": threads}
     if toolpath is not None:
-        map_toolpath(m, toolpath, force, how, output, kinds, as_json)
-        return
+        return map_toolpath(m, toolpath, force, how, output, kinds)
     call: dict[str, Any] = {
         **planes({"x": x, "y": y, "z": z}), **how, "points": points, "wrench": cases(plane, force), "plane": plane,
         "directions": directions, "tolerance": MM * tolerance, "compliance": compliance, "uncertainty": uncertainty,
     }  # fmt: skip
     if estimate:
         found = stiffmap.map_estimate(m, **call)
-        show(as_json, vars(found), [str(found)])
-        return
+        return Answer(vars(found), [str(found)])
     given = assumptions(context, force, tolerance)
     call |= {"scheduler": scheduler, "progress": False if as_json else None}
     if statistics:
-        show_statistics(m, stiffmap.map_statistics(m, **call), plane, given, as_json)
-        return
+        return whole_map(m, stiffmap.map_statistics(m, **call), plane, given)
     target = make_folder(output) / ("map.zarr" if zarr else "map.nc")
     ds = stiffmap.error_map(m, **call, out=target, resume=resume).load()
     result = MapSummary(m, ds, plane, MM * tolerance, given, how["gravity"], uncertainty)
     files = [target, *write_map_files(result, output, kinds, sheets, own_scales)]
-    show(as_json, result.as_plain(files), result.lines(), files)
-    finish(bool(result.failed))
+    return Answer(result.as_plain(files), result.lines(), files, finding=bool(result.failed))
 
 
 def planes(across: dict[str, list[float] | None]) -> dict[str, Any]:
@@ -150,15 +145,14 @@ def cases(plane: str, text: str) -> dict[str, list[float]]:
     return {f"F{'xyz'[i]}": [size if k == i else 0.0 for k in range(6)] for i in plane_axes(plane)}
 
 
-def show_statistics(machine: Machine, ds: xr.Dataset, plane: str, given: str, as_json: bool) -> None:
-    """Figures of a map that is not stored; exits with 1 where poses failed."""
+def whole_map(machine: Machine, ds: xr.Dataset, plane: str, given: str) -> Answer:
+    """Figures of a map that is not stored."""
     rows = statistics_rows(ds, plane)
     counts = {s.name: int(ds.status_count.sel(status=int(s)).sum()) for s in Status if s}
     failed = {name: count for name, count in counts.items() if count}
     lost = failed_in_words(failed, "solves of the load cases")
     data = {"machine": machine.name, "rows": rows, "failed": failed}
-    show(as_json, data, [given, _statistics_table(ds, rows), *lost])
-    finish(bool(failed))
+    return Answer(data, [given, _statistics_table(ds, rows), *lost], finding=bool(failed))
 
 
 def _statistics_table(ds: xr.Dataset, rows: list[dict[str, Any]]) -> Table:
@@ -177,15 +171,9 @@ def _statistics_table(ds: xr.Dataset, rows: list[dict[str, Any]]) -> Table:
 
 
 def map_toolpath(
-    m: Machine,
-    toolpath: str,
-    force: str,
-    how: dict[str, Any],
-    output: Path,
-    pictures: list[str],
-    as_json: bool,
-) -> None:
-    """Solve along the path, print the worst place, write table, data and pictures."""
+    m: Machine, toolpath: str, force: str, how: dict[str, Any], output: Path, pictures: list[str]
+) -> Answer:
+    """Solve along the path: its worst place; table, data and pictures are written."""
     from stiffmap.workspace.performance import load_motion
     from stiffmap.workspace.performance.motion.trajectory import way_along
 
@@ -210,8 +198,7 @@ def map_toolpath(
         )
     lost = f"{failed} of {len(way)} poses failed: {s.count()}" if failed else None
     data = {"machine": m.name, "poses": len(way), "failed": failed, "worst": worst}
-    show(as_json, data, [told, lost], files)
-    finish(failed > 0)
+    return Answer(data, [told, lost], files, finding=failed > 0)
 
 
 def _load(m: Machine, position: Floats, force: str, how: dict[str, Any]) -> Floats:

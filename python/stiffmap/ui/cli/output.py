@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rich import box
 from rich.console import Console
@@ -28,11 +28,22 @@ MEANINGS = {
 }
 
 
-def show(as_json: bool, data: Any, told: Iterable[Any], files: Iterable[str | Path] | None = None) -> None:
-    """A result as one document of JSON, with the files written, or as lines and tables for the terminal.
+class Answer(NamedTuple):
+    """What a command found."""
 
-    Text is shown as it is, without markup and never broken; None: nothing.
-    """
+    data: Any
+    """For JSON."""
+    told: Iterable[Any]
+    """Lines and tables for the terminal; None: nothing."""
+    files: Iterable[str | Path] | None = None
+    """That were written; they are part of the JSON as well."""
+    finding: bool = False
+    """Whether there is something to act on: exit code 1."""
+
+
+def show(as_json: bool, answer: Answer) -> None:
+    """One document of JSON, or lines and tables for the terminal: text as it is, without markup and never broken."""
+    data, told, files, _ = answer
     if as_json:
         text = json_text(data if files is None else {**data, "files": files})
         print(text, flush=True)  # a program that reads a pipe waits for it
