@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import wraps
 from importlib import import_module
-from importlib.util import find_spec
 from inspect import Parameter, Signature, signature
 from types import SimpleNamespace
 from typing import Any, NamedTuple, cast
@@ -21,19 +20,11 @@ from stiffmap.ui.cli.options import Json
 
 
 class Command(NamedTuple):
-    """Name on the command line, module and function behind it, and the line in ``stiffmap --help``."""
+    """Name on the command line, the module whose function ``command`` it is, and the line in ``stiffmap --help``."""
 
     name: str
     module: str
-    function: str
     summary: str
-
-    def exists(self) -> bool:
-        """Whether this installation has the module (it is not imported)."""
-        try:
-            return find_spec(self.module) is not None
-        except ModuleNotFoundError:
-            return False
 
 
 SUMMARIES = {
@@ -70,7 +61,7 @@ SUMMARIES = {
     "bench": "Speed of this installation on this computer.",
 }
 COMMANDS = tuple(
-    Command(name, f"stiffmap.ui.cli.{'importing' if name == 'import' else name}", "command", summary)
+    Command(name, f"stiffmap.ui.cli.{'importing' if name == 'import' else name}", summary)
     for name, summary in SUMMARIES.items()
 )  # `import` is a word of Python's own
 
@@ -87,7 +78,7 @@ def load(command: Command) -> Callable[..., Any]:
     A function that does something else under ``--json`` has the option itself.
     """
     with _all_installed(command), imports_wait():
-        function: Callable[..., Any] = getattr(import_module(command.module), command.function)
+        function: Callable[..., Any] = import_module(command.module).command
     parameters = dict(signature(function, eval_str=True).parameters)
     own = "as_json" in parameters
     parameters.setdefault(

@@ -7,13 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from matplotlib.collections import PatchCollection, QuadMesh
+from matplotlib.collections import PolyQuadMesh, QuadMesh
 from matplotlib.contour import QuadContourSet
 from matplotlib.figure import Figure
 
 import stiffmap as sm
 from stiffmap import plot
-from stiffmap.ui.plot.planes import edges
 from stiffmap.ui.plot.skeleton import skeleton
 
 
@@ -52,7 +51,7 @@ def test_failed_cells_are_hatched_not_coloured(machine: sm.Machine) -> None:
     figure = plot.map_figure(ds)
     missing = int(np.isnan(ds.worst_deflection_xy).sum())
     assert missing > 0
-    hatched = [c for c in figure.axes[0].collections if isinstance(c, PatchCollection)]
+    hatched = [c for c in figure.axes[0].collections if isinstance(c, PolyQuadMesh)]
     assert sum(len(c.get_paths()) for c in hatched) == missing
     mesh = next(c for c in figure.axes[0].collections if isinstance(c, QuadMesh))
     assert int(np.ma.getmaskarray(mesh.get_array()).sum()) == missing
@@ -119,11 +118,6 @@ def test_saving(machine: sm.Machine, tmp_path: Path) -> None:
         plot.save(figure, tmp_path / "nowhere" / "a.png")
     with pytest.raises(sm.StiffmapError, match="not supported"):
         plot.save(figure, tmp_path / "a.xyz")
-
-
-def test_edges_surround_the_centres() -> None:
-    np.testing.assert_allclose(edges(np.array([0.0, 1.0, 3.0])), [-0.5, 0.5, 2.0, 4.0])
-    np.testing.assert_allclose(edges(np.array([2.0])), [1.5, 2.5])
 
 
 def test_every_figure_shows_in_a_notebook_without_pyplot(monkeypatch: pytest.MonkeyPatch) -> None:
