@@ -105,7 +105,7 @@ def toolpath_figure(ds: xr.Dataset, name: str) -> Figure:
     """Deflection and its components over the way."""
     with paper(6.4, 3.4, f"{name}: deflection along the toolpath") as figure:
         ax: Any = figure.subplots()
-        way = ds.way.values / MM
+        way = MM * ds.way.values
         unit, factor = length_unit(float(np.nanmax(ds.deflection.values, initial=0.0)))
         ax.plot(way, factor * ds.deflection.values, color=BLACK, lw=1.6, label="|d|")
         for i, axis in enumerate("xyz"):

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 
 import stiffmap as sm
 from stiffmap import plot
+from stiffmap.ui.plot.paths import toolpath_figure
 from stiffmap.ui.plot.skeleton import skeleton
 
 
@@ -118,6 +119,15 @@ def test_saving(machine: sm.Machine, tmp_path: Path) -> None:
         plot.save(figure, tmp_path / "nowhere" / "a.png")
     with pytest.raises(sm.StiffmapError, match="not supported"):
         plot.save(figure, tmp_path / "a.xyz")
+
+
+def test_a_toolpath_is_drawn_over_its_way_in_mm(machine: sm.Machine) -> None:
+    way = np.array([0.0, 0.1, 0.2])
+    position = way[:, None] * [1.0, 0.0, 0.0]
+    solved = machine.solve(position, [300.0, 0, 0, 0, 0, 0])
+    ax = toolpath_figure(solved.to_xarray(("way",), {"way": ("way", way)}), "it").axes[0]
+    np.testing.assert_allclose(ax.lines[0].get_xdata(), [0.0, 100.0, 200.0])
+    assert ax.get_xlabel() == "way along the path, mm"
 
 
 def test_every_figure_shows_in_a_notebook_without_pyplot(monkeypatch: pytest.MonkeyPatch) -> None:
