@@ -86,7 +86,7 @@ def test_every_output_of_a_command_is_reserved_before_it_computes() -> None:
     """Options that hold a path to write have the callback of `written`."""
     missing, seen = [], 0
     for command in COMMANDS:
-        function = getattr(import_module(command.module), command.function)
+        function = import_module(command.module).command
         for name, parameter in signature(function, eval_str=True).parameters.items():
             option = next(
                 (

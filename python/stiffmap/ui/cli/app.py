@@ -102,7 +102,7 @@ def build_app(arguments: Sequence[str]) -> typer.Typer:
         help=flowed(HELP), no_args_is_help=True, rich_markup_mode="rich", pretty_exceptions_enable=False
     )
     app.callback()(_root)
-    for command in (c for c in COMMANDS if c.exists()):
+    for command in COMMANDS:
         if command.name == wanted:
             function = load(command)
             app.command(command.name, help=flowed(getdoc(function) or ""))(function)

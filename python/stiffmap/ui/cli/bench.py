@@ -11,9 +11,8 @@ import numpy as np
 from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.compiled import kernel_levels
 from stiffmap.solve.machine import Machine, load_machine
-from stiffmap.ui.cli import options
 from stiffmap.ui.cli.options import option
-from stiffmap.ui.cli.output import show, table
+from stiffmap.ui.cli.output import Answer, table
 
 MACHINES = ("tripteron", "orthoglide-revised")
 FORCE = 300.0  # N, along z
@@ -30,8 +29,7 @@ class BenchCase(NamedTuple):
 
 def command(
     rounds: int = option("Measurements of each case; the median is shown.", 7),
-    as_json: options.Json = False,
-) -> None:
+) -> Answer:
     """Speed of this installation on this computer, in less than a minute.
 
     Times per pose with all answers (displacement, stiffness, efforts, leg wrenches) on one thread, cases in
@@ -49,7 +47,7 @@ def command(
     title = f"instruction set {level}, median of {rounds}"
     words = [(line.case, f"{line.value:.3g}", line.unit) for line in lines]
     data = {"instruction_set": level, "rounds": rounds, "cases": [line._asdict() for line in lines]}
-    show(as_json, data, [table(title, ("case", "value", "unit"), words, left=("case", "unit"))])
+    return Answer(data, [table(title, ("case", "value", "unit"), words, left=("case", "unit"))])
 
 
 def machine_lines(machine: Machine, rounds: int) -> list[BenchCase]:

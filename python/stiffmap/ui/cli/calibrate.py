@@ -4,15 +4,12 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 
-from stiffmap.common.outputs import write_rows
-from stiffmap.common.outputs.option import written
 from stiffmap.identification.calibration import Calibration, calibrate
 from stiffmap.identification.inference.travel import Profile
 from stiffmap.identification.numbers import Tolerances
 from stiffmap.ui.cli import options
-from stiffmap.ui.cli.inputs import finish
-from stiffmap.ui.cli.options import option
-from stiffmap.ui.cli.output import show, write_files
+from stiffmap.ui.cli.options import option, written
+from stiffmap.ui.cli.output import Answer, write_files
 
 
 def command(
@@ -25,8 +22,7 @@ def command(
     rows: int = option("Unknowns to list.", 20),
     seed: int = option("Seed of the folds.", 0),
     threads: options.Threads = None,
-    as_json: options.Json = False,
-) -> None:
+) -> Answer:
     """All uncertain numbers of a machine from readings at once, and which of them the readings can determine.
 
     Exit codes: 0 as declared or within tolerance, 1 beyond tolerance or unattributed, 2 bad input.
@@ -45,17 +41,16 @@ def command(
     more = len(result.rows) - (len(table) - 1)
     if more:
         table.append(f"… {more} more, which the readings determine less well (--rows {len(result.rows)})")
-    show(as_json, result.as_plain(), [*result.lines(), "", *table])
-    finish(result.verdict not in ("as declared", "adjusted within tolerance"))
+    beyond = result.verdict not in ("as declared", "adjusted within tolerance")
+    return Answer(result.as_plain(), [*result.lines(), "", *table], finding=beyond)
 
 
 def write(result: Calibration, folder: Path) -> None:
     """All files of a calibration; raises `FileError` where the folder cannot be written."""
     text = "\n".join([*result.lines(), "", *result.table()]) + "\n"
     contents = {"calibration.json": result.as_plain(), "table.txt": text, "machine.yaml": result.machine}
-    write_files(folder, contents.items())
-    if result.profiles:
-        write_rows(folder / "travel.csv", *profiles(result.profiles))
+    travel = {"travel.csv": profiles(result.profiles)} if result.profiles else {}
+    write_files(folder, (contents | travel).items())
 
 
 def profiles(found: Sequence[Profile]) -> tuple[list[str], list[list[str]]]:

@@ -3,16 +3,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
-import typer
 from rich.text import Text
 
 from stiffmap.model.home import ENOUGH, gap_text
 from stiffmap.solve.advice import FileCheck, advice, check_file
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.trial import tried
-from stiffmap.ui.cli import options
 from stiffmap.ui.cli.options import argument, flag
-from stiffmap.ui.cli.output import show
+from stiffmap.ui.cli.output import Answer
 
 MOST_CHANGES = 12
 
@@ -20,8 +18,7 @@ MOST_CHANGES = 12
 def command(
     file: str = argument("Machine file, or the name of a shipped machine."),
     strict: bool = flag("Exit with 1 where there are warnings.", "--strict"),
-    as_json: options.Json = False,
-) -> None:
+) -> Answer:
     """Validate a machine file and look it over: keys, units, home, free motions, reach, odd numbers.
 
     Exit codes: 0 usable, 1 usable with warnings (--strict), 2 not usable.
@@ -33,9 +30,7 @@ def command(
     """
     found = check_file(file)
     result = replace(found, warnings=[*found.warnings, *advice(Machine(found.description), file)])
-    show(as_json, result.as_plain(), _lines(result))
-    if strict and result.warnings:
-        raise typer.Exit(1)
+    return Answer(result.as_plain(), _lines(result), finding=strict and bool(result.warnings))
 
 
 def _lines(result: FileCheck) -> Iterator[str | Text]:

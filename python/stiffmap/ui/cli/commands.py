@@ -9,27 +9,22 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import wraps
 from importlib import import_module
-from importlib.util import find_spec
+from inspect import Parameter, Signature, signature
 from types import SimpleNamespace
 from typing import Any, NamedTuple, cast
 
+import typer
+
 from stiffmap.common.errors import MissingPartError
+from stiffmap.ui.cli.options import Json
 
 
 class Command(NamedTuple):
-    """Name on the command line, module and function behind it, and the line in ``stiffmap --help``."""
+    """Name on the command line, the module whose function ``command`` it is, and the line in ``stiffmap --help``."""
 
     name: str
     module: str
-    function: str
     summary: str
-
-    def exists(self) -> bool:
-        """Whether this installation has the module (it is not imported)."""
-        try:
-            return find_spec(self.module) is not None
-        except ModuleNotFoundError:
-            return False
 
 
 SUMMARIES = {
@@ -66,7 +61,7 @@ SUMMARIES = {
     "bench": "Speed of this installation on this computer.",
 }
 COMMANDS = tuple(
-    Command(name, f"stiffmap.ui.cli.{'importing' if name == 'import' else name}", "command", summary)
+    Command(name, f"stiffmap.ui.cli.{'importing' if name == 'import' else name}", summary)
     for name, summary in SUMMARIES.items()
 )  # `import` is a word of Python's own
 
@@ -77,16 +72,32 @@ _waiting: list[dict[str, Any]] = []
 
 
 def load(command: Command) -> Callable[..., Any]:
-    """A command's function, which imports what it needs when it is called; raises `MissingPartError` for what is not installed."""
+    """A command's function with the option ``--json``: it imports what it needs when it is called, shows the answer and exits with
+    1 where that is a finding; raises `MissingPartError` for what is not installed.
+
+    A function that does something else under ``--json`` has the option itself.
+    """
     with _all_installed(command), imports_wait():
-        function: Callable[..., Any] = getattr(import_module(command.module), command.function)
+        function: Callable[..., Any] = import_module(command.module).command
+    parameters = dict(signature(function, eval_str=True).parameters)
+    own = "as_json" in parameters
+    parameters.setdefault(
+        "as_json", Parameter("as_json", Parameter.KEYWORD_ONLY, default=False, annotation=Json)
+    )
 
     @wraps(function)
-    def called(*args: object, **options: object) -> None:
+    def called(as_json: bool, **given: object) -> None:
+        from stiffmap.ui.cli.output import show
+
         with _all_installed(command):
             import_all()
-        function(*args, **options)
+        answer = function(**given, as_json=as_json) if own else function(**given)
+        if answer is not None:  # else the command has shown it
+            show(as_json, answer)
+            raise typer.Exit(int(answer.finding))
 
+    called.__signature__ = Signature([*parameters.values()])  # type: ignore[attr-defined]
+    called.__annotations__ = {name: p.annotation for name, p in parameters.items()}
     return called
 
 
@@ -103,32 +114,19 @@ def _all_installed(command: Command) -> Iterator[None]:
         raise MissingPartError(f"'stiffmap {command.name}' needs {missing}, {advice}") from error
 
 
-class _Waits:
-    """A module, or a name in one, that is imported when something is done with it."""
+class _Waits(NamedTuple):
+    """Stands for a module, or a name in one, until it is imported: nothing can be done with it before."""
 
-    def __init__(self, module: str, name: str | None = None) -> None:
-        self._of = (module, name)
+    module: str
+    name: str | None = None
 
-    def __getattr__(self, name: str) -> Any:
-        return getattr(imported(self), name)
-
-    def __call__(self, *args: object, **options: object) -> Any:
-        return imported(self)(*args, **options)
-
-    def __getitem__(self, key: object) -> Any:
-        return imported(self)[key]
-
-    def __iter__(self) -> Iterator[Any]:
-        return iter(imported(self))
-
-
-def imported(waits: _Waits) -> Any:
-    """What has waited, imported now."""
-    module, name = waits._of
-    home = import_module(module)
-    if name is None:
-        return home
-    return getattr(home, name) if hasattr(home, name) else import_module(f"{module}.{name}")
+    def imported(self) -> Any:
+        """What it stands for."""
+        module, name = self
+        home = import_module(module)
+        if name is None:
+            return home
+        return getattr(home, name) if hasattr(home, name) else import_module(f"{module}.{name}")
 
 
 def import_all() -> None:
@@ -137,7 +135,7 @@ def import_all() -> None:
         names = _waiting[-1]
         for key, value in list(names.items()):
             if isinstance(value, _Waits):
-                names[key] = imported(value)
+                names[key] = value.imported()
         _waiting.pop()
 
 
@@ -145,8 +143,7 @@ def import_all() -> None:
 def imports_wait() -> Iterator[None]:
     """Inside, modules of commands get stand-ins for numerics and for what lies below the user interface.
 
-    A stand-in that is used, as in the declaration of an option, is imported at once; modules that are loaded already are
-    no stand-ins.
+    A module that is loaded already needs none.
     """
     usual = builtins.__import__
 

@@ -7,16 +7,15 @@ import numpy as np
 import typer
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.outputs.option import written
 from stiffmap.common.short import first_of
 from stiffmap.experiment.comparison.residual import Summary
 from stiffmap.machining import compensation
 from stiffmap.solve.machine import Machine
 from stiffmap.ui.cli import options
-from stiffmap.ui.cli.inputs import finish, flags_of, in_si, machine_with, numbers, options_given
+from stiffmap.ui.cli.inputs import flags_of, in_si, machine_with, numbers, options_given
 from stiffmap.ui.cli.inputs import gravity as gravity_of
-from stiffmap.ui.cli.options import argument, option
-from stiffmap.ui.cli.output import show
+from stiffmap.ui.cli.options import argument, option, written
+from stiffmap.ui.cli.output import Answer
 
 MM = 1e3
 WORSE = "worse: these commands would enlarge the error of these readings; the file does not hold where they were taken"
@@ -50,8 +49,7 @@ def command(
     check: Path | None = option(
         "Readings that no fit saw: the error before, and what compensation would leave."
     ),
-    as_json: options.Json = False,
-) -> None:
+) -> Answer:
     """Commands at which a deflected machine with errors stands where it is wanted.
 
     The machine is the corrected one: what its controller believes, with the effects that a diagnosis found. Weight,
@@ -98,8 +96,8 @@ def command(
         if poses is not None:
             out |= _commands(compensation.compensate(m, poses, wrench=load, gravity=pull), output)
         out |= {} if check is None else _checked(m, check)
-    show(as_json, out, (f"{key}: {value}" for key, value in out.items()))
-    finish(out.get("verdict") == WORSE)
+    lines = (f"{key}: {value}" for key, value in out.items())
+    return Answer(out, lines, finding=out.get("verdict") == WORSE)
 
 
 def _checked(m: Machine, folder: Path) -> dict[str, object]:

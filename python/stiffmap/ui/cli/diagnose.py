@@ -8,14 +8,13 @@ from pathlib import Path
 import typer
 
 from stiffmap.common.outputs import make_folder, write_picture, write_text
-from stiffmap.common.outputs.option import written
 from stiffmap.identification.diagnosis import Diagnosis, diagnose
 from stiffmap.identification.diagnosis.report.sentences import next_step
 from stiffmap.identification.numbers import Tolerances
 from stiffmap.ui.cli import options
-from stiffmap.ui.cli.inputs import finish, refuse_unused
-from stiffmap.ui.cli.options import flag, option
-from stiffmap.ui.cli.output import show
+from stiffmap.ui.cli.inputs import refuse_unused
+from stiffmap.ui.cli.options import flag, option, written
+from stiffmap.ui.cli.output import Answer
 
 
 def command(
@@ -31,7 +30,7 @@ def command(
     date: str | None = option("Date that the report bears, as you write it."),
     quiet: bool = flag("Say nothing of what is being tried.", "--quiet"),
     as_json: options.Json = False,
-) -> None:
+) -> Answer:
     """Which physical effect a machine lacks, where it sits, how large it is, and how sure that is.
 
     With -o: diagnosis.json (SI), report.html (all inside), machine.yaml (corrected), pictures.
@@ -53,8 +52,8 @@ def command(
     if output is not None:
         write(result, output, date, [p for p in (Path(machine), Path(data)) if p.exists()])
     wrote = None if output is None else f"wrote {output}: start with report.html"
-    show(as_json, result.as_plain(), [str(result), f"next: {next_step(result)}", wrote])
-    finish(result.verdict != "none")
+    lines = [str(result), f"next: {next_step(result)}", wrote]
+    return Answer(result.as_plain(), lines, finding=result.verdict != "none")
 
 
 def write(result: Diagnosis, folder: Path, date: str | None = None, inputs: Sequence[Path] = ()) -> None:

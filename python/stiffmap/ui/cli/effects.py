@@ -9,9 +9,8 @@ from stiffmap.model.effects import EffectType, get, kinds
 from stiffmap.model.effects.registry import found_by
 from stiffmap.model.files.shipped import machine_names
 from stiffmap.solve.machine import Machine, load_machine
-from stiffmap.ui.cli import options
 from stiffmap.ui.cli.options import argument, option
-from stiffmap.ui.cli.output import show
+from stiffmap.ui.cli.output import Answer
 
 
 def command(
@@ -21,8 +20,7 @@ def command(
         None,
     ),
     on: str | None = option("Machine: the elements and legs where each can be."),
-    as_json: options.Json = False,
-) -> None:
+) -> Answer:
     """List the effects that a machine can have beyond what is declared, for --effect and with_effect.
 
     Examples:
@@ -39,7 +37,7 @@ def command(
     else:
         chosen = [get(kind)] if kind else [get(k) for k in kinds()]
     told = [line for e in chosen for line in _lines(e, machine)]
-    show(as_json, [_plain(e, machine) for e in chosen], [*told, *(_definition(chosen[0]) if kind else ())])
+    return Answer([_plain(e, machine) for e in chosen], [*told, *(_definition(chosen[0]) if kind else ())])
 
 
 def _lines(effect: EffectType, machine: Machine | None) -> Iterator[str | Text]:

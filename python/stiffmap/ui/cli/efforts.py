@@ -9,9 +9,9 @@ import xarray as xr
 from rich.table import Table
 
 from stiffmap.ui.cli import options
-from stiffmap.ui.cli.inputs import MM, finish, gravity, in_si, machine_with
+from stiffmap.ui.cli.inputs import MM, gravity, in_si, machine_with
 from stiffmap.ui.cli.options import argument, option
-from stiffmap.ui.cli.output import show, table, write_files
+from stiffmap.ui.cli.output import Answer, table, write_files
 from stiffmap.workspace.performance import drive_efforts, load_motion
 
 
@@ -29,8 +29,7 @@ def command(
     gravity_: options.Gravity = None,
     output: options.Folder = None,
     threads: options.Threads = None,
-    as_json: options.Json = False,
-) -> None:
+) -> Answer:
     """Efforts, speeds and powers of the drives along a motion of the tool: inverse dynamics of the closed machine.
 
     A CSV table has columns such as x [mm], y [mm], z [mm]; with t [s] a motion over time, with feed [mm/min] a path at this
@@ -56,8 +55,8 @@ def command(
     names = ("peak_effort", "rms_effort", "effort_margin", "peak_speed", "speed_margin", "peak_power",
              "range_margin")  # fmt: skip
     data = {"machine": m.name, "time": found.time.values[-1], "drives": list(map(str, found.drive.values))}
-    show(as_json, data | {n: found[n].values for n in names}, [as_table(found)], files)
-    finish(bool(exceeded(found).any()))
+    data |= {n: found[n].values for n in names}
+    return Answer(data, [as_table(found)], files, finding=bool(exceeded(found).any()))
 
 
 def exceeded(found: xr.Dataset) -> np.ndarray:

@@ -13,14 +13,13 @@ import typer
 from rich.text import Text
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.outputs.option import written
 from stiffmap.experiment.noise.level import unknown
 from stiffmap.experiment.spreadsheet.dh import ASSUMED
 from stiffmap.experiment.spreadsheet.from_table import FromTable, experiment_from_table
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import numbers, options_given, pairs, refuse_unused
-from stiffmap.ui.cli.options import argument, flag, option
-from stiffmap.ui.cli.output import show
+from stiffmap.ui.cli.options import argument, flag, option, written
+from stiffmap.ui.cli.output import Answer
 from stiffmap.ui.cli.output import table as table_of
 
 
@@ -65,8 +64,7 @@ def command(
     ),
     dialogue: bool = flag("Ask what cannot be guessed, and remember the answers.", "--dialogue"),
     overwrite: options.Overwrite = False,
-    as_json: options.Json = False,
-) -> None:
+) -> Answer:
     """Make an experiment of a spreadsheet: columns, units and repeats are understood and described in words.
 
     Units stand in brackets in the header. The header may come after other lines; n/a, - and empty cells were not
@@ -95,7 +93,7 @@ def command(
             "warnings": made.warnings}  # fmt: skip
     warnings = [Text(f"WARNING: {line}", "bold red") for line in made.warnings]
     assumed = [ASSUMED] if dh is not None and "dh_convention" not in options_given(context) else []
-    show(as_json, data, [*warnings, *assumed, *made.remarks, *_told(made, context.obj)])
+    return Answer(data, [*warnings, *assumed, *made.remarks, *_told(made, context.obj)])
 
 
 def _prompt(text: str) -> str:

@@ -9,14 +9,13 @@ from rich.text import Text
 
 from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.outputs import new_file
-from stiffmap.common.outputs.option import written
 from stiffmap.common.tables.workbook import TABLES
 from stiffmap.model.urdf import Imported, import_urdf
 from stiffmap.solve.machine import Machine
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import flags_of, options_given, pairs
-from stiffmap.ui.cli.options import argument, option
-from stiffmap.ui.cli.output import show
+from stiffmap.ui.cli.options import argument, option, written
+from stiffmap.ui.cli.output import Answer
 
 AWAY = " (not on the way to the tip; masses stay on what carries them)"
 
@@ -32,8 +31,7 @@ def command(
         "Link of the URDF that is the tool. [default: tool0 and the like, or the only end]"
     ),
     overwrite: options.Overwrite = False,
-    as_json: options.Json = False,
-) -> None:
+) -> Answer:
     """Machine file from a URDF: its tree to a tool as a serial machine, with a sidecar also closed loops; or from a table
     of Denavit and Hartenberg: a serial arm with rigid joints, whose compliances can be written into the file.
 
@@ -60,7 +58,7 @@ def command(
             "left_out": read.left_out, "rigid": read.rigid}  # fmt: skip
     lines = [f"wrote {file}: legs {', '.join(machine.legs)}; {len(machine.actuators)} actuators"]
     assumed = table and "dh_convention" not in options_given(context)
-    show(as_json, data, [*lines, *_remarks(read, assumed)])
+    return Answer(data, [*lines, *_remarks(read, assumed)])
 
 
 def _remarks(found: Imported, assumed: bool) -> Iterator[Text]:

@@ -153,9 +153,3 @@ def options_given(context: typer.Context) -> list[str]:
     """The parameters whose value the command line gives, be it that of the default."""
     source = context.get_parameter_source
     return [n for n in flags_of(context) if getattr(source(n), "name", "") == "COMMANDLINE"]
-
-
-def finish(found: bool) -> None:
-    """Exit with 1 where there is something to find."""
-    if found:
-        raise typer.Exit(1)

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any, cast
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.outputs.option import written
 from stiffmap.model.link.gmshmesh import CAD, MESH, mesh_file
 from stiffmap.model.link.identify import identify_link
 from stiffmap.model.link.inputs import UNIT_WRENCHES, read_cases, read_material, read_part
@@ -20,10 +19,9 @@ from stiffmap.model.link.readers import FIELDS, read_field
 from stiffmap.model.link.result import Link
 from stiffmap.model.link.solve import Material, Setup
 from stiffmap.model.link.transport import Floats
-from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import in_si
-from stiffmap.ui.cli.options import argument, flag, option
-from stiffmap.ui.cli.output import show
+from stiffmap.ui.cli.options import argument, flag, option, written
+from stiffmap.ui.cli.output import Answer
 
 
 def command(
@@ -44,8 +42,7 @@ def command(
     zeros: bool = flag("Set insignificant entries to zero.", "--zeros"),
     out: Path | None = written("Link file to write (YAML).", None, "-o", "--out"),
     picture: Path | None = written("PNG to write.", None, "--picture"),
-    as_json: options.Json = False,
-) -> None:
+) -> Answer:
     """Identify a link's 6x6 spring, with error bars, from a part or a displacement field.
 
     Examples:
@@ -86,7 +83,7 @@ def command(
         draw_link(link, picture, found)
     told = [link.report(), *([] if found is None else _of_part(found, link))]
     told += [f"wrote {path}" for path in (out, picture) if path is not None]
-    show(as_json, as_data(link, found, file), told)
+    return Answer(as_data(link, found, file), told)
 
 
 def _field(path: Path, unit: str | None, nodes: Path | None, wrenches: Floats) -> tuple[Floats, Floats]:

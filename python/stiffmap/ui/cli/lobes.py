@@ -13,9 +13,9 @@ from stiffmap.common.number_text import place_text
 from stiffmap.machining.chatter import stability_lobes
 from stiffmap.machining.process import Process, load_process
 from stiffmap.ui.cli import options
-from stiffmap.ui.cli.inputs import MM, finish, gravity, in_si, machine_with, numbers, position, rotation
+from stiffmap.ui.cli.inputs import MM, gravity, in_si, machine_with, numbers, position, rotation
 from stiffmap.ui.cli.options import option
-from stiffmap.ui.cli.output import show, write_files
+from stiffmap.ui.cli.output import Answer, write_files
 
 RPM = 60 / (2 * math.pi)
 
@@ -45,8 +45,7 @@ def command(
     output: options.Folder = None,
     threads: options.Threads = None,
     scheduler: options.Scheduler = None,
-    as_json: options.Json = False,
-) -> None:
+) -> Answer:
     """Stability lobes: at which speed of the spindle what depth of cut does not chatter.
 
     The modes are the machine's at the pose, and those of spindle and tool that are given. Depths and speeds are those of the
@@ -81,8 +80,8 @@ def command(
     }  # fmt: skip
     answers = [_one(m, p, text, given, output, i) for i, text in enumerate(at or [None])]
     data = {"machine": m.name, "process": p.name, "poses": answers}
-    show(as_json, data, (line for a in answers for line in _lines(a)))
-    finish(not all(a["stable"] for a in answers))
+    lines = (line for a in answers for line in _lines(a))
+    return Answer(data, lines, finding=not all(a["stable"] for a in answers))
 
 
 def _one(

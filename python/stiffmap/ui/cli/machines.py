@@ -6,11 +6,10 @@ from rich.padding import Padding
 from rich.text import Text
 
 from stiffmap.model.files import shipped_machines
-from stiffmap.ui.cli import options
-from stiffmap.ui.cli.output import show
+from stiffmap.ui.cli.output import Answer
 
 
-def command(as_json: options.Json = False) -> None:
+def command() -> Answer:
     """List the machines that come with stiffmap.
 
     Examples:
@@ -21,4 +20,4 @@ def command(as_json: options.Json = False) -> None:
     data = [{"name": m.name, "title": m.title, "source": m.source, "file": m.path} for m in shipped]
     titles = (Text.assemble((m.name, "bold"), f"  {m.title}") for m in shipped)
     sources = (Padding(Text(m.source, "dim"), (0, 0, 0, 2)) for m in shipped)
-    show(as_json, data, chain.from_iterable(zip(titles, sources, strict=True)))
+    return Answer(data, chain.from_iterable(zip(titles, sources, strict=True)))

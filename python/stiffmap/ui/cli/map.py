@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,16 +10,18 @@ import xarray as xr
 from rich.table import Table
 
 import stiffmap
+from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
+from stiffmap.common.number_text import length_text, place_text
 from stiffmap.common.outputs import make_folder
-from stiffmap.common.outputs.option import written
+from stiffmap.solve.kinematics import must_take
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.status import Status
 from stiffmap.ui.cli import options
-from stiffmap.ui.cli.inputs import MM, finish, force_given, gravity, machine_with, refuse_unused
+from stiffmap.ui.cli.inputs import MM, force_given, gravity, machine_with, refuse_unused
 from stiffmap.ui.cli.map_summary import MapSummary, assumptions, write_map_files
-from stiffmap.ui.cli.options import flag, option
-from stiffmap.ui.cli.output import failed_in_words, show, table
+from stiffmap.ui.cli.options import flag, option, written
+from stiffmap.ui.cli.output import Answer, failed_in_words, table, write_files
 from stiffmap.workspace.maps.inputs import magnitude, plane_axes
 from stiffmap.workspace.maps.statistics import statistics_rows
 
@@ -68,7 +70,7 @@ def command(
     method: options.Method = "fast",
     threads: options.Threads = None,
     as_json: options.Json = False,
-) -> None:
+) -> Answer:
     """Error maps of z-planes: how far a force in the plane pushes the tool off its commanded position.
 
     The default is the paper's Figure 7: 300 N, z = -200, 0 and 300 mm over the whole xy workspace,
@@ -98,29 +100,23 @@ def command(
     m = machine_with(machine, effect)
     how: dict[str, Any] = {"gravity": gravity(gravity_), "method": method, "threads": threads}
     if toolpath is not None:
-        from stiffmap.ui.cli.map_toolpath import map_toolpath
-
-        map_toolpath(m, toolpath, force, how, output, kinds, as_json)
-        return
+        return map_toolpath(m, toolpath, force, how, output, kinds)
     call: dict[str, Any] = {
         **planes({"x": x, "y": y, "z": z}), **how, "points": points, "wrench": cases(plane, force), "plane": plane,
         "directions": directions, "tolerance": MM * tolerance, "compliance": compliance, "uncertainty": uncertainty,
     }  # fmt: skip
     if estimate:
         found = stiffmap.map_estimate(m, **call)
-        show(as_json, vars(found), [str(found)])
-        return
+        return Answer(vars(found), [str(found)])
     given = assumptions(context, force, tolerance)
     call |= {"scheduler": scheduler, "progress": False if as_json else None}
     if statistics:
-        show_statistics(m, stiffmap.map_statistics(m, **call), plane, given, as_json)
-        return
+        return whole_map(m, stiffmap.map_statistics(m, **call), plane, given)
     target = make_folder(output) / ("map.zarr" if zarr else "map.nc")
     ds = stiffmap.error_map(m, **call, out=target, resume=resume).load()
     result = MapSummary(m, ds, plane, MM * tolerance, given, how["gravity"], uncertainty)
     files = [target, *write_map_files(result, output, kinds, sheets, own_scales)]
-    show(as_json, result.as_plain(files), result.lines(), files)
-    finish(bool(result.failed))
+    return Answer(result.as_plain(files), result.lines(), files, finding=bool(result.failed))
 
 
 def planes(across: dict[str, list[float] | None]) -> dict[str, Any]:
@@ -149,15 +145,14 @@ def cases(plane: str, text: str) -> dict[str, list[float]]:
     return {f"F{'xyz'[i]}": [size if k == i else 0.0 for k in range(6)] for i in plane_axes(plane)}
 
 
-def show_statistics(machine: Machine, ds: xr.Dataset, plane: str, given: str, as_json: bool) -> None:
-    """Figures of a map that is not stored; exits with 1 where poses failed."""
+def whole_map(machine: Machine, ds: xr.Dataset, plane: str, given: str) -> Answer:
+    """Figures of a map that is not stored."""
     rows = statistics_rows(ds, plane)
     counts = {s.name: int(ds.status_count.sel(status=int(s)).sum()) for s in Status if s}
     failed = {name: count for name, count in counts.items() if count}
     lost = failed_in_words(failed, "solves of the load cases")
     data = {"machine": machine.name, "rows": rows, "failed": failed}
-    show(as_json, data, [given, _statistics_table(ds, rows), *lost])
-    finish(bool(failed))
+    return Answer(data, [given, _statistics_table(ds, rows), *lost], finding=bool(failed))
 
 
 def _statistics_table(ds: xr.Dataset, rows: list[dict[str, Any]]) -> Table:
@@ -173,3 +168,59 @@ def _statistics_table(ds: xr.Dataset, rows: list[dict[str, Any]]) -> Table:
         place = f"{1e3 * r['at'][0]:.0f}, {1e3 * r['at'][1]:.0f}"
         out.add_row(f"{1e3 * r['z']:g}", name, *values, place, f"{100 * r['share_within']:.1f} %")
     return out
+
+
+def map_toolpath(
+    m: Machine, toolpath: str, force: str, how: dict[str, Any], output: Path, pictures: list[str]
+) -> Answer:
+    """Solve along the path: its worst place; table, data and pictures are written."""
+    from stiffmap.workspace.performance import load_motion
+    from stiffmap.workspace.performance.motion.trajectory import way_along
+
+    position, given = load_motion(toolpath).places()
+    must_take(m, position)
+    load = given if given.any() else _load(m, position, force, how)
+    wrench = np.hstack([load, np.zeros_like(load)])
+    s = m.solve(position, wrench, **how)
+    way = way_along(position)
+    ds = s.to_xarray(("way",), {"way": ("way", way, {"units": "m"})})
+    ds = ds.assign(position=(("way", "axis"), position), force=(("way", "axis"), load))
+    files = write_files(output, _toolpath_files(ds, m.name, pictures))
+    failed = int((~s.ok).sum())
+    sizes = ds.deflection.values
+    worst, told = None, f"{m.name}: no pose of the path converged"
+    if np.isfinite(sizes).any():
+        i = int(np.nanargmax(sizes))
+        worst = {"way": way[i], "position": position[i], "deflection": sizes[i]}
+        told = (
+            f"{m.name}: largest deflection along the path {length_text(sizes[i])} at {place_text(position[i], '.4g')}, "
+            f"{way[i] / MM:.4g} mm from its start"
+        )
+    lost = f"{failed} of {len(way)} poses failed: {s.count()}" if failed else None
+    data = {"machine": m.name, "poses": len(way), "failed": failed, "worst": worst}
+    return Answer(data, [told, lost], files, finding=failed > 0)
+
+
+def _load(m: Machine, position: Floats, force: str, how: dict[str, Any]) -> Floats:
+    """(n, 3) N: the vector given; of a size, in the direction that pushes the tool furthest at each pose."""
+    size, vector = force_given(force)
+    if vector is not None:
+        return np.broadcast_to(vector, position.shape)
+    c = m.solve(position, None, **how).compliance[:, :3, :3]
+    right = np.linalg.svd(np.nan_to_num(c))[2]
+    return np.asarray(size * right[:, 0])
+
+
+def _toolpath_files(ds: xr.Dataset, name: str, kinds: list[str]) -> Iterator[tuple[str, Any]]:
+    from stiffmap.ui.plot.paths import toolpath_figure
+
+    yield "toolpath.nc", ds
+    head = ["way [mm]", "x [mm]", "y [mm]", "z [mm]", "fx [N]", "fy [N]", "fz [N]",
+            "dx [mm]", "dy [mm]", "dz [mm]", "deflection [mm]"]  # fmt: skip
+    columns = np.column_stack([
+        ds.way.values / MM, ds.position.values / MM, ds.force.values,
+        ds.displacement.values[:, :3] / MM, ds.deflection.values / MM,
+    ])  # fmt: skip
+    yield "toolpath.csv", (head, (list(map(repr, row)) for row in columns.tolist()))
+    pictured = toolpath_figure(ds, name) if kinds else None
+    yield from ((f"toolpath.{kind}", pictured) for kind in kinds)

@@ -11,9 +11,9 @@ from rich.text import Text
 
 from stiffmap.common.outputs import make_folder
 from stiffmap.ui.cli import options
-from stiffmap.ui.cli.inputs import MM, finish, gravity, in_si, machine_with, numbers, words
+from stiffmap.ui.cli.inputs import MM, gravity, in_si, machine_with, numbers, words
 from stiffmap.ui.cli.options import option
-from stiffmap.ui.cli.output import as_text, show, write_files
+from stiffmap.ui.cli.output import Answer, as_text, write_files
 from stiffmap.ui.cli.output import table as table_of
 from stiffmap.workspace.maps.loading import machine_digest
 from stiffmap.workspace.performance import MeasuresTable, measures
@@ -47,8 +47,7 @@ def command(
     output: options.Folder = None,
     threads: options.Threads = None,
     scheduler: options.Scheduler = None,
-    as_json: options.Json = False,
-) -> None:
+) -> Answer:
     """All performance measures of a machine over a box: worst and best pose, requirement, margin.
 
     With -o: the table (JSON), pictures, and both as a page (report.html).
@@ -71,8 +70,7 @@ def command(
         deflection=in_si(deflection),
     )  # fmt: skip
     files = [] if output is None else write(table, make_folder(output))
-    show(as_json, table.as_plain(), _told(table), files)
-    finish(not table.passed)
+    return Answer(table.as_plain(), _told(table), files, finding=not table.passed)
 
 
 def _told(table: MeasuresTable) -> Iterator[Table | Text | str]:

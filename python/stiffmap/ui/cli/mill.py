@@ -6,9 +6,9 @@ from collections.abc import Iterator
 
 from stiffmap.machining.milling import mill_job
 from stiffmap.ui.cli import options
-from stiffmap.ui.cli.inputs import MM, finish, in_si, machine_with, pairs
+from stiffmap.ui.cli.inputs import MM, in_si, machine_with, pairs
 from stiffmap.ui.cli.options import argument, option
-from stiffmap.ui.cli.output import show
+from stiffmap.ui.cli.output import Answer
 from stiffmap.ui.report.milling import summary, write_report
 
 
@@ -53,7 +53,7 @@ def command(
     threads: options.Threads = None,
     scheduler: options.Scheduler = None,
     as_json: options.Json = False,
-) -> None:
+) -> Answer:
     """The part as a machine will cut it, and a program that makes it right.
 
     The cutting force and the deflection are found together; the compensated program is read back and simulated.
@@ -75,8 +75,7 @@ def command(
     out = summary(found)
     if output is not None:
         out["files"] = {k: str(output / v) for k, v in write_report(found, output).items()}
-    show(as_json, out, _lines(out))
-    finish(found.finding)
+    return Answer(out, _lines(out), finding=found.finding)
 
 
 def _read(count: int) -> None:

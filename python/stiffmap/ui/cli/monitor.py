@@ -9,9 +9,8 @@ from stiffmap.identification.planning.budget import budgets
 from stiffmap.identification.planning.changes import monitor
 from stiffmap.solve.machine import load_machine
 from stiffmap.ui.cli import options
-from stiffmap.ui.cli.inputs import finish
 from stiffmap.ui.cli.options import argument, option
-from stiffmap.ui.cli.output import show
+from stiffmap.ui.cli.output import Answer
 
 
 def command(
@@ -21,8 +20,7 @@ def command(
     effect: options.Effects = None,
     diagnosis: Path | None = option("diagnosis.json of the last diagnosis: its effects are followed."),
     budget: bool = option("Print the uncertainty budget of every number now.", False),
-    as_json: options.Json = False,
-) -> None:
+) -> Answer:
     """What changed since the last diagnosis; or whether two specimens of a type share their numbers.
 
     The same effects are fitted to both experiments, each on its own. Exit codes: 0 nothing changed, 1 something
@@ -38,5 +36,5 @@ def command(
         raise StiffmapError("monitor: name what to follow, by --effect or --diagnosis")
     found = monitor(m, before, after, terms)
     now = budgets(m, load_experiment(after), found.second) if budget else []
-    show(as_json, found.as_plain() | ({"budgets": now} if budget else {}), [str(found), *map(str, now)])
-    finish(not found.common)
+    data = found.as_plain() | ({"budgets": now} if budget else {})
+    return Answer(data, [str(found), *map(str, now)], finding=not found.common)

@@ -12,7 +12,7 @@ from stiffmap.model.files.shipped import starter_text
 from stiffmap.solve.starters import CLASSES, class_of, machine_text
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.options import argument, flag, option
-from stiffmap.ui.cli.output import show
+from stiffmap.ui.cli.output import Answer
 
 DIMENSIONS = {
     "radius": "mm, of the circle on which the legs stand on the base",
@@ -55,8 +55,7 @@ def command(
     wall: Length = _dimension("wall"),
     drive: Length = _dimension("drive"),
     overwrite: options.Overwrite = False,
-    as_json: options.Json = False,
-) -> None:
+) -> Answer:
     """Start a machine file: a template in which every key is explained, or a machine of a common class.
 
     With --from, the file is complete: geometry, steel tubes, drives, masses and a workspace within reach.
@@ -76,8 +75,7 @@ def command(
             for name, c in CLASSES.items()
         )
         units = "lengths in mm; --drive in N/µm where drives slide, in kN·m/rad where they turn"
-        show(as_json, classes, [*lines, units])
-        return
+        return Answer(classes, [*lines, units])
     if file is None:
         raise StiffmapError("new: expected a file to write, such as my_machine.yaml (or --list)")
     if kind is None and (given := [k for k, v in dimensions.items() if v is not None]):
@@ -95,4 +93,4 @@ def command(
             f"wrote {file}: {kind} with {used} (mm; drive in N/µm or kN·m/rad)\nlook at it: ",
             (f"stiffmap show {file}", "cyan"), "; map it: ", (f"stiffmap map {file}", "cyan"),
         )  # fmt: skip
-    show(as_json, data, [told])
+    return Answer(data, [told])

@@ -12,11 +12,9 @@ from rich.text import Text
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs import make_folder
-from stiffmap.common.outputs.option import written
 from stiffmap.ui.cli import options
-from stiffmap.ui.cli.inputs import finish
-from stiffmap.ui.cli.options import argument, option
-from stiffmap.ui.cli.output import show, table, write_files
+from stiffmap.ui.cli.options import argument, option, written
+from stiffmap.ui.cli.output import Answer, table, write_files
 from stiffmap.workspace.design import ParetoSet, load_design, optimize
 from stiffmap.workspace.design.chosen import NOTHING, ComparedDesigns, measured
 
@@ -27,8 +25,7 @@ def command(
     generations: int | None = option("Generations; default: the file's."),
     processes: int | None = option("Processes; default: all cores."),
     scheduler: options.Scheduler = None,
-    as_json: options.Json = False,
-) -> None:
+) -> Answer:
     """Machines that are best under several measures at once: a Pareto set, and chosen designs as machine files.
 
     Seeded. Killed at any moment, the same command goes on where it was. The folder gets the set
@@ -67,8 +64,8 @@ def command(
     lines = (Text(line, "dim") for line in report.lines())
     machines = ", ".join(f"{k}.yaml" for k in report.chosen)
     wrote = f"wrote {', '.join(map(str, files))} and the machine files {machines}"
-    show(as_json, data, [as_table(found, report), *lines, wrote])
-    finish(not all(c.table.passed for c in report.chosen.values()))
+    missed = not all(c.table.passed for c in report.chosen.values())
+    return Answer(data, [as_table(found, report), *lines, wrote], finding=missed)
 
 
 def _files(found: ParetoSet, report: ComparedDesigns) -> Iterator[tuple[str, Any]]:

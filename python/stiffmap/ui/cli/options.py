@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from stiffmap.common.outputs.option import written
+from stiffmap.common.outputs.keeping import check_replaceable, reserved
 
 
 def option(help: str, default: Any = None, *names: str, **more: Any) -> Any:
@@ -23,6 +23,22 @@ def flag(help: str, name: str) -> Any:
 def argument(help: str, default: Any = ...) -> Any:
     """An argument of one command, required where it has no default."""
     return typer.Argument(default, help=help)
+
+
+def written(help: str, default: object = None, *names: str) -> Any:
+    """Option for a file or folder that a command writes: no other job writes there while the command runs.
+
+    `default` and `names` as of ``typer.Option``; ``-o, --output`` where there are no names.
+    """
+    return typer.Option(default, *(names or ("-o", "--output")), help=help, callback=_alone)
+
+
+def _alone(context: typer.Context, path: Path | None) -> Path | None:
+    if path is not None and not context.resilient_parsing:
+        context.with_resource(reserved(path))
+        if path.is_file() and "overwrite" not in {p.name for p in context.command.params}:
+            check_replaceable(path)  # before anything is computed
+    return path
 
 
 Machine = Annotated[str, typer.Argument(help="Shipped name (stiffmap machines) or machine file.")]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rich import box
 from rich.console import Console
@@ -13,7 +13,7 @@ from rich.text import Text
 from rich.tree import Tree
 
 from stiffmap.common.json_text import json_text
-from stiffmap.common.outputs import make_folder, write_text, writing
+from stiffmap.common.outputs import make_folder, write_rows, write_text, writing
 
 if TYPE_CHECKING:
     import numpy as np
@@ -28,11 +28,22 @@ MEANINGS = {
 }
 
 
-def show(as_json: bool, data: Any, told: Iterable[Any], files: Iterable[str | Path] | None = None) -> None:
-    """A result as one document of JSON, with the files written, or as lines and tables for the terminal.
+class Answer(NamedTuple):
+    """What a command found."""
 
-    Text is shown as it is, without markup and never broken; None: nothing.
-    """
+    data: Any
+    """For JSON."""
+    told: Iterable[Any]
+    """Lines and tables for the terminal; None: nothing."""
+    files: Iterable[str | Path] | None = None
+    """That were written; they are part of the JSON as well."""
+    finding: bool = False
+    """Whether there is something to act on: exit code 1."""
+
+
+def show(as_json: bool, answer: Answer) -> None:
+    """One document of JSON, or lines and tables for the terminal: text as it is, without markup and never broken."""
+    data, told, files, _ = answer
     if as_json:
         text = json_text(data if files is None else {**data, "files": files})
         print(text, flush=True)  # a program that reads a pipe waits for it
@@ -45,7 +56,8 @@ def show(as_json: bool, data: Any, told: Iterable[Any], files: Iterable[str | Pa
 
 
 def write_files(folder: Path | None, contents: Iterable[tuple[str, Any]]) -> list[Path]:
-    """Write named datasets (.nc), data (.json), machines (.yaml), texts, bytes and figures, each of them made when its turn comes; no folder: nothing."""
+    """Write named datasets (.nc), data (.json), machines (.yaml), tables (.csv: head and rows), texts, bytes and figures, each of them made
+    when its turn comes; no folder: nothing."""
     if folder is None:
         return []
     return [_written(make_folder(folder) / name, content) for name, content in contents]
@@ -59,6 +71,9 @@ def _written(path: Path, content: Any) -> Path:
     if isinstance(content, bytes):
         with writing(path) as fresh:
             fresh.write_bytes(content)
+        return path
+    if path.suffix == ".csv":
+        write_rows(path, *content)
         return path
     if path.suffix == ".nc":
         from stiffmap.workspace.maps.files import write_dataset

@@ -5,10 +5,9 @@ from pathlib import Path
 from typing import Any
 
 from stiffmap.common.outputs import make_folder
-from stiffmap.common.outputs.option import written
 from stiffmap.ui.cli import options
-from stiffmap.ui.cli.options import option
-from stiffmap.ui.cli.output import show, write_files
+from stiffmap.ui.cli.options import option, written
+from stiffmap.ui.cli.output import Answer, write_files
 from stiffmap.ui.paper import Results, Statement, all_statements, compute
 from stiffmap.ui.paper.results import all_figures
 from stiffmap.ui.paper.statement import as_csv, as_markdown, as_rich, count, count_text
@@ -22,7 +21,7 @@ def command(
     figures: bool = option("Draw Figures 5 to 7 (with -o).", True),
     threads: options.Threads = None,
     as_json: options.Json = False,
-) -> None:
+) -> Answer:
     """Reproduce the paper's application: Figures 5a–h, 6, 7 and every quantitative statement of §5.2 and §5.3.
 
     Each statement has the paper's words and number, our number and a verdict: agrees, differs because …, or cannot be
@@ -40,7 +39,7 @@ def command(
     statements = all_statements(results)
     files = write_files(target, _files(results, statements, figures))
     told = [as_rich(statements), count_text(statements), NO_CURVES]
-    show(as_json, {"statements": statements, "count": count(statements)}, told, files)
+    return Answer({"statements": statements, "count": count(statements)}, told, files)
 
 
 def _files(results: Results, statements: list[Statement], figures: bool) -> Iterator[tuple[str, Any]]:

@@ -11,7 +11,6 @@ import typer
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import with_uncertainty
 from stiffmap.common.outputs import write_rows
-from stiffmap.common.outputs.option import written
 from stiffmap.experiment import simulate
 from stiffmap.experiment.calls import effects_of
 from stiffmap.experiment.files.save import plan_columns
@@ -20,8 +19,8 @@ from stiffmap.identification.taps import where_to_tap
 from stiffmap.solve.machine import Machine, load_machine
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import MM, in_si, numbers, refuse_unused
-from stiffmap.ui.cli.options import argument, flag, option
-from stiffmap.ui.cli.output import show
+from stiffmap.ui.cli.options import argument, flag, option, written
+from stiffmap.ui.cli.output import Answer
 
 UNUSED = {"with taps": "rival for_map at rows quantity force read noise frame tool until twin", "with until": "output rival for_map at",
           "without until": "twin", "without for_map": "at"}  # fmt: skip
@@ -51,8 +50,7 @@ def command(
     ),
     twin: list[str] | None = option("What the twin really has; default: --identify.", None, "--twin"),
     seed: int = option("Seed of candidates and of the twin's noise.", 0),
-    as_json: options.Json = False,
-) -> None:
+) -> Answer:
     """Which poses, loads and readings are most informative, before the instrument is booked.
 
     Identifies numbers (D-optimal), separates two explanations (--rival, T-optimal) or makes a map certain (--map).
@@ -72,8 +70,7 @@ def command(
             "expected either --identify, with the effects, or --taps, with the number of poses"
         )
     if taps is not None:
-        _taps(m, taps, poses, seed, output, as_json)
-        return
+        return _taps(m, taps, poses, seed, output)
     if rival and for_map:
         raise StiffmapError("--map and --rival exclude each other")
     aim = "separate" if rival else "map" if for_map else "identify"
@@ -82,36 +79,29 @@ def command(
         "tool": tool, "noise": in_si(noise), "seed": seed,
     }  # fmt: skip
     if until is not None:
-        _sequential(m, identify or (), twin, until, rows, how, as_json)
-        return
+        return _sequential(m, identify or (), twin, until, rows, how)
     workpiece = np.array([MM * numbers(t, "at", 3) for t in at]) if at else None
     found = plan(m, identify or (), rows=rows, aim=aim, rival=rival or (), position=workpiece, **how)
     if output is not None:
         columns = plan_columns(found.experiment)
         write_rows(output, list(columns), zip(*columns.values(), strict=True))
-    show(as_json, found.as_plain(), found.lines())
+    return Answer(found.as_plain(), found.lines())
 
 
-def _taps(m: Machine, count: int, tries: int, seed: int, output: Path | None, as_json: bool) -> None:
+def _taps(m: Machine, count: int, tries: int, seed: int, output: Path | None) -> Answer:
     poses = [[round(float(v), 1) for v in p] for p in where_to_tap(m, count, tries=tries, seed=seed) / MM]
     if output is not None:
         write_rows(output, ["x_mm", "y_mm", "z_mm"], poses)
     none: dict[str, Any] = {"parameters": [], "value": None, "value_random": None}
     told = [f"{len(poses)} poses to tap, the most informative first (x, y, z in mm)"]
     told += ["  " + ", ".join(f"{v:.1f}" for v in p) for p in poses]
-    show(as_json, {"aim": "taps", "rows": len(poses), "poses_mm": poses, **none}, told)
+    return Answer({"aim": "taps", "rows": len(poses), "poses_mm": poses, **none}, told)
 
 
 def _sequential(
-    m: Machine,
-    identify: Sequence[str],
-    twin: list[str] | None,
-    until: float,
-    rows: int,
-    how: dict[str, Any],
-    as_json: bool,
-) -> None:
-    """Plan, simulate, fit, again; prints each step."""
+    m: Machine, identify: Sequence[str], twin: list[str] | None, until: float, rows: int, how: dict[str, Any]
+) -> Answer:
+    """Plan, simulate, fit, again."""
     terms = effects_of(m, identify)
     seeds = itertools.count(how["seed"])
     steps = follow(
@@ -125,4 +115,4 @@ def _sequential(
         told.append(f"{step['rows']} rows: {', '.join(each)}")
     why = f"every u is at most {until:g} of a typical size" if met else "rows used up"
     told.append(f"stopped: {why}")
-    show(as_json, {"met": met, "steps": found}, told)
+    return Answer({"met": met, "steps": found}, told)

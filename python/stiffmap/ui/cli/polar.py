@@ -10,9 +10,9 @@ from rich.table import Table
 import stiffmap
 from stiffmap.common.number_text import place_text
 from stiffmap.ui.cli import options
-from stiffmap.ui.cli.inputs import MM, finish, force_given, gravity, machine_with, position
+from stiffmap.ui.cli.inputs import MM, force_given, gravity, machine_with, position
 from stiffmap.ui.cli.options import option
-from stiffmap.ui.cli.output import failed, failed_in_words, show, table, write_files
+from stiffmap.ui.cli.output import Answer, failed, failed_in_words, table, write_files
 
 
 def command(
@@ -26,8 +26,7 @@ def command(
     gravity_: options.Gravity = None,
     output: options.Folder = None,
     method: options.Method = "fast",
-    as_json: options.Json = False,
-) -> None:
+) -> Answer:
     """Deflection against the direction of a force in a plane: weakest and strongest direction.
 
     Of a force that is given as a vector, the size turns in the plane, and the deflection under the vector
@@ -53,8 +52,8 @@ def command(
     told = [_under(p, vector, d) for p, d in zip(places, moved, strict=False)]
     data: dict[str, Any] = {"machine": m.name, "diagrams": [as_plain(d, plane) for d in many], "files": files}
     data |= {} if vector is None else {"displacement_under_the_vector": moved}
-    show(as_json, data, [as_table(many, plane), *told, *failed_in_words(lost, "directions")], files)
-    finish(bool(lost))
+    lines = [as_table(many, plane), *told, *failed_in_words(lost, "directions")]
+    return Answer(data, lines, files, finding=bool(lost))
 
 
 def _under(place: Any, vector: Any, displacement: Any) -> str:

@@ -2,11 +2,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from stiffmap.common.outputs.option import written
 from stiffmap.machining.process import identify_process, load_process
-from stiffmap.ui.cli import options
-from stiffmap.ui.cli.options import argument, option
-from stiffmap.ui.cli.output import show
+from stiffmap.ui.cli.options import argument, option, written
+from stiffmap.ui.cli.output import Answer
 
 
 def command(
@@ -19,8 +17,7 @@ def command(
     ),
     sheet: str | None = option("Sheet of a workbook; the first where none is named."),
     output: Path | None = written("Process file, for mill, lobes, map and so on."),
-    as_json: options.Json = False,
-) -> None:
+) -> Answer:
     """Coefficients of the cutting force from a dynamometer's table.
 
     A row is a cut with its mean forces or, with a column of time, a sample. Every number has its 95 % interval. The straight
@@ -33,4 +30,4 @@ def command(
     given = None if base is None else load_process(base)
     law = identify_process(table, given, sheet)
     files = [] if output is None else [law.save(output, given)]
-    show(as_json, law.to_dict(), law.words(), files)
+    return Answer(law.to_dict(), law.words(), files)

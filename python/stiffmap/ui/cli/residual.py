@@ -8,9 +8,8 @@ from stiffmap.experiment import Residual, residual
 from stiffmap.identification.validity import beyond
 from stiffmap.solve.machine import load_machine
 from stiffmap.ui.cli import options
-from stiffmap.ui.cli.inputs import finish
 from stiffmap.ui.cli.options import option
-from stiffmap.ui.cli.output import show
+from stiffmap.ui.cli.output import Answer
 
 
 def command(
@@ -20,8 +19,7 @@ def command(
     effect: options.Effects = None,
     output: options.Folder = None,
     threads: options.Threads = None,
-    as_json: options.Json = False,
-) -> None:
+) -> Answer:
     """Prediction for every reading: rms, per axis, worst rows, noise, lack of fit, model-free checks.
 
     With -o: residual.csv (mm, rad), residual.json (SI) and pictures. Exit codes: 0 the readings are as
@@ -41,8 +39,7 @@ def command(
     if far is not None:
         found["rows_beyond_calibration"] = int(far.sum())
         told.append(f"  beyond what the machine was calibrated by: {int(far.sum())} of {len(far)} rows")
-    show(as_json, found, told)
-    finish(result.lack_of_fit < 1e-3)
+    return Answer(found, told, finding=result.lack_of_fit < 1e-3)
 
 
 def _write(r: Residual, rows: int, output: Path) -> None:

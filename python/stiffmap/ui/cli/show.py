@@ -9,7 +9,6 @@ from rich.text import Text
 from rich.tree import Tree
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.outputs.option import written
 from stiffmap.model.description import Block, Body, Element, Joint, Offset, Point, Spring
 from stiffmap.model.effects import effect_text
 from stiffmap.solve.budget import deflection_budget
@@ -19,8 +18,8 @@ from stiffmap.solve.mobility import Mobility, mobility
 from stiffmap.solve.status import Status
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import machine_at, numbers
-from stiffmap.ui.cli.options import option
-from stiffmap.ui.cli.output import show
+from stiffmap.ui.cli.options import option, written
+from stiffmap.ui.cli.output import Answer
 
 
 def command(
@@ -35,8 +34,7 @@ def command(
     ),
     view: str | None = option("Elevation and azimuth of the view, deg. [default: 22,35; flat: from above]"),
     picture: bool = option("Draw the machine.", True),
-    as_json: options.Json = False,
-) -> None:
+) -> Answer:
     """Draw a machine in 3-D at a pose and print what it is made of.
 
     Elements from base to platform, as built with its effects; the effects; degrees of freedom, over-constraint (closure equations that follow
@@ -65,11 +63,10 @@ def command(
             raise StiffmapError("--page: needs --load, the force under which the machine is drawn")
         write_page(m, page, p, wrench, rotation=r)
     if wrench is None:
-        show(as_json, as_plain(m, counts, file), _lines(m, counts, file))
-        return
+        return Answer(as_plain(m, counts, file), _lines(m, counts, file))
     budget = deflection_budget(m, p, wrench, rotation=r)
     found = {"machine": m.name, "wrench": wrench} | budget.as_plain()
-    show(as_json, found, [str(budget)], [f for f in (file, page) if f is not None])
+    return Answer(found, [str(budget)], [f for f in (file, page) if f is not None])
 
 
 def _draw(m: Machine, p: Any, r: Any, path: Path, view: str | None, wrench: Any) -> Path:

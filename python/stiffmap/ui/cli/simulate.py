@@ -10,7 +10,6 @@ import numpy as np
 
 from stiffmap.common.broadcasting import Floats, random_numbers
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.outputs.option import written
 from stiffmap.experiment import Experiment, Loop, load_experiment, save_experiment, simulate
 from stiffmap.experiment.channels import AXES, SIDES, Channel
 from stiffmap.experiment.files.load import load_plan
@@ -18,8 +17,8 @@ from stiffmap.experiment.virtual import plans as make
 from stiffmap.solve.machine import Machine, load_machine
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import in_si, numbers
-from stiffmap.ui.cli.options import argument, option
-from stiffmap.ui.cli.output import show
+from stiffmap.ui.cli.options import argument, option, written
+from stiffmap.ui.cli.output import Answer
 
 GRID = re.compile(r"^grid:(\d+)x(\d+)x(\d+)$")
 WORDS = {
@@ -64,8 +63,7 @@ def command(
     gravity: str | None = option("m/s², base axes, as 0,0,-9.81."),
     outliers: float = option("Share of rows that are wild, 0 to 1.", 0.0),
     seed: int = option("Seed of poses, loads and noise.", 0),
-    as_json: options.Json = False,
-) -> None:
+) -> Answer:
     """Write a virtual experiment, to try a plan before the instrument is booked.
 
     [bold]stiffmap diagnose[/bold] on it says what the plan would have found, and how small.
@@ -114,7 +112,7 @@ def command(
     data = {"machine": chosen.name, "rows": len(twin), "poses": number, "quantity": twin.quantity,
             "axes": twin.axes, "folder": output}  # fmt: skip
     told = f"{output}: {len(twin)} rows of {twin.quantity} at {number} poses; reads {', '.join(twin.axes)}"
-    show(as_json, data, [told])
+    return Answer(data, [told])
 
 
 def _sizes(text: str) -> list[float]:

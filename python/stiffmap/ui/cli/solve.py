@@ -11,7 +11,6 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import length_text
 from stiffmap.common.outputs import write_rows
-from stiffmap.common.outputs.option import written
 from stiffmap.common.tables.named import PoseTable, read_pose_table
 from stiffmap.solve.labels import WRENCH
 from stiffmap.solve.machine import Machine
@@ -21,9 +20,9 @@ from stiffmap.solve.status import Flag, Status
 from stiffmap.solve.unreachable import why_unreachable
 from stiffmap.solve.worst_force import worst_force
 from stiffmap.ui.cli import options
-from stiffmap.ui.cli.inputs import MM, finish, force_given, machine_at, numbers, position_words
-from stiffmap.ui.cli.options import option
-from stiffmap.ui.cli.output import MEANINGS, show
+from stiffmap.ui.cli.inputs import MM, force_given, machine_at, numbers, position_words
+from stiffmap.ui.cli.options import option, written
+from stiffmap.ui.cli.output import MEANINGS, Answer
 from stiffmap.ui.cli.output import table as table_of
 
 SCALE = [1e3] * 3 + [1.0] * 3
@@ -43,8 +42,7 @@ def command(
     effect: options.Effects = None,
     gravity_: options.Gravity = None,
     method: options.Method = "fast",
-    as_json: options.Json = False,
-) -> None:
+) -> Answer:
     """Deflection and compliance at one pose under one wrench.
 
     A force that is given by its size alone acts in the direction in space that pushes the tool furthest.
@@ -70,8 +68,7 @@ def command(
         if acting is None:  # its worst direction would differ from pose to pose
             raise StiffmapError("--force: with a file of poses, expected a vector, such as 0,0,-100")
         load = np.r_[acting, MM * numbers(moment, "moment", 3)]
-        finish(not solve_table(m, file, load, how, output, as_json))
-        return
+        return solve_table(m, file, load, how, output)
     if output is not None:
         raise StiffmapError("--output: only with a file of poses (--at poses.csv)")
     size, vector = force_given(force)
@@ -89,8 +86,7 @@ def command(
     if int(s.status) == Status.SINGULAR and (ways := free_motions(m, s.free_twists)):
         told.append(f"free: the platform can {'; '.join(ways)}")
     found = {"machine": m.name, "point": point, "position": place, "wrench": load} | s.as_plain()
-    show(as_json, found | {"reason": why}, told)
-    finish(int(s.status) != Status.CONVERGED)
+    return Answer(found | {"reason": why}, told, finding=int(s.status) != Status.CONVERGED)
 
 
 def _lines(m: Machine, s: Solution) -> Iterator[str | Table]:
@@ -112,10 +108,8 @@ def _lines(m: Machine, s: Solution) -> Iterator[str | Table]:
         yield table_of(title, ("", *WRENCH), rows, padding=0, pad_edge=False, collapse_padding=True)
 
 
-def solve_table(
-    m: Machine, file: Path, load: Floats, how: dict[str, Any], output: Path | None, as_json: bool
-) -> bool:
-    """Solve, print, write; whether every pose converged."""
+def solve_table(m: Machine, file: Path, load: Floats, how: dict[str, Any], output: Path | None) -> Answer:
+    """Solve the poses of a file; the answers are written."""
     commanded = {"x", "y", "z"} <= set(m.description.task)
     table = read_pose_table(file, at_home=None if commanded else m.description.home.p)
     turned = table.rotation(m.description.home.r)
@@ -136,8 +130,7 @@ def solve_table(
         for p, w, state, d in zip(table.position, wrench, words, s.displacement, strict=True)
     ]
     data = {"machine": m.name, "point": s.point, "poses": rows}
-    show(as_json, data, _rows(table, s, words), files)
-    return bool(s.ok.all())
+    return Answer(data, _rows(table, s, words), files, finding=not s.ok.all())
 
 
 def _rows(table: PoseTable, s: Solution, words: list[str]) -> Iterator[str | Table]:

@@ -9,8 +9,8 @@ import stiffmap
 from stiffmap.solve.internal_wrenches import InternalWrenches
 from stiffmap.solve.status import Status
 from stiffmap.ui.cli import options
-from stiffmap.ui.cli.inputs import finish, machine_at
-from stiffmap.ui.cli.output import show, table, write_files
+from stiffmap.ui.cli.inputs import machine_at
+from stiffmap.ui.cli.output import Answer, table, write_files
 
 
 def command(
@@ -20,8 +20,7 @@ def command(
     effect: options.Effects = None,
     gravity_: options.Gravity = None,
     output: options.Folder = None,
-    as_json: options.Json = False,
-) -> None:
+) -> Answer:
     """Wrenches inside a machine that carries nothing: geometric errors of over-constrained legs, preload.
 
     With -o: a picture (PNG).
@@ -39,8 +38,9 @@ def command(
     data = {"machine": m.name, "status": status.name} | {
         n: getattr(result, n) for n in ("springs", "joints", "legs", "displacement")
     }
-    show(as_json, data, [f"status {status.name.lower()}", _table(result)], files)
-    finish(status != Status.CONVERGED)
+    return Answer(
+        data, [f"status {status.name.lower()}", _table(result)], files, finding=status != Status.CONVERGED
+    )
 
 
 def _picture(result: InternalWrenches, name: str) -> Iterator[tuple[str, Any]]:

@@ -12,9 +12,9 @@ from stiffmap.common.number_text import place_text
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.status import Status
 from stiffmap.ui.cli import options
-from stiffmap.ui.cli.inputs import MM, finish, machine_at, numbers
+from stiffmap.ui.cli.inputs import MM, machine_at, numbers
 from stiffmap.ui.cli.options import option
-from stiffmap.ui.cli.output import show, table, write_files
+from stiffmap.ui.cli.output import Answer, table, write_files
 
 
 def command(
@@ -34,8 +34,7 @@ def command(
     gravity_: options.Gravity = None,
     output: options.Folder = None,
     method: options.Method = "fast",
-    as_json: options.Json = False,
-) -> None:
+) -> Answer:
     """Deflection against the size of a force of one direction.
 
     Unstable equilibria are kept and named; a force without any equilibrium has no value. With --limit,
@@ -61,9 +60,9 @@ def command(
     counted = ds.assign(unstable_modes=ds.unstable_modes.astype(int)) if path else ds
     data = {"machine": m.name} | ({n: ds.attrs[n] for n in ("end", "crossing_end")} if path else {})
     data |= {n: counted[n].values for n in (OF_PATH if path else OF_FORCES)}
-    show(as_json, data, _path_lines(ds) if path else [as_table(ds)], files)
     early = path and ds.attrs["end"] != "the limit was reached"
-    finish(early or bool((ds.status != Status.CONVERGED).any()))
+    lost = early or bool((ds.status != Status.CONVERGED).any())
+    return Answer(data, _path_lines(ds) if path else [as_table(ds)], files, finding=lost)
 
 
 def _files(ds: xr.Dataset, tolerance: float) -> Iterator[tuple[str, Any]]:

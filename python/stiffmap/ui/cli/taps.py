@@ -11,9 +11,9 @@ from stiffmap.experiment import load_experiment
 from stiffmap.identification.taps import TapDiagnosis, TapTest, explain_taps, load_taps
 from stiffmap.identification.taps.problem import corrected
 from stiffmap.ui.cli import options
-from stiffmap.ui.cli.inputs import finish, machine_with, words
+from stiffmap.ui.cli.inputs import machine_with, words
 from stiffmap.ui.cli.options import argument, option
-from stiffmap.ui.cli.output import show, write_files
+from stiffmap.ui.cli.output import Answer, write_files
 
 
 def command(
@@ -26,8 +26,7 @@ def command(
     mass_u: float = option("Standard uncertainty of masses that declare none, %.", 5.0),
     effect: options.Effects = None,
     output: options.Folder = None,
-    as_json: options.Json = False,
-) -> None:
+) -> Answer:
     """Which effect explains the frequencies and damping that tap tests found, typed or from measured responses.
 
     Effects of stiffness, masses of links, dampers, and a hammer held otherwise are tried. Modes are paired by the direction in which
@@ -49,8 +48,8 @@ def command(
     rows = found.modes(m, measured)
     files = write_files(output, _files(m, measured, found))
     data = {"machine": m.name, **found.as_plain(), "modes": rows}
-    show(as_json, data, [found.sentence, *map(_row, rows)], files)
-    finish(bool(found.named) or not found.fits)
+    missing = bool(found.named) or not found.fits
+    return Answer(data, [found.sentence, *map(_row, rows)], files, finding=missing)
 
 
 def _row(r: dict[str, Any]) -> str:

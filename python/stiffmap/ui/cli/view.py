@@ -9,11 +9,10 @@ import typer
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import number_in
-from stiffmap.common.outputs.option import written
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import MM, in_si, machine_with, numbers, refuse_unused
-from stiffmap.ui.cli.options import option
-from stiffmap.ui.cli.output import show
+from stiffmap.ui.cli.options import option, written
+from stiffmap.ui.cli.output import Answer, show
 
 LOCAL = "127.0.0.1"
 DEGREE = math.pi / 180
@@ -84,10 +83,11 @@ def command(
     data = data_of(model.declared, experiment, diagnosis, path)
     name = model.declared.name
     if html is not None or picture is not None:
-        show(as_json, {"machine": name}, [], _written(model, data, html, picture))
+        show(as_json, Answer({"machine": name}, [], _written(model, data, html, picture)))
         return
     opened = View(model, host, port, data)
-    show(as_json, {"machine": name, "url": opened.url}, [f"{name}: {opened.url}", "Ctrl-C ends it"])
+    lines = [f"{name}: {opened.url}", "Ctrl-C ends it"]
+    show(as_json, Answer({"machine": name, "url": opened.url}, lines))
     if browser:
         webbrowser.open(opened.url)
     opened.wait()

@@ -6,9 +6,9 @@ import numpy as np
 
 from stiffmap.solve.status import Status
 from stiffmap.ui.cli import options
-from stiffmap.ui.cli.inputs import MM, finish, machine_at, numbers
+from stiffmap.ui.cli.inputs import MM, machine_at, numbers
 from stiffmap.ui.cli.options import option
-from stiffmap.ui.cli.output import show
+from stiffmap.ui.cli.output import Answer
 
 
 def command(
@@ -20,8 +20,7 @@ def command(
     point: str = option("Named point that is held.", "tcp"),
     effect: options.Effects = None,
     gravity_: options.Gravity = None,
-    as_json: options.Json = False,
-) -> None:
+) -> Answer:
     """Wrench that holds a machine at a displacement from its commanded pose, whole and per leg.
 
     Exit codes: 0 converged, 1 any other status, 2 bad input.
@@ -39,5 +38,4 @@ def command(
     for name, w in {"whole machine": held.wrench, **parts}.items():
         force, moment = (", ".join(f"{v:.4f}" for v in part) for part in (w[:3], w[3:]))
         told.append(f"{name}: force ({force}) N, moment about {point} ({moment}) N m")
-    show(as_json, data, told)
-    finish(int(held.status) != Status.CONVERGED)
+    return Answer(data, told, finding=int(held.status) != Status.CONVERGED)

@@ -10,6 +10,7 @@ import xarray as xr
 
 from stiffmap.ui.paper.results import Results
 from stiffmap.ui.paper.statement import Statement, by_point, judge, of_section_5_3, rounds_to
+from stiffmap.workspace.maps.summary import readings, values_of
 
 LINEAR = 5.0  # percent: what a straight line in a printed figure can hide
 
@@ -90,7 +91,8 @@ READINGS = ("worst", "Fx", "Fy", "best")
 
 def workspace_statements(results: Results) -> Iterator[Statement]:
     """The error maps."""
-    ranges: Ranges = {r: _ranges(reading(results.maps, r)) for r in READINGS}
+    maps = results.maps
+    ranges: Ranges = {n: _ranges(1e3 * values_of(maps, how)) for n, how in readings(maps, "xy").items()}
     outer = (-0.2, 0.3)
     low = min(ranges[r][z][0] for r in READINGS for z in outer)
     high = min(ranges[r][z][1] for r in ("worst", "Fx", "Fy") for z in outer)
@@ -137,7 +139,7 @@ def workspace_statements(results: Results) -> Iterator[Statement]:
         {f"z{1e3 * z:g}_best_max_mm": v for z, v in top.items()},
         printed="better than 0.2 mm",
     )
-    worst, best = results.maps.worst_deflection_xy, results.maps.best_deflection_xy
+    worst, best = maps.worst_deflection_xy, maps.best_deflection_xy
     ratio, of_largest = worst / best, float(worst.max() / best.max())
     largest, median, share = float(ratio.max()), float(np.median(ratio)), 100 * float((ratio > 3).mean())
     yield of_section_5_3(
@@ -155,13 +157,6 @@ def workspace_statements(results: Results) -> Iterator[Statement]:
         },
         printed="more than 3 times",
     )
-
-
-def reading(maps: xr.Dataset, name: str) -> xr.DataArray:
-    """Deflection in the plane (mm) under one reading of the force's direction."""
-    extreme = name in ("worst", "best")
-    values: xr.DataArray = maps[f"{name}_deflection_xy"] if extreme else maps.deflection_xy.sel(case=name)
-    return values * 1e3
 
 
 def _ranges(values: xr.DataArray) -> dict[float, tuple[float, float]]:

@@ -16,6 +16,7 @@ from stiffmap.ui.plot.error_maps import map_figure
 from stiffmap.ui.plot.forces import draw_ellipse, draw_polar, sweep_figure
 from stiffmap.ui.plot.style import MM, headline, panel, paper
 from stiffmap.workspace.maps import error_map, polar, sweep
+from stiffmap.workspace.maps.summary import readings
 
 POINTS = {
     "isotropic": (0.0, 0.0, 0.0),
@@ -90,9 +91,9 @@ def all_figures(results: Results) -> dict[str, Figure]:
     figure_6 = sweep_figure(list(results.sweeps.values()), tolerance=TOLERANCE)
     headline(figure_6, "Figure 6. Deflection against force at the four points")
     figures = {"figure5.png": figure_5(results), "figure6.png": figure_6}
-    for name in ("worst", "best", "Fx", "Fy"):
-        variable, case = (f"{name}_deflection_xy", None) if name.islower() else ("deflection_xy", name)
-        figures[f"figure7-{name}.png"] = map_figure(results.maps, variable, case=case, tolerance=TOLERANCE)
+    for name, how in readings(results.maps, "xy").items():
+        figure = map_figure(results.maps, how.variable, case=how.case, tolerance=TOLERANCE)
+        figures[f"figure7-{name}.png"] = figure
     worst = float(results.maps.worst_deflection_xy.max()) * MM
     title = f"Figure 7. {FORCE:g} N in the worst direction of the plane, up to {worst:.2f} mm"
     headline(figures["figure7-worst.png"], title)

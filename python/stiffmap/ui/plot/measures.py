@@ -194,7 +194,8 @@ def caption(name: str) -> str:
 
 def requirement_figure(table: MeasuresTable) -> Figure:
     """Each requirement as a bar: worst value over the bound, the line at 1 is the bound."""
-    rows = [r for r in table.rows if r.bound is not None]
+    bounds = [(r, r.bound) for r in table.rows if r.bound is not None]
+    rows = [r for r, _ in bounds]
     with paper(6.4, 0.6 + 0.42 * len(rows), most=0) as figure:
         axes = figure.add_subplot()
         shares = np.nan_to_num([_share(r) for r in rows], posinf=0.0, neginf=0.0)
@@ -204,7 +205,8 @@ def requirement_figure(table: MeasuresTable) -> Figure:
             text = f"{r.measure.factor * r.found.worst:.4g} {r.measure.shown} – {r.verdict}"
             axes.text(max(share, 1.0) * 1.02, i, text, va="center")
         axes.axvline(1.0, color="black", linewidth=1)
-        axes.set_yticks(range(len(rows)), [_bound_text(r) for r in rows])
+        names = [f"{r.measure.name} {b.text(r.measure.factor)} {r.measure.shown}".rstrip() for r, b in bounds]
+        axes.set_yticks(range(len(rows)), names)
         axes.invert_yaxis()
         axes.set_xlim(0, 1.45 * max([1.0, *shares]))
         axes.set_xlabel("worst value over the bound (line: the bound)")
@@ -220,14 +222,6 @@ def _limit(bound: Bound | None) -> float | None:
 def _share(r: MeasureRow) -> float:
     limit = _limit(r.bound)
     return float(r.found.worst / limit) if limit else float("nan")
-
-
-def _bound_text(r: MeasureRow) -> str:
-    limit = _limit(r.bound)
-    assert r.bound is not None
-    assert limit is not None
-    sign = "≤" if r.bound.at_least is None else "≥"
-    return f"{r.measure.name} {sign} {r.measure.factor * limit:.4g} {r.measure.shown}".rstrip()
 
 
 def map_figure(table: MeasuresTable, row: MeasureRow) -> Figure:

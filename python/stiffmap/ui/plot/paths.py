@@ -1,6 +1,8 @@
-"""A load path with its critical points, and a buckling mode."""
+"""A load path with its critical points, and a buckling mode; deflection along a toolpath."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -15,7 +17,7 @@ from stiffmap.solve.machine import Machine
 from stiffmap.solve.status import Status
 from stiffmap.ui.plot.scene import dots, draw_skeleton, finish, on, scene_axes
 from stiffmap.ui.plot.skeleton import Skeleton, skeleton
-from stiffmap.ui.plot.style import BLACK, BLUE, GREEN, MM, VERMILLION, leg_colours, paper
+from stiffmap.ui.plot.style import BLACK, BLUE, CYCLE, GREEN, MM, VERMILLION, leg_colours, length_unit, paper
 
 MARKS = {"limit": "^", "bifurcation": "X"}
 HALO = "#f5c9b0"
@@ -97,3 +99,18 @@ def _mark(ax: Axes, machine: Machine, shape: Skeleton, moved: Floats, leg: str, 
     node = next(i for i, (_, c) in enumerate(core.nodes) if c == index)
     at = core.frames(moved)[0][node]
     dots(ax, at, 190, facecolor="none", edgecolor=VERMILLION, linewidth=1.8, label="moves most")
+
+
+def toolpath_figure(ds: xr.Dataset, name: str) -> Figure:
+    """Deflection and its components over the way."""
+    with paper(6.4, 3.4, f"{name}: deflection along the toolpath") as figure:
+        ax: Any = figure.subplots()
+        way = MM * ds.way.values
+        unit, factor = length_unit(float(np.nanmax(ds.deflection.values, initial=0.0)))
+        ax.plot(way, factor * ds.deflection.values, color=BLACK, lw=1.6, label="|d|")
+        for i, axis in enumerate("xyz"):
+            if np.nanmax(np.abs(ds.displacement.values[:, i]), initial=0.0) > 1e-12:
+                ax.plot(way, factor * ds.displacement.values[:, i], color=CYCLE[i], lw=1.0, label=f"d{axis}")
+        ax.set(xlabel="way along the path, mm", ylabel=f"deflection, {unit}")
+        ax.grid(color="0.9", lw=0.5)
+    return figure

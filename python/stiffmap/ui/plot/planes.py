@@ -10,9 +10,7 @@ import numpy as np
 import xarray as xr
 from matplotlib import patheffects
 from matplotlib.axes import Axes
-from matplotlib.collections import PatchCollection
-from matplotlib.colors import Normalize
-from matplotlib.patches import Rectangle
+from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
@@ -118,23 +116,13 @@ def draw_tolerance(ax: Axes, x: Floats, y: Floats, v: Floats, level: float, word
         ax.plot([], [], color=TOLERANCE, label=f"tolerance {words}")
 
 
-def edges(centres: Floats) -> Floats:
-    """Borders of the cells around sorted grid values."""
-    if centres.size == 1:
-        return np.array([centres[0] - 0.5, centres[0] + 0.5])
-    middle = (centres[1:] + centres[:-1]) / 2
-    first, last = centres[0] - (middle[0] - centres[0]), centres[-1] + (centres[-1] - middle[-1])
-    return np.concatenate([[first], middle, [last]])
-
-
 def hatch_failed(ax: Axes, x: Floats, y: Floats, values: Floats, status: NDArray[np.uint8]) -> None:
     """Hatch the cells (y, x) without a value."""
     for state, (name, hatch, colour) in LOOK.items():
-        cells = np.argwhere(np.isnan(values) & (status == state))
-        if len(cells) == 0:
+        cells = np.isnan(values) & (status == state)
+        if not cells.any():
             continue
-        look: dict[str, Any] = {"facecolor": colour, "edgecolor": "#555555", "hatch": hatch, "linewidth": 0}
-        right, up = edges(x), edges(y)
-        corners = [((right[j], up[i]), right[j + 1] - right[j], up[i + 1] - up[i]) for i, j in cells]
-        ax.add_collection(PatchCollection([Rectangle(*c) for c in corners], **look))
-        ax.fill([], [], label=name, **look)
+        look: dict[str, Any] = {"edgecolor": "#555555", "hatch": hatch, "linewidth": 0}
+        shown = np.ma.masked_where(~cells, cells)
+        ax.pcolor(x, y, shown, shading="nearest", cmap=ListedColormap([colour]), snap=True, **look)
+        ax.fill([], [], label=name, facecolor=colour, **look)

@@ -51,16 +51,17 @@ def _files(inputs: Iterable[str | PathLike[str]]) -> list[Path]:
 
 
 @cache
-def _environment() -> Environment:
-    pages = FileSystemLoader(Path(__file__).parent / "pages")
+def templates(folder: Path) -> Environment:
+    """The templates of a folder; what they are filled with is escaped."""
     return Environment(
-        loader=pages, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
+        loader=FileSystemLoader(folder), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
+        lstrip_blocks=True,
+    )  # fmt: skip
 
 
 def render(template: str, /, **values: object) -> str:
     """A template filled in; values are escaped."""
-    return _environment().get_template(template).render(**values)
+    return templates(Path(__file__).parent / "pages").get_template(template).render(**values)
 
 
 def inline(picture: Figure | bytes) -> str:

@@ -18,8 +18,8 @@ from stiffmap.common.kept import Kept
 from stiffmap.experiment import Experiment
 from stiffmap.experiment.calls import residual
 from stiffmap.solve.machine import Machine, load_machine
-from stiffmap.ui.plot.elements import element_links
 from stiffmap.ui.plot.loaded import round_factor
+from stiffmap.ui.plot.skeleton import element_links
 from stiffmap.ui.plot.style import BLUE, GREEN, VERMILLION
 from stiffmap.ui.view.moment import Moment
 from stiffmap.ui.view.plane import rgb

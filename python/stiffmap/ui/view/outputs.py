@@ -40,14 +40,8 @@ if TYPE_CHECKING:
     from viser import GuiApi, GuiButtonHandle, GuiEvent, ViserServer
 
 SHOWN = 51  # poses along each edge of the plane in a picture
-STYLE = """<style>
-#said { position: fixed; z-index: 1000; left: .6em; top: .6em; width: min(24em, 45vw); max-height: 90vh; overflow: auto;
-  background: rgba(255,255,255,.92); color: #111; font: 13px system-ui,sans-serif; border-radius: 4px; padding: .3em .6em; }
-@media (max-width: 36em) {
-  #root { height: 55vh !important; }
-  #said { box-sizing: border-box; left: 0; top: 55vh; width: 100%; max-height: 45vh; }
-}</style>"""
-"""What is said stands next to the scene, or below it on narrow screens."""
+SAID = Path(__file__).parent / "pages/said.html"
+"""Opens what is said, which stands next to the scene, or below it on narrow screens."""
 
 
 class Outputs:
@@ -146,7 +140,7 @@ def page_of(moment: Moment, data: Data | None = None) -> str:
     title = escape(f"{moment.machine.name}: stiffness view")
     text = text.replace("<title>", f"<title>{title} - ", 1)
     head, _, tail = text.rpartition("</body>")
-    return f'{head}{STYLE}<div id="said">{said}</div></body>{tail}'
+    return f"{head}{SAID.read_text(encoding='utf-8')}{said}</div></body>{tail}"
 
 
 def draw(server: ViserServer, moment: Moment, data: Data | None = None) -> str:

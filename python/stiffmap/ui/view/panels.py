@@ -1,9 +1,11 @@
-"""What is said next to the scene, as HTML: every text of a file or a person is escaped here."""
+"""What is said next to the scene, as HTML: the macros of the template escape every text of a file or a person."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from html import escape
+from functools import cache
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -18,6 +20,7 @@ from stiffmap.ui.plot.planes import levels
 from stiffmap.ui.plot.scene import FORCE
 from stiffmap.ui.plot.skeleton import Skeleton
 from stiffmap.ui.plot.style import BLACK, BLUE, ORANGE, TOLERANCE, leg_colours
+from stiffmap.ui.report.sheet import templates
 from stiffmap.ui.view.moment import Moment, turns
 from stiffmap.ui.view.plane import QUANTITIES, STATUS_COLOURS, PlaneMap, table, tolerance_level
 from stiffmap.ui.view.scene import DARK, GHOST, GREY
@@ -28,6 +31,11 @@ Row = tuple[str, float, str, str]
 """Label, length of the bar (-1 … 1), colour, text."""
 
 
+@cache
+def _macros() -> Any:
+    return templates(Path(__file__).parent / "pages").get_template("panels.html").module
+
+
 DUST = 1e-12  # m and m/N, below which a deflection and a compliance are round-off
 
 
@@ -35,73 +43,40 @@ def status_line(moment: Moment, solution: Solution, message: str, error: str) ->
     """Where the tool is, how far it moves, what is wrong; a live region for screen readers."""
     size = float(np.linalg.norm(solution.displacement[:3]))
     if bool(solution.ok) and max(size, np.abs(solution.compliance[:3, :3]).max()) < DUST:
-        said = RIGID
+        said = (RIGID, "", "")
     elif bool(solution.ok):
         unit, factor, decimals = length_unit(size)
         parts = ", ".join(f"{factor * v:z.{decimals}f}" for v in solution.displacement[:3])
-        said = f"the tool moves <b>{length_text(size)}</b> ({parts}) {unit}"
+        said = ("the tool moves ", length_text(size), f" ({parts}) {unit}")
     else:
-        said = f"<b>{escape(Status(int(solution.status)).name.lower())}</b>: no equilibrium"
-    lines = [f"{escape(moment.machine.name)} at {place_text(moment.state.position, '.1f')}: {said}"]
-    lines += [f'<span style="color:{ORANGE}">{escape(message)}</span>'] if message else []
-    for line in error.splitlines():
-        lines.append(f'<span role="alert" style="color:{RED}">{escape(line)}</span>')
-    return f'<div role="status" aria-live="polite" style="padding:.3em .6em">{"<br/>".join(lines)}</div>'
+        said = ("", Status(int(solution.status)).name.lower(), ": no equilibrium")
+    where = f"{moment.machine.name} at {place_text(moment.state.position, '.1f')}"
+    return str(_macros().status(where, said, message, error, ORANGE, RED))
 
 
 def colour_bar(found: PlaneMap, limits: tuple[float, float], tolerance: float) -> str:
     """An SVG with the scale, its round values (those of the isolines) and the tolerance."""
     q = QUANTITIES[found.quantity]
     if found.quantity == "status":
-        marks = "".join(
-            f'<span style="background:rgb{c};display:inline-block;width:1em">&nbsp;</span> '
-            f"{escape(k.name.lower().replace('_', ' '))} "
-            for k, c in STATUS_COLOURS.items()
-        )
-        return f'<div style="padding:.3em .6em" aria-label="status of the poses">{marks}</div>'
+        names = ((colour, kind.name.lower().replace("_", " ")) for kind, colour in STATUS_COLOURS.items())
+        return str(_macros().status_colours(names))
     low, high = limits
     unit, factor = q.shown(max(map(abs, limits)))
-    stops = "".join(
-        f'<stop offset="{i / 15:.4f}" stop-color="rgb({r},{g},{b})"/>'
-        for i, (r, g, b) in enumerate(table()[:: 255 // 15])
-    )
 
-    def at(v: float) -> float:
-        return 10 + 280 * (v - low) / (high - low)
+    def at(v: float) -> str:
+        return f"{10 + 280 * (v - low) / (high - low):.1f}"
 
-    ticks = "".join(
-        f'<line x1="{at(v):.1f}" x2="{at(v):.1f}" y1="18" y2="36" stroke="white" stroke-width=".8"/>'
-        f'<text x="{at(v):.1f}" y="48" font-size="10" text-anchor="middle" fill="currentColor">{factor * v:.5g}</text>'
-        for v in levels(*limits)
-    )
     level = tolerance_level(found.quantity, tolerance)
-    if level is not None and low < level < high:
-        ticks += f'<line x1="{at(level):.1f}" x2="{at(level):.1f}" y1="14" y2="40" stroke="{TOLERANCE}" stroke-width="2.5"/>'
-    words = f"{q.title}, {unit}"
-    failed = int(found.failed.sum())
-    which = "1 pose" if failed == 1 else f"{failed} poses"
-    note = f'<div style="font-size:85%">hatched: {which} without an equilibrium</div>' if failed else ""
-    text = f"{factor * low:.4g} to {factor * high:.4g} {unit}"
-    return (
-        f'<svg viewBox="0 0 300 54" width="100%" role="img" aria-label="{escape(words)}: {escape(text)}">'
-        f'<defs><linearGradient id="scale">{stops}</linearGradient></defs>'
-        f'<text x="10" y="12" font-size="11" fill="currentColor">{escape(words)}</text>'
-        f'<rect x="10" y="18" width="280" height="18" fill="url(#scale)"/>{ticks}</svg>{note}'
-    )
+    mark = at(level) if level is not None and low < level < high else ""
+    ticks = [(at(v), f"{factor * v:.5g}") for v in levels(*limits)]
+    said = f"{factor * low:.4g} to {factor * high:.4g} {unit}"
+    stops, failed = table()[:: 255 // 15], int(found.failed.sum())
+    return str(_macros().colour_bar(f"{q.title}, {unit}", said, stops, ticks, mark, TOLERANCE, failed))
 
 
 def bars(title: str, rows: Sequence[Row]) -> str:
     """A table with a bar in each row."""
-    out = "".join(
-        f'<tr><td style="white-space:nowrap">{escape(label)}</td><td style="width:35%"><div style="'
-        f'width:{100 * min(abs(size), 1.0):.1f}%;background:{colour};height:.8em"></div></td>'
-        f'<td style="text-align:right;white-space:nowrap">{escape(text)}</td></tr>'
-        for label, size, colour, text in rows
-    )
-    return (
-        f'<table style="width:100%;font-size:85%;padding:0 .8em 0 .4em"><caption style="text-align:left"><b>{escape(title)}</b>'
-        f"</caption>{out}</table>"
-    )
+    return str(_macros().bars(title, rows))
 
 
 def shares_panel(budget: DeflectionBudget, lit: str = "") -> str:
@@ -172,37 +147,23 @@ def probe_text(moment: Moment, point: Sequence[float]) -> str:
     return f"probe at {place_text(point, '.1f')}: {said}"
 
 
-DOT = "width:.7em;height:.7em;border-radius:50%;border:1px solid #888"
-PADDED = "padding:.3em .6em;font-size:85%"
-SQUARE, LINE = "width:.7em;height:.7em", "width:1.4em;height:.25em"
-
-
 def legend(moment: Moment, rest: Skeleton, factor: float) -> str:
     """Rows of what is drawn of this machine; `factor`: the magnification of the deflected one."""
     state = moment.state
     size = float(np.linalg.norm(state.force))
-    rows = [(LINE, c, f"leg {leg}") for leg, c in leg_colours(moment.machine.legs).items() if leg]
-    rows += [(LINE, GREY, "travel of the drives")] if len(rest.guides) else []
-    rows += [(SQUARE, BLACK, "drive")] if len(rest.actuators) else []
-    rows += [(DOT, "#FFFFFF", "passive joint")] if len(rest.passive) else []
-    rows += [(SQUARE, DARK, "platform")] if len(rest.plate) else []
-    rows += [("width:.6em;height:.6em;border:1px solid #888", "none", "workspace box")]
-    rows += [(LINE, GHOST, f"under the load, × {factor:g}")] if factor else []
-    rows += [(LINE, FORCE, f"force, {size:.4g} N")] if size else []
+    rows = [("line", c, f"leg {leg}") for leg, c in leg_colours(moment.machine.legs).items() if leg]
+    rows += [("line", GREY, "travel of the drives")] if len(rest.guides) else []
+    rows += [("square", BLACK, "drive")] if len(rest.actuators) else []
+    rows += [("dot", "#FFFFFF", "passive joint")] if len(rest.passive) else []
+    rows += [("square", DARK, "platform")] if len(rest.plate) else []
+    rows += [("frame", "none", "workspace box")]
+    rows += [("line", GHOST, f"under the load, × {factor:g}")] if factor else []
+    rows += [("line", FORCE, f"force, {size:.4g} N")] if size else []
     if tolerance_level(state.quantity, state.tolerance) is not None:
-        rows.append((LINE, TOLERANCE, f"tolerance, {length_text(state.tolerance)}"))
-    said = "".join(
-        f'<span style="display:inline-block;margin-right:1em"><span style="display:inline-block;vertical-align:middle;{shape};'
-        f'background:{colour}"></span> {escape(text)}</span> '
-        for shape, colour, text in rows
-    )
-    return f'<div style="{PADDED}">{said}</div>'
+        rows.append(("line", TOLERANCE, f"tolerance, {length_text(state.tolerance)}"))
+    return str(_macros().legend(rows))
 
 
 def hint(moment: Moment) -> str:
     """What can be dragged."""
-    turned = "; its rings turn it" if any(turns(moment.machine)) else ""
-    return (
-        f'<div style="{PADDED}"><b>Drag</b> the tool by its arrows and squares{turned}. Drag the force by the arrows at its tail. '
-        "Click the plane to place the probe, and drag its red dot.</div>"
-    )
+    return str(_macros().hint(any(turns(moment.machine))))

@@ -11,9 +11,8 @@ from scipy.spatial.transform import Rotation
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.solve.solution import Solution
-from stiffmap.ui.plot.elements import thicknesses
 from stiffmap.ui.plot.scene import ARROW, FORCE, box_edges
-from stiffmap.ui.plot.skeleton import COINCIDENT, Skeleton
+from stiffmap.ui.plot.skeleton import COINCIDENT, Skeleton, thicknesses
 from stiffmap.ui.plot.style import BLACK, ORANGE, SKY, TOLERANCE, leg_colours
 from stiffmap.ui.view.meshes import Meshes
 from stiffmap.ui.view.moment import Moment, box_of, moves, turns

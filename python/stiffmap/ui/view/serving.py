@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator, Mapping
 from functools import lru_cache
 from http import HTTPStatus
 from http.cookies import CookieError, SimpleCookie
+from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qs, urlsplit
@@ -172,38 +173,9 @@ def free_port(host: str, port: int | None) -> int:
     raise StiffmapError(f"no port from {FIRST_PORT} to {FIRST_PORT + TRIED_PORTS - 1} is free; give --port")
 
 
-SCRIPT = """<script>(() => {
-  const buttons = {
-    "button:has(.tabler-icon-list-search)": "Search commands",
-    "button:has(.tabler-icon-adjustments)": "Connection, camera and scene",
-    ".mantine-Notification-closeButton": "Close the message",
-  };
-  const fields = () => document.querySelectorAll("label[for]").forEach(label => {
-    const row = label.closest(".mantine-Flex-root");
-    const found = row ? [...row.querySelectorAll("input:not([type=hidden]), textarea, [role=slider]")] : [];
-    found.forEach((field, i) => {
-      const text = label.textContent + (found.length === 3 ? ", " + "xyz"[i] : "");
-      if (field.getAttribute("aria-label") !== text) field.setAttribute("aria-label", text);
-    });
-  });
-  const name = () => {
-    fields();
-    for (const [where, text] of Object.entries(buttons))
-      document.querySelectorAll(where + ":not([aria-label])").forEach(b => b.setAttribute("aria-label", text));
-  };
-  let waiting = false;
-  new MutationObserver(() => {
-    if (!waiting) { waiting = true; setTimeout(() => { waiting = false; name(); }, 250); }
-  }).observe(document, {childList: true, subtree: true});
-})();</script>"""
-"""Names for screen readers: viser's client labels the first field of a row at best, and no button with a picture."""
-STYLE = """<style>@media (max-width: 36em) {
-  div:has(> .mantine-Paper-root):has(canvas) { flex-direction: column; }
-  div:has(> .mantine-Paper-root) > div:has(canvas) { height: 0 !important; }
-  div:has(canvas) ~ .mantine-Paper-root { position: relative !important; width: 100% !important; max-height: 50% !important; flex: none; }
-  div:has(canvas) ~ .mantine-Paper-root .mantine-ScrollArea-content > div { width: 100% !important; }
-}</style>"""
-"""Where viser's client lays its panel over the scene, on narrow screens, the panel stands below the scene instead."""
+HEAD = Path(__file__).parent / "pages/head.html"
+"""Script and style for the head of viser's page. Names for screen readers: its client labels the first field of a row at best, and no
+button with a picture. On narrow screens the panel stands below the scene, over which the client lays it."""
 
 
 @lru_cache(maxsize=4)
@@ -211,5 +183,5 @@ def named(body: bytes, packed: bool) -> bytes:
     """The page with script and style in its head; `packed`: as it is sent, by gzip."""
     text = gzip.decompress(body) if packed else body
     head, end, tail = text.partition(b"</head>")
-    out = head + (SCRIPT + STYLE).encode() + end + tail if end else text
+    out = head + HEAD.read_bytes() + end + tail if end else text
     return gzip.compress(out, mtime=0) if packed else out

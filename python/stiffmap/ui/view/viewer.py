@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.solution import Solution
-from stiffmap.ui.plot.elements import element_links
+from stiffmap.ui.plot.skeleton import element_links
 from stiffmap.ui.view import panels
 from stiffmap.ui.view.controls import NONE, Controls
 from stiffmap.ui.view.data import Data

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from matplotlib.collections import PatchCollection, QuadMesh
+from matplotlib.collections import PolyQuadMesh, QuadMesh
 from matplotlib.contour import QuadContourSet
 from matplotlib.figure import Figure
 
 import stiffmap as sm
 from stiffmap import plot
-from stiffmap.ui.plot.planes import edges
+from stiffmap.ui.plot.paths import toolpath_figure
 from stiffmap.ui.plot.skeleton import skeleton
 
 
@@ -52,7 +52,7 @@ def test_failed_cells_are_hatched_not_coloured(machine: sm.Machine) -> None:
     figure = plot.map_figure(ds)
     missing = int(np.isnan(ds.worst_deflection_xy).sum())
     assert missing > 0
-    hatched = [c for c in figure.axes[0].collections if isinstance(c, PatchCollection)]
+    hatched = [c for c in figure.axes[0].collections if isinstance(c, PolyQuadMesh)]
     assert sum(len(c.get_paths()) for c in hatched) == missing
     mesh = next(c for c in figure.axes[0].collections if isinstance(c, QuadMesh))
     assert int(np.ma.getmaskarray(mesh.get_array()).sum()) == missing
@@ -121,9 +121,13 @@ def test_saving(machine: sm.Machine, tmp_path: Path) -> None:
         plot.save(figure, tmp_path / "a.xyz")
 
 
-def test_edges_surround_the_centres() -> None:
-    np.testing.assert_allclose(edges(np.array([0.0, 1.0, 3.0])), [-0.5, 0.5, 2.0, 4.0])
-    np.testing.assert_allclose(edges(np.array([2.0])), [1.5, 2.5])
+def test_a_toolpath_is_drawn_over_its_way_in_mm(machine: sm.Machine) -> None:
+    way = np.array([0.0, 0.1, 0.2])
+    position = way[:, None] * [1.0, 0.0, 0.0]
+    solved = machine.solve(position, [300.0, 0, 0, 0, 0, 0])
+    ax = toolpath_figure(solved.to_xarray(("way",), {"way": ("way", way)}), "it").axes[0]
+    np.testing.assert_allclose(ax.lines[0].get_xdata(), [0.0, 100.0, 200.0])
+    assert ax.get_xlabel() == "way along the path, mm"
 
 
 def test_every_figure_shows_in_a_notebook_without_pyplot(monkeypatch: pytest.MonkeyPatch) -> None:

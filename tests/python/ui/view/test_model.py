@@ -12,8 +12,7 @@ import stiffmap as sm
 from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.model.files.shipped import find
 from stiffmap.solve.kinematics import assembly_modes
-from stiffmap.ui.plot.elements import THICK, THIN, element_links, thicknesses
-from stiffmap.ui.plot.skeleton import skeleton
+from stiffmap.ui.plot.skeleton import THICK, THIN, element_links, skeleton, thicknesses
 from stiffmap.ui.view.model import ViewModel, addresses, changed
 from stiffmap.ui.view.moment import moves, turns
 from stiffmap.ui.view.panels import principal

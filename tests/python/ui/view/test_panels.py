@@ -13,8 +13,7 @@ import stiffmap as sm
 from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.status import Status
 from stiffmap.ui.cli.view import _change, _state
-from stiffmap.ui.plot.elements import element_links
-from stiffmap.ui.plot.skeleton import skeleton
+from stiffmap.ui.plot.skeleton import element_links, skeleton
 from stiffmap.ui.view import model_of
 from stiffmap.ui.view.model import ViewModel
 from stiffmap.ui.view.outputs import command_line, python_lines, view_figure

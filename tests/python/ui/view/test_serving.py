@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import pytest
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.ui.view.serving import COOKIE, FIRST_PORT, SCRIPT, STYLE, Guard, free_port, in_one_line, named
+from stiffmap.ui.view.serving import COOKIE, FIRST_PORT, HEAD, Guard, free_port, in_one_line, named
 
 HERE = {"Host": "127.0.0.1:8080"}
 
@@ -84,7 +84,7 @@ def test_the_page_gets_names_and_style(packed: bool) -> None:
     page = b"<html><head><title>t</title></head><body></body></html>"
     out = named(gzip.compress(page) if packed else page, packed)
     text = gzip.decompress(out) if packed else out
-    added = (SCRIPT + STYLE).encode()
+    added = HEAD.read_bytes()
     assert text.replace(added, b"") == page and added in text
     assert named(b"no page", False) == b"no page"
 

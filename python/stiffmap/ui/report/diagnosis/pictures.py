@@ -16,11 +16,10 @@ from stiffmap.identification.diagnosis.report.findings import Effect
 from stiffmap.identification.diagnosis.report.result import Diagnosis
 from stiffmap.solve.compiled import Role
 from stiffmap.solve.machine import Machine
-from stiffmap.ui.plot.elements import nodes_of
 from stiffmap.ui.plot.experiment import arrow_figure, kept, pose_means, trending, trends, vector_cases
 from stiffmap.ui.plot.loaded import loaded_figure
 from stiffmap.ui.plot.scene import dots, draw_skeleton, finish, on, scene_axes
-from stiffmap.ui.plot.skeleton import COINCIDENT, owners, standing
+from stiffmap.ui.plot.skeleton import COINCIDENT, nodes_of, owners, standing
 from stiffmap.ui.plot.style import AFTER, BEFORE, MM, UM, new_figure
 
 CAPTIONS = {
