@@ -24,6 +24,7 @@ from stiffmap.model.effects import get, kinds
 from stiffmap.solve.closing import of_drives
 from stiffmap.solve.kinematics import forward_kinematics, inverse_kinematics
 from stiffmap.solve.machine import Machine
+from stiffmap.solve.solution import Solution
 
 Array = TypeVar("Array", bound=NDArray[Any])
 KEPT = 32
@@ -75,17 +76,23 @@ def poses_once(plan: Experiment) -> tuple[Experiment, Integers]:
     return plan, np.arange(len(plan))
 
 
+def at_rest(machine: Machine, plan: Experiment) -> Solution:
+    """The machine at the poses of a plan without load, its gaps closed: one without force has no stiffness, and would leave the
+    kernels."""
+    plain = straight(machine.description)
+    if plain is not machine.description:
+        machine = Machine(plain, like=machine)
+    return machine.solve(plan.position, np.zeros((len(plan), 6)), rotation=plan.rotation)
+
+
 @_once
 def in_reach(machine: Machine, plan: Experiment) -> Mask:
     """(n,) rows whose commanded pose the rigid machine can take; not to be written to."""
     if plan.joints is not None:
         return np.asarray(np.isfinite(plan.joints).all(axis=1))
-    plain = straight(machine.description)  # a gap without force has no stiffness, and would leave the kernels
-    if plain is not machine.description:
-        machine = Machine(plain, like=machine)
     out = np.zeros(len(plan), bool)
     if not machine.compiled.not_fast:  # where the kernels stand at rest the joints close, twenty times faster
-        out = machine.solve(plan.position, np.zeros((len(plan), 6)), rotation=plan.rotation).ok.copy()
+        out = at_rest(machine, plan).ok.copy()
     left = np.flatnonzero(~out)
     if len(left):
         out[left] = np.isfinite(coordinates_of(machine, plan.rows(left))).all(axis=1)

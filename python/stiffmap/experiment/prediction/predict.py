@@ -14,7 +14,7 @@ from stiffmap.common.fingerprints import code, digest
 from stiffmap.common.kept import MOST_BYTES, Kept
 from stiffmap.experiment.experiment import Experiment, Floats, Mask
 from stiffmap.experiment.poses.commanded import OUT_OF_REACH, located, resolved, without
-from stiffmap.experiment.poses.configuration import coordinates_of
+from stiffmap.experiment.poses.configuration import at_rest, coordinates_of
 from stiffmap.experiment.prediction.equilibria import motions
 from stiffmap.experiment.prediction.history import Drives, Terms, at_records, history_motion, records_of
 from stiffmap.experiment.prediction.joints import check_joints
@@ -26,6 +26,8 @@ from stiffmap.solve.machine import Machine
 
 MACHINES, OTHERS = 4, 32
 """Machines with terms, and predictors of other machines and of some rows, that are kept."""
+SAMPLE, SLOW = 100, 0.02
+"""Poses that are asked whether the fast path closes them, and the share of others from which on it pays to keep where the joints stand."""
 
 
 class Predictor:
@@ -160,12 +162,16 @@ class Predictor:
         return OUT_OF_REACH
 
     def _close_from_here(self) -> None:
-        """Keeps where the joints stand, for variants of the machine; one on the fast path closes faster by itself."""
-        e, compiled = self.experiment, self.machine.compiled
-        if e.joints is None and compiled.not_fast:
+        """Keeps where the joints stand, for variants of the machine; poses on the fast path are closed faster without."""
+        e = self.experiment
+        if e.joints is not None:
+            return
+        some = e.each_pose.rows(np.arange(len(e.each_pose))[:: 1 + len(e.each_pose) // SAMPLE])
+        if at_rest(self.machine, some).reference_share > SLOW:
             near = coordinates_of(self.machine, e)
             if np.isfinite(near).all():
-                self.experiment = replace(e, near=near, near_names=tuple(compiled.names.coordinates))
+                names = self.machine.compiled.names.coordinates
+                self.experiment = replace(e, near=near, near_names=tuple(names))
 
     def with_terms(self, terms: Sequence[AppliedEffect]) -> Machine:
         """The machine with the mechanical terms added."""
