@@ -254,6 +254,18 @@ def test_coordinates_in_other_axes_are_refused(tmp_path, lines):
         listing(tmp_path, ansys_text(), lines + NODES)
 
 
+@pytest.mark.parametrize("head", ["node,z [mm],y [mm],x [mm]", "NODE Z Y X", "x, z, y in mm"])
+def test_coordinates_in_another_order_are_refused(tmp_path, head):
+    with pytest.raises(StiffmapError, match=rf"order node, x, y, z; found {re.escape(head)}"):
+        listing(tmp_path, ansys_text(), f"{head}\n{NODES}")
+
+
+def test_coordinates_with_decimal_commas(tmp_path):
+    nodes = "node;x [m];y [m];z [m]\n" + NODES.replace(",", ";").replace(".", ",")
+    points, _ = listing(tmp_path, ansys_text(), nodes)
+    np.testing.assert_allclose(points, listing(tmp_path, ansys_text())[0], rtol=0)
+
+
 def test_sets_of_nodes_make_one_case(tmp_path):
     head, *rows = dat_text().split("\n displ")[1].splitlines()
     rows = [r for r in rows if r.strip()]
@@ -559,6 +571,7 @@ def test_displacements_may_be_numbered_by_their_case(tmp_path, between):
     turned = [*range(4), *range(7, 10), *range(4, 7), *range(10, 22)]  # the second case before the first
     again = "\n".join(",".join(row[i] for i in turned) for row in (names, *rows))
     assert read_field(write(tmp_path, "g.csv", again))[1] == pytest.approx(U)
+    assert read_field(write(tmp_path, "h.csv", again.replace(" [mm]", "_mm")))[1] == pytest.approx(U)
 
 
 def test_no_link_file_is_written_that_cannot_be_read(tmp_path):

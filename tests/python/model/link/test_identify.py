@@ -273,3 +273,11 @@ def test_lengths_of_a_cantilever_along_any_axis(axis, sense):
     found, lengths = bending_lengths(Q @ bar_compliance() @ Q.T)
     assert found == ("" if sense > 0 else "-") + "xyz"[axis]
     assert list(lengths.values()) == pytest.approx([L] * 4)
+
+
+def test_wrenches_that_no_elastic_body_answers_are_said():
+    points, u = noisy_field()
+    words = "NOT an elastic body: compare order, units and reference of the wrenches"
+    assert words not in identify(points, u).report()
+    for wrong in (WRENCHES @ np.diag([1, 1, 1, 1e3, 1e3, 1e3]), WRENCHES[[1, 0, 2, 3, 4, 5]]):
+        assert words in identify(points, u, wrong).report()
