@@ -8,9 +8,6 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.model.link.estimate import SpringEstimate
 from stiffmap.model.link.transport import Floats
 
-ASYMMETRIC = 0.1
-"""Of sqrt(kii kjj): more than warping of the face and mesh leave."""
-
 
 def unit_factor(length: str) -> Floats:
     """(6, 6) factor from SI entries to mm/N, 1/N, rad/(N·mm) for "mm", ones for "m".
@@ -94,7 +91,8 @@ def _field_lines(link: SpringEstimate) -> list[str]:
 
 def _matrix_lines(link: SpringEstimate) -> list[str]:
     missing = ~np.isfinite(link.compliance)
-    wrong = link.asymmetry > ASYMMETRIC and link.symmetry_p_value < link.level
+    # 0.1 is more than warping of the face and the mesh make
+    wrong = link.asymmetry > 0.1 and link.symmetry_p_value < link.level
     lines = [
         f"asymmetry before symmetrisation: {link.asymmetry:.2e} of sqrt(kii kjj) "
         f"(p = {link.symmetry_p_value:.2g})"

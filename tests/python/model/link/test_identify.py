@@ -16,6 +16,7 @@ from tests.python.model.link.link_fields import (
     rigid_field,
 )
 
+from stiffmap.common.errors import StiffmapError
 from stiffmap.model.link import transport_compliance
 from stiffmap.model.link.identify import identify_link
 from stiffmap.model.link.report import bending_lengths
@@ -281,3 +282,9 @@ def test_wrenches_that_no_elastic_body_answers_are_said():
     assert words not in identify(points, u).report()
     for wrong in (WRENCHES @ np.diag([1, 1, 1, 1e3, 1e3, 1e3]), WRENCHES[[1, 0, 2, 3, 4, 5]]):
         assert words in identify(points, u, wrong).report()
+
+
+@pytest.mark.parametrize("point", [0.3, [0.3, 0.0], [0.3, 0.0, np.nan], "tip"])
+def test_another_reference_is_a_point(point):
+    with pytest.raises(StiffmapError, match=r"reference: expected .*\(3,\) in m|reference: expected finite"):
+        identify(*noisy_field(n=10)).at(point)
