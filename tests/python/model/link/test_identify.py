@@ -288,3 +288,11 @@ def test_wrenches_that_no_elastic_body_answers_are_said():
 def test_another_reference_is_a_point(point):
     with pytest.raises(StiffmapError, match=r"reference: expected .*\(3,\) in m|reference: expected finite"):
         identify(*noisy_field(n=10)).at(point)
+
+
+def test_nodes_of_the_whole_part_are_no_rigid_end():
+    """The part is stretched and twisted in proportion to the distance from the fixed end."""
+    points = np.random.default_rng(3).uniform(size=(40, 3)) * [L, 0.02, 0.04] - [0, 0.01, 0.02]
+    bent = rigid_field(C, WRENCHES, points, REFERENCE) * (points[:, :1] / L)
+    assert "NOT rigid: are these nodes of the loaded end alone?" in identify(points, bent).report()
+    assert "NOT rigid" not in identify(*noisy_field()).report()
