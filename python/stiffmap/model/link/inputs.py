@@ -123,8 +123,12 @@ def read_cases(path: str | Path) -> Floats:
             line=table.top,
         )
     at = table.find(r"(load[^a-z]?)?case|lc|id|nr\.?|no\.?|name|number")
-    if at is not None and table.is_numeric(at):
-        falls = np.diff(table.numbers(at), prepend=-np.inf) <= 0
+    cells = [*table.columns[at]] if at is not None else []
+    cases = [
+        re.fullmatch(r"(?i)(?:lc|lf|(?:load ?)?case|step)?[ _-]*(\d+)(?:[.,]0*)?", c.strip()) for c in cells
+    ]
+    if at is not None and all(cases):
+        falls = np.diff([int(c[1]) for c in cases if c], prepend=-1) <= 0
         table.check(~falls, lambda i: f"'{table.header[at]}': expected cases in the order of the field")
     return np.stack([found[c][0] for c in WRENCH], axis=-1)
 

@@ -66,6 +66,7 @@ def known_columns(
     sheet = read_sheet(Path(path), None, layout)
     cases = [re.match(r"(?i)(u[xyz])[ _]?(\d+)(?![^\W_])", h) for h in sheet.header]  # ux1
     names = [m[1] + h[m.end() :] if m else h for m, h in zip(cases, sheet.header, strict=True)]
+    names = [re.sub(r"(?i)^(u?[xyz])_m$", r"\1 [m]", n) for n in names]  # x as measured is no column here
     order = sorted(range(len(names)), key=lambda i: int(m[2]) if (m := cases[i]) else 0)
     header = tuple(names[i] for i in order)
     sheet = replace(sheet, header=header, columns=tuple(sheet.columns[i] for i in order))

@@ -59,8 +59,8 @@ def ansys_text():
 
 
 def test_csv_field_comes_back_in_metres(tmp_path):
-    for unit, factor in (("mm", 1e3), ("m", 1.0)):
-        (tmp_path / "f.csv").write_text(csv_text(unit, factor))
+    for text in (csv_text(), csv_text("m", 1.0), csv_text("m", 1.0).replace(" [m]", "_m")):
+        (tmp_path / "f.csv").write_text(text)
         p, u = read_field(tmp_path / "f.csv")
         assert p == pytest.approx(POINTS, rel=1e-12)
         assert u == pytest.approx(U, rel=1e-12)
@@ -555,10 +555,11 @@ def test_short_rows_of_an_frd(tmp_path):
         read_frd(write(tmp_path, "a.frd", binary))
 
 
+@pytest.mark.parametrize("word", ["", "LC", "case_", "Load case "])
 @pytest.mark.parametrize("name", ["case", "Load case", "No."])
-def test_cases_stand_in_the_order_of_the_field(tmp_path, name):
+def test_cases_stand_in_the_order_of_the_field(tmp_path, name, word):
     head = f"{name},fx [N],fy [N],fz [N],mx [N*m],my [N*m],mz [N*m]\n"
-    rows = [f"{k}," + ",".join("1" if i == k else "0" for i in range(1, 7)) for k in range(1, 7)]
+    rows = [f"{word}{k}," + ",".join("1" if i == k else "0" for i in range(1, 7)) for k in range(1, 7)]
     assert read_cases(write(tmp_path, "c.csv", head + "\n".join(rows) + "\n")) == pytest.approx(np.eye(6))
     rows[2:4] = rows[3], rows[2]
     with pytest.raises(StiffmapError, match=r"line 5.*in the order of the field"):
