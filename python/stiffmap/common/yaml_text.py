@@ -144,8 +144,7 @@ def _text_keys(
         sources = [s for v in merges for s in (v.value if isinstance(v, yaml.SequenceNode) else [v])]
         for source in reversed(sources):
             if len(merges) > 1 or not isinstance(source, yaml.MappingNode):
-                what = "expected '<<' once, with a mapping or a list of mappings"
-                raise FileError(what, file=file, line=line)
+                raise FileError("expected '<<' once, with a mapping or a list of them", file=file, line=line)
             _text_keys(source, path, lines, file, above)
             pairs |= {key.value: (key, value) for key, value in source.value}
         seen: set[str] = set()

@@ -67,7 +67,7 @@ def test_of_merged_mappings_the_first_with_a_key_counts() -> None:
 
 @pytest.mark.parametrize("text", ["{<<: *first, <<: *other}", "{<<: 3}", "{<<: [*first, E]}", "{<<: }"])
 def test_what_cannot_be_merged_is_refused(text: str) -> None:
-    with pytest.raises(FileError, match="line 7: expected '<<' once, with a mapping or a list of mappings"):
+    with pytest.raises(FileError, match="line 7: expected '<<' once, with a mapping or a list of them"):
         yaml_text.parse(f"{MERGED}bad: {text}\n")
     with pytest.raises(FileError, match="line 1: an anchor contains itself"):
         yaml_text.parse("a: &a {<<: *a}")
