@@ -63,6 +63,7 @@ def _sized(loader: Any, node: Any) -> float:
         raise FileError(str(error), file=loader.file, line=node.start_mark.line + 1) from error
 
 
+_MERGE = "tag:yaml.org,2002:merge"
 _PLAIN = {f"tag:yaml.org,2002:{t}" for t in ("null", "bool", "int", "float", "str", "seq", "map")}
 _Loader.add_constructor("tag:yaml.org,2002:int", _construct_int)
 _Loader.add_constructor("tag:yaml.org,2002:float", _sized)
@@ -137,13 +138,20 @@ def _text_keys(
         for i, item in enumerate(node.value):
             _text_keys(item, (*path, i), lines, file, above)
     elif isinstance(node, yaml.MappingNode):
+        merges = [value for key, value in node.value if key.tag == _MERGE]
+        # by the text of keys, of which the first source counts: PyYAML 6.0.4 compares their addresses
+        pairs: dict[str, Any] = {}
+        sources = [s for v in merges for s in (v.value if isinstance(v, yaml.SequenceNode) else [v])]
+        for source in reversed(sources):
+            if len(merges) > 1 or not isinstance(source, yaml.MappingNode):
+                raise FileError("expected '<<' once, with a mapping or a list of them", file=file, line=line)
+            _text_keys(source, path, lines, file, above)
+            pairs |= {key.value: (key, value) for key, value in source.value}
         seen: set[str] = set()
-        for key, value in node.value:
+        for key, value in (pair for pair in node.value if pair[0].tag != _MERGE):
             line = key.start_mark.line + 1
             if not isinstance(key, yaml.ScalarNode):
                 raise FileError("a key must be plain text", file=file, line=line)
-            if key.tag == "tag:yaml.org,2002:merge":
-                continue
             key.tag = "tag:yaml.org,2002:str"
             here = (*path, key.value)
             if key.value in seen:
@@ -152,6 +160,8 @@ def _text_keys(
             seen.add(key.value)
             lines[here] = line
             _text_keys(value, here, lines, file, above)
+            pairs[key.value] = key, value
+        node.value = [*pairs.values()]
 
 
 def read(path: Path) -> Document:

@@ -26,6 +26,7 @@ SPELLINGS = {
     "round brackets and tabs": ("X (mm)\tY (mm)\tZ (mm)\n50.5\t0\t700\n0\t-20.25\t700\n", "utf-8"),
     "semicolons, decimal commas": ("x [mm];y [mm];z [mm]\n50,5;0;700\n0;-20,25;700\n", "utf-8-sig"),
     "decimal commas, thousands": ("x [um];y [mm];z [mm]\n50.500;0,0;700\n0;-20,25;700\n", "utf-8"),
+    "decimal commas, powers of ten": ("x [mm];y [mm];z [mm]\n5,05E+01;0;7,0E+02\n0;-2,025D+01;7E2\n", "utf-8"),
     "blanks": ("x [mm] y [mm]  z [mm]\n50.5 0   700\n0 -20.25 700\n", "utf-8"),
     "UTF-16": ("x [mm],y [mm],z [mm]\n50.5,0,700\n0,-20.25,700\n", "utf-16"),
     "UTF-16 without a mark": ("x [mm],y [mm],z [mm]\n50.5,0,700\n0,-20.25,700\n", "utf-16-le"),

@@ -47,3 +47,27 @@ def test_what_libyaml_reads_otherwise_is_as_pyyaml_reads_it(
     read = answer()
     monkeypatch.setattr(yaml_text, "_Fast", yaml_text._Loader)
     assert read == answer()
+
+
+MERGED = """first: &first {E: 1, nu: 2}
+other: &other {E: 3, nu: 4, rho: 5}
+both: {<<: [*first, *other], E: 6}
+turned:
+  <<: [*other, *first]
+inside: {<<: {<<: *other, nu: 7}}
+"""
+
+
+def test_of_merged_mappings_the_first_with_a_key_counts() -> None:
+    data = yaml_text.parse(MERGED).data
+    assert data["both"] == {"E": 6, "nu": 2, "rho": 5}
+    assert data["turned"] == data["other"]
+    assert data["inside"] == {"E": 3, "nu": 7, "rho": 5}
+
+
+@pytest.mark.parametrize("text", ["{<<: *first, <<: *other}", "{<<: 3}", "{<<: [*first, E]}", "{<<: }"])
+def test_what_cannot_be_merged_is_refused(text: str) -> None:
+    with pytest.raises(FileError, match="line 7: expected '<<' once, with a mapping or a list of them"):
+        yaml_text.parse(f"{MERGED}bad: {text}\n")
+    with pytest.raises(FileError, match="line 1: an anchor contains itself"):
+        yaml_text.parse("a: &a {<<: *a}")

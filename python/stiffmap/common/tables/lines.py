@@ -30,9 +30,9 @@ MARKED = re.compile(r"^(#|%|//)\s+")
 """The mark of a comment, which is no cell."""
 THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(\.\d{3})+")
 """``1.000`` is a thousand in a table with decimal commas; ``0.041`` is not."""
-COMMA = re.compile(r"^[ \t]*[+-]?[\d.]*,\d+[ \t]*$", re.M)
+COMMA = re.compile(r"^[ \t]*[+-]?[\d.]*,\d+(?:[eEdD][+-]?\d+)?[ \t]*$", re.M)
 QUOTED = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
-POINT = re.compile(rf"^[ \t]*(?!{THOUSANDS.pattern}[ \t]*$)[+-]?[\d,]*\.\d+[ \t]*$", re.M)
+POINT = re.compile(rf"^[ \t]*(?!{THOUSANDS.pattern}[ \t]*$)[+-]?[\d,]*\.\d+(?:[eEdD][+-]?\d+)?[ \t]*$", re.M)
 """A number with a decimal point, which no `THOUSANDS` are."""
 ODD_SIGNS = str.maketrans("−–", "--", "\u00a0\u2007\u2009\u202f")
 """Blanks within a number go, and a minus is that of a keyboard."""

@@ -179,11 +179,10 @@ def load_link(name: str, context: Context) -> Matrix6:
     if not path.exists():
         context.fail(f"no link file '{name}' in {context.folder}")
     link = read_link(path)
-    matrix = np.asarray(link.compliance, dtype=float)
-    _check(matrix, "compliance", context)
+    _check(link.compliance, "compliance", context)
     context.gathered.notes[f"{context.full}/link"] = name
-    _keep_covariance(name, np.asarray(link.covariance, dtype=float), context)
-    return as_rows(matrix)
+    _keep_covariance(name, link.covariance, context)
+    return as_rows(link.compliance)
 
 
 def _keep_covariance(name: str, covariance: NDArray[np.float64], context: Context) -> None:

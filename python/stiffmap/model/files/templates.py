@@ -60,8 +60,9 @@ class _Expansion:
         asked = leg.get("template") if isinstance(leg, dict) else None
         if not isinstance(asked, str | int) or not self.sound:
             return leg
-        if self.templates and str(asked) not in self.names:
-            self._fail(("legs", name, "template"), unknown_name("template", str(asked), self.names))
+        asked = str(asked)  # template 1 reads as a number in YAML
+        if self.templates and asked not in self.names:
+            self._fail(("legs", name, "template"), unknown_name("template", asked, self.names))
         if asked not in self.templates:
             return leg
         template = self.templates[asked]

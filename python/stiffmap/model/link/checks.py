@@ -34,15 +34,15 @@ def checked_field(
     Raises:
         StiffmapError: wrong shape, NaN or infinity, fewer than three points, collinear points.
     """
-    p = _finite("points", points, (None, 3), "(n, 3) in m")
+    p = finite_array("points", points, (None, 3), "(n, 3) in m")
     check_points(p)
-    w = _finite("wrenches", wrenches, (None, 6), "(cases, 6) in N and N·m")
-    u = _finite("displacements", displacements, (len(w), len(p), 3), "(cases, n, 3) in m")
+    w = finite_array("wrenches", wrenches, (None, 6), "(cases, 6) in N and N·m")
+    u = finite_array("displacements", displacements, (len(w), len(p), 3), "(cases, n, 3) in m")
     if np.abs(u).max(initial=0.0) < SMALLEST:
         raise StiffmapError(
             "displacements: expected a field that moves, got 0 m at every point of every case"
         )
-    r = _finite("reference", reference, (3,), "(3,) in m")
+    r = finite_array("reference", reference, (3,), "(3,) in m")
     return DisplacementField(p, u, w, r)
 
 
@@ -97,7 +97,8 @@ def identifiable_columns(wrenches: Floats, *, partial: bool) -> Bools:
     return seen
 
 
-def _finite(name: str, value: ArrayLike, shape: tuple[int | None, ...], words: str) -> Floats:
+def finite_array(name: str, value: ArrayLike, shape: tuple[int | None, ...], words: str) -> Floats:
+    """Finite numbers of a shape, None where any size will do; StiffmapError for anything else."""
     a = real_array(value, name, f"an array of numbers, {words}")
     fits = a.ndim == len(shape) and all(
         want is None or want == got for want, got in zip(shape, a.shape, strict=True)

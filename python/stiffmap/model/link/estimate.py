@@ -6,9 +6,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.special import chdtrc, stdtrit
 
-from stiffmap.model.link.checks import DisplacementField
+from stiffmap.model.link.checks import DisplacementField, finite_array
 from stiffmap.model.link.noise import Correlation, FieldNoise
 from stiffmap.model.link.regression import Regression
 from stiffmap.model.link.rigidfit import RigidFit
@@ -74,7 +75,7 @@ class SpringEstimate:
     @property
     def stiffness_covariance(self) -> Floats:
         """(36, 36) covariance of the stiffness entries, first order: ``dK = -K dC K``, link (12)."""
-        K = np.linalg.inv(self.compliance)
+        K = self.stiffness
         gain = np.kron(K, K.T)
         return np.asarray(gain @ self.covariance @ gain.T)
 
@@ -99,9 +100,8 @@ class SpringEstimate:
     @property
     def asymmetry(self) -> float:
         """Largest |raw - raw^T| over sqrt(C_ii C_jj), before symmetrisation."""
-        size = np.sqrt(np.abs(np.diag(self.raw)))
-        with np.errstate(invalid="ignore", divide="ignore"):
-            return float(np.nanmax(np.abs(self.raw - self.raw.T) / np.outer(size, size)))
+        scaled = unit_diagonal(self.raw)
+        return float(np.nanmax(np.abs(scaled - scaled.T)))
 
     @property
     def symmetry_p_value(self) -> float:
@@ -126,10 +126,10 @@ class SpringEstimate:
         half = -stdtrit(self.entry_dof, (1 - probability) / 2) * self.standard_error
         return np.stack([self.compliance - half, self.compliance + half], axis=-1)
 
-    def at(self, reference: Floats) -> tuple[Floats, Floats]:
+    def at(self, reference: ArrayLike) -> tuple[Floats, Floats]:
         """Compliance (6, 6) and covariance (36, 36) at another reference point (3,) m, same axes."""
-        shift = np.asarray(reference, dtype=float) - self.reference
-        return transport_compliance(self.compliance, self.covariance, shift)
+        point = finite_array("reference", reference, (3,), "(3,) in m")
+        return transport_compliance(self.compliance, self.covariance, point - self.reference)
 
 
 def critical_multiple(level: float, tests: int, dof: Floats | float) -> Floats:

@@ -37,9 +37,7 @@ def gmsh_session() -> Iterator[ModuleType]:
             f"gmsh is installed but misses a system library ({error}); on Debian: "
             "apt install libglu1-mesa libxcursor1 libxft2 libxinerama1"
         ) from None
-    with _same_action(
-        "SIGPIPE"
-    ):  # gmsh takes the default, by which a connection that closes ends the process
+    with _same_action("SIGPIPE"):  # by gmsh's own, a connection that closes ends the process
         gmsh.initialize(interruptible=False)
     try:
         gmsh.option.setNumber("General.Terminal", 0)

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Generic, Literal, TypeVar
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import Field
 
 from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.units import STRESSES, size_of
 from stiffmap.common.yaml_text import read
+from stiffmap.model.files.report import validated
+from stiffmap.model.files.schema.base import FileModel
 from stiffmap.model.link.gmshmesh import UNITS
 from stiffmap.model.link.readers import known_columns
-from stiffmap.model.link.shapes import Bar, Foot, ForkBar, HollowBar
+from stiffmap.model.link.shapes import Bar, Foot, ForkBar, HollowBar, Length
 from stiffmap.model.link.solve import Material
 from stiffmap.model.link.transport import Floats
 
@@ -32,24 +34,26 @@ WRENCH = {f"f{a}": ("N", f"f{a} [N]") for a in "xyz"} | {f"m{a}": ("N*m", f"m{a}
 """Columns of load cases: their SI unit, and how they are usually written."""
 UNIT_WRENCHES = np.diag([100.0, 100.0, 100.0, 10.0, 10.0, 10.0])  # linear solver: the size does not matter
 
-_BY_NAME: dict[str, type[BaseModel]] = {
-    s.model_fields["shape"].default: s for s in (Bar, HollowBar, ForkBar, Foot)
-}
+S = TypeVar("S")
+_BY_NAME = {str(s.model_fields["shape"].default): s for s in (Bar, HollowBar, ForkBar, Foot)}
 
 
-class _Units(BaseModel):
-    model_config = ConfigDict(extra="forbid")
+class _Units(FileModel):
     length: Literal["mm", "m", "cm", "in", "inch"]
     stress: Literal["Pa", "MPa", "GPa", "N/mm2"] | None = None
 
 
-class PartFile(BaseModel):
+class _Moduli(FileModel):
+    young: float = Length
+    poisson: float = Field(gt=-1, lt=0.5)
+
+
+class PartFile(FileModel, Generic[S]):
     """A parametric link: ``units``, ``part`` (shape, lengths), ``material`` (name, or young and poisson)."""
 
-    model_config = ConfigDict(extra="forbid")
     units: _Units
-    part: dict[str, Any]
-    material: dict[str, float] | str | None = None
+    part: S
+    material: _Moduli | str | None = None
     name: str | None = None
 
 
@@ -73,9 +77,10 @@ def read_material(text: str) -> Material:
 
 def checked_material(young: float, poisson: float, name: str) -> Material:
     """The material, SI, if an elastic solid can have it."""
-    if not (young > 0 and np.isfinite(young)) or not -1 < poisson < 0.5:
+    if not 1e5 < young < 2e12 or not -1 < poisson < 0.5:
         raise StiffmapError(
-            f"material: expected a modulus > 0 and Poisson ratio in (-1, 0.5), got {young:g} Pa, {poisson:g}"
+            "material: expected a modulus between gel and diamond (1e5 to 2e12 Pa) and Poisson ratio in (-1, 0.5), "
+            f"got {young:g} Pa, {poisson:g}"
         )
     return Material(young, poisson, name)
 
@@ -88,17 +93,17 @@ def read_part(path: str | Path) -> tuple[Any, Material | None, str]:
     """
     if not Path(path).exists():
         raise StiffmapError(f"{path}: no such file")
-    data = read(Path(path)).data
-    if not isinstance(data, dict):
-        raise StiffmapError(f"{path}: expected the keys units, part, material; got {type(data).__name__}")
-    file = _validated(path, PartFile, data)
-    shape = file.part.get("shape")
-    if shape not in _BY_NAME:
+    document = read(Path(path))
+    part = document.data.get("part") if isinstance(document.data, dict) else None
+    shape = part.get("shape") if isinstance(part, dict) else None
+    if isinstance(part, dict) and str(shape) not in _BY_NAME:
         raise StiffmapError(f"{path}: part.shape: expected one of {', '.join(_BY_NAME)}, got {shape!r}")
-    factor = UNITS[file.units.length]
-    lengths = {k: v * factor if isinstance(v, int | float) else v for k, v in file.part.items()}
-    made = _validated(path, _BY_NAME[shape], lengths)
-    return made, _part_material(path, file), file.name or Path(path).stem
+    schema: Any = PartFile
+    model = schema[_BY_NAME.get(str(shape), Bar)]
+    file = validated(model, document, str(path), "a part file is a mapping with units, part and material")
+    given, factor = dict(file.part), UNITS[file.units.length]
+    lengths = {k: v * factor for k, v in given.items() if isinstance(v, float)}
+    return type(file.part)(**given | lengths), _part_material(path, file), file.name or Path(path).stem
 
 
 def read_cases(path: str | Path) -> Floats:
@@ -118,30 +123,20 @@ def read_cases(path: str | Path) -> Floats:
             line=table.top,
         )
     at = table.find(r"(load[^a-z]?)?case|lc|id|nr\.?|no\.?|name|number")
-    if at is not None and table.is_numeric(at):
-        falls = np.diff(table.numbers(at), prepend=-np.inf) <= 0
+    cells = [*table.columns[at]] if at is not None else []
+    cases = [
+        re.fullmatch(r"(?i)(?:lc|lf|(?:load ?)?case|step)?[ _-]*(\d+)(?:[.,]0*)?", c.strip()) for c in cells
+    ]
+    if at is not None and all(cases):
+        falls = np.diff([int(c[1]) for c in cases if c], prepend=-1) <= 0
         table.check(~falls, lambda i: f"'{table.header[at]}': expected cases in the order of the field")
     return np.stack([found[c][0] for c in WRENCH], axis=-1)
 
 
-def _part_material(path: str | Path, file: PartFile) -> Material | None:
+def _part_material(path: str | Path, file: PartFile[Any]) -> Material | None:
     given = file.material
     if given is None or isinstance(given, str):
         return None if given is None else read_material(given)
-    if set(given) != {"young", "poisson"}:
-        raise StiffmapError(
-            f"{path}: material: expected young and poisson, got {', '.join(given) or 'nothing'}"
-        )
     if file.units.stress is None:
         raise StiffmapError(f"{path}: units.stress: young needs its unit, one of {', '.join(STRESS)}")
-    return checked_material(given["young"] * STRESS[file.units.stress], given["poisson"], "part file")
-
-
-def _validated(path: str | Path, model: type[BaseModel], data: dict[str, Any]) -> Any:
-    try:
-        return model.model_validate(data)
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(p) for p in first["loc"])
-        got = "" if first["type"] in {"missing", "value_error"} else f", got {first['input']!r}"
-        raise StiffmapError(f"{path}: {where + ': ' if where else ''}{first['msg']}{got}") from None
+    return checked_material(given.young * STRESS[file.units.stress], given.poisson, "part file")

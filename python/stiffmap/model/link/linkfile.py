@@ -102,7 +102,8 @@ def _check_spring(path: str | Path, C: Floats) -> None:
     d = np.diag(C)
     if np.any(d < 0):
         raise StiffmapError(
-            f"{path}: compliance: expected a diagonal that is not negative, got {d.min():.3g}"
+            f"{path}: compliance: expected a diagonal that is not negative, got {d.min():.3g}; wrenches are "
+            "loads on the link, not reactions, with moments at the reference"
         )
     with np.errstate(over="ignore", invalid="ignore"):  # numbers of 1e308 have no finite ratio
         scaled = unit_diagonal(C)

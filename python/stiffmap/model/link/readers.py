@@ -64,8 +64,9 @@ def known_columns(
         raise FileError("no such file", file=str(path))
     layout = Layout(lambda name: name.lower() in units, strict=True, repeated=True)
     sheet = read_sheet(Path(path), None, layout)
-    cases = [re.match(r"(?i)(u[xyz])[ _]?(\d+)\b", h) for h in sheet.header]  # ux1
+    cases = [re.match(r"(?i)(u[xyz])[ _]?(\d+)(?![^\W_])", h) for h in sheet.header]  # ux1
     names = [m[1] + h[m.end() :] if m else h for m, h in zip(cases, sheet.header, strict=True)]
+    names = [re.sub(r"(?i)^(u?[xyz])_m$", r"\1 [m]", n) for n in names]  # x as measured is no column here
     order = sorted(range(len(names)), key=lambda i: int(m[2]) if (m := cases[i]) else 0)
     header = tuple(names[i] for i in order)
     sheet = replace(sheet, header=header, columns=tuple(sheet.columns[i] for i in order))
@@ -200,7 +201,8 @@ def read_field(
             f"{nodes}: expected coordinates in the global frame, found {turned[0].splitlines()[0]}"
         )
     sections = re.findall(r"^\*NODE\b(?!\s+[A-Z]).*\n([^*]*)", given, flags=re.MULTILINE | re.IGNORECASE)
-    table = re.sub("[,;]", " ", "".join(sections or [given]))
+    table = "".join(sections or [given])
+    table = table.replace(",", ".") if ";" in table else table  # decimal commas
     place = _node_rows(nodes, table, (7,) if "THXY" in table else (4,))  # NLIST has the axes of a node, too
     said = unit if sections else _unit_above(nodes, given, unit)
     absent = [int(i) for i in numbers if int(i) not in place]
@@ -216,6 +218,12 @@ def _unit_above(path: str | Path, text: str, other: str) -> str:
     above = re.split(r"^\s*\d", text, maxsplit=1, flags=re.MULTILINE)[0]
     named = r"(?i)coordinates|(?<![^\W_])[xyz](?![^\W_])"
     lines = [n for n in above.splitlines() if re.search(named, n) or not re.sub(rf"{unit}|[\W_]", "", n)]
+    for line in lines:
+        axes = "".join(re.findall(r"(?<![^\W_])[xyz](?![^\W_])", line.lower()))
+        if {*axes} == {*"xyz"} and not axes.endswith("xyz"):
+            raise StiffmapError(
+                f"{path}: expected columns in the order node, x, y, z; found {line.strip()[:60]}"
+            )
     found = {u for n in lines for u in re.findall(unit, n)}
     if len(found) > 1:
         raise StiffmapError(f"{path}: expected coordinates in one unit, found {' and '.join(sorted(found))}")
@@ -226,7 +234,7 @@ def _node_rows(path: str | Path, text: str, columns: tuple[int, ...] = (4,)) -> 
     """Rows "node a b c": the first three numbers behind an integer. Columns may touch: 12-1.0E-03-2.0E-04."""
     rows: dict[int, list[float]] = {}
     for line in _FORTRAN.sub("E", text).splitlines():
-        head = re.match(r"\s*(\d+)(?:\s+|(?=-\d*\.))(\S.*)", line)
+        head = re.match(r"\s*(\d+)(?:[\s,;]+|(?=-\d*\.))([^\s,;].*)", line)
         if not head:
             continue
         cells = _NUMBER.findall(head[2])

@@ -65,12 +65,13 @@ def _field_lines(link: SpringEstimate) -> list[str]:
     size = np.sqrt(np.mean(np.sum(e.field.displacements**2, axis=2), axis=1))
     place = np.array2string(link.reference, precision=6)
     lines = [f"rigid-body residual, {e.kept.shape[1]} nodes, reference {place} m:"]
+    share = np.divide(link.sigma, size, out=np.full_like(size, np.nan), where=size > 0)
     for k in range(len(size)):
         gone = int(link.outliers[k].sum())
-        share = link.sigma[k] / size[k] if size[k] > 0 else np.nan
+        loose = "; NOT rigid: are these nodes of the loaded end alone?" if share[k] > 0.1 else ""
         lines.append(
-            f"  case {k + 1}: sigma {link.sigma[k]:.2e} m ({share:.1e} of the displacement), "
-            f"{link.dof[k]} degrees of freedom, {gone} outliers"
+            f"  case {k + 1}: sigma {link.sigma[k]:.2e} m ({share[k]:.1e} of the displacement), "
+            f"{link.dof[k]} degrees of freedom, {gone} outliers{loose}"
         )
     kind = "pooled" if noise.pooled else "given" if not np.all(np.isfinite(noise.used_dof)) else "per case"
     lines.append(f"noise: {kind} (homogeneity p = {noise.homogeneity:.2g})")
@@ -91,9 +92,12 @@ def _field_lines(link: SpringEstimate) -> list[str]:
 
 def _matrix_lines(link: SpringEstimate) -> list[str]:
     missing = ~np.isfinite(link.compliance)
+    # 0.1 is more than warping of the face and the mesh make
+    wrong = link.asymmetry > 0.1 and link.symmetry_p_value < link.level
     lines = [
         f"asymmetry before symmetrisation: {link.asymmetry:.2e} of sqrt(kii kjj) "
-        f"(p = {link.symmetry_p_value:.2g})",
+        f"(p = {link.symmetry_p_value:.2g})"
+        + ("; NOT an elastic body: compare order, units and reference of the wrenches" if wrong else ""),
         *findings(link.compliance, link.covariance),
     ]
     if np.isfinite(link.case_p_value):

@@ -10,19 +10,18 @@ from types import ModuleType
 from typing import Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
+from stiffmap.model.files.schema.base import FileModel
 from stiffmap.model.link.gmshmesh import Faces, mesh_model, with_others
 from stiffmap.model.link.mesh import SolidMesh
 from stiffmap.model.link.transport import Floats
 
-Length = Field(gt=0)
+Length = Field(gt=0, allow_inf_nan=False)
 Vector = tuple[float, float, float]
 
 
-class _Shape(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
+class _Shape(FileModel):
     def default_size(self) -> float:
         """Target edge length in m."""
         raise NotImplementedError

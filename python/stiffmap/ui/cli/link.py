@@ -52,6 +52,8 @@ def command(
     """
     wrenches = UNIT_WRENCHES if cases is None else read_cases(cases)
     place, edge = in_si(reference, "reference", 3), in_si(size)
+    if size is not None and not size > 0:
+        raise StiffmapError(f"--size: expected an edge length above 0, got {size:g}")
     found: PartLink | None = None
     if part.suffix.lower() in FIELDS:
         if cases is None or place is None:

@@ -59,7 +59,8 @@ def _draw_residuals(figure: SubFigure, link: Link, cases: int) -> None:
         axes.quiver(x, y, residual[k, :, a], residual[k, :, b], angles="xy", width=0.005)
         out = link.outliers[k]
         axes.plot(x[out], y[out], "x", color=VERMILLION, label="outlier")
-        figure.colorbar(dots, ax=axes, label="residual, µm", location="bottom")
+        bar = figure.colorbar(dots, ax=axes, label="residual, µm", location="bottom")
+        bar.ax.locator_params("x", nbins=3)
         axes.set(title=f"case {k + 1}", xlabel=f"{'xyz'[a]}, mm", aspect="equal")
         if k == 0:
             axes.set_ylabel(f"{'xyz'[b]}, mm")

@@ -164,7 +164,7 @@ def test_unknown_material() -> None:
     ("material", "said"),
     [
         ({"E": "210 000", "nu": 0.3}, "material.E: expected a number; found text ('210 000')"),
-        ({"E": 2, "1e5": None, "nu": 0.3}, "material: unknown key '1e5'; known keys: E, G, nu, density"),
+        ({"E": 2, "1e5": None, "nu": 0.3}, "material: unknown key '1e5' (decimals stand behind a point: 0.5); known keys: E, G, nu, density"),
         ({"E": 1.0}, "material: give exactly one of G and nu"), ({"nu": 0.3}, "material: missing key 'E'"),
         ({"E": 1.0, "nu": 30.0}, "material.nu: must be above -1 and at most 0.5 (a laminate with more: give G); found 30.0"),
         ([1.0, 0.3], "material: expected a mapping with keys among E, G, nu, density; found a list ([1.0, 0.3])"),

@@ -53,6 +53,7 @@ def test_a_template_is_what_it_is_written_out_to_be() -> None:
     assert d == description_from_text(WRITTEN)
     assert dict(d.uncertainty) == {"a.tube/beam.tube.outer": pytest.approx(5e-5)}
     assert description_from_text(description_text(d)) == d
+    assert description_from_text(TEMPLATE.replace("strut", "1")) == d  # a name that reads as a number
 
 
 def problems(text: str) -> list[FileError]:

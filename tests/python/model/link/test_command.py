@@ -138,6 +138,14 @@ def test_unknown_face_lists_those_that_exist(run, tmp_path, fea):
     assert "no face 'left' on this part; it has fixed (200 mm² at" in done.output
 
 
+@pytest.mark.parametrize("size", ["0", "-4", "nan"])
+def test_elements_have_a_size(run, tmp_path, size):
+    (tmp_path / "bar.yaml").write_text(PART)
+    done = run("bar.yaml", "--size", size)
+    assert done.exit_code == 2
+    assert f"--size: expected an edge length above 0, got {size}" in done.output
+
+
 def test_number_of_cases_must_match(run, tmp_path):
     write_field(tmp_path / "field.csv")
     (tmp_path / "cases.csv").write_text("\n".join(CASES.splitlines()[:5]))

@@ -16,6 +16,7 @@ from tests.python.model.link.link_fields import (
     rigid_field,
 )
 
+from stiffmap.common.errors import StiffmapError
 from stiffmap.model.link import transport_compliance
 from stiffmap.model.link.identify import identify_link
 from stiffmap.model.link.report import bending_lengths
@@ -273,3 +274,25 @@ def test_lengths_of_a_cantilever_along_any_axis(axis, sense):
     found, lengths = bending_lengths(Q @ bar_compliance() @ Q.T)
     assert found == ("" if sense > 0 else "-") + "xyz"[axis]
     assert list(lengths.values()) == pytest.approx([L] * 4)
+
+
+def test_wrenches_that_no_elastic_body_answers_are_said():
+    points, u = noisy_field()
+    words = "NOT an elastic body: compare order, units and reference of the wrenches"
+    assert words not in identify(points, u).report()
+    for wrong in (WRENCHES @ np.diag([1, 1, 1, 1e3, 1e3, 1e3]), WRENCHES[[1, 0, 2, 3, 4, 5]]):
+        assert words in identify(points, u, wrong).report()
+
+
+@pytest.mark.parametrize("point", [0.3, [0.3, 0.0], [0.3, 0.0, np.nan], "tip"])
+def test_another_reference_is_a_point(point):
+    with pytest.raises(StiffmapError, match=r"reference: expected .*\(3,\) in m|reference: expected finite"):
+        identify(*noisy_field(n=10)).at(point)
+
+
+def test_nodes_of_the_whole_part_are_no_rigid_end():
+    """The part is stretched and twisted in proportion to the distance from the fixed end."""
+    points = np.random.default_rng(3).uniform(size=(40, 3)) * [L, 0.02, 0.04] - [0, 0.01, 0.02]
+    bent = rigid_field(C, WRENCHES, points, REFERENCE) * (points[:, :1] / L)
+    assert "NOT rigid: are these nodes of the loaded end alone?" in identify(points, bent).report()
+    assert "NOT rigid" not in identify(*noisy_field()).report()

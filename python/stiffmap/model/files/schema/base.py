@@ -80,7 +80,8 @@ def _keys_of(model: type[FileModel]) -> list[str]:
 
 def unknown_key(key: object, known: Sequence[str]) -> str:
     """That a mapping cannot have this key, and which it can."""
-    return f"unknown key '{key}'{suggestion(str(key), known)}; known keys: {', '.join(known)}"
+    comma = " (decimals stand behind a point: 0.5)" if str(key)[:1].isdigit() else ""
+    return f"unknown key '{key}'{comma or suggestion(str(key), known)}; known keys: {', '.join(known)}"
 
 
 def _once_more(error: Any) -> InitErrorDetails:
