@@ -46,6 +46,13 @@ def test_shipped_requirements_are_those_of_the_paper():
         ("force: 200 N", "limits: {clearance: 20}", r"limits.clearance: the unit is missing"),
         ("force: 200 N", "limits: {deflection: -1 mm}", r"limits.deflection: expected a positive length"),
         ("force: 200 N", "forse: 200 N", r"unknown key 'forse' \(did you mean 'force'\?\)"),
+        ("force: 200 N", "force: -200 N", r"line 4: force: expected a positive force, found -200 N"),
+        ("{x: 300 mm, y", "{x: 0 mm, y", r"box.x: expected a positive length, found 0 mm"),
+        (
+            "{x: 300 mm, y: 300",
+            "{x: 300 mm, y: -300",
+            r"box.y: expected a positive length or 0, found -300 mm",
+        ),
     ],
 )
 def test_bad_requirements_name_the_key(tmp_path, old, new, words):
