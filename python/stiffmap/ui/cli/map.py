@@ -28,7 +28,7 @@ from stiffmap.workspace.maps.statistics import statistics_rows
 STORED = "zarr resume tables own_scales compliance uncertainty"
 """Options of what a stored map holds, and of its files."""
 UNUSED = {"with toolpath": f"x y z points plane tolerance directions estimate statistics scheduler {STORED}",
-          "with statistics": f"output formats {STORED}", "without pictures": "formats own_scales"}  # fmt: skip
+          "with statistics": f"x y output formats {STORED}", "without pictures": "formats own_scales"}  # fmt: skip
 
 
 def command(
