@@ -54,7 +54,7 @@ def under(document: Document, file: str, *keys: str | int) -> Iterator[None]:
 Length = Annotated[float, BeforeValidator(partial(quantity, unit="m"))]
 Force = Annotated[float, BeforeValidator(partial(quantity, unit="N"))]
 PositiveForce = Annotated[float, BeforeValidator(partial(positive, unit="N", what="force"))]
-Thickness = Annotated[float, BeforeValidator(partial(positive, unit="m", what="length", zero=True))]
+Edge = Annotated[float, BeforeValidator(partial(positive, unit="m", what="length", zero=True))]
 PositiveLength = Annotated[float, BeforeValidator(partial(positive, unit="m", what="length"))]
 Duration = Annotated[float, BeforeValidator(partial(positive, unit="s", what="duration"))]
 Speed = Annotated[float, BeforeValidator(partial(positive, unit="m/s", what="speed"))]

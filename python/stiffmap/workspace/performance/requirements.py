@@ -16,13 +16,7 @@ from stiffmap.common.yaml_text import Document, read
 from stiffmap.model.files.report import validated
 from stiffmap.model.files.schema.base import FileModel, Name
 from stiffmap.workspace.performance.motion.motion_files import given_or_shipped, near_or_shipped
-from stiffmap.workspace.performance.quantities import (
-    PositiveForce,
-    PositiveLength,
-    Thickness,
-    quantity,
-    under,
-)
+from stiffmap.workspace.performance.quantities import Edge, PositiveForce, PositiveLength, quantity, under
 from stiffmap.workspace.performance.registry import get_measure
 
 Written = str | float | int
@@ -32,8 +26,8 @@ class RequiredBoxModel(FileModel):
     """Edges of the box in which the machine works, with units; a machine that moves in a plane has a box without thickness."""
 
     x: PositiveLength
-    y: Thickness
-    z: Thickness
+    y: Edge
+    z: Edge
 
 
 class BoundModel(FileModel):

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import stiffmap as sm
@@ -150,6 +151,18 @@ def test_side_cuts_and_a_file(tmp_path: Path) -> None:
     law = sm.identify_process(path)
     for n, (value, _) in law.coefficients.items():
         assert value == pytest.approx(getattr(p.law, n), rel=1e-6)
+
+
+def test_a_data_frame_is_a_table() -> None:
+    columns = {"feed_per_tooth_mm": [0.05, 0.1, 0.2], "Fx_N": [-40, -60, -101.0], "Fy_N": [60, 100, 181.0],
+               "Fz_N": [5, 8, 14.5], "teeth": 2, "axial_mm": 3}  # fmt: skip
+    frame = pd.DataFrame(columns, index=[7, 5, 6])
+    law = sm.identify_process(frame)
+    assert law.coefficients == sm.identify_process(columns).coefficients
+    with pytest.raises(StiffmapError, match=r"Fy_N: .*finite.*nan"):
+        sm.identify_process(frame.replace(100.0, np.nan))
+    with pytest.raises(StiffmapError, match="a mapping or a DataFrame, got list"):
+        sm.identify_process([1, 2])
 
 
 @pytest.mark.parametrize("side", ["climb", "conventional"])

@@ -30,7 +30,7 @@ from stiffmap.machining.process.identify.models import (
     fit,
     runout_of,
 )
-from stiffmap.machining.process.identify.table import COLUMNS, ForceTable, read_table
+from stiffmap.machining.process.identify.table import COLUMNS, ForceColumns, ForceTable, read_table
 from stiffmap.machining.process.load import load_process
 
 SIGNIFICANT = 0.01
@@ -236,14 +236,12 @@ def _mm(value: float) -> str:
 
 
 def identify_process(
-    table: str | PathLike[str] | Mapping[str, object],
-    process: Process | None = None,
-    sheet: str | None = None,
+    table: ForceColumns, process: Process | None = None, sheet: str | None = None
 ) -> IdentifiedLaw:
     """Coefficients of the mechanistic law from a dynamometer's table: means per feed, or signals over time.
 
     table
-        CSV file, workbook or columns ``feed_per_tooth_mm, Fx_N, Fy_N, Fz_N, teeth, axial_mm`` and, where the cut is no slot,
+        CSV file, workbook, mapping or data frame of columns ``feed_per_tooth_mm, Fx_N, Fy_N, Fz_N, teeth, axial_mm`` and, where the cut is no slot,
         ``side, radial_mm, diameter_mm``; signals also ``time_s, spindle_rpm``. Other units are ``Fx [kN]``,
         ``feed [mm/min]`` (with ``spindle_rpm``). Single values stand for all rows.
     process

@@ -168,9 +168,7 @@ def _described(document: Document, file: str) -> Motion:
 def _table(place: FilePath) -> Motion:
     table = read_pose_table(place)
     for name in ("mx", "my", "mz", "rx", "ry", "rz"):
-        table.check(
-            name, lambda v: v == 0, "0: a motion has a force and no moment, and the tool is turned as at home"
-        )
+        table.check(name, lambda v: v == 0, "0: a motion has no moment, its tool is turned as at home")
     file, p, f = table.file, table.position, table.wrench[:, :3]
     feed = table.values.get("feed")
     if "t" not in table.values:
