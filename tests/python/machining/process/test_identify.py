@@ -184,6 +184,11 @@ def test_forces_on_the_part_are_no_forces_on_the_tool(side: str) -> None:
     assert good.coefficients["Ktc"][0] == pytest.approx(958.8e6, rel=1e-6)
     assert not any("below zero" in w for w in good.words())
     assert any("Ktc is below zero" in w and "on the part" in w for w in bad.words())
+    turned = on_tool | {"Fx_N": -force[:, 0]}
+    other = on_tool | {"side": "conventional" if side == "climb" else "climb"}
+    for table, rare in ((on_tool, False), (turned, True), (other, True)):
+        words = sm.identify_process(table).words()
+        assert any("is the side right" in w or "below zero" in w for w in words) == rare
 
 
 @pytest.mark.parametrize(

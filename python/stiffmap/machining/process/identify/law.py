@@ -258,12 +258,16 @@ def identify_process(
             "are what does not change with the feed", file=t.file, key="feed_per_tooth_mm",
         )  # fmt: skip
     straight = fit(STRAIGHT, t)
-    if straight.numbers["Ktc"][3] < 0:  # the end of its interval
+    tangential, radial = (straight.numbers[n][2:] for n in ("Ktc", "Krc"))  # the ends of their intervals
+    note = ""
+    if tangential[1] < 0:
         note = (
             "Ktc is below zero, which no tool has: the forces are to be those on the tool, along the feed, to its left (seen "
             "against the tool) and from holder to tip; those on the part have the other signs"
         )
-        t = replace(t, notes=(*t.notes, note))
+    elif radial[1] < 0 or radial[0] > tangential[1]:
+        note = "Krc is below zero or above Ktc, which is rare: is the side right, and are Fx and Fy, with their signs?"
+    t = replace(t, notes=(*t.notes, note)) if note else t
     runout = runout_of(t, straight)
     if runout is not None:  # with the coefficients of teeth that leave the cut
         runout = runout_of(t, fit(RUNOUT, t, np.array([runout.offset])))
