@@ -51,7 +51,7 @@ def test_statistics_read_the_deflection_that_the_table_of_the_map_reads(
     keys = ("force", "z", "max")
     tables = [[[r[k] for k in keys] for r in json.loads(text)["rows"]] for text in (stored, figures)]
     assert tables[0] == tables[1]
-    assert ("in space" in run(capsys, *words, "--statistics")[1]) == (force == "200,0,-100")
+    assert ("|d|" in run(capsys, *words, "--statistics")[1]) == (force == "200,0,-100")
 
 
 def test_statistics_are_a_table(capsys: pytest.CaptureFixture[str]) -> None:
