@@ -80,7 +80,12 @@ def _tests(hint: Any) -> Iterator[Test]:
             yield from _tests(part)
     elif origin is Literal:
         yield lambda v: isinstance(v, str) and v in inner, " or ".join(map(repr, inner))
-    elif getattr(origin, "__module__", "").partition(".")[0] in ("stiffmap", "xarray", "matplotlib"):
+    elif getattr(origin, "__module__", "").partition(".")[0] in (
+        "stiffmap",
+        "xarray",
+        "pandas",
+        "matplotlib",
+    ):
         yield lambda v: isinstance(v, origin), f"a{'n' * (origin.__name__[0] in 'AEIOU')} {origin.__name__}"
     elif origin is Sequence and hint not in (Sequence[float], Sequence[str]):  # arrays are numbers too
         of = [test for test, _ in _tests(*inner)]

@@ -19,7 +19,7 @@ from stiffmap.solve.machine import Machine
 from stiffmap.solve.status import Status
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import MM, force_given, gravity, machine_with, refuse_unused
-from stiffmap.ui.cli.map_summary import MapSummary, assumptions, write_map_files
+from stiffmap.ui.cli.map_summary import MapSummary, assumptions, label, write_map_files
 from stiffmap.ui.cli.options import flag, option, written
 from stiffmap.ui.cli.output import Answer, failed_in_words, table, write_files
 from stiffmap.workspace.maps.inputs import magnitude, plane_axes
@@ -28,7 +28,7 @@ from stiffmap.workspace.maps.statistics import statistics_rows
 STORED = "zarr resume tables own_scales compliance uncertainty"
 """Options of what a stored map holds, and of its files."""
 UNUSED = {"with toolpath": f"x y z points plane tolerance directions estimate statistics scheduler {STORED}",
-          "with statistics": f"output formats {STORED}", "without pictures": "formats own_scales"}  # fmt: skip
+          "with statistics": f"x y output formats {STORED}", "without pictures": "formats own_scales"}  # fmt: skip
 
 
 def command(
@@ -152,21 +152,21 @@ def whole_map(machine: Machine, ds: xr.Dataset, plane: str, given: str) -> Answe
     failed = {name: count for name, count in counts.items() if count}
     lost = failed_in_words(failed, "solves of the load cases")
     data = {"machine": machine.name, "rows": rows, "failed": failed}
-    return Answer(data, [given, _statistics_table(ds, rows), *lost], finding=bool(failed))
+    return Answer(data, [given, _statistics_table(ds, plane, rows), *lost], finding=bool(failed))
 
 
-def _statistics_table(ds: xr.Dataset, rows: list[dict[str, Any]]) -> Table:
+def _statistics_table(ds: xr.Dataset, plane: str, rows: list[dict[str, Any]]) -> Table:
     percent = [f"{p:g} %" for p in ds.percentile.values]
     out = table(
-        f"{ds.attrs['machine']}: deflection in the plane, mm, under {ds.attrs['turning_force_N']:g} N",
+        f"{ds.attrs['machine']}: deflection in the {plane} plane, mm, under {ds.attrs['turning_force_N']:g} N",
         ("z, mm", "force", *percent, "max", "at x, y", f"within {1e3 * ds.attrs['tolerance_m']:g} mm"),
         left=("force",),
     )
     for r in rows:
-        name = f"{r['force']} direction" if r["force"] in ("worst", "best") else r["force"]
         values = (f"{1e3 * v:.3f}" for v in (*r["percentiles"].values(), r["max"]))
         place = f"{1e3 * r['at'][0]:.0f}, {1e3 * r['at'][1]:.0f}"
-        out.add_row(f"{1e3 * r['z']:g}", name, *values, place, f"{100 * r['share_within']:.1f} %")
+        name, share = label(ds, plane, r["force"]), f"{100 * r['share_within']:.1f} %"
+        out.add_row(f"{1e3 * r['z']:g}", name, *values, place, share)
     return out
 
 

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
+import typer
 import xarray as xr
 from rich.table import Table
 
@@ -12,12 +13,13 @@ from stiffmap.common.number_text import place_text
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.status import Status
 from stiffmap.ui.cli import options
-from stiffmap.ui.cli.inputs import MM, machine_at, numbers
+from stiffmap.ui.cli.inputs import MM, machine_at, numbers, refuse_unused
 from stiffmap.ui.cli.options import option
 from stiffmap.ui.cli.output import Answer, table, write_files
 
 
 def command(
+    context: typer.Context,
     machine: options.Machine,
     at: options.At = None,
     direction: str = option("Direction of the force, any length.", "1,0,0"),
@@ -49,6 +51,7 @@ def command(
       [cyan]stiffmap sweep orthoglide-revised --from 0 --to 8000 --points 41[/cyan]
       [cyan]stiffmap sweep linear-delta --direction 0,0,-1 --control displacement --limit 20 -o out[/cyan]
     """
+    refuse_unused(context, {"with limit": "from_ to tolerance method"})
     m, place, posed = machine_at(machine, effect, at, acting=gravity_)
     path = limit is not None or control != "force" or bool(cross)
     how: dict[str, Any] = {"forces": np.linspace(from_, to, max(points, 0)), "method": method}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
 from functools import cached_property
 from os import PathLike
@@ -182,7 +183,10 @@ def load_design(path: str | PathLike[str]) -> DesignProblem:
     def fail(message: str, *keys: str) -> FileError:
         return FileError(message, file=file, line=document.line(keys), key=".".join(keys))
 
+    words = set(re.findall(r"\w+", " ".join(map(str, [*model.derived.values(), *model.numbers.values()]))))
     for name, v in model.variables.items():
+        if name not in words:
+            raise fail("no expression uses this variable", "variables", name)
         if v.low is None or v.high is None:
             raise fail("give low and high", "variables", name)
         if not v.low < v.high:

@@ -21,6 +21,7 @@ from stiffmap.solve.status import Status
 from stiffmap.workspace.maps.block import work_of
 from stiffmap.workspace.maps.loading import track
 from stiffmap.workspace.maps.plan import MapPlan, Variable, map_plan
+from stiffmap.workspace.maps.summary import readings, values_of
 
 NODE = ("x", "y", "z")
 DEFLECTION = re.compile(r"(worst_|best_)?deflection(_xy|_xz|_yz)?")
@@ -183,18 +184,14 @@ class Histogram:
 
 
 def statistics_rows(ds: xr.Dataset, plane: str) -> list[dict[str, Any]]:
-    """A row per plane and force: largest value (m), its pose (m), percentiles (m), share of the area within."""
+    """A row per plane and reading: largest value (m), its pose (m), percentiles (m), share of the area within."""
     rows = []
     for z in ds.z.values:
         here = ds.sel(z=z)
-        for force in ("worst", "best", *map(str, ds.case.values)):
-            name = f"{force}_deflection_{plane}" if force in ("worst", "best") else f"deflection_{plane}"
-            one = here if force in ("worst", "best") else here.sel(case=force)
-            each = (values.values.tolist() for values in (ds.percentile, one[f"{name}_percentile"]))
-            percentiles = dict(zip(*each, strict=True))
-            rows.append(
-                {"z": float(z), "force": force, "max": float(one[f"{name}_max"]),
-                 "at": one[f"{name}_max_position"].values.tolist(), "percentiles": percentiles,
-                 "share_within": float(one[f"{name}_within"])}
-            )  # fmt: skip
+        for force, how in readings(ds, plane).items():
+            names = ("max", "max_position", "percentile", "within")
+            most, at, each, share = (values_of(here, how, f"_{n}").values.tolist() for n in names)
+            percentiles = dict(zip(ds.percentile.values.tolist(), each, strict=True))
+            rows.append({"z": float(z), "force": force, "max": most, "at": at, "percentiles": percentiles,
+                         "share_within": share})  # fmt: skip
     return rows

@@ -32,11 +32,11 @@ def quantity(value: object, unit: str) -> float:
     return read_value(text, unit)
 
 
-def positive(value: object, unit: str, what: str) -> float:
-    """The same of what must be above zero, by its name."""
+def positive(value: object, unit: str, what: str, zero: bool = False) -> float:
+    """The same of what must be above zero, or may also be `zero`, by its name."""
     number = quantity(value, unit)
-    if not number > 0:
-        raise StiffmapError(f"expected a positive {what}, found {value}")
+    if not (number > 0 or (zero and number == 0)):
+        raise StiffmapError(f"expected a positive {what}{' or 0' if zero else ''}, found {value}")
     return number
 
 
@@ -53,6 +53,8 @@ def under(document: Document, file: str, *keys: str | int) -> Iterator[None]:
 
 Length = Annotated[float, BeforeValidator(partial(quantity, unit="m"))]
 Force = Annotated[float, BeforeValidator(partial(quantity, unit="N"))]
+PositiveForce = Annotated[float, BeforeValidator(partial(positive, unit="N", what="force"))]
+Edge = Annotated[float, BeforeValidator(partial(positive, unit="m", what="length", zero=True))]
 PositiveLength = Annotated[float, BeforeValidator(partial(positive, unit="m", what="length"))]
 Duration = Annotated[float, BeforeValidator(partial(positive, unit="s", what="duration"))]
 Speed = Annotated[float, BeforeValidator(partial(positive, unit="m/s", what="speed"))]

@@ -16,18 +16,18 @@ from stiffmap.common.yaml_text import Document, read
 from stiffmap.model.files.report import validated
 from stiffmap.model.files.schema.base import FileModel, Name
 from stiffmap.workspace.performance.motion.motion_files import given_or_shipped, near_or_shipped
-from stiffmap.workspace.performance.quantities import Force, Length, PositiveLength, quantity, under
+from stiffmap.workspace.performance.quantities import Edge, PositiveForce, PositiveLength, quantity, under
 from stiffmap.workspace.performance.registry import get_measure
 
 Written = str | float | int
 
 
 class RequiredBoxModel(FileModel):
-    """Edges of the box in which the machine works, with units."""
+    """Edges of the box in which the machine works, with units; a machine that moves in a plane has a box without thickness."""
 
-    x: Length
-    y: Length
-    z: Length
+    x: PositiveLength
+    y: Edge
+    z: Edge
 
 
 class BoundModel(FileModel):
@@ -52,7 +52,7 @@ class RequirementsFile(FileModel):
     source: str = ""
     box: RequiredBoxModel | None = None
     plane: Literal["xy", "xz", "yz"] = "xy"
-    force: Force | None = None
+    force: PositiveForce | None = None
     toolpath: str | None = None
     limits: LimitsModel = LimitsModel()
     requirements: dict[str, BoundModel] = Field(default_factory=dict)

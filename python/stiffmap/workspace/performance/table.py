@@ -159,7 +159,8 @@ def measures(
     task = Requirements() if requirements is None else requirements
     task = task if isinstance(task, Requirements) else load_requirements(task)
     chosen = all_measures() if only is None else tuple(get_measure(n) for n in names_of(only, "only"))
-    low, high, notes = _box(machine, box, task)
+    turned = None if rotation is None else real_array(rotation, "rotation")
+    low, high, notes = _box(machine, box, task, turned)
     size = force if force is not None else task.force if task.force is not None else 100.0
     path = toolpath or task.toolpath
     plane = task.plane if plane is None else plane
@@ -170,7 +171,7 @@ def measures(
         machine, low, high, magnitude(size, "force", "N"), plane,
         transmission=task.transmission, proportions=task.proportions, nodes=nodes, coarse=coarse, gap=box_tolerance,
         length=length, gravity=None if gravity is None else real_array(gravity, "gravity"),
-        rotation=None if rotation is None else real_array(rotation, "rotation"), threads=threads,
+        rotation=turned, threads=threads,
         toolpath=path if path is None or isinstance(path, Motion) else load_motion(path),
         clearance=_positive("clearance", task.clearance if clearance is None else clearance),
         deflection=_positive("deflection", task.deflection if deflection is None else deflection),
@@ -205,26 +206,28 @@ def _row(measure: Measure, case: Case, bound: Bound | None) -> MeasureRow:
 
 
 def _box(
-    machine: Machine, box: ArrayLike | None, task: Requirements
+    machine: Machine, box: ArrayLike | None, task: Requirements, rotation: Floats | None
 ) -> tuple[Floats, Floats, tuple[str, ...]]:
     low, high = read_box(machine, box)
     if box is not None or task.box is None:
-        notes, some = _outside(machine, low, high, "the box")
+        notes, some = _outside(machine, low, high, rotation, "the box")
         if not some:
             raise StiffmapError(f"{notes[0]}: the workspace of {machine.name} is elsewhere")
         return low, high, notes
     half = np.array(task.box) / 2
     wanted = ((low + high) / 2 - half, (low + high) / 2 + half)
-    notes, _ = _outside(machine, *wanted, "the required box about the centre of the workspace")
+    notes, _ = _outside(machine, *wanted, rotation, "the required box about the centre of the workspace")
     if not notes:
         return (*wanted, ())
     return low, high, (*notes, "measures are over the machine's own workspace instead")
 
 
-def _outside(machine: Machine, low: Floats, high: Floats, what: str) -> tuple[tuple[str, ...], bool]:
+def _outside(
+    machine: Machine, low: Floats, high: Floats, rotation: Floats | None, what: str
+) -> tuple[tuple[str, ...], bool]:
     """What is said of nodes of a box that are out of reach, and whether some are within it."""
     p = box_nodes(low, high, 5)
-    bad = drive_kinematics(machine, p, patient=False).status != Status.CONVERGED
+    bad = drive_kinematics(machine, p, rotation, patient=False).status != Status.CONVERGED
     if not bad.any():
         return (), True
     first = place_text(p[int(np.argmax(bad))], ".1f")

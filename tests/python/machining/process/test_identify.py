@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import stiffmap as sm
@@ -152,6 +153,18 @@ def test_side_cuts_and_a_file(tmp_path: Path) -> None:
         assert value == pytest.approx(getattr(p.law, n), rel=1e-6)
 
 
+def test_a_data_frame_is_a_table() -> None:
+    columns = {"feed_per_tooth_mm": [0.05, 0.1, 0.2], "Fx_N": [-40, -60, -101.0], "Fy_N": [60, 100, 181.0],
+               "Fz_N": [5, 8, 14.5], "teeth": 2, "axial_mm": 3}  # fmt: skip
+    frame = pd.DataFrame(columns, index=[7, 5, 6])
+    law = sm.identify_process(frame)
+    assert law.coefficients == sm.identify_process(columns).coefficients
+    with pytest.raises(StiffmapError, match=r"Fy_N: .*finite.*nan"):
+        sm.identify_process(frame.replace(100.0, np.nan))
+    with pytest.raises(StiffmapError, match="a mapping or a DataFrame, got list"):
+        sm.identify_process([1, 2])
+
+
 @pytest.mark.parametrize("side", ["climb", "conventional"])
 def test_forces_on_the_part_are_no_forces_on_the_tool(side: str) -> None:
     """Of a slot the signs are known; of another cut only that the tangential pressure is above zero."""
@@ -171,6 +184,11 @@ def test_forces_on_the_part_are_no_forces_on_the_tool(side: str) -> None:
     assert good.coefficients["Ktc"][0] == pytest.approx(958.8e6, rel=1e-6)
     assert not any("below zero" in w for w in good.words())
     assert any("Ktc is below zero" in w and "on the part" in w for w in bad.words())
+    turned = on_tool | {"Fx_N": -force[:, 0]}
+    other = on_tool | {"side": "conventional" if side == "climb" else "climb"}
+    for table, rare in ((on_tool, False), (turned, True), (other, True)):
+        words = sm.identify_process(table).words()
+        assert any("is the side right" in w or "below zero" in w for w in words) == rare
 
 
 @pytest.mark.parametrize(

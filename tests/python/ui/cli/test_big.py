@@ -40,6 +40,20 @@ def test_statistics_agree_with_the_map(capsys: pytest.CaptureFixture[str]) -> No
     assert rows[2]["max"] == float(ds.deflection_xy.max())
 
 
+@pytest.mark.parametrize("force", ["200,0,-100", "200,100,0"])
+def test_statistics_read_the_deflection_that_the_table_of_the_map_reads(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, force: str
+) -> None:
+    """A force out of the plane is judged by its deflection in space, in both."""
+    words = ("--points", "3", "--force", force, "--z", "0")
+    _, stored = run(capsys, *words, "--no-pictures", "--json", "-o", str(tmp_path))
+    _, figures = run(capsys, *words, "--statistics", "--json")
+    keys = ("force", "z", "max")
+    tables = [[[r[k] for k in keys] for r in json.loads(text)["rows"]] for text in (stored, figures)]
+    assert tables[0] == tables[1]
+    assert ("|d|" in run(capsys, *words, "--statistics")[1]) == (force == "200,0,-100")
+
+
 def test_statistics_are_a_table(capsys: pytest.CaptureFixture[str]) -> None:
     code, out = run(capsys, "--points", "5", "--statistics", "--z", "0")
     assert code == 0

@@ -215,6 +215,8 @@ def test_the_package_runs_as_the_command() -> None:
     [
         ("map five-bar --toolpath trim --points 5", "--points: not with --toolpath"),
         ("map five-bar --statistics --table csv", "--table: not with --statistics"),
+        ("map five-bar --statistics --y 350", "--y: not with --statistics"),
+        ("sweep five-bar --limit 100 --to 50", "--to: not with --limit"),
         ("map five-bar --no-pictures --format svg", "--format: not without --pictures"),
         ("plan ur10 --taps 3 --rows 8", "--rows: not with --taps"),
         ("plan ur10 --identify x --until 0.1 -o p.csv", "--output: not with --until"),

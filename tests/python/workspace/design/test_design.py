@@ -111,6 +111,7 @@ def test_a_design_that_cannot_be_is_infeasible_not_an_error(tmp_path):
             r"expected one body named 'cart', found 0; here are: .*body\[carriage\]",
         ),
         ("carriage / 2", "cariage / 2", r"derived: unknown name 'cariage'; known: .*carriage"),
+        ("].compliance: diameter", "].compliance: 1e-4", "line 6: variables.diameter: no expression uses"),
         ("at_most: 45 kg", "at_most: 45", r"constraints\.mass\.at_most: the unit is missing"),
         (
             "templates.leg.actuator[actuator].compliance",

@@ -103,6 +103,26 @@ def test_bad_tables_name_the_line(tmp_path, old, new, words):
         load_motion(write(tmp_path, ROWS.replace(old, new), "rows.csv"))
 
 
+def test_a_feed_is_in_place_of_the_duration_of_the_file(tmp_path):
+    """100 mm at 100 mm/s take a second, whatever the file says."""
+    machine = sm.load_machine("orthoglide-revised")
+    text = "name: cut\nline: {start: [0 mm, 0 mm, 0 mm], end: [100 mm, 0 mm, 0 mm]}\nduration: 2 s\n"
+    motion = load_motion(write(tmp_path, text))
+    assert motion.trajectory(machine).time[-1] == pytest.approx(2)
+    assert motion.trajectory(machine, feed=0.1).time[-1] == pytest.approx(1, rel=1e-3)
+    with pytest.raises(sm.StiffmapError, match="a duration or a feed, not both"):
+        motion.trajectory(machine, feed=0.1, duration=1.0)
+
+
+@pytest.mark.parametrize(("name", "value"), [("mz [N*m]", 5), ("rx [deg]", 0.5)])
+def test_moments_and_turns_in_a_table_are_not_dropped(tmp_path, name, value):
+    """They were read and counted as zero."""
+    text = f"x [mm],y [mm],z [mm],{name}\n0,0,0,0\n50,0,0,0\n100,0,0,{{}}\n"
+    assert load_motion(write(tmp_path, text.format(0), "still.csv")).path is not None
+    with pytest.raises(sm.StiffmapError, match=rf"line 4: {name[:2]} .*expected 0.*found {value}"):
+        load_motion(write(tmp_path, text.format(value), "turned.csv"))
+
+
 @pytest.mark.parametrize("samples", [21, 101, 401])
 def test_a_parallel_singularity_is_found_where_the_closed_form_has_it(samples):
     """The five-bar on its axis: the two forearms (374 mm) in one line, elbows 300 mm from the motors at ±150 mm."""

@@ -46,6 +46,13 @@ def test_shipped_requirements_are_those_of_the_paper():
         ("force: 200 N", "limits: {clearance: 20}", r"limits.clearance: the unit is missing"),
         ("force: 200 N", "limits: {deflection: -1 mm}", r"limits.deflection: expected a positive length"),
         ("force: 200 N", "forse: 200 N", r"unknown key 'forse' \(did you mean 'force'\?\)"),
+        ("force: 200 N", "force: -200 N", r"line 4: force: expected a positive force, found -200 N"),
+        ("{x: 300 mm, y", "{x: 0 mm, y", r"box.x: expected a positive length, found 0 mm"),
+        (
+            "{x: 300 mm, y: 300",
+            "{x: 300 mm, y: -300",
+            r"box.y: expected a positive length or 0, found -300 mm",
+        ),
     ],
 )
 def test_bad_requirements_name_the_key(tmp_path, old, new, words):
@@ -80,6 +87,17 @@ def test_a_box_outside_the_reach_is_said_and_replaced():
     )
     assert any("not within reach" in n for n in table.notes)
     np.testing.assert_allclose((table.case.low, table.case.high), ([-0.08] * 3, [0.12] * 3))
+
+
+def test_the_reach_of_a_box_is_that_of_the_orientation():
+    """A six-axis arm reaches this box with its tool turned by a quarter of a turn, and not as at home."""
+    p, turn = np.array([-1.05, -0.31, 0.72]), np.array([[0, 0, -1], [0, 1, 0], [1, 0, 0]])
+    call = {"box": [p - 1e-3, p + 1e-3], "nodes": 2, "coarse": 2}
+    table = sm.measures("ur10", only=["condition", "path_effort"], toolpath="trim", rotation=turn, **call)
+    assert not table.notes and np.isfinite(table["condition"].found.worst)
+    assert "turned as at home" in table["path_effort"].reason
+    with pytest.raises(sm.StiffmapError, match="125 of 125 nodes"):
+        sm.measures("ur10", only=["condition"], **call)
 
 
 def test_a_measure_without_its_data_says_what_is_missing():

@@ -30,7 +30,7 @@ from stiffmap.machining.process.identify.models import (
     fit,
     runout_of,
 )
-from stiffmap.machining.process.identify.table import COLUMNS, ForceTable, read_table
+from stiffmap.machining.process.identify.table import COLUMNS, ForceColumns, ForceTable, read_table
 from stiffmap.machining.process.load import load_process
 
 SIGNIFICANT = 0.01
@@ -236,14 +236,12 @@ def _mm(value: float) -> str:
 
 
 def identify_process(
-    table: str | PathLike[str] | Mapping[str, object],
-    process: Process | None = None,
-    sheet: str | None = None,
+    table: ForceColumns, process: Process | None = None, sheet: str | None = None
 ) -> IdentifiedLaw:
     """Coefficients of the mechanistic law from a dynamometer's table: means per feed, or signals over time.
 
     table
-        CSV file, workbook or columns ``feed_per_tooth_mm, Fx_N, Fy_N, Fz_N, teeth, axial_mm`` and, where the cut is no slot,
+        CSV file, workbook, mapping or data frame of columns ``feed_per_tooth_mm, Fx_N, Fy_N, Fz_N, teeth, axial_mm`` and, where the cut is no slot,
         ``side, radial_mm, diameter_mm``; signals also ``time_s, spindle_rpm``. Other units are ``Fx [kN]``,
         ``feed [mm/min]`` (with ``spindle_rpm``). Single values stand for all rows.
     process
@@ -260,12 +258,16 @@ def identify_process(
             "are what does not change with the feed", file=t.file, key="feed_per_tooth_mm",
         )  # fmt: skip
     straight = fit(STRAIGHT, t)
-    if straight.numbers["Ktc"][3] < 0:  # the end of its interval
+    tangential, radial = (straight.numbers[n][2:] for n in ("Ktc", "Krc"))  # the ends of their intervals
+    note = ""
+    if tangential[1] < 0:
         note = (
             "Ktc is below zero, which no tool has: the forces are to be those on the tool, along the feed, to its left (seen "
             "against the tool) and from holder to tip; those on the part have the other signs"
         )
-        t = replace(t, notes=(*t.notes, note))
+    elif radial[1] < 0 or radial[0] > tangential[1]:
+        note = "Krc is below zero or above Ktc, which is rare: is the side right, and are Fx and Fy, with their signs?"
+    t = replace(t, notes=(*t.notes, note)) if note else t
     runout = runout_of(t, straight)
     if runout is not None:  # with the coefficients of teeth that leave the cut
         runout = runout_of(t, fit(RUNOUT, t, np.array([runout.offset])))

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pandas import DataFrame
 
 from stiffmap.common.broadcasting import Floats, given_path
 from stiffmap.common.errors import FileError
@@ -19,6 +20,7 @@ from stiffmap.common.tables.named import WORD, Known, NamedTable, named, read_na
 from stiffmap.common.tables.table import Table
 from stiffmap.machining.process.description import SIDES, Cut, EndMill, Process, Tool
 
+ForceColumns = str | PathLike[str] | Mapping[str, object] | DataFrame
 COLUMNS = {
     "feed_per_tooth": ("feed_per_tooth_mm", "m"), "fx": ("Fx_N", "N"), "fy": ("Fy_N", "N"), "fz": ("Fz_N", "N"),
     "teeth": ("teeth", ""), "axial": ("axial_mm", "m"), "radial": ("radial_mm", "m"), "diameter": ("diameter_mm", "m"),
@@ -67,11 +69,9 @@ KNOWN = Known(
 )
 
 
-def columns_of(
-    table: str | PathLike[str] | Mapping[str, object], defaults: Mapping[str, object], sheet: str | None
-) -> NamedTable:
+def columns_of(table: ForceColumns, defaults: Mapping[str, object], sheet: str | None) -> NamedTable:
     """Numbers by the names of `COLUMNS`, SI, of a file or a mapping; `defaults`, SI, where it has none of that name. Raises FileError."""
-    if isinstance(table, Mapping):
+    if isinstance(table, Mapping | DataFrame):
         out = named(_of_mapping(table), KNOWN)
     else:
         out = read_named(given_path(table, "table", "a file or a mapping of columns"), KNOWN, sheet)
@@ -93,7 +93,7 @@ def columns_of(
     return out
 
 
-def _of_mapping(table: Mapping[str, Any]) -> Table:
+def _of_mapping(table: Mapping[Any, Any] | DataFrame) -> Table:
     """Rows counted from 1; single values stand for all rows."""
     columns = {str(k): [table[k]] if np.ndim(table[k]) == 0 else list(table[k]) for k in table}
     count = max((len(v) for v in columns.values()), default=0)
@@ -151,11 +151,7 @@ class ForceTable:
         return replace(self, cuts=tuple(self.cuts[i] for i in index), force=self.force[index], signals=())
 
 
-def read_table(
-    table: str | PathLike[str] | Mapping[str, object],
-    process: Process | None = None,
-    sheet: str | None = None,
-) -> ForceTable:
+def read_table(table: ForceColumns, process: Process | None = None, sheet: str | None = None) -> ForceTable:
     """A CSV file, a workbook, or a mapping (a data frame) of columns as `identify_process` takes them.
 
     Columns may be single values; `process` gives what no column says. With a column of time the rows are samples, and those

@@ -103,6 +103,8 @@ def path_compliance(case: Case) -> Found:
 def path_effort(case: Case) -> Found:
     """Inverse dynamics along the motion, forces on the tool included."""
     motion = case.motion
+    if case.rotation is not None:
+        raise StiffmapError("along a motion the tool is turned as at home: leave rotation out")
     most = drive_values(case.machine, "force", None, "N or N·m")
     run = motion.trajectory(case.machine, gravity=case.gravity)
     e = drive_efforts(case.machine, run, gravity=case.gravity)

@@ -101,10 +101,12 @@ class Motion:
                 word = "duration" if feed is None else "feed"
                 raise StiffmapError(f"{self.name}: the table has times, so no {word} can be given")
             return self.timed
-        span = self.duration if duration is None else duration
+        if duration is not None and feed is not None:
+            raise StiffmapError(f"{self.name}: give a duration or a feed, not both")
+        span, speed = (self.duration, self.feed) if duration is None and feed is None else (duration, feed)
         if span is not None:
             run = timed(self.path, span)
-        elif (speed := self.feed if feed is None else feed) is not None:
+        elif speed is not None:
             run = at_feed(self.path, speed)
         else:
             run = fastest(machine, self.path, gravity=gravity, speed=self.speed, force=self.force)
@@ -165,6 +167,8 @@ def _described(document: Document, file: str) -> Motion:
 
 def _table(place: FilePath) -> Motion:
     table = read_pose_table(place)
+    for name in ("mx", "my", "mz", "rx", "ry", "rz"):
+        table.check(name, lambda v: v == 0, "0: a motion has no moment, its tool is turned as at home")
     file, p, f = table.file, table.position, table.wrench[:, :3]
     feed = table.values.get("feed")
     if "t" not in table.values:
