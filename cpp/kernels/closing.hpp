@@ -58,15 +58,14 @@ struct Closing {
   }
 
   /// Adaptive continuation of theory (C5), each lane by its own leaps, from the node of the grid that is nearest
-  /// (home where there is none) straight to the pose.
+  /// (home where there is none; of an arm home, turned towards the pose) straight to the pose.
   M leap(const Frame& tip, const double* const (&at)[W], M moving) {
     Frame from = home();
-    const V3 turn = rotation_between(from.R, tip.R);
     M closed_lanes{}, stuck{};
     for (int q = 0; q < P.coordinate_count; ++q)
       if (P.coordinates[q].role != 2) s.x[q] = select(moving, splat(P.coordinates[q].home), s.x[q]);
     for (int i = 0; i < W; ++i) {
-      if (!moving[i]) continue;
+      if (!moving[i] || P.arm) continue;
       double node[3];
       const double* row = Starts{P}.nearest(at[i], node);
       if (!row) continue;
@@ -75,6 +74,8 @@ struct Closing {
       from.p.z[i] = node[2];
       for (int j = 0; j < P.unknown_count; ++j) s.x[P.unknowns[j]][i] = row[j];
     }
+    if (P.arm) turn_home(*P.arm, tip.p, moving, from, s.x);
+    const V3 turn = rotation_between(from.R, tip.R);
     // What is not a number can not be reached.
     stuck |= moving & ~((dot(tip.p, tip.p) + dot(turn, turn)) < 1e200);
     moving &= ~stuck;
@@ -94,7 +95,8 @@ struct Closing {
       moving &= ~closed_lanes & ~stuck;
     }
     stuck |= moving;
-    if (any(stuck)) never |= out_of_reach(tip, stuck);
+    // Other arms may stay away on their way round their own first axis: the reference path turns them there.
+    if (any(stuck) && (P.arm || P.leg_count > 1)) never |= out_of_reach(tip, stuck);
     return closed_lanes;
   }
 
@@ -118,9 +120,12 @@ struct Closing {
   M out_of_reach(const Frame& tip, M lanes) {
     M no = lanes;
     for (int attempt = 0; attempt < 2 && any(no); ++attempt) {
-      if (attempt == 1)
+      if (attempt == 1) {
         for (int q = 0; q < P.coordinate_count; ++q)
           if (P.coordinates[q].role != 2) s.x[q] = select(no, splat(P.coordinates[q].home), s.x[q]);
+        Frame there = home();
+        if (P.arm) turn_home(*P.arm, tip.p, no, there, s.x);
+      }
       M some{};
       each_leg(tip, [&](const LegClosure& leg, int chain, const Frame& before, const Frame& after) {
         const M left = no & ~some;

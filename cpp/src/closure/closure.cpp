@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "closing.hpp"
 #include "stiffmap/kinematics/pull.hpp"
@@ -186,6 +187,56 @@ void stop(const Mechanism& m, ClosureWorkspace& ws, VecX& x) {
   ws.renumber = false;
 }
 
+/// Home with the first drive turned so that the tip is where the pose is about its axis; all that follows turns with
+/// it. False where there is no such drive.
+bool turn_home(const Mechanism& m, const Pose& pose, ClosureWorkspace& ws, VecX& x) {
+  const auto has = [&](Index node, Index j) {
+    const auto& path = m.path[at(node)];
+    return std::find(path.begin(), path.end(), j) != path.end();
+  };
+  const auto& path = m.path[at(m.tip)];
+  const auto springs = [&](Index j) { return m.coordinates[at(j)].role == Role::spring; };
+  const auto first = std::find_if_not(path.begin(), path.end(), springs);
+  if (first == path.end() || m.coordinates[at(*first)].role != Role::actuator) return false;
+  const Index j = *first;
+  for (const Loop& l : m.loops)
+    if (has(l.primary, j) != has(l.end, j)) return false;
+  x = m.home_coordinates;
+  start(m, ws, x);
+  forward(m, Geometry::nominal, x, ws.frames, &ws.charts);
+  const Vec6 tip = column(m, ws.frames, j, ws.frames.at(m.tip).p);
+  const Vec3 axis = tip.tail<3>(), from = tip.head<3>(), to = column(m, ws.frames, j, pose.p).head<3>();
+  if (axis.isZero(0) || std::min(from.norm(), to.norm()) < rank_threshold * m.length) return false;
+  const Coordinate& c = m.coordinates[at(j)];
+  x[j] += std::atan2(axis.dot(from.cross(to)), from.dot(to));
+  if (x[j] > c.upper) x[j] -= 2 * std::numbers::pi;
+  if (x[j] < c.lower) x[j] += 2 * std::numbers::pi;
+  forward(m, Geometry::nominal, x, ws.frames, &ws.charts);
+  return true;
+}
+
+/// From there straight to the pose, in the configuration of home; coordinates stay as they are where that leads
+/// nowhere.
+bool round_first_drive(const Mechanism& m, const Pose& pose, ClosureWorkspace& ws, VecX& x, ClosureResult& out) {
+  const VecX before = x;
+  const Charts charts = ws.charts;
+  ClosureResult turned;
+  if (turn_home(m, pose, ws, x)) {
+    Pose way = ws.frames.at(m.tip);
+    const Pose there = way;
+    const auto set = [&](double s, VecX&) { way = on_the_way(there, pose, s); };
+    const bool ok = continuation(m, Target{&way, m.task}, set, ws, x, turned);
+    out.iterations += turned.iterations;
+    if (ok && !turned.flags) {
+      out.flags = 0;
+      return true;
+    }
+  }
+  x = before;
+  ws.charts = charts;
+  return false;
+}
+
 /// From anywhere, in as many steps as it takes: of which configuration the end is then is not known.
 bool all_at_once(const Mechanism& m, const Target& target, const VecX& from, ClosureWorkspace& ws, VecX& x,
                  ClosureResult& out) {
@@ -244,8 +295,14 @@ ClosureResult inverse_closure(const Mechanism& m, const Pose& pose, ClosureWorks
     ok = continuation(m, target, [&](double s, VecX&) { way = on_the_way(beside, pose, s); }, ws, x, out);
     if (ok) out.flags |= flag::branch_unverified;
   }
+  // The straight way may lead through the axis of the first drive.
+  if (!ok || out.flags & flag::branch_unverified) ok = round_first_drive(m, pose, ws, x, out) || ok;
   way = pose;  // the straight way may leave the workspace although its end lies inside
   ok = ok || all_at_once(m, target, m.home_coordinates, ws, x, out);
+  if (!ok && turn_home(m, pose, ws, x)) {
+    stop(m, ws, x);
+    ok = all_at_once(m, target, VecX(x), ws, x, out);
+  }
   if (!m.cables.empty()) {  // where all else is closed
     forward(m, Geometry::nominal, x, ws.frames, &ws.charts);
     wind(m, ws.frames, x);

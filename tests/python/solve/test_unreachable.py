@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -113,3 +114,58 @@ def test_what_is_no_number_is_said_in_python(position: object) -> None:
 def test_a_reachable_pose_says_nothing(recwarn: pytest.WarningsRecorder) -> None:
     sm.load_machine("orthoglide-revised").solve((0.1, -0.2, 0.1), np.zeros(6))
     assert not recwarn.list
+
+
+SIX = """
+name: six
+units: {length: mm, force: N, angle: deg}
+home: {solve: true, translation: [700, 50, 600], axes: xyz}
+legs:
+  arm:
+    elements:
+      - {actuator: j1, kind: revolute, axis: z, home: 0, stiffness: 1.0e+8}
+      - {offset: o1, translation: [100, 0, 300]}
+      - {actuator: j2, kind: revolute, axis: y, home: 10, stiffness: 1.0e+8}
+      - {offset: o2, translation: [0, 0, 400]}
+      - {actuator: j3, kind: revolute, axis: y, home: 80, stiffness: 1.0e+8}
+      - {offset: o3, translation: [0, 20, 300]}
+      - {actuator: j4, kind: revolute, axis: x, home: 20, stiffness: 1.0e+8}
+      - {offset: o4, translation: [50, 0, 100]}
+      - {actuator: j5, kind: revolute, axis: y, home: 30, stiffness: 1.0e+8}
+      - {offset: o5, translation: [80, 0, 60]}
+      - {actuator: j6, kind: revolute, axis: x, home: 0, stiffness: 1.0e+8}
+      - {offset: o6, translation: [60, 0, 0]}
+"""
+"""No two axes but the second and third are parallel, no three meet: no closed form."""
+
+
+@pytest.mark.parametrize("name", ["ur10", "six"])
+def test_an_arm_reaches_all_round_its_first_axis(name: str, tmp_path: Path) -> None:
+    """Poses that forward kinematics gives, also where the straight way from home leads through the base."""
+    (tmp_path / "six.yaml").write_text(SIX, encoding="utf-8")
+    machine = sm.load_machine(tmp_path / "six.yaml" if name == "six" else name)
+    drives = [machine.compiled.names.joints[a] for a in machine.actuators]
+    joints = np.tile(machine.compiled.home_coordinates()[drives], (48, 1))
+    joints += np.random.default_rng(1).uniform(-0.1, 0.1, joints.shape)
+    joints[:, 0] += np.linspace(-3.0, 3.0, len(joints))
+    at = sm.forward_kinematics(machine, joints)
+    for method in ("fast", "reference"):
+        here = machine.solve(at.position, np.zeros(6), rotation=at.rotation, method=method)
+        assert (here.status == sm.Status.CONVERGED).all()
+        found = here.coordinates[:, drives]
+        if (
+            name == "ur10"
+        ):  # in the configuration of home; without parallel axes the way may lead to another one
+            np.testing.assert_allclose(found, joints, rtol=0, atol=1e-7)
+        there = sm.forward_kinematics(machine, found)
+        np.testing.assert_allclose(there.position, at.position, rtol=0, atol=1e-9)
+        np.testing.assert_allclose(there.rotation, at.rotation, rtol=0, atol=1e-9)
+
+
+def test_what_an_arm_reaches_at_no_angle_of_its_first_axis_stays_unreachable() -> None:
+    machine = sm.load_machine("ur10")
+    angle = np.linspace(-3.0, 3.0, 12)
+    far = np.column_stack([1.6 * np.cos(angle), 1.6 * np.sin(angle), np.full(12, 0.3)])
+    near = np.column_stack([0.05 * np.cos(angle), 0.05 * np.sin(angle), np.full(12, 0.3)])
+    for position in (far, near):
+        assert (machine.solve(position, np.zeros(6)).status == sm.Status.UNREACHABLE).all()
