@@ -15,6 +15,7 @@ namespace {
 constexpr double stationary = 1e-9;     // a step that leaves what misfit there is
 constexpr double contraction = 0.25;    // Newton steps of a trusted continuation shrink at least so
 constexpr double shortest_leap = 1e-3;  // of the way from home
+constexpr double quick_leap = 0.01;     // the same of one attempt of several
 
 }  // namespace
 
@@ -142,10 +143,11 @@ Pose on_the_way(const Pose& a, const Pose& b, double s) {
   return {a.p + s * (b.p - a.p), exp_so3(s * log_so3(b.R * a.R.transpose())) * a.R};
 }
 
-/// Adaptive continuation: `set(s)` puts the target to the share s of the way.
+/// Adaptive continuation: `set(s)` puts the target to the share s of the way. `patient`: where its steps shrink without
+/// end, one attempt from there, of which configuration it may be.
 template <class Set>
 bool continuation(const Mechanism& m, const Target& target, Set&& set, ClosureWorkspace& ws, VecX& x,
-                  ClosureResult& out) {
+                  ClosureResult& out, bool patient = true) {
   double done = 0, leap = 1;
   while (done < 1) {
     const double s = std::min(1.0, done + leap);
@@ -159,9 +161,9 @@ bool continuation(const Mechanism& m, const Target& target, Set&& set, ClosureWo
       continue;
     }
     leap *= 0.5;
-    if (leap >= shortest_leap) continue;
-    // At a border of the workspace the steps shrink without end: one patient attempt.
-    ws.trial = x;
+    if (leap >= (patient ? shortest_leap : quick_leap)) continue;
+    if (!patient) return false;
+    ws.trial = x;  // at a border of the workspace
     set(1.0, ws.trial);
     if (close(m, target, Pace::damped, ws, ws.trial, out.iterations)) {
       x = ws.trial;
@@ -197,13 +199,12 @@ bool turn_home(const Mechanism& m, const Pose& pose, ClosureWorkspace& ws, VecX&
   const auto& path = m.path[at(m.tip)];
   const auto springs = [&](Index j) { return m.coordinates[at(j)].role == Role::spring; };
   const auto first = std::find_if_not(path.begin(), path.end(), springs);
-  if (first == path.end() || m.coordinates[at(*first)].role != Role::actuator) return false;
+  if (!m.cables.empty() || first == path.end() || m.coordinates[at(*first)].role != Role::actuator) return false;
   const Index j = *first;
   for (const Loop& l : m.loops)
     if (has(l.primary, j) != has(l.end, j)) return false;
   x = m.home_coordinates;
-  start(m, ws, x);
-  forward(m, Geometry::nominal, x, ws.frames, &ws.charts);
+  forward(m, Geometry::nominal, x, ws.frames);
   const Vec6 tip = column(m, ws.frames, j, ws.frames.at(m.tip).p);
   const Vec3 axis = tip.tail<3>(), from = tip.head<3>(), to = column(m, ws.frames, j, pose.p).head<3>();
   if (axis.isZero(0) || std::min(from.norm(), to.norm()) < rank_threshold * m.length) return false;
@@ -211,30 +212,9 @@ bool turn_home(const Mechanism& m, const Pose& pose, ClosureWorkspace& ws, VecX&
   x[j] += std::atan2(axis.dot(from.cross(to)), from.dot(to));
   if (x[j] > c.upper) x[j] -= 2 * std::numbers::pi;
   if (x[j] < c.lower) x[j] += 2 * std::numbers::pi;
+  start(m, ws, x);
   forward(m, Geometry::nominal, x, ws.frames, &ws.charts);
   return true;
-}
-
-/// From there straight to the pose, in the configuration of home; coordinates stay as they are where that leads
-/// nowhere.
-bool round_first_drive(const Mechanism& m, const Pose& pose, ClosureWorkspace& ws, VecX& x, ClosureResult& out) {
-  const VecX before = x;
-  const Charts charts = ws.charts;
-  ClosureResult turned;
-  if (turn_home(m, pose, ws, x)) {
-    Pose way = ws.frames.at(m.tip);
-    const Pose there = way;
-    const auto set = [&](double s, VecX&) { way = on_the_way(there, pose, s); };
-    const bool ok = continuation(m, Target{&way, m.task}, set, ws, x, turned);
-    out.iterations += turned.iterations;
-    if (ok && !turned.flags) {
-      out.flags = 0;
-      return true;
-    }
-  }
-  x = before;
-  ws.charts = charts;
-  return false;
 }
 
 /// From anywhere, in as many steps as it takes: of which configuration the end is then is not known.
@@ -272,7 +252,24 @@ ClosureWorkspace::ClosureWorkspace(const Mechanism& m)
       wanted(m.home_coordinates) {}
 
 ClosureResult inverse_closure(const Mechanism& m, const Pose& pose, ClosureWorkspace& ws, VecX& x) {
-  return inverse_closure(m, pose, ws, x, m.home_coordinates, m.home);
+  const ClosureResult straight = inverse_closure(m, pose, ws, x, m.home_coordinates, m.home);
+  const bool sure = straight.status == Status::converged && !(straight.flags & flag::branch_unverified);
+  if (sure || !pose.p.allFinite() || !pose.R.allFinite()) return straight;
+  // The straight way may lead through the axis of the first drive.
+  const VecX found = x;
+  ClosureResult out;
+  if (turn_home(m, pose, ws, x)) {
+    Pose way = ws.frames.at(m.tip);
+    const Pose there = way;
+    const Target target{&way, m.task};
+    const auto set = [&](double s, VecX&) { way = on_the_way(there, pose, s); };
+    const bool ok = continuation(m, target, set, ws, x, out, false);
+    way = pose;
+    finish(m, target, ok, ws, x, out);
+  }
+  if (out.status == Status::converged) return out;
+  x = found;
+  return straight;
 }
 
 ClosureResult inverse_closure(const Mechanism& m, const Pose& pose, ClosureWorkspace& ws, VecX& x, const VecX& from,
@@ -295,14 +292,8 @@ ClosureResult inverse_closure(const Mechanism& m, const Pose& pose, ClosureWorks
     ok = continuation(m, target, [&](double s, VecX&) { way = on_the_way(beside, pose, s); }, ws, x, out);
     if (ok) out.flags |= flag::branch_unverified;
   }
-  // The straight way may lead through the axis of the first drive.
-  if (!ok || out.flags & flag::branch_unverified) ok = round_first_drive(m, pose, ws, x, out) || ok;
   way = pose;  // the straight way may leave the workspace although its end lies inside
   ok = ok || all_at_once(m, target, m.home_coordinates, ws, x, out);
-  if (!ok && turn_home(m, pose, ws, x)) {
-    stop(m, ws, x);
-    ok = all_at_once(m, target, VecX(x), ws, x, out);
-  }
   if (!m.cables.empty()) {  // where all else is closed
     forward(m, Geometry::nominal, x, ws.frames, &ws.charts);
     wind(m, ws.frames, x);

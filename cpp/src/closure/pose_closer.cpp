@@ -218,7 +218,7 @@ ClosureResult PoseCloser::close(const Mechanism& m, const Pose& pose, VecX& x, b
     }
     if (!ok) ok = from_home(m, pose, x);
     if (!ok && patient) {
-      out = inverse_closure(m, pose, ws_, x);
+      out = inverse_closure(m, pose, ws_, x, m.home_coordinates, m.home);  // a motion goes on, it does not turn round
       ok = out.status == Status::converged;
       if (ok) residual(m, pose, x);
     }
