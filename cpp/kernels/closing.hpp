@@ -64,8 +64,9 @@ struct Closing {
     M closed_lanes{}, stuck{};
     for (int q = 0; q < P.coordinate_count; ++q)
       if (P.coordinates[q].role != 2) s.x[q] = select(moving, splat(P.coordinates[q].home), s.x[q]);
-    for (int i = 0; i < W; ++i) {
-      if (!moving[i] || P.arm) continue;
+    if (P.arm) turn_home(*P.arm, tip.p, moving, from, s.x);
+    for (int i = 0; i < W && !P.arm; ++i) {
+      if (!moving[i]) continue;
       double node[3];
       const double* row = Starts{P}.nearest(at[i], node);
       if (!row) continue;
@@ -74,7 +75,6 @@ struct Closing {
       from.p.z[i] = node[2];
       for (int j = 0; j < P.unknown_count; ++j) s.x[P.unknowns[j]][i] = row[j];
     }
-    if (P.arm) turn_home(*P.arm, tip.p, moving, from, s.x);
     const V3 turn = rotation_between(from.R, tip.R);
     // What is not a number can not be reached.
     stuck |= moving & ~((dot(tip.p, tip.p) + dot(turn, turn)) < 1e200);

@@ -175,6 +175,14 @@ bool continuation(const Mechanism& m, const Target& target, Set&& set, ClosureWo
   return true;
 }
 
+/// From closed coordinates `x`, at which the tip has the pose `from`, straight to another pose.
+bool straight_on(const Mechanism& m, const Pose& from, const Pose& pose, ClosureWorkspace& ws, VecX& x,
+                 ClosureResult& out, bool patient = true) {
+  Pose way;
+  const auto set = [&](double s, VecX&) { way = on_the_way(from, pose, s); };
+  return continuation(m, Target{&way, m.task}, set, ws, x, out, patient);
+}
+
 /// A search starts at `x`, by its own axes; for good where the nearest configuration is sought, which counts by them.
 void start(const Mechanism& m, ClosureWorkspace& ws, VecX& x) {
   ws.charts = {};
@@ -259,13 +267,9 @@ ClosureResult inverse_closure(const Mechanism& m, const Pose& pose, ClosureWorks
   const VecX found = x;
   ClosureResult out;
   if (turn_home(m, pose, ws, x)) {
-    Pose way = ws.frames.at(m.tip);
-    const Pose there = way;
-    const Target target{&way, m.task};
-    const auto set = [&](double s, VecX&) { way = on_the_way(there, pose, s); };
-    const bool ok = continuation(m, target, set, ws, x, out, false);
-    way = pose;
-    finish(m, target, ok, ws, x, out);
+    const Pose there = ws.frames.at(m.tip);
+    const bool ok = straight_on(m, there, pose, ws, x, out, false);
+    finish(m, Target{&pose, m.task}, ok, ws, x, out);
   }
   if (out.status == Status::converged) return out;
   x = found;
@@ -280,19 +284,17 @@ ClosureResult inverse_closure(const Mechanism& m, const Pose& pose, ClosureWorks
   ws.wanted = m.home_coordinates;
   x = from;
   start(m, ws, x);
-  Pose way;
-  const Target target{&way, m.task};
-  const auto set = [&](double s, VecX&) { way = on_the_way(at_pose, pose, s); };
-  bool ok = continuation(m, target, set, ws, x, out);
+  const Target target{&pose, m.task};
+  bool ok = straight_on(m, at_pose, pose, ws, x, out);
   if (!ok && m.beside_home.size() > 0) {  // from home no way leads where a locked hinge has to turn by a right angle
     x = m.beside_home;
     start(m, ws, x);
     forward(m, Geometry::nominal, x, ws.frames, &ws.charts);
     const Pose beside = ws.frames.at(m.tip);
-    ok = continuation(m, target, [&](double s, VecX&) { way = on_the_way(beside, pose, s); }, ws, x, out);
+    ok = straight_on(m, beside, pose, ws, x, out);
     if (ok) out.flags |= flag::branch_unverified;
   }
-  way = pose;  // the straight way may leave the workspace although its end lies inside
+  // The straight way may leave the workspace although its end lies inside.
   ok = ok || all_at_once(m, target, m.home_coordinates, ws, x, out);
   if (!m.cables.empty()) {  // where all else is closed
     forward(m, Geometry::nominal, x, ws.frames, &ws.charts);
@@ -387,15 +389,14 @@ ClosureResult branch_closure(const Mechanism& m, const Pose& pose, ClosureWorksp
   x = ws.wanted = joints_only(m, from);
   start(m, ws, x);
   select_unknowns(m, false, ws);
-  Pose way;
-  const Target target{&way, m.task};
+  const Target target{&pose, m.task};
   bool ok = close(m, Target{}, Pace::damped, ws, x, out.iterations);
   select_unknowns(m, true, ws);
   if (ok) {
     const Pose first = ws.frames.at(m.tip);
-    ok = continuation(m, target, [&](double s, VecX&) { way = on_the_way(first, pose, s); }, ws, x, out);
+    ok = straight_on(m, first, pose, ws, x, out);
   }
-  way = pose;  // actuators and the others may belong to different configurations: all move at once
+  // Actuators and the others may belong to different configurations: all move at once.
   ok = ok || all_at_once(m, target, ws.wanted, ws, x, out);
   finish(m, target, ok, ws, x, out);
   return out;
