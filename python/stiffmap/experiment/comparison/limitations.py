@@ -52,7 +52,7 @@ def limitations(experiment: Experiment, noise: Noise, machine: Machine) -> list[
             + ("" if e.runs.max() > 0 else ", nothing is held out")
         )
     if not (noise.freedom > 0).any():
-        out.append("no repeats: the noise is taken as stated")
+        out.append("no repeats: only the stated noise says how large it is")
     outside = _outside(e, machine)
     if outside:
         out.append(f"{outside} row{'s lie' if outside > 1 else ' lies'} outside the workspace of the file")

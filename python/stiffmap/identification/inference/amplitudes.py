@@ -137,8 +137,14 @@ def fitted(
         How much likelier that fit was than with heavy tails, ln; none are tried where one effect more can hardly change that.
     """
     given = start or {}
+    unnamed = np.array([False, *(p.kind in (*GAPS, "time") for p in parts)])
     first = np.array([given.get(NOISE, 0.0), *(given.get(p.name, BEGIN) for p in parts)])
-    light = _optimum(columns, tuple(parts), first, np.ones(len(columns.rows)))
+    even = np.ones(len(columns.rows))
+    light = _optimum(columns, tuple(parts), first, even)
+    square = float(np.mean(columns.residual**2))
+    if not given and square > 1.0:  # noise beyond its declaration and short gaps look much alike
+        noisy = np.where(unnamed, QUIET, [np.log(square), *first[1:]])
+        light = max(light, _optimum(columns, tuple(parts), noisy, even), key=lambda f: f.score)
     if weights is not None and np.any(weights != 1.0):
         heavy = _optimum(columns, tuple(parts), first, weights, heavy=True, beat=light.score)
         return max(light, heavy, key=lambda f: f.score)
@@ -148,7 +154,7 @@ def fitted(
     begun = np.array([2.0 * np.log(typical), *first[1:]])  # what sank may rise
     starts = [(begun, slips)]
     if not given:  # what nobody can name may have taken what stands out
-        quiet = np.where([False, *(p.kind in (*GAPS, "time") for p in parts)], QUIET, begun)
+        quiet = np.where(unnamed, QUIET, begun)
         starts.append((quiet, _standing_out(evaluated(columns, parts, quiet, light.weights))[1]))
     if columns.alone.any():
         starts.append((begun, np.where(columns.alone, NOTHING, 1.0)))
@@ -189,12 +195,27 @@ def evaluated(columns: Columns, parts: Sequence[Part], t: Floats, weights: Float
     return _priced(fit, _information(fit, along))
 
 
-def noise_prior(columns: Columns) -> tuple[float, float]:
-    """Mean and standard deviation of ln κ² before the readings are compared with the machine: by repeats, or as declared."""
+def known_by_repeats(columns: Columns) -> bool:
+    """Whether repeats say how large the noise is."""
     squares, freedom = columns.repeats
-    if freedom < FEWEST_REPEATS or not squares > 0.0:
+    return freedom >= FEWEST_REPEATS and squares > 0.0
+
+
+def declared_noise(columns: Columns) -> tuple[float, float]:
+    """Mean and standard deviation of ln κ² before the readings are compared with the machine: by repeats, or as declared."""
+    if not known_by_repeats(columns):
         return 0.0, 2.0 * NOISE_SD
+    squares, freedom = columns.repeats
     return float(np.log(squares / freedom)), 2.0 / float(np.sqrt(2.0 * freedom))
+
+
+def noise_prior(columns: Columns, t: float) -> float:
+    """ln density of ln κ² before that, over the one of its centre; Cauchy's of a declaration, which may be off by any factor."""
+    centre, sd = declared_noise(columns)
+    square = ((t - centre) / sd) ** 2
+    if known_by_repeats(columns):
+        return -0.5 * square
+    return -float(np.log1p(square))
 
 
 def noise_part(f: Fit, information: Floats | None = None) -> tuple[Floats, Floats]:
@@ -233,8 +254,8 @@ def _evaluate(
     along[:, 0] = variance[0] * (columns.free.T @ ((columns.free @ solved) / weights))
     for k, p in on.items():
         along[:, k] = variance[k] * p.times(solved)
-    centre, sd = _prior(columns, parts)
-    score = likelihood - 0.5 * float(np.sum(((t - centre) / sd) ** 2))
+    sd = np.array([p.sd for p in parts])
+    score = likelihood + noise_prior(columns, float(t[0])) - 0.5 * float(np.sum((t[1:] / sd) ** 2))
     return Fit(columns, parts, t, weights, root, solved, likelihood, score), along
 
 
@@ -255,28 +276,31 @@ def _gradient(fit: Fit, along: Floats, inverse: Floats, information: Floats) -> 
         if p.full is not None:
             trace[k] = 2.0 * np.vdot(inverse.T, p.full) - np.diag(inverse) @ np.diag(p.full)
     trace[0] = np.sum(information / fit.weights)
-    centre, sd = _prior(fit.columns, fit.parts)
+    centre, sd = _prior(fit)
     slope = along.T @ fit.solved - np.exp(fit.t) * trace
     return np.asarray(0.5 * slope - (fit.t - centre) / sd**2)
 
 
 def _information(fit: Fit, along: Floats) -> Floats:
     """(1 + k, 1 + k) average information, priors included."""
-    _, sd = _prior(fit.columns, fit.parts)
+    _, sd = _prior(fit)
     white = fit.white(along)
     return np.asarray(0.5 * white.T @ white + np.diag(1.0 / sd**2))
 
 
-def _prior(columns: Columns, parts: Sequence[Part]) -> tuple[Floats, Floats]:
-    """(1 + k,) means and standard deviations of ln variances before any reading."""
-    mean, sd = noise_prior(columns)
-    return np.array([mean, *np.zeros(len(parts))]), np.array([sd, *(p.sd for p in parts)])
+def _prior(fit: Fit) -> tuple[Floats, Floats]:
+    """(1 + k,) means and standard deviations of ln variances before any reading; of the noise, as its heavy tails weigh it here."""
+    mean, sd = declared_noise(fit.columns)
+    if not known_by_repeats(fit.columns):
+        sd *= np.sqrt(0.5 * (1.0 + ((fit.t[0] - mean) / sd) ** 2))
+    return np.array([mean, *np.zeros(len(fit.parts))]), np.array([sd, *(p.sd for p in fit.parts)])
 
 
 def _priced(fit: Fit, information: Floats) -> Fit:
     """The evidence: less the price of the amplitudes (Laplace), the mean over sizes of each effect."""
-    _, sd = _prior(fit.columns, fit.parts)
+    _, sd = _prior(fit)
     wide = np.minimum(sd, WIDEST)
+    wide[0] = declared_noise(fit.columns)[1]
     counted = np.array([True, *(p.kind != "effect" for p in fit.parts)])
     of_data = information - np.diag(1.0 / sd**2)
     some = (wide[:, None] * of_data * wide)[np.ix_(counted, counted)]

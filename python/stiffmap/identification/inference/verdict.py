@@ -9,7 +9,7 @@ import numpy as np
 from scipy.special import chdtrc, ndtri
 
 from stiffmap.experiment.experiment import Experiment, Floats, Integers
-from stiffmap.identification.inference.amplitudes import OFF, Fit, noise_prior
+from stiffmap.identification.inference.amplitudes import OFF, Fit, declared_noise, noise_prior
 from stiffmap.identification.inference.chosen import Chosen
 from stiffmap.identification.inference.columns import Columns
 from stiffmap.identification.inference.constants import ALIKE, EQUAL_SHARE, NOISE_SD, ODDS, RARE, TOLERANCES
@@ -28,6 +28,8 @@ CLEARLY = 1.15
 """Noise over what is stated, or under it, from which it is said."""
 LEAST_SCALE = 0.01
 """Of a compliance or a mass that a straight line would make negative."""
+NOISIER_BY = (1.0, 1.1, 1.2, 1.35, 1.5, 2.0, 3.0, 5.0, 8.0, 12.0, 20.0, 30.0)
+"""Factors of the noise that are tried in place of gaps."""
 KAPPA_SDS = 4.0
 """Prior standard deviations of ln κ beyond which the noise is no noise."""
 LARGEST_TIME = 2.0 * KAPPA_SDS * NOISE_SD
@@ -269,13 +271,19 @@ def left(fit: Fit) -> tuple[str, str]:
     on = {p: t for p, t in zip(fit.parts, fit.t[1:], strict=True) if t > OFF + 1.0}
     gaps, over = [p for p in on if p.kind in GAPS], [p for p in on if p.kind == "time"]
 
+    centre, sd = declared_noise(fit.columns)
+    noise = float(fit.t[0])  # ln κ², at least: without gaps that it may stand for
+
     def largest(some: list[Part], freedom: int = 0) -> str:
-        found = some and _significant(fit, [p.name for p in some], freedom)
+        nonlocal noise
+        if not some:
+            return ""
+        found, instead = _significant(fit, [p.name for p in some], freedom)
+        noise = noise if found else max(noise, instead)
         return max(some, key=lambda p: on[p]).name if found else ""
 
     rest, time = largest(gaps), largest(over)
-    centre, sd = noise_prior(fit.columns)
-    if float(fit.t[0]) - centre > KAPPA_SDS * sd:
+    if noise - centre > KAPPA_SDS * sd:
         rest = rest or NOISIER
     rest = rest or largest([p for p in over if on[p] > LARGEST_TIME])
     if not rest and not time and gaps and over:
@@ -290,16 +298,16 @@ def not_as_stated(noise: float, source: str = "is stated") -> list[str]:
     return [f"the noise is {noise:.2g} times what {source}, and is taken so"]
 
 
-def _significant(fit: Fit, names: Sequence[str], freedom: int = 0) -> bool:
+def _significant(fit: Fit, names: Sequence[str], freedom: int = 0) -> tuple[bool, float]:
     """Likelihood ratio of some parts against none of them and noise of any size that its prior allows, at `RARE`, half of it
-    at the boundary; `freedom`: other degrees of freedom than one for two parts."""
+    at the boundary, and ln κ² of that noise; `freedom`: other degrees of freedom than one for two parts."""
     bare = fit.without(names)
-    noisier = (bare.without([], bare.noise * factor) for factor in (1.0, 1.1, 1.2, 1.35, 1.5, 2.0, 3.0))
-    gain = 2.0 * (_supported(fit) - max(map(_supported, noisier)))
-    return float(0.5 * chdtrc(freedom or max(1, len(names) // 2), max(gain, 0.0))) < RARE
+    instead = max((bare.without([], bare.noise * factor) for factor in NOISIER_BY), key=_supported)
+    gain = 2.0 * (_supported(fit) - _supported(instead))
+    chance = float(0.5 * chdtrc(freedom or max(1, len(names) // 2), max(gain, 0.0)))
+    return chance < RARE, float(instead.t[0])
 
 
 def _supported(fit: Fit) -> float:
     """ln likelihood, with the prior of the noise: what repeats say of it."""
-    centre, sd = noise_prior(fit.columns)
-    return fit.likelihood - 0.5 * ((float(fit.t[0]) - centre) / sd) ** 2
+    return fit.likelihood + noise_prior(fit.columns, float(fit.t[0]))

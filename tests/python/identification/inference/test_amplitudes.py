@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy.stats import multivariate_normal, multivariate_t, norm
+from scipy.stats import cauchy, multivariate_normal, multivariate_t, norm
 from tests.python.identification.inference.synthetic import READINGS, columns, parts
 
 from stiffmap.identification.inference import amplitudes
@@ -108,10 +108,14 @@ def test_priors_are_those_of_the_table():
     c, some = columns(rng), parts(rng)
     at, w = np.array([0.3, 0.8, -1.0, 0.5]), np.ones(READINGS)
     fit = amplitudes._evaluate(c, some, at, w, np.eye(len(c)))[0]
-    prior = -0.5 * (0.3 / (2 * NOISE_SD)) ** 2 - 0.5 * (0.8 / (2 * NUMBERS_SD)) ** 2
+    of_noise = cauchy.logpdf(0.3, scale=2 * NOISE_SD) - cauchy.logpdf(0.0, scale=2 * NOISE_SD)
+    prior = of_noise - 0.5 * (0.8 / (2 * NUMBERS_SD)) ** 2
     assert fit.score - fit.likelihood == pytest.approx(prior, abs=1e-12)
     repeated = columns(np.random.default_rng(0), repeats=1.44)
-    assert amplitudes.noise_prior(repeated) == pytest.approx((np.log(1.44), 2 / np.sqrt(20)))
+    centre, sd = amplitudes.declared_noise(repeated)
+    assert (centre, sd) == pytest.approx((np.log(1.44), 2 / np.sqrt(20)))
+    by_repeats = norm.logpdf(0.9, centre, sd) - norm.logpdf(centre, centre, sd)
+    assert amplitudes.noise_prior(repeated, 0.9) == pytest.approx(by_repeats)
 
 
 def test_the_price_of_an_effect_is_the_mean_over_its_sizes():
@@ -124,8 +128,10 @@ def test_the_price_of_an_effect_is_the_mean_over_its_sizes():
     sizes = [np.array([at[0], 2 * np.log(b)]) for b in SIZES]
     each = [multivariate_normal(cov=dense(c, some[2:], x, w)).logpdf(c.residual) for x in sizes]
     price = np.logaddexp.reduce(each) - np.log(len(each)) - fit.likelihood
-    kappa = -0.5 * np.log1p((2 * NOISE_SD) ** 2 * (bare[0, 0] - 1 / (2 * NOISE_SD) ** 2))
-    prior = -0.5 * (at[0] / (2 * NOISE_SD)) ** 2
+    scale = 2 * NOISE_SD
+    bend = 2 / (scale**2 + at[0] ** 2)  # of ln Cauchy: its slope over the distance from its centre
+    kappa = -0.5 * np.log1p(scale**2 * (bare[0, 0] - bend))
+    prior = cauchy.logpdf(at[0], scale=scale) - cauchy.logpdf(0.0, scale=scale)
     assert fit.score == pytest.approx(fit.likelihood + prior + kappa + price, abs=1e-6)
 
 

@@ -47,7 +47,7 @@ def test_one_strength_everywhere_passes_and_two_do_not():
     p, scatter = verdict.evenness(c, fit.without(["effect"]), FLAT, block)
     assert p > 1e-3 and scatter < 0.2
     c, fit, _ = flat(0, np.where(block == 0, 12.0, 0.0))
-    p, scatter = verdict.evenness(c, fit.without(["effect"]), FLAT, block)
+    p, scatter = verdict.evenness(c, fit.without(["effect"], noise=1.0), FLAT, block)
     assert p < 1e-10
     assert scatter == pytest.approx(
         np.sqrt(2.0), rel=0.15
@@ -162,6 +162,27 @@ def test_noise_far_beyond_its_declaration_is_a_rest():
     assert verdict.left(amplitudes.fitted(c, ()))[0] == "noise larger than declared"
     c = replace(c, residual=c.residual / 6.0)
     assert verdict.left(amplitudes.fitted(c, ())) == ("", "")
+
+
+def beyond(factor: float, correlated: float) -> str:
+    """What is unexplained of noise `factor` times as large as stated, carried over to the next reading, where a gap is as short."""
+    rng = np.random.default_rng(5)
+    away = np.abs(np.subtract.outer(np.arange(READINGS), np.arange(READINGS)))
+    c = columns(rng)
+    short = Part("short", "field", full=c.free.T @ np.exp(-away / 1.0) @ c.free)
+    drawn = np.linalg.cholesky(np.where(away, correlated**away, 1.0)) @ rng.normal(size=READINGS)
+    c = replace(c, residual=c.free.T @ (factor * drawn), zero=np.zeros((len(c), len(c))))
+    return verdict.left(amplitudes.fitted(c, [short]))[0]
+
+
+@pytest.mark.parametrize("factor", [4.0, 10.0, 30.0])
+def test_noise_far_beyond_its_declaration_is_no_short_gap(factor: float) -> None:
+    assert beyond(factor, 0.0) == "noise larger than declared"
+
+
+@pytest.mark.parametrize("factor", [4.0, 10.0, 30.0])
+def test_a_gap_stays_one_that_noise_of_any_size_shows_badly(factor: float) -> None:
+    assert beyond(factor, 0.8) == "short"
 
 
 @pytest.mark.parametrize(("width", "wave"), [(0.5, 1.0), (0.05, 1.0), (0.05, 60.0)])

@@ -152,7 +152,8 @@ def _of_machine(d: Any, verdict: str) -> str:
         but = f"; {d.limitations[0]}" if beyond_noise(d) else ""
         return f"The machine agrees with its file within what these readings can show ({size}){but}."
     if verdict == "unattributed" and left_is(d, NOISIER):
-        return f"The readings scatter {d.noise.scale:.2g} times as much as is stated ({size}), and show nothing else for certain."
+        times = d.noise.scale * before / d.noise_size
+        return f"The readings scatter {times:.2g} times as much as is stated ({size}), and show nothing else for certain."
     if verdict == "unattributed" and left_is(d, WANDER):
         return f"What the readings differ by from the file ({size}) goes on from row to row over time, as a drift of the instrument or of the machine does."
     if verdict == "unattributed" and off_as_a_group(d):
