@@ -238,14 +238,15 @@ def _begun(
         rows = iter(lines() if layout.table is None else _one_table(lines(), spelling, layout, file))
         data = list(islice(_above(rows, spelling, above), skip + 1))
         counted = [d for d in data[:-1] if _counts(d[1], spelling)]
+        runs = bool(data) and not all(map(str.strip, data[-1][1])) and _counts(data[-1][1], spelling)
         for over in ([*above], *([sorted([*above, *counted])] if counted else ())):
             found = header_of(over, data[-1][1], layout.known, layout.repeated) if data else None
             if found and len(data) > skip and (not skip or found[0] >= data[-2][0]):
                 names = _checked(found[1], file, found[0])
-                behind = any(is_finite(c, spelling) for c in data[-1][1][len(names) :])
+                behind = runs or any(is_finite(c, spelling) for c in data[-1][1][len(names) :])
                 if not behind and (layout.repeated or len({*names}) == len(names)):
                     return rows, over, [d for d in data if d not in over], found
-        if not skip and (found is None or any(layout.known(split_unit(n)[0]) for n in found[1])):
+        if not skip and not runs and (found is None or any(layout.known(split_unit(n)[0]) for n in found[1])):
             break
     return rows, above, data, found
 

@@ -123,6 +123,21 @@ def test_numbers_above_the_header_are_no_readings(above: str, lines: tuple[int, 
     assert found.remarks == tuple(f"left out: row {n}, of numbers above the header" for n in lines)
 
 
+@pytest.mark.parametrize(
+    "head",
+    [
+        "x [mm];y [mm];z [mm];fz [N];dz [µm];;\n",
+        "x [mm];y [mm];z [mm];fz [N];dz [µm];;\n;;;;1;2;3\n",
+        "x [mm];y [mm];z [mm];fz [N];dz [µm];;\n;;;;Run 1;Run 2;Run 3\n",
+        "x;y;z;fz;dz;;\nmm;mm;mm;N;µm;µm;µm\n;;;;1;2;3\n",
+    ],
+)
+def test_a_header_holds_for_the_columns_behind_it_that_have_none(head: str, tmp_path: Path) -> None:
+    e = made(tmp_path, head + "0;0;0;-100;-41;-42;-43\n50;0;0;-200;-83;-84;-85\n").experiment
+    np.testing.assert_allclose(e.reading[:, 2], 1e-6 * np.array([-41, -42, -43, -83, -84, -85]))
+    np.testing.assert_allclose(e.wrench[:, 2], [-100] * 3 + [-200] * 3)
+
+
 def test_a_first_table_is_not_passed_over(tmp_path: Path) -> None:
     with pytest.raises(
         StiffmapError, match=r"line 1: column 'x \[mm\]' occurs twice; name the columns: --header"
