@@ -138,6 +138,32 @@ def test_a_header_holds_for_the_columns_behind_it_that_have_none(head: str, tmp_
     np.testing.assert_allclose(e.wrench[:, 2], [-100] * 3 + [-200] * 3)
 
 
+@pytest.mark.parametrize(
+    "names",
+    [
+        "Channel 1 Fx [N];Channel 2 Fy [N];Channel 3 Fz [N]",
+        "CH1: Fx (N);CH2: Fy (N);CH3: Fz (N)",
+        "Dev1/ai0_Fx [N];Dev1/ai1_Fy [N];Dev1/ai2_Fz [N]",
+        "/ft/wrench/force/x;/ft/wrench/force/y;/ft/wrench/force/z",
+    ],
+)
+def test_a_load_is_a_word_of_its_channel(names: str, tmp_path: Path) -> None:
+    e = made(
+        tmp_path, f"x [mm];y [mm];z [mm];dz [µm];{names}\n0;0;0;-41;1;2;-100\n50;0;0;-83;3;4;-200\n"
+    ).experiment
+    np.testing.assert_allclose(e.wrench[:, :3], [[1, 2, -100], [3, 4, -200]])
+
+
+@pytest.mark.parametrize("names", ["Fx set;Fx actual", "Fx nominal;Fx measured", "CH1 Fx;CH2 Fx"])
+def test_one_of_two_loads_along_an_axis_is_asked_for(names: str, tmp_path: Path) -> None:
+    one, other = (f"{name} [N]" for name in names.split(";"))
+    text = f"x [mm];y [mm];z [mm];fz [N];dz [µm];{one};{other}\n0;0;0;-100;-41;5;6\n50;0;0;-200;-83;7;8\n"
+    with pytest.raises(StiffmapError, match=r"is fx\? Say --map fx='HEADER'"):
+        made(tmp_path, text)
+    e = made(tmp_path, text, columns={"fx": other}).experiment
+    np.testing.assert_allclose(e.wrench[:, 0], [6, 8])
+
+
 def test_a_first_table_is_not_passed_over(tmp_path: Path) -> None:
     with pytest.raises(
         StiffmapError, match=r"line 1: column 'x \[mm\]' occurs twice; name the columns: --header"
