@@ -41,14 +41,17 @@ def header_of(
     width = sum(bool(c.strip()) for c in first)
     lines = [(n, [_plain(c) for c in cells]) for n, cells in above]
     lines = [(n, cells) for n, cells in lines if any(c.strip("-=_–—: ") for c in cells)]
-    lines = [(n, cells) for n, cells in lines if not any(map(_states_unit, cells))][-MOST_LINES:]
+    lines = [
+        (n, cells) for n, cells in lines if not any(m and m["text"] for m in map(STATED.fullmatch, cells))
+    ][-MOST_LINES:]
     units: list[str] = []
     if len(lines) > 2 and _units(lines[-2][1]) and _completes(lines[-3][1], lines[-1][1], width):
         lines[-2:] = lines[:-3:-1]  # runs are counted below the units
     while lines and not fits(lines[-1][1], width):
         if _units(lines[-1][1]) or (len(lines) > 1 and _completes(lines[-2][1], lines[-1][1], width)):
             break
-        if len(lines) == 1 and sum(map(bool, lines[-1][1])) >= 1 and not _commented(above, lines[-1][0]):
+        commented = {n for n, cells in above if cells[0].strip().startswith(COMMENTS)}
+        if len(lines) == 1 and any(lines[-1][1]) and lines[-1][0] not in commented:
             break
         lines.pop()
     if lines and _units(lines[-1][1]) and len(lines) > 1:
@@ -116,10 +119,6 @@ STATED = re.compile(
 )
 
 
-def _states_unit(cell: str) -> bool:
-    return bool((match := STATED.fullmatch(cell)) and match["text"])
-
-
 def stated_unit(above: Sequence[str], quantity: str) -> str:
     """``Units: mm, deg`` or ``Length unit;inches`` in the cells above a table: what it says of a quantity, of lengths also a unit
     that nobody knows; nothing where it says nothing."""
@@ -142,10 +141,6 @@ def _plain(cell: str) -> str:
     text = re.sub(r"\s+", " ", cell.strip())
     bare = text.lstrip("#%").strip() if text.startswith(("#", "%")) else text
     return bare or text
-
-
-def _commented(above: Sequence[Line], number: int) -> bool:
-    return any(n == number and c[0].strip().startswith(COMMENTS) for n, c in above)
 
 
 def fits(cells: Sequence[str], width: int) -> bool:

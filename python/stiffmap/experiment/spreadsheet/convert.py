@@ -75,7 +75,9 @@ def understand(m: Meant, loaded: bool = False) -> ImportedSheet:
         raise StiffmapError(f"{sheet.file}: expected one unit of all repeats of {meaning}; found {written}")
     for axis in sorted({*WRENCH} - known) if loaded else ():
         if headers := ", ".join(f"'{sheet.header[c.index]}'" for c in named_loads(columns, axis)):
-            m.ask_column(f"which of {headers} is {axis}? Say --map {axis}='HEADER', or --set {axis}=0", axis)
+            m.ask_column(
+                f"which of {headers} is {axis}? Say --map {axis}='HEADER', or --set {axis}=0", "load"
+            )
     if loaded and not known & {*WRENCH, "ll"}:
         m.ask_column(
             "missing column: a deflection needs a load; which column is it? Say --map fx='HEADER' (fy, fz, mx, my, mz; "
