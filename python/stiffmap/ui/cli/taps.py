@@ -38,7 +38,7 @@ def command(
       [cyan]stiffmap taps examples/taps/kr210.yaml examples/taps/taps.csv -o result[/cyan]
       [cyan]stiffmap taps examples/taps/kr210.yaml examples/taps/taps.csv --only compliance --json[/cyan]
     """
-    default_u = float(percent(mass_u, "mass-u", 1)[0])
+    default_u = float(percent(str(mass_u), "mass-u", 1)[0])
     m = machine_with(machine, effect)
     measured = load_taps(table, m)
     readings = None if statics is None else load_experiment(statics)
