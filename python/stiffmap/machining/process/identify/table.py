@@ -19,6 +19,7 @@ from stiffmap.common.tables.cells import Cells
 from stiffmap.common.tables.named import WORD, Known, NamedTable, named, read_named
 from stiffmap.common.tables.table import Table
 from stiffmap.machining.process.description import SIDES, Cut, EndMill, Process, Tool
+from stiffmap.machining.process.load import THINNEST
 
 ForceColumns = str | PathLike[str] | Mapping[str, object] | DataFrame
 COLUMNS = {
@@ -107,8 +108,6 @@ def _of_mapping(table: Mapping[Any, Any] | DataFrame) -> Table:
 FORCES = ("fx", "fy", "fz")
 SLOT_SIGNS = (-1.0, 1.0, 1.0)
 """Of the mean forces of a slot with positive coefficients."""
-THINNEST = 1e-7
-"""m, feed per tooth: below, no edge of a tool cuts."""
 SAME = 2
 """Decimals of the logarithm of feeds per tooth that count as one feed, which is about 1 %."""
 
