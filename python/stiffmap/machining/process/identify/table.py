@@ -183,9 +183,9 @@ def _whole_turns(c: NamedTable, here: NDArray[np.intp], force: Floats) -> Signal
         c.fail(what, "time", here[i + 1])
     step = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
     turns = int((time[-1] - time[0] + step) / turn * (1 + 1e-9))
-    if len(time) < 8 or turns < 1:
+    if len(time) < 8 or turns < 1 or step > turn / 8:
         c.fail(
-            f"expected eight or more samples over a revolution ({turn:g} s) or more for each cut, found {len(time)} over "
+            f"expected a revolution ({turn:g} s) or more of each cut, with eight or more samples in each, found {len(time)} over "
             f"{time[-1] - time[0] + step:g} s", "time", here[0],
         )  # fmt: skip
     keep = min(len(time), round(turns * turn / step))
