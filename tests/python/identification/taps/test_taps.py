@@ -111,6 +111,10 @@ def test_statics_and_frequencies_must_say_the_same(arm, static_scale, agree):
         ),
         ("x_mm,y_mm,z_mm,frequency_Hz\n1,2,3,low\n", "frequency_Hz: expected a number, found 'low'"),
         ("x_mm,y_mm,z_mm,frequency_Hz,u_Hz\n1,2,3,9,0\n", "u_Hz: expected a number above zero"),
+        (
+            "x_mm,y_mm,z_mm,frequency_Hz,damping_percent\n1,2,3,9,2\n1,2,3,9,0.02\n",
+            "line 3.*a ratio of 0.02 is 2 %",
+        ),
         ("x_mm,y_mm,z_mm,frequency_Hz\n1,2,3\n", "expected 4 values, found 3"),
         ("", "the file is empty"),
         ("x_mm,y_mm,z_mm,frequency_rad_s\n1,2,3,60\n", "expected a unit such as in frequency_Hz, found rad"),
