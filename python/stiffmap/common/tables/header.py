@@ -11,7 +11,7 @@ from itertools import pairwise, takewhile, zip_longest
 
 from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.number_text import terms
-from stiffmap.common.tables.lines import COMMENTS
+from stiffmap.common.tables.lines import COMMENTS, NUMBER
 from stiffmap.common.units import SHORT_TIMES, TIMES, name_and_unit, unit_of
 
 Line = tuple[int, list[str]]
@@ -41,12 +41,17 @@ def header_of(
     width = sum(bool(c.strip()) for c in first)
     lines = [(n, [_plain(c) for c in cells]) for n, cells in above]
     lines = [(n, cells) for n, cells in lines if any(c.strip("-=_–—: ") for c in cells)]
-    lines = [(n, cells) for n, cells in lines if not any(map(_states_unit, cells))][-MOST_LINES:]
+    lines = [
+        (n, cells) for n, cells in lines if not any(m and m["text"] for m in map(STATED.fullmatch, cells))
+    ][-MOST_LINES:]
     units: list[str] = []
+    if len(lines) > 2 and _units(lines[-2][1]) and _completes(lines[-3][1], lines[-1][1], width):
+        lines[-2:] = lines[:-3:-1]  # runs are counted below the units
     while lines and not fits(lines[-1][1], width):
-        if _units(lines[-1][1]):
+        if _units(lines[-1][1]) or (len(lines) > 1 and _completes(lines[-2][1], lines[-1][1], width)):
             break
-        if len(lines) == 1 and sum(map(bool, lines[-1][1])) >= 1 and not _commented(above, lines[-1][0]):
+        commented = {n for n, cells in above if cells[0].strip().startswith(COMMENTS)}
+        if len(lines) == 1 and any(lines[-1][1]) and lines[-1][0] not in commented:
             break
         lines.pop()
     if lines and _units(lines[-1][1]) and len(lines) > 1:
@@ -65,6 +70,7 @@ def header_of(
     for _, group in reversed([] if repeated else lines[:-2]):
         if len({*names}) < len(names) and _needs_group(names, group, first):
             names = _grouped(group, names, known)
+    names = names if repeated else _held(names, first, known)
     if units:
         names = [_with_own_unit(n, units[i] if i < len(units) else "") for i, n in enumerate(names)]
     return number, _of_metres(names)
@@ -113,10 +119,6 @@ STATED = re.compile(
 )
 
 
-def _states_unit(cell: str) -> bool:
-    return bool((match := STATED.fullmatch(cell)) and match["text"])
-
-
 def stated_unit(above: Sequence[str], quantity: str) -> str:
     """``Units: mm, deg`` or ``Length unit;inches`` in the cells above a table: what it says of a quantity, of lengths also a unit
     that nobody knows; nothing where it says nothing."""
@@ -139,10 +141,6 @@ def _plain(cell: str) -> str:
     text = re.sub(r"\s+", " ", cell.strip())
     bare = text.lstrip("#%").strip() if text.startswith(("#", "%")) else text
     return bare or text
-
-
-def _commented(above: Sequence[Line], number: int) -> bool:
-    return any(n == number and c[0].strip().startswith(COMMENTS) for n, c in above)
 
 
 def fits(cells: Sequence[str], width: int) -> bool:
@@ -201,6 +199,27 @@ def _grouped(group: Sequence[str], names: Sequence[str], known: Callable[[str], 
         if once[plain.lower()] == 1 and known(plain) and not known(text):
             text = plain  # Force over Fx
         out.append(with_unit(text, own or unit))
+    return out
+
+
+def _completes(over: Sequence[str], names: Sequence[str], width: int) -> bool:
+    """Whether names, or numbers of runs, stand where the header over them has blank cells."""
+    pairs = [*zip_longest(over, names, fillvalue="")]
+    blank = any(name and not above for above, name in pairs)
+    return (
+        blank and sum(map(bool, names)) > 1 and fits(over, width) and fits([a or b for a, b in pairs], width)
+    )
+
+
+def _held(names: Sequence[str], first: Sequence[str], known: Callable[[str], bool]) -> list[str]:
+    """``dx [um]`` over three columns of numbers, the next two of them without a name, is ``dx 1``, ``dx 2``, ``dx 3``."""
+    out, begin = [*names], 0
+    for i, name in enumerate(names):
+        plain, unit = split_unit(names[begin])
+        if name or not (i < len(first) and NUMBER.fullmatch(first[i]) and known(f"{plain} 2")):
+            begin = i
+        else:
+            out[begin : i + 1] = [with_unit(f"{plain} {k}", unit) for k in range(1, i - begin + 2)]
     return out
 
 

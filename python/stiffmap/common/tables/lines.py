@@ -67,6 +67,8 @@ WITH_UNIT = re.compile(
 NOTHING = {
     "", *["na", "n/a", "n.a.", "nan", "none", "null", "#n/a", "#nv", "n.m.", "k.a.", "ka", "?", "x", "./.", "*", "out", "off", "leer", "empty", "fehlt", "missing", "entfällt", "ausreißer"],
     *["#div/0!", "#value!", "#wert!", "#ref!", "#bezug!", "#name?", "#num!", "#zahl!"], "k. a.", "nicht gemessen", "not read", "not measured",
+    *["ol", "o.l.", "over", "+over", "-over", "overload", "overrange", "over range", "overflow", "err", "error", "fail", "failed", "invalid", "no signal", "timeout"],
+    *["#####", "1.#qnan", "-1.#ind", "1.#ind"],
 }  # fmt: skip
 DASHES = re.compile(r"[-–—_.· ]+")
 
@@ -153,7 +155,8 @@ def finite_number(cell: str, blank: Sequence[str] = ()) -> float:
     try:
         value = number_in(cell)
     except ValueError:
-        raise ValueError("a number", repr(cell) if cell else "an empty cell") from None
+        empty = "an empty cell; what holds for several rows stands in each of them"
+        raise ValueError("a number", repr(cell) if cell else empty) from None
     if not math.isfinite(value):
         raise ValueError("a finite number", cell)
     return value

@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from itertools import chain, islice
+from itertools import chain, islice, zip_longest
 from pathlib import Path
 
 from stiffmap.common.errors import FileError
@@ -95,6 +95,13 @@ def read_sheet(path: Path, sheet: str | None = None, layout: Layout = PLAIN) -> 
         rows, above, begun, found = _begun(lines, spelling, layout, str(path))
         if begun:
             break
+    behind = begun[-1][1][len(_checked(found[1], str(path), found[0])) if found else 0 :] if begun else []
+    named = (
+        layout.strict or layout.header or layout.numbered or not any(is_finite(c, spelling) for c in behind)
+    )
+    turned = [] if named else _turned(kept(lines()), spelling, layout)
+    if turned:
+        rows, above, begun, found = _begun(lambda: turned, spelling, layout, str(path))
     first = begun[-1] if begun else None
     if first is None and not above:
         raise FileError(f"the {'sheet' if page else 'file'} is empty", file=str(path))
@@ -110,12 +117,8 @@ def read_sheet(path: Path, sheet: str | None = None, layout: Layout = PLAIN) -> 
     names = _checked(header, str(path), number_)
     if not layout.repeated:
         way = " (names with blanks in them?)" if separator == " " else ""
-        refuse_twice(
-            names,
-            str(path),
-            number_,
-            way + ("" if layout.strict or layout.names else f"; name the columns: {WAY}"),
-        )
+        way += "" if layout.strict or layout.names else f"; name the columns: {WAY}"
+        refuse_twice(names, str(path), number_, way)
     width = len(names)
     said = [*header, *(c.strip() for _, cells in above for c in cells)]
     aside = [f"row {n}, of numbers above the header" for n, _ in begun[:-1]]
@@ -127,6 +130,7 @@ def read_sheet(path: Path, sheet: str | None = None, layout: Layout = PLAIN) -> 
     cells_of, lines_ = packed(data, width)
     columns = list(cells_of)
     file = f"{path}, sheet '{page}'" if page else str(path)
+    file += ", rows and columns exchanged" if turned else ""
     if aside and layout.strict:
         raise FileError(f"expected rows of numbers alone below the header; {aside[0]}", file=file)
     for i in range(width):
@@ -137,14 +141,26 @@ def read_sheet(path: Path, sheet: str | None = None, layout: Layout = PLAIN) -> 
     )
 
 
+def _turned(lines: Iterable[Line], spelling: Spelling, layout: Layout) -> list[Line]:
+    """A table whose names stand to the left of their numbers, as of runs below positions, with names above numbers; nothing where
+    no word there has a unit or a meaning."""
+    rows = [(cells, is_data(cells, spelling)) for _, cells in lines]
+    names = [cells[0].strip() for cells, data in rows if data]
+    said = any(split_unit(n)[1] or layout.known(n) for n in names)
+    if not said or any(is_finite(n, Spelling(spelling.comma, units=True)) for n in names):
+        return []
+    columns = zip_longest(*(cells for cells, data in rows if data), fillvalue="")
+    return [*enumerate([*(cells for cells, data in rows if not data), *map(list, columns)], 1)]
+
+
 def _united(name: str, cells: Cells, file: str, lines: Sequence[int]) -> tuple[str, Cells]:
     """A column without the units of its cells, which its name has instead; the column as it is where a cell is none.
     Raises FileError for a second unit."""
-    sample = next((c for c in cells if not is_nothing(c)), "")
+    sample = next((c for c in cells if c.strip("0.,+-") and not is_nothing(c)), "")  # 0 needs no unit
     if not parted(sample)[1]:
         return name, cells
     pairs = [("", "") if is_nothing(c) else parted(c) for c in cells]
-    if any(number and not unit for number, unit in pairs):
+    if any(number.strip("0.,+-") and not unit for number, unit in pairs):
         return name, cells
     own = split_unit(name)[1]
     first = own or parted(sample)[1]
@@ -160,11 +176,8 @@ def _checked(header: Sequence[str], file: str, line: int) -> list[str]:
     endless = next((c for c in header if len(c) > LONGEST_HEADER), None)
     if endless is not None or len(header) > MOST_COLUMNS:
         what = f"{len(header)} columns" if endless is None else f"one of {len(endless)} characters"
-        raise FileError(
-            f"expected a header of at most {MOST_COLUMNS} columns of {LONGEST_HEADER} characters each; found {what}",
-            file=file,
-            line=line,
-        )
+        most = f"at most {MOST_COLUMNS} columns of {LONGEST_HEADER} characters each"
+        raise FileError(f"expected a header of {most}; found {what}", file=file, line=line)
     width = max(i for i, c in enumerate(header) if c) + 1
     return [h or f"column {i + 1}" for i, h in enumerate(header[:width])]
 
@@ -209,9 +222,8 @@ def _one_table(lines: Iterable[Line], spelling: Spelling, layout: Layout, file: 
         tables[-1].append((n, cells))
     assert layout.table is not None
     if not 1 <= layout.table <= len(tables):
-        raise FileError(
-            f"--table: expected a number from 1 to {len(tables)}; found {layout.table}", file=file
-        )
+        what = f"--table: expected a number from 1 to {len(tables)}; found {layout.table}"
+        raise FileError(what, file=file)
     return tables[layout.table - 1]
 
 
@@ -238,14 +250,15 @@ def _begun(
         rows = iter(lines() if layout.table is None else _one_table(lines(), spelling, layout, file))
         data = list(islice(_above(rows, spelling, above), skip + 1))
         counted = [d for d in data[:-1] if _counts(d[1], spelling)]
+        runs = bool(data) and not all(map(str.strip, data[-1][1])) and _counts(data[-1][1], spelling)
         for over in ([*above], *([sorted([*above, *counted])] if counted else ())):
             found = header_of(over, data[-1][1], layout.known, layout.repeated) if data else None
             if found and len(data) > skip and (not skip or found[0] >= data[-2][0]):
                 names = _checked(found[1], file, found[0])
-                behind = any(is_finite(c, spelling) for c in data[-1][1][len(names) :])
+                behind = runs or any(is_finite(c, spelling) for c in data[-1][1][len(names) :])
                 if not behind and (layout.repeated or len({*names}) == len(names)):
                     return rows, over, [d for d in data if d not in over], found
-        if not skip and (found is None or any(layout.known(split_unit(n)[0]) for n in found[1])):
+        if not skip and not runs and (found is None or any(layout.known(split_unit(n)[0]) for n in found[1])):
             break
     return rows, above, data, found
 

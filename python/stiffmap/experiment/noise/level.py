@@ -120,10 +120,12 @@ def _unknown(experiment: Experiment, squares: Floats, freedom: Integers, declare
 
 LOUD = 10.0
 """Times the declared noise: repeats that scatter by more were not taken as the declaration says."""
+SCATTER = 0.3
+"""Times the root mean square of deflections: repeats without a declared noise that scatter by more are of different things."""
 
 
 def contradictions(experiment: Experiment) -> list[str]:
-    """Channels whose declared noise is far below what repeats of the same command and load show, in words.
+    """Channels whose repeats of the same command and load scatter far beyond the declared noise or, without one, as deflections do; in words.
 
     Coordinates in the instrument's own frame are compared as they are; no machine is needed.
     """
@@ -134,12 +136,17 @@ def contradictions(experiment: Experiment) -> list[str]:
         e = replace(e, reading=reading)
     squares, freedom, declared = _within(e, None, numbered([e.conditions, e.target, e.instrument, e.setup]))
     repeats = np.sqrt(squares / np.maximum(freedom, 1))
+    lengths, known = metres(e.channels), np.nan_to_num(declared) > 0
+    size = [rms(e.reading[:, lengths == own]) if e.quantity == "deflection" else np.nan for own in lengths]
     return [
-        f"the declared noise of {c.name} is {1e3 * d:.3g} {unit}, and readings of the same command and load scatter by "
-        f"{1e3 * s:.3g} {unit}, {s / d:.2g} times as much: are they of one target, one set-up and one load?"
-        for c, s, d, n in zip(e.channels, repeats, declared, freedom, strict=True)
+        f"{f'the declared noise of {c.name} is' if k else f'no noise of {c.name} is declared, deflections are'} {1e3 * d:.3g} {unit}, "
+        f"and readings of the same command and load scatter by {1e3 * s:.3g} {unit}, {s / d:.2g} times as much: are they of one "
+        "target, one set-up and one load?"
+        for c, s, d, n, k in zip(
+            e.channels, repeats, np.where(known, declared, size), freedom, known, strict=True
+        )
         for unit in ("mm" if c.unit == "m" else "mrad",)
-        if n > 0 and s > LOUD * d > 0
+        if n > 0 and s > (LOUD if k else SCATTER) * d > 0
     ]
 
 
@@ -181,11 +188,8 @@ def against_the_load(experiment: Experiment) -> str:
     e = experiment
     alone = np.count_nonzero(e.wrench, axis=1) == 1
     work = e.wrench[:, :3] * np.where(np.isfinite(e.reading[:, :3]), e.reading[:, :3], 0.0)
-    clear = (
-        (np.abs(work) > 5.0 * np.abs(e.wrench[:, :3]) * np.nan_to_num(e.sigma[:, :3]))
-        & alone[:, None]
-        & (work != 0)
-    )
+    unsure = 5.0 * np.abs(e.wrench[:, :3]) * np.nan_to_num(e.sigma[:, :3])
+    clear = (np.abs(work) > unsure) & alone[:, None]
     wrong = clear & (work < 0)
     if e.quantity != "deflection" or 2 * wrong.sum() <= clear.sum():
         return ""

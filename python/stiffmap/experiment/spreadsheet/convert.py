@@ -21,7 +21,7 @@ from stiffmap.experiment.channels import AXES
 from stiffmap.experiment.experiment import WRENCH
 from stiffmap.experiment.files.fields import POSE, quantity_of
 from stiffmap.experiment.spreadsheet.answers import Meant
-from stiffmap.experiment.spreadsheet.guess import READINGS, Column
+from stiffmap.experiment.spreadsheet.guess import READINGS, Column, named_loads
 from stiffmap.experiment.spreadsheet.instrument import load_instrument
 from stiffmap.experiment.spreadsheet.sides import side_of_run
 from stiffmap.experiment.spreadsheet.together import weight
@@ -73,6 +73,11 @@ def understand(m: Meant, loaded: bool = False) -> ImportedSheet:
     for meaning in (name for name, unit in units if unit != found[name]):
         written = " and ".join(f"'{sheet.header[c.index]}'" for c in used if c.meaning == meaning)
         raise StiffmapError(f"{sheet.file}: expected one unit of all repeats of {meaning}; found {written}")
+    for axis in sorted({*WRENCH} - known) if loaded else ():
+        if headers := ", ".join(f"'{sheet.header[c.index]}'" for c in named_loads(columns, axis)):
+            m.ask_column(
+                f"which of {headers} is {axis}? Say --map {axis}='HEADER', or --set {axis}=0", "load"
+            )
     if loaded and not known & {*WRENCH, "ll"}:
         m.ask_column(
             "missing column: a deflection needs a load; which column is it? Say --map fx='HEADER' (fy, fz, mx, my, mz; "

@@ -42,8 +42,6 @@ from stiffmap.experiment.spreadsheet.sides import approached
 from stiffmap.experiment.spreadsheet.together import one_point_a_row, oriented, together
 from stiffmap.solve.machine import Machine, load_machine
 
-CIRCULAR = ("deviation",)
-"""What a ball bar reads, by the name that its mapping file has for it."""
 Understand = Callable[[str | None, dialogue.Ask | None], tuple[Meant, ImportedSheet]]
 """What is meant by a sheet of that name, with answers to its questions."""
 
@@ -144,17 +142,8 @@ def experiment_from_table(
             return loaded
         return Machine(arm(rows, dh_convention, output.name, f"from {Path(dh).name}", m.middle()))
 
-    wanted = _Wanted(
-        file,
-        layout,
-        drives,
-        wrote,
-        difference,
-        quantity == "deflection",
-        given,
-        declared_for,
-        rows is not None,
-    )
+    deflection, alone = quantity == "deflection", rows is not None
+    wanted = _Wanted(file, layout, drives, wrote, difference, deflection, given, declared_for, alone)
     m, found = _fitting(file, sheet, wanted.understood, ask)
     own = m.sheet
     _refuse_units(given.units, m, drives, () if rows is None else QUANTITIES)
@@ -181,20 +170,13 @@ def experiment_from_table(
 
 def _refuse_units(units: Mapping[str, str], m: Meant, drives: Iterable[str], more: Iterable[str]) -> None:
     """StiffmapError for a unit that nobody knows, or of nothing that is there."""
-    names = {c.meaning for c in m.guessed} | {
-        *m.sheet.names,
-        *m.sheet.header,
-        *SPELLINGS,
-        *more,
-        "joints",
-        *CIRCULAR,
-    }
+    names = {c.meaning for c in m.guessed} | {*m.sheet.names, *m.sheet.header, *SPELLINGS}
+    names |= {*more, "joints", "deviation"}  # the last is what a ball bar reads
     names |= {part for d in drives for part in (d, d.split(".")[-1])}
     for name, unit in units.items():
         if name not in names:
-            raise StiffmapError(
-                f"--unit {name}: no column has this name or meaning; columns: {', '.join(m.sheet.header)}"
-            )
+            there = ", ".join(m.sheet.header)
+            raise StiffmapError(f"--unit {name}: no column has this name or meaning; columns: {there}")
         if unit_of(unit) is None:
             raise StiffmapError(f"--unit {name}: the unit '{unit}' is not known; known: {known()}")
 
@@ -271,9 +253,8 @@ class _Wanted:
             said = m.to_remember(form, self.given)
             if said == self.given:
                 raise
-            raise StiffmapError(
-                f"{left}; the answers so far are remembered: {dialogue.remember(form, said)}"
-            ) from None
+            kept_in = dialogue.remember(form, said)
+            raise StiffmapError(f"{left}; the answers so far are remembered: {kept_in}") from None
         if m.answered:
             kept_in = dialogue.remember(form, m.to_remember(form, self.given))
             m.said.append(f"the answers are remembered for sheets of this form: {kept_in}")

@@ -10,6 +10,7 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.common.tables.header import meaning_of, split_unit
 from stiffmap.common.units import TIMES, unit_of
 from stiffmap.experiment.channels import AXES
+from stiffmap.experiment.experiment import WRENCH
 from stiffmap.experiment.files.fields import APPROACH, SEEN
 
 REPEATED = re.compile(r"^(.*?)[ _.-]*(?:#|run|messung|wdh|rep|repeat)?[ _.-]*(\d+)$", re.IGNORECASE)
@@ -63,10 +64,21 @@ def guess(headers: Sequence[str], chosen: Mapping[str, Sequence[str]]) -> list[C
     if meant & set(AXES) and not meant & set("xyz") and not set(chosen) & set(SEEN):
         # where deflections are read, what was touched is where the tool stood
         out = [replace(c, meaning=c.meaning[1]) if c.meaning in SEEN else c for c in out]
+    for axis in sorted({*WRENCH} - meant - {*chosen}):
+        if len(named := named_loads(out, axis)) == 1:
+            out[named[0].index] = replace(named[0], meaning=axis)
     first = {(c.meaning, c.repeat): c.index for c in reversed(out)}  # a second one is a note
     return [
         c if first[c.meaning, c.repeat] == c.index else Column(c.index, c.name, c.unit, "note") for c in out
     ]
+
+
+def named_loads(columns: Sequence[Column], axis: str) -> list[Column]:
+    """Notes that have a load of this axis, such as fx, among their words: ``Channel 1 Fx``, ``/ft/wrench/force/x``."""
+    sort, topic = ("force", "force") if axis[0] == "f" else ("moment", "torque")
+    word = re.compile(rf"(?i)(?<![a-z])({axis[0]}_?|{topic}[./]){axis[1]}(?![a-z])")
+    notes = (c for c in columns if c.meaning == "note" and word.search(c.name))
+    return [c for c in notes if not c.unit or unit_of(c.unit, sort)]
 
 
 def find_column(wanted: str, headers: Sequence[str]) -> int:

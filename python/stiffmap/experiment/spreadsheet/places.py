@@ -32,8 +32,8 @@ LEVER = 5.0
 SOCKET = r"(ball[ _-]?)?(socket|seat|nest|cup|datum|pfanne|kugelpfanne|sphere|ball|kugel)[ _.-]?(id|name|no\.?|nr\.?|number|nummer)?"
 PLACE = r"position|pos\.?|place|location|station|ort|stelle|platz"
 BALL = "the one ball"
-NINES = [round(10.0**k - 0.1**j, 4) for k in range(3, 9) for j in range(5)]
-"""999, 9999.99 and the like, which stand for no reading."""
+NINES = [*(round(10.0**k - 0.1**j, 4) for k in range(3, 9) for j in range(5)), 9.9e37, 9.91e37]
+"""999, 9999.99, overload and no number of SCPI, and the like, which stand for no reading."""
 BEYOND = 5.0
 """How many times the others such a number is, where it is the only one of its row."""
 AXIS = r"(?i)(?:(?<![a-z])|(?<=\b[dp]))[xyz](?![a-z])"
@@ -115,9 +115,7 @@ def without_marks(m: Meant) -> None:
     asked = {c.index for c in m.guessed if c.meaning in POSE}
     for at in [*(s for s in _sets(m.sheet) if not asked & {*s}), *([i] for i in read)]:
         values = np.column_stack([m.sheet.numbers(i) for i in at])
-        marks = np.isin(np.round(np.abs(values), 4), NINES).all(axis=1) & (values == values[:, :1]).all(
-            axis=1
-        )
+        marks = np.isin(np.round(np.abs(values), 4), NINES).all(1) & (values == values[:, :1]).all(1)
         if len(at) == 1:
             marks &= np.abs(values[:, 0]) > BEYOND * np.nanmax(np.abs(values[~marks]), initial=0.0)
         _emptied(m, at, marks, f"{values[marks][0, 0]:.10g}" if marks.any() else "")

@@ -30,9 +30,9 @@ DIRECTION = re.compile(
 )
 WAY = re.compile(r"([+-]?)\s*([xyz])|([xyz])\s*([+-])", re.IGNORECASE)
 STATES = {
-    "before": re.compile(r"\b((unloaded|after unloading)( again)?|no[ -]load|without load|before( loading)?|unbelastet|ohne last|vorher|leer|entlastet|initial|zero)\b", re.I),
+    "before": re.compile(r"\b((unloaded|after unloading)( again)?|no[ -]load|without load|before( loading)?|unbelastet|ohne last|vorher|leer|entlastet|initial|zero|pre|vor)\b", re.I),
     "loaded": re.compile(r"\b(loaded|with load|under load|belastet|mit last|unter last)\b", re.I),
-    "after": re.compile(r"\b(after( loading)?|nachher|final)\b", re.I),
+    "after": re.compile(r"\b(after( loading)?|nachher|final|post|nach)\b", re.I),
 }  # fmt: skip
 """A gauge that was read ``before``, ``loaded`` and ``after`` was read without the load after it, too."""
 TARGET = re.compile(

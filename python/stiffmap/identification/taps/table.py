@@ -112,7 +112,13 @@ def load_taps(path: str | PathLike[str], machine: Machine | None = None) -> TapT
         )
     for name in ABOVE_ZERO:
         t.check(name, lambda v: v > 0, "a number above zero")
-    t.check("damping", lambda v: (v >= 0) & (v < 100), "a number from 0 to below 100")
+    least = (
+        0.1 if t.size.get("damping", 1.0) == 1 else 0.0
+    )  # in %, where all are below they may as well be ratios
+    expected = "from 0 to below 100 %, and not all below 0.1 (a ratio of 0.02 is 2 %)"
+    t.check(
+        "damping", lambda v: (v == 0) | ((v > 0) & (v < 100) & (np.nanmax(v, initial=0) >= least)), expected
+    )
     typed: list[dict[str, object]] = []
     measured: list[Measured] = []
     places = [(float(x), float(y), float(z)) for x, y, z in t.block(POSE)]

@@ -191,7 +191,7 @@ def coupling_depth(modes: ToolModes | Iterable[object], process: GivenProcess) -
     if bad is None:
         return float("inf")
     low, high = (0.0 if bad == 0 else depths[bad - 1]), depths[bad]
-    while high - low > 1e-6 * high:
+    while high - low > max(1e-6 * high, 1e-18):  # without damping there is no least depth
         middle = (low + high) / 2
         low, high = (low, middle) if coupled_growth(m, p, middle) > 0 else (middle, high)
     return float(high)

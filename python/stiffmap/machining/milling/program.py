@@ -153,8 +153,10 @@ def run(
     """Simulate a program on the job's machine or on another one, the force re-evaluated at the true distance from the wall."""
     must_cut_whole(job, made)
     p = made.path
-    own = sampled(p, step)
-    own = own.only(job.path.cuts[made.origin[own.move]])
+    own, first = sampled(p, step), np.searchsorted(job.points.move, made.origin).clip(max=len(job) - 1)
+    joint = (p.kind == Kind.LINE) & (job.points.share[first] == 0)  # its two ends are those of its neighbours
+    joint &= np.linalg.norm(p.end - made.command[first], axis=1) < TOLERANCE
+    own = own.only((job.path.cuts[made.origin] & ~joint)[own.move])
     wanted, u = made.origin[own.move], job.place.points(own.position)
     at = job.place.back(u)
     start = np.r_[0.0, np.cumsum(np.where(job.path.cuts, job.path.length, 0.0))][:-1]

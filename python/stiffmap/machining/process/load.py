@@ -59,6 +59,10 @@ UNITS = {
 MAIN = ("Ktc", "kc11", "specific_energy")
 """Numbers of a law that are above zero, and what they may be, N/m²: from foam to beyond any metal."""
 PRESSURES = (1e5, 1e11)
+MOST = {"": (10.0, "10 (0.3 for 30 %)"), PRESSURE: (10.0, "10 times"), EDGE: (1e-3, "1 mm times")}
+"""Of a law's other numbers and their uncertainties: shares; pressures and edge forces by the main number."""
+THINNEST = 1e-7
+"""m, feed per tooth: below, no edge of a tool cuts."""
 LONGEST = 1.0
 """m of a tool or a cut: above, millimetres were meant."""
 
@@ -114,10 +118,10 @@ def process_of(document: Document, file: str) -> Process:
     feed, cut, law = _feed(m.feed, tool, spindle, r), _cut(m, tool, r), _law(m, tool, r)
     tolerance = None if m.tolerance is None else r.positive(m.tolerance, "m", "tolerance", most=tool.diameter)
     process = Process(m.name, tool, law, spindle, feed, cut, tolerance, m.title, m.source, r.uncertainty)
-    if tool.teeth and process.chip > tool.diameter / 2:
+    if tool.teeth and not THINNEST <= process.chip <= tool.diameter / 2:
         r.fail(
-            f"the chip is too thick: {1e3 * process.chip:.4g} mm per tooth at {60e3 * feed:.4g} mm/min and "
-            f"{spindle * 30 / pi:.4g} rpm; expected at most half the tool's diameter", "feed"
+            f"the chip is too {'thin' if process.chip < THINNEST else 'thick'}: {1e3 * process.chip:.4g} mm per tooth at "
+            f"{60e3 * feed:.4g} mm/min and {spindle * 30 / pi:.4g} rpm; expected {1e3 * THINNEST:g} mm to half the tool's diameter", "feed"
         )  # fmt: skip
     return process
 
@@ -187,10 +191,21 @@ def _law(m: ProcessFile, tool: Tool, r: NumberReader) -> Law:
         if k in MAIN and not PRESSURES[0] <= values[k] <= PRESSURES[1]:
             low, high = (p / 1e6 for p in PRESSURES)
             r.fail(f"expected {low:g} to {high:g} N/mm2 (J/cm3), found {number.value!r}", *keys)
+        main = next(iter(values))  # each law has it first
+        most, limit = (
+            MOST[unit][0] * (values[main] if unit else 1),
+            f"{MOST[unit][1]} {main if unit else ''}".strip(),
+        )
+        if abs(values[k]) > most:
+            r.fail(f"expected at most {limit}; found {number.value!r}", *keys)
         if number.u is not None:
             r.uncertainty[k] = r.si(number.u, unit, *keys, "u")
-            if r.uncertainty[k] < 0:
-                r.fail(f"expected an uncertainty of zero or more, found {number.u!r}", *keys, "u")
+            if not 0 <= r.uncertainty[k] <= most:
+                r.fail(
+                    f"expected an uncertainty of zero or more, at most {limit}; found {number.u!r}",
+                    *keys,
+                    "u",
+                )
     if not 0 <= values.get("mc", 0) < 1:
         r.fail(f"expected an exponent from 0 to below 1, found {model.mc.value!r}", "law", name, "mc")
     return LAWS[name](**values)

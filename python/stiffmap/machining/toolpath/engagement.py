@@ -179,9 +179,9 @@ def engagement(
     if stock is not None:
         radial, axial = _in_box(points, process, stock, side)
     radial[points.along] = axial[points.along] = 0.0
+    if process.cut.side == "slot":  # where one of its walls ends at a corner the other goes on
+        return Engagement(radial, np.zeros(m), np.zeros(m), axial, np.ones(m, bool))
     corner, wall = _corners(points, path, process, radial, side)
-    if process.cut.side == "slot":
-        return Engagement(radial, np.zeros(m), np.zeros(m), axial, wall)
     curvature = _over_contact(points, process, -side * (points.bend * points.normal).sum(axis=1))
     return Engagement(radial, curvature, corner, axial, wall)
 

@@ -6,7 +6,7 @@ import math
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import dropwhile
+from itertools import dropwhile, islice
 from os import PathLike, fspath
 from pathlib import Path
 
@@ -235,10 +235,13 @@ def doubts(model: UrdfModel) -> Iterator[str]:
                 f"largest to be at most the sum of the others, {a + b:.3g}; those of other links may be wrong as well"
             )
             break
+    whole = ((j.name, a) for j in model.above.values() for a in j.rpy if abs(a) >= 1.0 and a % LIMITS[2] == 0)
+    for name, angle in islice(whole, 1):
+        yield f"joint {name}: rpy: found {angle:g} rad; expected radians, {math.radians(angle):.3g} rad if it and others are degrees"
     for joint in model.moving:
         low, high = joint.limits or (0.0, 0.0)
-        whole = low % LIMITS[2] == high % LIMITS[2] == 0
-        if joint.kind == "revolute" and whole and LIMITS[0] < max(-low, high) <= LIMITS[1]:
+        degrees = low % LIMITS[2] == high % LIMITS[2] == 0
+        if joint.kind == "revolute" and degrees and LIMITS[0] < max(-low, high) <= LIMITS[1]:
             yield (
                 f"joint {joint.name}: limit: found {low:g} to {high:g} rad; expected radians, {math.radians(low):.4g} to "
                 f"{math.radians(high):.4g} if these are degrees, as may be those of other joints"

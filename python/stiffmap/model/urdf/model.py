@@ -43,6 +43,7 @@ class UrdfJoint:
     parent: str
     child: str
     origin: Pose
+    rpy: Vector = (0.0, 0.0, 0.0)  # of the origin, as written
     axis: Vector = (1.0, 0.0, 0.0)
     limits: tuple[float, float] | None = None
     effort: float | None = None

@@ -174,7 +174,7 @@ def _joint(e: xml.Element, wrong: Wrong) -> UrdfJoint:
     ranged = kind != "continuous" and lower != upper and max(abs(lower), abs(upper)) < LARGEST
     return UrdfJoint(
         name, KINDS.get(kind, kind), parent, child, _origin(e, wrong),
-        axis=vector(axis / (length or 1.0)),
+        rpy=vector(_numbers(e.find("origin"), "rpy", np.zeros(3), wrong)), axis=vector(axis / (length or 1.0)),
         limits=(lower, upper) if ranged else None,
         effort=_largest(limit, "effort", wrong),
         velocity=_largest(limit, "velocity", wrong),

@@ -40,6 +40,15 @@ def in_si(given: str | float | None, name: str = "", count: int | None = None, u
     return unit * (numbers(given, name, count) if isinstance(given, str) else given)
 
 
+def percent(text: str, name: str, count: int | None = None) -> Floats:
+    """Ratios given in %, the sign with them or not: what is below 0.1 without it may as well be a ratio (0.02 for 2 %)."""
+    out = numbers(text.replace("%", " "), name, count)
+    if not ((out > 0) & (out < 100) & ((out >= 0.1) | ("%" in text))).all():
+        expected = "% above 0 and below 100, such as 2; below 0.1 with the sign: 0.02% (0.02 may be a ratio)"
+        raise StiffmapError(f"--{name}: expected {expected}; got '{text}'")
+    return out / 100
+
+
 def words(text: str | None) -> list[str] | None:
     """What stands between commas; None where nothing is given."""
     return None if text is None else [part.strip() for part in text.split(",")]

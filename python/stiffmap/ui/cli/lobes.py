@@ -13,7 +13,7 @@ from stiffmap.common.number_text import place_text
 from stiffmap.machining.chatter import stability_lobes
 from stiffmap.machining.process import Process, load_process
 from stiffmap.ui.cli import options
-from stiffmap.ui.cli.inputs import MM, gravity, in_si, machine_with, numbers, position, rotation
+from stiffmap.ui.cli.inputs import MM, gravity, in_si, machine_with, numbers, percent, position, rotation
 from stiffmap.ui.cli.options import option
 from stiffmap.ui.cli.output import Answer, write_files
 
@@ -76,7 +76,7 @@ def command(
         "tool": in_si(tool, "tool", 3, 1.0), "also": _modes(mode), "method": method,
         "rotation": rotation(rotation_), "gravity": gravity(gravity_), "threads": threads,
         "scheduler": scheduler,
-        "damping": in_si(damping, "damping", unit=0.01),
+        "damping": None if damping is None else percent(damping, "damping"),
     }  # fmt: skip
     answers = [_one(m, p, text, given, output, i) for i, text in enumerate(at or [None])]
     data = {"machine": m.name, "process": p.name, "poses": answers}
@@ -116,8 +116,8 @@ def _modes(given: list[str] | None) -> list[tuple[float, float, float, str]]:
             raise StiffmapError(
                 f"--mode: expected Hz, damping in %, modal mass in kg, direction, e.g. 1243,6.2,0.048,x; got '{text}'"
             )
-        f, ratio, mass = numbers(",".join(parts[:3]), "mode", 3)
-        out.append((float(f), float(ratio) / 100, float(mass), parts[3]))
+        f, mass = numbers(f"{parts[0]},{parts[2]}", "mode", 2)
+        out.append((float(f), float(percent(parts[1], "mode", 1)[0]), float(mass), parts[3]))
     return out
 
 

@@ -6,12 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment import load_experiment
 from stiffmap.identification.taps import TapDiagnosis, TapTest, explain_taps, load_taps
 from stiffmap.identification.taps.problem import corrected
 from stiffmap.ui.cli import options
-from stiffmap.ui.cli.inputs import machine_with, words
+from stiffmap.ui.cli.inputs import machine_with, percent, words
 from stiffmap.ui.cli.options import argument, option
 from stiffmap.ui.cli.output import Answer, write_files
 
@@ -39,12 +38,11 @@ def command(
       [cyan]stiffmap taps examples/taps/kr210.yaml examples/taps/taps.csv -o result[/cyan]
       [cyan]stiffmap taps examples/taps/kr210.yaml examples/taps/taps.csv --only compliance --json[/cyan]
     """
-    if not 0 < mass_u < 100:
-        raise StiffmapError(f"--mass-u: expected an uncertainty above 0 and below 100 %, got {mass_u:g}")
+    default_u = float(percent(str(mass_u), "mass-u", 1)[0])
     m = machine_with(machine, effect)
     measured = load_taps(table, m)
     readings = None if statics is None else load_experiment(statics)
-    found = explain_taps(m, measured, readings, default_u=mass_u / 100, only=words(only))
+    found = explain_taps(m, measured, readings, default_u=default_u, only=words(only))
     rows = found.modes(m, measured)
     files = write_files(output, _files(m, measured, found))
     data = {"machine": m.name, **found.as_plain(), "modes": rows}

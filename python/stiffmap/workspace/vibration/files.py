@@ -11,15 +11,15 @@ import numpy as np
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError, StiffmapError, needed, refuse_folder
-from stiffmap.common.tables.header import split_unit
 from stiffmap.common.tables.lines import complex_number
 from stiffmap.common.tables.named import WORD, Known, read_named
 from stiffmap.common.tables.workbook import TABLES
 from stiffmap.workspace.vibration.response import Complex
 from stiffmap.workspace.vibration.response_units import FREQUENCIES, ResponseUnit, response_unit
 
-PREFIX = re.compile(r"((frf|h[12]?|\w+/\w+|dyn(amic|amische|\.)?)_)+(?=.)")
+PREFIX = re.compile(r"((frf|h[12]?(\(f\))?|\w+/\w+|dyn(amic|amische|\.)?)_)+(?=.)")
 """Before the part of a response, as in ``H1 Ch2/Ch1 Real [m/N]``."""
+LEVEL = re.compile(r"(?i)db(?: ?re[fl]?[.:]?)? ?([\d.]+(?:e-?\d+)?)? ?(.*)")
 MEANT = {
     "accelerance": (2, 1), "inertance": (2, 1), "mobility": (1, 1), "receptance": (0, 1), "compliance": (0, 1), "nachgiebigkeit": (0, 1),
     "stiffness": (0, -1), "steifigkeit": (0, -1), "impedance": (1, -1), "apparent_mass": (2, -1),
@@ -36,7 +36,7 @@ COLUMNS = Known(
         **dict.fromkeys(("im", "im(h)", "im(frf)", "imaginary", "imaginary_part", "imag_part", "imaginärteil"), "imag"),
         **dict.fromkeys(("mag", "amplitude", "|h|", "|frf|", "betrag", "gain", *MEANT), "magnitude"),
     },
-    lambda name, unit: (PREFIX.sub("", name), unit),
+    lambda name, unit: (PREFIX.sub("", name).removesuffix("_db"), f"dB {unit}" if name.endswith("_db") else unit),
 )  # fmt: skip
 FORMS = (("real", "imag"), ("magnitude", "phase"))
 EXAMPLES = "m/N, mm/N, um/N, m/s/N, m/s2/N, g/N and the like, N/m, N/um"
@@ -93,18 +93,25 @@ def _table(path: Path) -> MeasuredResponse:
         for n in ("real", "imag"):
             t.values[n], t.units[n] = getattr(np.array(parts, complex), n), t.units["response"]
     form = next((pair for pair in FORMS if {*pair, "frequency"} == {*t.values} - {"coherence"}), ("", ""))
-    unit = t.units.get(form[0], "")
-    if form == FORMS[1] and (level := re.fullmatch(r"(?i)db(?: rel?[.:]?)? ?(?:1 ?)?(.*)", unit)):
-        unit = level[1] or t.fail("expected what 0 dB is, as in [dB re 1 m/N]", "magnitude")
-        t.values["magnitude"] = 10 ** (t.values["magnitude"] / 20)
+    unit = written = t.units.get(form[0], "")
+    if form == FORMS[1] and (level := LEVEL.fullmatch(unit)):
+        unit = level[2] or t.fail("expected what 0 dB is, as in [dB re 1 m/N]", "magnitude")
+        t.values["magnitude"] = float(level[1] or 1) * 10 ** (t.values["magnitude"] / 20)
     t.check("magnitude", lambda v: v >= 0, "a size of zero or more ([dB re 1 m/N] where it is in decibels)")
     known = response_unit(unit)
     kind, power = (None, 1) if known is None else _kind(known)
     if known is None or kind is None or t.units.get("imag", unit) != unit:
         t.fail(f"expected the columns {HEAD}, UNIT one of {EXAMPLES}; found {', '.join(t.header.values())}")
-    name = PREFIX.sub("", re.sub(r"\W+", "_", split_unit(t.header.get(form[0], ""))[0].lower()))
+    name = PREFIX.sub(
+        "", re.sub(r"[\W_]+", "_", t.header.get(form[0], "").replace(written, "").lower()).strip("_")
+    )
     if MEANT.get(name, (kind, power)) != (kind, power):
         t.fail(f"expected a unit of {name.replace('_', ' ')}; found {unit}", form[0])
+    phase = t.values.get("phase", np.zeros(0))
+    steps = np.abs(np.diff(phase, prepend=phase[:1])) <= 2 * np.pi + 0.01
+    t.check(
+        "phase", lambda _: steps & (np.abs(phase) < 100), "steps of a turn at most (phase_deg: in degrees)"
+    )
     if t.units.get("coherence", "").endswith(("%", "percent")):
         t.values["coherence"] = t.values["coherence"] / 100
     if len(t.lines) < 2:

@@ -123,6 +123,112 @@ def test_numbers_above_the_header_are_no_readings(above: str, lines: tuple[int, 
     assert found.remarks == tuple(f"left out: row {n}, of numbers above the header" for n in lines)
 
 
+@pytest.mark.parametrize(
+    "head",
+    [
+        "x [mm];y [mm];z [mm];fz [N];dz [µm];;\n",
+        "x [mm];y [mm];z [mm];fz [N];dz [µm];;\n;;;;1;2;3\n",
+        "x [mm];y [mm];z [mm];fz [N];dz [µm];;\n;;;;Run 1;Run 2;Run 3\n",
+        "x;y;z;fz;dz;;\nmm;mm;mm;N;µm;µm;µm\n;;;;1;2;3\n",
+    ],
+)
+def test_a_header_holds_for_the_columns_behind_it_that_have_none(head: str, tmp_path: Path) -> None:
+    e = made(tmp_path, head + "0;0;0;-100;-41;-42;-43\n50;0;0;-200;-83;-84;-85\n").experiment
+    np.testing.assert_allclose(e.reading[:, 2], 1e-6 * np.array([-41, -42, -43, -83, -84, -85]))
+    np.testing.assert_allclose(e.wrench[:, 2], [-100] * 3 + [-200] * 3)
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        "Channel 1 Fx [N];Channel 2 Fy [N];Channel 3 Fz [N]",
+        "CH1: Fx (N);CH2: Fy (N);CH3: Fz (N)",
+        "Dev1/ai0_Fx [N];Dev1/ai1_Fy [N];Dev1/ai2_Fz [N]",
+        "/ft/wrench/force/x;/ft/wrench/force/y;/ft/wrench/force/z",
+    ],
+)
+def test_a_load_is_a_word_of_its_channel(names: str, tmp_path: Path) -> None:
+    e = made(
+        tmp_path, f"x [mm];y [mm];z [mm];dz [µm];{names}\n0;0;0;-41;1;2;-100\n50;0;0;-83;3;4;-200\n"
+    ).experiment
+    np.testing.assert_allclose(e.wrench[:, :3], [[1, 2, -100], [3, 4, -200]])
+
+
+@pytest.mark.parametrize("names", ["Fx set;Fx actual", "Fx nominal;Fx measured", "CH1 Fx;CH2 Fx"])
+def test_one_of_two_loads_along_an_axis_is_asked_for(names: str, tmp_path: Path) -> None:
+    one, other = (f"{name} [N]" for name in names.split(";"))
+    text = f"x [mm];y [mm];z [mm];fz [N];dz [µm];{one};{other}\n0;0;0;-100;-41;5;6\n50;0;0;-200;-83;7;8\n"
+    with pytest.raises(StiffmapError, match=r"is fx\? Say --map fx='HEADER'"):
+        made(tmp_path, text)
+    e = made(tmp_path, text, columns={"fx": other}).experiment
+    np.testing.assert_allclose(e.wrench[:, 0], [6, 8])
+
+
+@pytest.mark.parametrize(
+    "cell", ["OL", "Overrange", "ERROR", "1.#QNAN", "no signal", "9.9E37", "-9.90000E+37", "9.91E37"]
+)
+def test_what_an_instrument_says_in_place_of_a_reading_is_none(cell: str, tmp_path: Path) -> None:
+    truth(made(tmp_path, f"{HEAD}{ROWS}0;0;50;-100;{cell}\n").experiment)
+
+
+@pytest.mark.parametrize("row", [";;;-200;-83", ";0;0;-200;-83", "50;0;0;;-83"])
+def test_a_number_that_is_written_once_is_asked_for(row: str, tmp_path: Path) -> None:
+    with pytest.raises(
+        StiffmapError, match=r"line 3: .* found an empty cell; what holds for several rows stands in each"
+    ):
+        made(tmp_path, f"{HEAD}{ROWS.splitlines()[0]}\n{row}\n")
+
+
+@pytest.mark.parametrize(
+    ("again", "said"),
+    [
+        ("41;83", "scatter by 0.0926 mm, 1.4 times"),  # the other sign
+        ("-82;-166", "scatter by 0.0463 mm, 0.45 times"),  # twice the load
+        ("0;0", "scatter by 0.0463 mm, 1 times"),  # without the load
+        ("-42;-82", ""),
+    ],
+)
+def test_repeats_that_contradict_are_no_noise(again: str, said: str, tmp_path: Path) -> None:
+    one, other = again.split(";")
+    found = made(tmp_path, f"{HEAD}{ROWS}0;0;0;-100;{one}\n50;0;0;-200;{other}\n")
+    lines = [w for w in found.warnings if "no noise of dz is declared" in w]
+    assert [said in w for w in lines] == ([True] if said else []), found.warnings
+
+
+@pytest.mark.parametrize(
+    ("above", "head", "runs"),
+    [
+        ("", "Position [mm]", "Run {} {} [µm]"),
+        ("Operator;Miller\n\n", "Pos. X [mm]", "{}{} [µm]"),
+        ("Axis X of 3 May\n", "Target [mm]", "Run {} {} in µm"),
+        ("i;1;2;3\n", "x [mm]", "Run {} {} [µm]"),
+    ],
+)
+def test_positions_may_stand_side_by_side_and_runs_below_them(
+    above: str, head: str, runs: str, tmp_path: Path
+) -> None:
+    names = [runs.format(k, side) for k in (1, 2) for side in "+-"]
+    rows = "\n".join(f"{n};{k};{k + 0.5};{k - 2}" for k, n in enumerate(names))
+    same = {"fz": 0.0, "y": 0.0, "z": 0.0}
+    chosen = {"x": head, "dx": "|".join(names)}
+    e = made(
+        tmp_path, f"{above}{head};-50;0;50\n{rows}\n", columns=chosen, constants=same, quantity="position"
+    ).experiment
+    np.testing.assert_allclose(e.position[:, 0], np.repeat([-0.05, 0, 0.05], 4))
+    np.testing.assert_allclose(
+        e.reading[:, 0], 1e-6 * np.add.outer([0, 0.5, -2], [0, 1, 2, 3]).ravel(), atol=1e-15
+    )
+    assert e.approach is not None and list(e.approach[:4, 0]) == [1, -1, 1, -1]
+
+
+@pytest.mark.parametrize("zero", ["0", "0.0", "-0", "0 N"])
+def test_zero_needs_no_unit_in_its_cell(zero: str, tmp_path: Path) -> None:
+    text = f"x;y;z;fx;fz;dz\n0 mm;0;0;{zero};-100 N;-41 µm\n50 mm;0;0;7 N;-200 N;-83 µm\n"
+    e = made(tmp_path, text, units={"y": "mm", "z": "mm"}).experiment
+    truth(e)
+    np.testing.assert_allclose(e.wrench[:, 0], [0, 7])
+
+
 def test_a_first_table_is_not_passed_over(tmp_path: Path) -> None:
     with pytest.raises(
         StiffmapError, match=r"line 1: column 'x \[mm\]' occurs twice; name the columns: --header"

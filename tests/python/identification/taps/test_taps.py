@@ -111,6 +111,10 @@ def test_statics_and_frequencies_must_say_the_same(arm, static_scale, agree):
         ),
         ("x_mm,y_mm,z_mm,frequency_Hz\n1,2,3,low\n", "frequency_Hz: expected a number, found 'low'"),
         ("x_mm,y_mm,z_mm,frequency_Hz,u_Hz\n1,2,3,9,0\n", "u_Hz: expected a number above zero"),
+        (
+            "x_mm,y_mm,z_mm,frequency_Hz,damping_percent\n1,2,3,9,0\n1,2,3,9,0.02\n",
+            "line 3.*a ratio of 0.02 is 2 %",
+        ),
         ("x_mm,y_mm,z_mm,frequency_Hz\n1,2,3\n", "expected 4 values, found 3"),
         ("", "the file is empty"),
         ("x_mm,y_mm,z_mm,frequency_rad_s\n1,2,3,60\n", "expected a unit such as in frequency_Hz, found rad"),
@@ -283,3 +287,8 @@ def test_modes_as_modal_programs_list_them(head, row, tmp_path):
     (tmp_path / "t.csv").write_text(f"{head}\n{row}\n", encoding="utf-8")
     taps = load_taps(tmp_path / "t.csv")
     np.testing.assert_allclose([*taps.frequency, *taps.ratio, *taps.position[0]], [50, 0.02, 0.01, 0, 0])
+
+
+def test_one_mode_of_a_bare_structure_may_be_damped_by_less_than_a_thousandth(tmp_path):
+    (tmp_path / "t.csv").write_text("x_mm,y_mm,z_mm,f_Hz,damping_percent\n1,2,3,9,0.05\n1,2,3,20,0.8\n")
+    np.testing.assert_allclose(load_taps(tmp_path / "t.csv").ratio, [0.0005, 0.008])

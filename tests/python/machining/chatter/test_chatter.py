@@ -382,6 +382,30 @@ def test_a_tool_stands_along_the_flange_by_default(capsys):
     assert "tool from tip to holder along (0, 0, 1), feed along (1, 0, 0)" in said
 
 
+@pytest.mark.parametrize(
+    ("option", "given", "good"),
+    [
+        ("--damping", "0.02", "2%"), ("--damping", "3,0.015", "3,1.5"), ("--damping", "0", "0.02%"), ("--damping", "300", "3"),
+        ("--mode", "1243,0.062,0.048,x", "1243,6.2%,0.048,x"),
+    ],
+)  # fmt: skip
+def test_a_ratio_is_not_taken_for_a_percentage(option, given, good, capsys):
+    start = ["lobes", "five-bar", "--process", "slot", "--method", "zero order", "--points", "3,2", option]
+    assert main([*start, given]) == 2
+    said = capsys.readouterr().err
+    assert f"{option}: expected % above 0 and below 100" in said and "0.02 may be a ratio" in said
+    assert main([*start, good]) < 2
+
+
+def test_what_nothing_damps_couples_at_no_depth():
+    modes = [
+        (20.0, 1e-300, 60.0, (1.0, 1.0, 0.0)),
+        (20.0, 1e-300, 60.0, (1.0, -1.0, 0.0)),
+        (60.0, 1e-300, 9.0, "y"),
+    ]
+    assert 0 <= coupling_depth(modes, process(10.0, "slot")) < 1e-9
+
+
 def test_a_diagram_has_the_points_that_are_asked_for_whatever_its_ends(tmp_path):
     for i, ends in enumerate(([], ["--speeds", "2000,3000"], ["--depth", "1"])):
         to = tmp_path / str(i)

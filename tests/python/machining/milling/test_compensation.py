@@ -57,6 +57,26 @@ def test_what_mirroring_leaves() -> None:
         command = command - e
 
 
+@pytest.mark.parametrize("corner", [(40, -40), (40, 40), (0, -10), (0, 10), (0, 0)])
+@pytest.mark.parametrize("written", [True, False], ids=["program", "table"])
+def test_both_walls_of_a_slot_go_round_its_corners(corner, written, tmp_path) -> None:
+    """Right, left, acute and back: the error is that of a straight slot all along, and compensation leaves none, whichever the force
+    at the joint, which is longer than the step."""
+    x, y = corner
+    (tmp_path / "a.ngc").write_text(
+        f"G21 G90 G94\nM3 S6000\nG0 X0 Y0 Z0\nG1 X40 F900\nX{x} Y{y}\nG0 Z5\nM2\n"
+    )
+    path = tmp_path / "a.ngc" if written else path_of(np.array([[0, 0, 0], [40, 0, 0], [x, y, 0]]) * 1e-3)
+    soft = 1e-2
+    slot = sm.load_process("slot")
+    slot = replace(slot, cut=replace(slot.cut, through=True))  # a force that nothing changes
+    ds = mill_job(gantry(soft, soft, soft), path, slot, at=(0, 0, 0), step=0.5e-3).dataset
+    straight = abs(sm.cutting_force(slot).mean[1]) * soft * 1e-3
+    normal = ds.error_normal.values
+    assert ds.wall.values.all() and np.abs(normal) == pytest.approx(np.full(len(normal), straight), rel=1e-3)
+    assert np.abs(ds.error_normal_after.values).max() < 0.01 * straight
+
+
 PROGRAM = """%
 (head) G21 G90 G17 G94 G40
 N10 S18000 M3 (start)

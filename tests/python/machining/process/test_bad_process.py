@@ -17,6 +17,7 @@ def changed(**given: Any) -> dict[str, Any]:
 
 
 TOOL = {"diameter": "25 mm", "teeth": 2}
+KIENZLE = {"kc11": "1800 N/mm2", "mc": 0.2, "radial": 0.4}
 BAD = [
     ({"tool": {**TOOL, "diameter": 25}}, "unit is missing"),
     ({"tool": {**TOOL, "diameter": "25 m"}}, "at most 1000 mm"),
@@ -48,6 +49,16 @@ BAD = [
     ({"law": {"trimming": {"specific_energy": "1 J/mm3", "radial": 0.5}}}, "without a number of teeth"),
     ({"law": {"kienzle": {"kc11": "1800 N/mm2", "mc": 1.2, "radial": 0.4}}}, "exponent from 0"),
     ({"tolerance": "0 mm"}, "above zero"),
+    ({"law": {"kienzle": {**KIENZLE, "radial": 30}}}, "law.kienzle.radial: expected at most 10 (0.3 for 30 %); found 30"),
+    ({"law": {"kienzle": {**KIENZLE, "axial": -20}}}, "law.kienzle.axial: expected at most 10 (0.3 for 30 %); found -20"),
+    ({"law": {"kienzle": {**KIENZLE, "radial": {"value": 0.3, "u": 30}}}}, "at most 10 (0.3 for 30 %); found 30"),
+    ({"tool": {**TOOL, "teeth": "coated"}, "feed": "6 m/min", "law": {"trimming": {"specific_energy": "1 J/mm3", "radial": 60}}},
+        "law.trimming.radial: expected at most 10"),
+    ({"law": {"end_mill": {**END_MILL, "Krc": "251 kN/mm2"}}}, "at most 10 times Ktc; found '251 kN/mm2'"),
+    ({"law": {"end_mill": {**END_MILL, "Kte": "15750 N/mm"}}}, "at most 1 mm times Ktc; found '15750 N/mm'"),
+    ({"feed": "0.075 mm/min"}, "chip is too thin"),
+    ({"feed": "0.075 um/rev"}, "chip is too thin"),
+    ({"tool": {**TOOL, "teeth": 3}, "feed": "1350 mm/tooth"}, "chip is too thick"),
 ]  # fmt: skip
 
 

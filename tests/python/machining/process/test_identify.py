@@ -227,6 +227,19 @@ def test_refused(given: dict[str, Any], message: str) -> None:
     assert message in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    ("slower", "every", "rpm"),
+    [(1000, 1, 6000), (1, 40, 6000), (1, 1, 360000)],
+    ids=["ms as s", "logged", "per minute"],
+)
+def test_signals_that_miss_the_teeth_are_refused(slower: int, every: int, rpm: int) -> None:
+    given = made(signals=True)
+    given |= {n: given[n][::every] for n in ("feed_per_tooth_mm", "time_s", "Fx_N", "Fy_N", "Fz_N")}
+    given |= {"time_s": slower * given["time_s"], "spindle_rpm": rpm}
+    with pytest.raises(StiffmapError, match="with eight or more samples in each, found"):
+        read_table(given)
+
+
 @pytest.mark.parametrize("unit", ["krpm", "1/s", "x1000"])
 def test_a_unit_next_to_rpm_counts(unit: str, tmp_path: Path) -> None:
     def text(head: str) -> str:

@@ -447,6 +447,10 @@ np.fill_diagonal(LARGE_FREE, 0.0)
 INDEFINITE = bar_compliance()
 INDEFINITE[1, 5] = INDEFINITE[5, 1] = 1.2 * np.sqrt(INDEFINITE[1, 1] * INDEFINITE[5, 5])
 
+NEGATIVE, CORRELATED = np.eye(36), np.eye(36)
+NEGATIVE[3, 3] = -1e-20
+CORRELATED[0, 7] = CORRELATED[7, 0] = 2.0
+
 
 @pytest.mark.parametrize(
     ("changes", "words"),
@@ -471,6 +475,23 @@ INDEFINITE[1, 5] = INDEFINITE[5, 1] = 1.2 * np.sqrt(INDEFINITE[1, 1] * INDEFINIT
             r"too large: expected at most 1e\+60, found -1e\+308",
         ),
         ({"compliance": (-bar_compliance()).tolist()}, "diagonal that is not negative"),
+        (
+            {"covariance": NEGATIVE.tolist(), "standard_error": None},
+            "covariance: expected a diagonal that is not negative",
+        ),
+        (
+            {"covariance": np.triu(CORRELATED).tolist(), "standard_error": None},
+            "covariance: expected a symmetric matrix",
+        ),
+        (
+            {"covariance": CORRELATED.tolist(), "standard_error": None},
+            "covariance: expected no negative eigenvalue",
+        ),
+        ({"standard_error": (-bar_compliance()).tolist()}, "standard_error: expected numbers from 0 on"),
+        ({"covariance": np.eye(36).tolist()}, "expected covariance or standard_error, found both"),
+        ({"standard_errors": 0}, "no key 'standard_errors' .did you mean 'standard_error'"),
+        ({"covarianse": 0}, "no key 'covarianse' .did you mean 'covariance'"),
+        ({"Reference": "[0, 0, 1]"}, "no key 'Reference' .did you mean 'reference'"),
         ({"compliance": "[[.nan]]"}, "expected finite numbers of shape"),
     ],
 )

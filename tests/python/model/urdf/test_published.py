@@ -347,6 +347,9 @@ DOUBTS = {
                               "joint q0: limit: found 400 m; expected metres, 0.4 m if these are millimetres"),
     "degrees": (machine_of(0.4, 5, '<limit lower="-180" upper="92.5"/>'),
                 "joint q0: limit: found -180 to 92.5 rad; expected radians, -3.142 to 1.614 if these are degrees"),
+    **{f"small degrees, {rpy}": (machine_of(0.4, 5).replace('rpy="0.3 -0.2 0.1"', f'rpy="{rpy}"', 1),
+                                 f"joint q0: rpy: found {first} rad; expected radians, {rad} rad if it and others are degrees")
+       for rpy, first, rad in (("0 0 3", 3, 0.0524), ("1 0 0", 1, 0.0175), ("0 -2 0", -2, -0.0349), ("0.2 0 1.5", 1.5, 0.0262))},
     "grams": (machine_of(0.4, 2500), "link a: mass: found 2500 kg, and 7500 kg in all that moves, in a machine of 0.8 m; expected "
                                      "kilograms, 2.5 kg if these are grams"),
     "kg mm²": (tensors(machine_of(0.4, 5), 8e3), "link a: inertia: found a radius of gyration of 40 m in a machine of 0.8 m; "
@@ -374,13 +377,13 @@ def test_numbers_that_no_machine_has_are_warned_of(name: str, tmp_path: Path) ->
     "text",
     [
         machine_of(30.0, 9e4), machine_of(1.3, 1600), machine_of(0.02, 0.1), tensors(machine_of(0.4, 1e-3), 1.0),
-        machine_of(0.4, 5, '<limit lower="-12.56" upper="12.56"/>'), machine_of(0.4, 5, '<limit lower="-1e16" upper="1e16"/>'),
+        machine_of(0.4, 5, '<limit lower="-12.56" upper="12.56"/>'), machine_of(0.4, 5).replace("0.3 -0.2 0.1", "0.5 3.14 -1.57"), machine_of(0.4, 5, '<limit lower="-1e16" upper="1e16"/>'),
         machine_of(0.01, 1500, '<limit lower="0" upper="0.6"/>', "prismatic"), machine_of(0.4, 5, '<limit lower="-1e6" upper="1e6"/>', "prismatic"),
         machine_of(0.4, 5).replace('izz="0.008', 'izz="0.01605'),
         robot(arm()).replace('<link name="base"/>', '<link name="map"/><link name="base"/><joint name="m" type="fixed"><parent '
                              'link="map"/><child link="base"/><origin xyz="691000 5334000 0"/></joint>'),
     ],
-    ids=["crane", "heavy arm", "finger", "moments of one", "four turns", "no limit", "machine tool", "no end of a rail", "flat plate, rounded", "place on a map"],
+    ids=["crane", "heavy arm", "finger", "moments of one", "four turns", "quarter turns", "no limit", "machine tool", "no end of a rail", "flat plate, rounded", "place on a map"],
 )  # fmt: skip
 def test_real_machines_are_not_doubted(text: str, tmp_path: Path) -> None:
     with warnings.catch_warnings():

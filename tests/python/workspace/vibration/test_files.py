@@ -41,6 +41,10 @@ TURN = 2 * np.pi
         ("Drehzahl [1/min];Apparent mass [kg];Phase [rad]", lambda f, r: (60 * f, 1 / abs(r), -np.angle(r))),
         ("f [Hz];Real [N/(m/s²)];Imag [N/(m/s²)];Coherence [%]", lambda f, r: (f, (1 / r).real, (1 / r).imag, 0 * f + 90)),
         ("f [Hz];Dyn. Steifigkeit [N/µm];Phase [°]", lambda f, r: (f, 1e-6 * (TURN * f) ** 2 / abs(r), np.degrees(np.angle(-1 / r)))),
+        ("Frequency (Hz);Magnitude dB (re 1 m/s²/N);Phase (deg)", lambda f, r: (f, 20 * np.log10(abs(r)), np.degrees(np.angle(r)))),
+        ("f [Hz];|H| [dB ref 1(m/s²)/N];phase [deg]", lambda f, r: (f, 20 * np.log10(abs(r)), np.degrees(np.angle(r)))),
+        ("f [Hz];Gain [dB re 1e-6 m/s²/N];phase [deg]", lambda f, r: (f, 20 * np.log10(1e6 * abs(r)), np.degrees(np.angle(r)))),
+        ("f [Hz];H1(f) Real (m/s²/N);H1(f) Imag (m/s²/N)", lambda f, r: (f, r.real, r.imag)),
         ("Frequency [rpm];Amplitude [g/N];Phase [°]", lambda f, r: (60 * f, abs(r) / 9.80665, np.degrees(np.angle(r)))),
     ],
 )  # fmt: skip
@@ -372,6 +376,9 @@ def test_a_coherence_in_percent_is_read(head, tmp_path):
     ("columns", "message"),
     [
         ("accelerance [m/N],phase [deg]", "expected a unit of accelerance; found m/N"),
+        ("accelerance_m/N,phase_deg", "expected a unit of accelerance; found m/N"),
+        ("mobility_m/s2/N,phase_deg", "expected a unit of mobility; found m/s2/N"),
+        ("receptance_g/N,phase_deg", "expected a unit of receptance; found g/N"),
         ("dynamic stiffness [um/N],phase [deg]", "expected a unit of stiffness; found um/N"),
         ("real [N/m],imag [N/m]", "line 2: real .*expected a force by a motion above zero"),
         ("gain [dB],phase [deg]", "expected what 0 dB is"),
@@ -402,3 +409,15 @@ def test_names_of_analysers(header, columns, tmp_path):
     (tmp_path / "r.csv").write_text(f"{header}\n{text}\n", encoding="utf-8")
     (one,) = read_responses(tmp_path / "r.csv")
     np.testing.assert_allclose(one.receptance, receptance, rtol=1e-12)
+
+
+@pytest.mark.parametrize("degrees", [[0, -20, -170], [179, -179, 170], [-100, -101, -102]])
+def test_degrees_are_not_taken_for_radians(degrees, tmp_path):
+    for unit, size in (("deg", 1.0), ("rad", np.pi / 180)):
+        rows = "".join(f"{10 + k},1e-6,{size * v}\n" for k, v in enumerate(degrees))
+        (tmp_path / f"{unit}.csv").write_text(f"frequency_Hz,receptance_m/N,phase_{unit}\n{rows}")
+        (one,) = read_responses(tmp_path / f"{unit}.csv")
+        np.testing.assert_allclose(np.exp(1j * np.radians(degrees)), 1e6 * one.receptance, rtol=1e-9)
+    (tmp_path / "mixed.csv").write_text((tmp_path / "deg.csv").read_text().replace("phase_deg", "phase_rad"))
+    with pytest.raises(sm.StiffmapError, match="phase_rad: expected steps of a turn at most"):
+        read_responses(tmp_path / "mixed.csv")

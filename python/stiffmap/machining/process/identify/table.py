@@ -19,6 +19,7 @@ from stiffmap.common.tables.cells import Cells
 from stiffmap.common.tables.named import WORD, Known, NamedTable, named, read_named
 from stiffmap.common.tables.table import Table
 from stiffmap.machining.process.description import SIDES, Cut, EndMill, Process, Tool
+from stiffmap.machining.process.load import THINNEST
 
 ForceColumns = str | PathLike[str] | Mapping[str, object] | DataFrame
 COLUMNS = {
@@ -107,8 +108,6 @@ def _of_mapping(table: Mapping[Any, Any] | DataFrame) -> Table:
 FORCES = ("fx", "fy", "fz")
 SLOT_SIGNS = (-1.0, 1.0, 1.0)
 """Of the mean forces of a slot with positive coefficients."""
-THINNEST = 1e-7
-"""m, feed per tooth: below, no edge of a tool cuts."""
 SAME = 2
 """Decimals of the logarithm of feeds per tooth that count as one feed, which is about 1 %."""
 
@@ -184,9 +183,9 @@ def _whole_turns(c: NamedTable, here: NDArray[np.intp], force: Floats) -> Signal
         c.fail(what, "time", here[i + 1])
     step = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
     turns = int((time[-1] - time[0] + step) / turn * (1 + 1e-9))
-    if len(time) < 8 or turns < 1:
+    if len(time) < 8 or turns < 1 or step > turn / 8:
         c.fail(
-            f"expected eight or more samples over a revolution ({turn:g} s) or more for each cut, found {len(time)} over "
+            f"expected a revolution ({turn:g} s) or more of each cut, with eight or more samples in each, found {len(time)} over "
             f"{time[-1] - time[0] + step:g} s", "time", here[0],
         )  # fmt: skip
     keep = min(len(time), round(turns * turn / step))
