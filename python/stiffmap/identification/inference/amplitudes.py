@@ -195,27 +195,29 @@ def evaluated(columns: Columns, parts: Sequence[Part], t: Floats, weights: Float
     return _priced(fit, _information(fit, along))
 
 
-def known_by_repeats(columns: Columns) -> bool:
-    """Whether repeats say how large the noise is."""
-    squares, freedom = columns.repeats
-    return freedom >= FEWEST_REPEATS and squares > 0.0
-
-
 def declared_noise(columns: Columns) -> tuple[float, float]:
     """Mean and standard deviation of ln κ² before the readings are compared with the machine: by repeats, or as declared."""
-    if not known_by_repeats(columns):
+    if not _known_by_repeats(columns):
         return 0.0, 2.0 * NOISE_SD
     squares, freedom = columns.repeats
     return float(np.log(squares / freedom)), 2.0 / float(np.sqrt(2.0 * freedom))
 
 
 def noise_prior(columns: Columns, t: float) -> float:
-    """ln density of ln κ² before that, over the one of its centre; Cauchy's of a declaration, which may be off by any factor."""
+    """ln density of ln κ² before that, over the one of its centre: Gaussian, but Cauchy's above a declaration, which may be short of
+    the noise by any factor."""
     centre, sd = declared_noise(columns)
     square = ((t - centre) / sd) ** 2
-    if known_by_repeats(columns):
-        return -0.5 * square
-    return -float(np.log1p(square))
+    return -float(np.log1p(square)) if _beyond_declared(columns, t) else -0.5 * square
+
+
+def _beyond_declared(columns: Columns, t: float) -> bool:
+    return t > 0.0 and not _known_by_repeats(columns)
+
+
+def _known_by_repeats(columns: Columns) -> bool:
+    squares, freedom = columns.repeats
+    return freedom >= FEWEST_REPEATS and squares > 0.0
 
 
 def noise_part(f: Fit, information: Floats | None = None) -> tuple[Floats, Floats]:
@@ -291,7 +293,7 @@ def _information(fit: Fit, along: Floats) -> Floats:
 def _prior(fit: Fit) -> tuple[Floats, Floats]:
     """(1 + k,) means and standard deviations of ln variances before any reading; of the noise, as its heavy tails weigh it here."""
     mean, sd = declared_noise(fit.columns)
-    if not known_by_repeats(fit.columns):
+    if _beyond_declared(fit.columns, float(fit.t[0])):
         sd *= np.sqrt(0.5 * (1.0 + ((fit.t[0] - mean) / sd) ** 2))
     return np.array([mean, *np.zeros(len(fit.parts))]), np.array([sd, *(p.sd for p in fit.parts)])
 

@@ -11,7 +11,7 @@ RARE = 1e-3
 DEGREES = 4.0
 """Of freedom of heavy tails, as usual."""
 NOISE_SD = 0.2
-"""Of ln κ: noise is declared to a fifth, with the tails of Cauchy, since some declarations are off by ten."""
+"""Of ln κ: noise is declared to a fifth, with the tail of Cauchy above, since some is ten times as large."""
 FEWEST_REPEATS = 5
 """Degrees of freedom from which repeats say how large the noise is, instead of the declaration."""
 NUMBERS_SD = 1.5

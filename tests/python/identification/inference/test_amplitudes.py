@@ -112,6 +112,7 @@ def test_priors_are_those_of_the_table():
     prior = of_noise - 0.5 * (0.8 / (2 * NUMBERS_SD)) ** 2
     assert fit.score - fit.likelihood == pytest.approx(prior, abs=1e-12)
     repeated = columns(np.random.default_rng(0), repeats=1.44)
+    assert amplitudes.noise_prior(c, -0.3) == pytest.approx(-0.5 * (0.3 / (2 * NOISE_SD)) ** 2)
     centre, sd = amplitudes.declared_noise(repeated)
     assert (centre, sd) == pytest.approx((np.log(1.44), 2 / np.sqrt(20)))
     by_repeats = norm.logpdf(0.9, centre, sd) - norm.logpdf(centre, centre, sd)
