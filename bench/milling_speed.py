@@ -7,12 +7,15 @@ from __future__ import annotations
 
 import argparse
 import resource
+import tempfile
 import time
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 
 import stiffmap as sm
+from stiffmap.common.texts import lines_of
 from stiffmap.machining.milling.equilibrium import Plant, commanded, equilibrium
 from stiffmap.machining.milling.placement import PlacementSearch
 from stiffmap.machining.milling.setting import setting
@@ -85,13 +88,15 @@ def many(machine: sm.Machine, count: int, threads: int) -> None:
 
 def program(count: int) -> None:
     """A program of many lines: read one by one, and kept."""
+    file = Path(tempfile.mkdtemp()) / "p.nc"
+    file.write_text("\n".join(lines(count)), encoding="utf-8")
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     start = time.process_time()
-    moves = sum(1 for _ in read_moves(lines(count), ProgramReader("p")))
+    moves = sum(1 for _ in read_moves(lines_of(file, "\n"), ProgramReader("p")))
     seconds = time.process_time() - start
     streamed = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     start = time.process_time()
-    path = load_gcode(lines(count), name="p", keep_text=False)
+    path = load_gcode(file, keep_text=False)
     kept = time.process_time() - start
     most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     print(
