@@ -50,8 +50,8 @@ def save_link(link: LinkFile, path: str | Path) -> None:
         "covariance": link.covariance.tolist(),
         "provenance": link.provenance,
     }
-    _check_semidefinite(path, "compliance", _array(path, data, "compliance", (6, 6)))
-    _check_semidefinite(path, "covariance", _array(path, data, "covariance", (36, 36)))
+    check_semidefinite(path, "compliance", _array(path, data, "compliance", (6, 6)))
+    check_semidefinite(path, "covariance", _array(path, data, "covariance", (36, 36)))
     text = yaml.safe_dump(data, sort_keys=False, default_flow_style=None, width=10_000, allow_unicode=True)
     write_text(path, text)
 
@@ -67,12 +67,12 @@ def load_link(path: str | Path) -> LinkFile:
     if data.get("units") != UNITS:
         raise StiffmapError(f"{path}: units: expected {UNITS}, got {data.get('units')}")
     C = _array(path, data, "compliance", (6, 6))
-    _check_semidefinite(path, "compliance", C)
+    check_semidefinite(path, "compliance", C)
     C = C / 2 + C.T / 2  # digits that a file rounds
     V = np.zeros((36, 36))
     if "covariance" in data:
         V = _array(path, data, "covariance", (36, 36))
-        _check_semidefinite(path, "covariance", V)
+        check_semidefinite(path, "covariance", V)
     elif "standard_error" in data:
         error = _array(path, data, "standard_error", (6, 6))
         if error.min() < 0:
@@ -107,7 +107,8 @@ def _array(path: str | Path, data: dict[str, Any], key: str, shape: tuple[int, .
     return a
 
 
-def _check_semidefinite(path: str | Path, key: str, C: Floats) -> None:
+def check_semidefinite(path: str | Path, key: str, C: Floats) -> None:
+    """StiffmapError where a matrix is not symmetric, or has a direction in which it is negative."""
     d = np.diag(C)
     if np.any(d < 0):
         why = "; wrenches are loads on the link, not reactions, with moments at the reference"

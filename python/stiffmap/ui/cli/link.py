@@ -12,7 +12,7 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.model.link.gmshmesh import CAD, MESH, mesh_file
 from stiffmap.model.link.identify import identify_link
 from stiffmap.model.link.inputs import UNIT_WRENCHES, read_cases, read_material, read_part
-from stiffmap.model.link.linkfile import LinkFile, save_link
+from stiffmap.model.link.linkfile import LinkFile, check_semidefinite, save_link
 from stiffmap.model.link.mesh import face_area_centre
 from stiffmap.model.link.pipeline import PartLink, Solver, Support, link_from_part
 from stiffmap.model.link.readers import FIELDS, read_field
@@ -85,7 +85,14 @@ def command(
         draw_link(link, picture, found)
     told = [link.report(), *([] if found is None else _of_part(found, link))]
     told += [f"wrote {path}" for path in (out, picture) if path is not None]
-    return Answer(as_data(link, found, file), told)
+    problem = None
+    try:
+        check_semidefinite(part, "compliance", file.compliance)
+    except StiffmapError as error:
+        problem = str(error)
+    return Answer(
+        {**as_data(link, found, file), "problem": problem}, [*told, problem], finding=problem is not None
+    )
 
 
 def _field(path: Path, unit: str | None, nodes: Path | None, wrenches: Floats) -> tuple[Floats, Floats]:

@@ -81,6 +81,31 @@ def test_field_to_spring(run, tmp_path):
     assert np.array(json.loads(done.output)["compliance"]) == pytest.approx(expected.compliance, rel=1e-9)
 
 
+def reactions(w):
+    return -w
+
+
+def swapped(w):
+    return w[[3, 4, 5, 0, 1, 2]]
+
+
+def turned(w):
+    return w[:, [1, 2, 0, 3, 4, 5]]
+
+
+@pytest.mark.parametrize("mistake", [reactions, swapped, turned])
+def test_loads_that_leave_no_spring_are_a_finding_in_text_and_in_json(run, tmp_path, mistake):
+    write_field(tmp_path / "field.csv")
+    rows = [",".join(map(repr, w)) for w in mistake(WRENCHES).tolist()]
+    (tmp_path / "cases.csv").write_text("\n".join([CASES.splitlines()[0], *rows]))
+    arguments = ("field.csv", "--cases", "cases.csv", "--reference", "310,0,0")
+    done, as_json = run(*arguments), run(*arguments, "--json")
+    assert done.exit_code == as_json.exit_code == 1
+    problem = json.loads(as_json.output)["problem"]
+    assert "compliance: expected" in problem
+    assert problem in done.output
+
+
 def test_help_has_examples(run):
     assert "stiffmap link bar.yaml" in run("--help").output
 
