@@ -85,14 +85,13 @@ def command(
         draw_link(link, picture, found)
     told = [link.report(), *([] if found is None else _of_part(found, link))]
     told += [f"wrote {path}" for path in (out, picture) if path is not None]
-    problem = None
+    problem = ""
     try:
         check_semidefinite(part, "compliance", file.compliance)
     except StiffmapError as error:
         problem = str(error)
-    return Answer(
-        {**as_data(link, found, file), "problem": problem}, [*told, problem], finding=problem is not None
-    )
+    data = {**as_data(link, found, file), "problem": problem}
+    return Answer(data, [*told, problem or None], finding=bool(problem))
 
 
 def _field(path: Path, unit: str | None, nodes: Path | None, wrenches: Floats) -> tuple[Floats, Floats]:
