@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from stiffmap.common.broadcasting import Floats, wrench_array
+from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.closing import commanded
 from stiffmap.solve.machine import Machine, takes_machine
 from stiffmap.workspace.cables.structure import (
@@ -77,11 +78,18 @@ def wrench_feasible(
         As `tension_distribution`; one rotation.
     gap
         Cells are halved down to this share of the box's longest edge.
+
+    StiffmapError for bad input, for a machine with legs or with external springs.
     """
     h = hanging(machine)
+    if h.springs:
+        names = ", ".join(spring.name for spring, _ in h.springs)
+        raise StiffmapError(
+            f"{machine.name}: expected a machine without external springs, whose pull is not enclosed; got {names}"
+        )
     low, high = read_box(machine, box)
     r = commanded(machine.compiled, low, rotation)[1]
-    w = np.atleast_2d(wrench_array(wrenches)) + weight(h, r, machine.compiled.gravity(gravity))
+    w = np.atleast_2d(wrench_array(wrenches)) + weight(h, low, r, machine.compiled.gravity(gravity))
     bounds = limits(h, lowest, highest)
     least = gap * float((high - low).max())
     cells = np.stack([low, high])[None]

@@ -202,7 +202,7 @@ def force_transmission(
     the machine exerts). Limits: ``declared`` in the machine file, ``unit``, or numbers (N, N·m).
 
     gravity
-        (3,) m/s²; None: what the machine file says. Its efforts count against the limits.
+        (3,) m/s²; None: what the machine file says. Its efforts and those of springs count against the limits.
     velocity
         (..., 3) m/s of the TCP, no acceleration, no rotation: inertia and friction at that speed count
         against the limits too; None: at rest, without friction.
