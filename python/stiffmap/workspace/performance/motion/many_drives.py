@@ -102,6 +102,7 @@ def section_polygon(
     half, room, inner, toward = _nearest_border(rows, limits, bias)
     points = _crossings(half, room, 2 * n)
     vertices, outer, best = _ordered(points)
+    outer = np.where(np.isnan(vertices).all(axis=(-2, -1)) & (inner > 0.0), np.inf, outer)  # a strip
     bad = np.asarray(~np.isfinite(rows).all(axis=(-2, -1)))
     vertices = np.where(bad[..., None, None], np.nan, vertices)
     weakest = np.arctan2(toward[..., 1], toward[..., 0])
