@@ -207,8 +207,8 @@ def _symmetric(
 def _body(e: Body) -> Fields:
     out = declared(e)
     entries = _symmetric(e.inertia, lambda i, j: INERTIA, lambda m: replace(e, inertia=m))
-    for (i, j), field in entries.items():
-        if field.value != 0.0:
-            bounds = out["mass"].bounds if i == j else UNBOUNDED
-            out[f"inertia.{'xyz'[i]}{'xyz'[j]}"] = field._replace(bounds=bounds)
-    return out
+    bounds = {True: out["mass"].bounds, False: UNBOUNDED}
+    terms = {
+        f"inertia.{'xyz'[i]}{'xyz'[j]}": f._replace(bounds=bounds[i == j]) for (i, j), f in entries.items()
+    }
+    return out | {key: field for key, field in terms.items() if field.value != 0.0}

@@ -45,11 +45,9 @@ def with_values(description: MachineDescription, values: Mapping[str, float]) ->
             raise StiffmapError(text if address in text else f"{address}: {text}") from None
     for ends in [a.rpartition(".")[0] for a in values if a.endswith((".low", ".high"))]:
         low, high = (known_values(description, f"{ends}.{end}") for end in ("low", "high"))
-        for least, most in zip(low, high, strict=True):
-            if least >= most:
-                raise StiffmapError(
-                    f"{ends}: the lower end {least:g} is not below the upper end {most:g} (SI)"
-                )
+        least, most = max(zip(low, high, strict=True), key=lambda pair: pair[0] - pair[1])
+        if least >= most:
+            raise StiffmapError(f"{ends}: the lower end {least:g} is not below the upper end {most:g}")
     return description
 
 

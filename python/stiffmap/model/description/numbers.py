@@ -62,9 +62,8 @@ class DeclaredNumber:
     @property
     def expected(self) -> str:
         """Its bounds in words."""
-        if self.upper == float("inf"):
-            return "a number that is not negative" if self.lower == 0.0 else f"{self.lower:g} or more (SI)"
-        return f"{self.lower:g} to {self.upper:g} (SI)"
+        above = "a number that is not negative" if self.lower == 0.0 else f"{self.lower:g} or more (SI)"
+        return above if self.upper == float("inf") else f"{self.lower:g} to {self.upper:g} (SI)"
 
     def dimension(self, angular: bool = False) -> Dimension:
         """Unit on a joint that turns, or that slides."""

@@ -75,18 +75,13 @@ def wrench_feasible(
     box
         (2, 3) m; None: the machine's workspace. Edges without length stay so.
     rotation, gravity, lowest, highest
-        As `tension_distribution`; one rotation.
+        As `tension_distribution`; one rotation. Machines with legs or external springs are refused.
     gap
         Cells are halved down to this share of the box's longest edge.
-
-    StiffmapError for bad input, for a machine with legs or with external springs.
     """
     h = hanging(machine)
     if h.springs:
-        names = ", ".join(spring.name for spring, _ in h.springs)
-        raise StiffmapError(
-            f"{machine.name}: expected a machine without external springs, whose pull is not enclosed; got {names}"
-        )
+        raise StiffmapError(f"{machine.name}: expected no external springs, got {h.springs[0][0].name}")
     low, high = read_box(machine, box)
     r = commanded(machine.compiled, low, rotation)[1]
     w = np.atleast_2d(wrench_array(wrenches)) + weight(h, low, r, machine.compiled.gravity(gravity))

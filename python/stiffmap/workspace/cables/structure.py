@@ -112,9 +112,8 @@ def weight(h: Hanging, position: Floats, rotation: Floats, gravity: Floats) -> F
         arm = np.einsum("...ij,j->...i", rotation, at)
         line = np.asarray(spring.anchor) - position - arm
         straight = np.linalg.norm(line, axis=-1, keepdims=True)
-        stretch = straight - spring.length
-        pull = spring.stiffness * (np.maximum(stretch, 0.0) if spring.tension_only else stretch)
-        loads.append((arm, pull * line / straight))
+        stretch = np.maximum(straight - spring.length, 0.0 if spring.tension_only else -np.inf)
+        loads.append((arm, spring.stiffness * stretch * line / straight))
     return sum((np.concatenate([f + 0.0 * arm, np.cross(arm, f)], axis=-1) for arm, f in loads), np.zeros(6))
 
 

@@ -247,9 +247,7 @@ def test_acceleration_asks_a_drive_for_all_it_has(name):
 @pytest.mark.parametrize(("name", "plane"), [("3-rps", "xy"), ("five-bar", "xz"), ("swing-table", "xy")])
 def test_planes_that_are_not_commanded_have_no_speed(name, plane):
     machine = sm.load_machine(name)
-    with pytest.raises(
-        sm.StiffmapError, match=rf"{name}: plane: expected axes that are commanded .*got {plane}"
-    ):
+    with pytest.raises(sm.StiffmapError, match=rf"{name}: plane: expected commanded axes .*got {plane}"):
         sm.velocity_section(machine, machine.description.home.p, plane=plane)
     held = sm.force_transmission(
         machine, machine.description.home.p, plane=plane, limits=1.0, gravity=[0, 0, 0]

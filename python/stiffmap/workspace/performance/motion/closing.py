@@ -101,7 +101,7 @@ def commanded_axes(machine: Machine, plane: str) -> list[int]:
     axes, task = list(plane_axes(plane)), machine.description.task
     if any(TASK[i] not in task for i in axes):
         raise StiffmapError(
-            f"{machine.name}: plane: expected axes that are commanded ({', '.join(task)}), got {plane}"
+            f"{machine.name}: plane: expected commanded axes ({', '.join(task)}), got {plane}"
         )
     return axes
 

@@ -146,8 +146,7 @@ def acceleration_of(
     efforts: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
 ) -> Floats:
-    """(...) m/s²: acceleration of the tool that the drives reach in every commanded direction, from rest, orientation kept
-    where it is commanded.
+    """(...) m/s²: acceleration of the tool that the drives reach in every commanded direction, from rest, commanded turns kept.
 
     efforts: limits of the drives, N or N·m (one or one each); None: the machine file's. Gravity counts
     against them. StiffmapError where masses are missing.
@@ -161,9 +160,7 @@ def acceleration_of(
     flat = k.coordinates.reshape(-1, k.coordinates.shape[-1])
     zero = np.zeros((len(flat), 6))
     mass = rigid_dynamics(machine, flat, zero, zero, zero, np.zeros(3))["mass"].reshape((*shape, n, n))
-    needed = (
-        mass @ inverse_rows(commanded_jacobian(machine, k))[..., :3]
-    )  # effort per acceleration of the TCP
+    needed = mass @ inverse_rows(commanded_jacobian(machine, k))[..., :3]
     return inner_radius(needed, most, bias)
 
 

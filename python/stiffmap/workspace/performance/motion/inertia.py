@@ -117,8 +117,7 @@ def rest_efforts(
     machine: Machine, k: DriveKinematics, *, gravity: ArrayLike | None, velocity: ArrayLike | None, sharing: str = "least_norm"
 ) -> Floats:  # fmt: skip
     """(..., drives) efforts at rest against gravity and springs, or at a constant velocity with friction."""
-    shape, drives = k.status.shape, k.actuators.shape[-1]
-    g = machine.compiled.gravity(gravity)
+    shape, g = k.status.shape, machine.compiled.gravity(gravity)
     if velocity is not None or g.any():
         need_masses(machine, "gravity" if velocity is None else "motion")
     flat = k.coordinates.reshape(-1, k.coordinates.shape[-1])
@@ -130,10 +129,8 @@ def rest_efforts(
         twist[:, :3] = rows(v, shape, (3,))
     zero = np.zeros_like(twist)
     out = rigid_dynamics(machine, flat, twist, zero, zero, g, sharing=sharing)
-    effort = out["effort"]
-    if velocity is not None:
-        effort = effort + friction_efforts(machine, out["rate"])
-    return effort.reshape((*shape, drives))
+    effort = out["effort"] + friction_efforts(machine, out["rate"])  # none at rest
+    return effort.reshape(k.actuators.shape)
 
 
 @short_repr

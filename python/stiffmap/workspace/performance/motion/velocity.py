@@ -180,7 +180,6 @@ def velocity_section(
 
     The polygon's vertices (..., 2 drives, 2), inner radius (the speed reached in every direction) and
     outer radius; m/s with ``limits="declared"`` or numbers, else per unit speed of the drives.
-
     Raises StiffmapError for bad input and for a plane that the machine's task does not command, never for a pose.
     """
     k = drive_kinematics(machine, position, rotation, threads=threads)
