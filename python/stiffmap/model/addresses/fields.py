@@ -13,12 +13,13 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.common.units import INERTIA, MODULUS, Dimension
 from stiffmap.model import beams
 from stiffmap.model.description import Body, Cable, Element, Joint, Law, Offset, Pose, Spring
-from stiffmap.model.description.numbers import DIRECTIONS, numbers_of, with_entry, with_part
+from stiffmap.model.description.numbers import DIRECTIONS, DeclaredNumber, numbers_of, with_entry, with_part
 from stiffmap.model.description.pose import Vector
 from stiffmap.model.description.strokes import Matrix6, entry_dimension
 
 SHORT = {MODULUS: "Pa", Dimension(force=-1, angle=1): "1/N"}
 POWERS = {1: "", 2: "²", 3: "³"}
+UNBOUNDED = DeclaredNumber("")
 
 
 def unit_text(d: Dimension, time: int = 0) -> str:
@@ -36,13 +37,14 @@ def unit_text(d: Dimension, time: int = 0) -> str:
 class Field(NamedTuple):
     """A number (SI) of an element: its value, its unit, and the element with another value in its place.
 
-    ``listed`` is False for another way to give a number that is listed already.
+    ``listed`` is False for another way to give a number that is listed already; ``bounds`` are those of a design.
     """
 
     value: float
     unit: str
     put: Callable[[float], Any]
     listed: bool = True
+    bounds: DeclaredNumber = UNBOUNDED
 
     def inside(self, around: Callable[[Any], Any]) -> Field:
         """The same number where its element is a part of something else."""
@@ -83,7 +85,7 @@ def declared(holder: object, angular: bool = False) -> Fields:
             continue
         for i, key in enumerate(n.keys(value)):
             unit = unit_text(n.dimension(n.turns(i, angular)), n.time)
-            out[key] = Field(value[i] if n.shape else value, unit, partial(with_part, holder, n, i))
+            out[key] = Field(value[i] if n.shape else value, unit, partial(with_part, holder, n, i), bounds=n)
     return out
 
 
@@ -204,7 +206,9 @@ def _symmetric(
 
 def _body(e: Body) -> Fields:
     out = declared(e)
-    mass = out["mass"]
-    out["mass"] = mass._replace(put=lambda x: mass.put(_positive(x) if x else x))
     entries = _symmetric(e.inertia, lambda i, j: INERTIA, lambda m: replace(e, inertia=m))
-    return out | {f"inertia.{'xyz'[i]}{'xyz'[j]}": f for (i, j), f in entries.items() if f.value != 0.0}
+    bounds = {True: out["mass"].bounds, False: UNBOUNDED}
+    terms = {
+        f"inertia.{'xyz'[i]}{'xyz'[j]}": f._replace(bounds=bounds[i == j]) for (i, j), f in entries.items()
+    }
+    return out | {key: field for key, field in terms.items() if field.value != 0.0}

@@ -43,6 +43,11 @@ def with_values(description: MachineDescription, values: Mapping[str, float]) ->
         except StiffmapError as problem:
             text = str(problem)
             raise StiffmapError(text if address in text else f"{address}: {text}") from None
+    for ends in [a.rpartition(".")[0] for a in values if a.endswith((".low", ".high"))]:
+        low, high = (known_values(description, f"{ends}.{end}") for end in ("low", "high"))
+        least, most = max(zip(low, high, strict=True), key=lambda pair: pair[0] - pair[1])
+        if least >= most:
+            raise StiffmapError(f"{ends}: the lower end {least:g} is not below the upper end {most:g}")
     return description
 
 
@@ -76,6 +81,8 @@ def _with_value(description: MachineDescription, address: str, value: float) -> 
             description = beam.put(value)
         number = _number(description, place, field)
         if place not in changed and number is not None:
+            if not number.bounds.lower <= value <= number.bounds.upper:
+                raise StiffmapError(f"{address}: expected {number.bounds.expected}, got {value!r}")
             description = number.put(value)
             changed.add(place)
     return description
@@ -121,7 +128,7 @@ def every_address(description: MachineDescription) -> list[str]:
 
 
 COUNTED = {
-    Spring: ("compliance.", "stiffness."),
+    Spring: ("compliance.", "stiffness.", "beam."),
     Body: ("mass", "com."),
     Point: ("at.",),
     Offset: ("translation.", "actual.translation."),
@@ -135,7 +142,7 @@ def moved(description: MachineDescription, key: str, delta: float) -> MachineDes
     """The machine with the number ``full.name/field`` moved by `delta` (SI).
 
     A length of an offset moves the machine as built; the controller keeps the nominal one. None: this
-    machine has no such number, or none that is an error of a machine as built (sections of a beam, angles).
+    machine has no such number, or none that is an error of a machine as built (angles).
     """
     found = _as_built(description, key)
     return None if found is None else found.put(found.value + delta)

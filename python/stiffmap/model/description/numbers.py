@@ -59,6 +59,12 @@ class DeclaredNumber:
     name: str = ""
     default: Any = None
 
+    @property
+    def expected(self) -> str:
+        """Its bounds in words."""
+        above = "a number that is not negative" if self.lower == 0.0 else f"{self.lower:g} or more (SI)"
+        return above if self.upper == float("inf") else f"{self.lower:g} to {self.upper:g} (SI)"
+
     def dimension(self, angular: bool = False) -> Dimension:
         """Unit on a joint that turns, or that slides."""
         coordinate, effort = (ANGLE, MOMENT) if angular else (LENGTH, FORCE)

@@ -106,11 +106,5 @@ def build_number(n: DeclaredNumber, given: Any, angular: bool, context: Context,
     )
     for part, value in zip(parts, values, strict=True):
         if not n.lower <= value <= n.upper:
-            context.at(*n.key.split(".")).fail(f"expected {_bounds(n)}; found {part.value}")
+            context.at(*n.key.split(".")).fail(f"expected {n.expected}; found {part.value}")
     return values if n.shape else values[0]
-
-
-def _bounds(n: DeclaredNumber) -> str:
-    if n.upper == float("inf"):
-        return "a number that is not negative" if n.lower == 0.0 else f"{n.lower:g} or more (SI)"
-    return f"{n.lower:g} to {n.upper:g} (SI)"

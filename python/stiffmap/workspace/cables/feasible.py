@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from stiffmap.common.broadcasting import Floats, wrench_array
+from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.closing import commanded
 from stiffmap.solve.machine import Machine, takes_machine
 from stiffmap.workspace.cables.structure import (
@@ -74,14 +75,16 @@ def wrench_feasible(
     box
         (2, 3) m; None: the machine's workspace. Edges without length stay so.
     rotation, gravity, lowest, highest
-        As `tension_distribution`; one rotation.
+        As `tension_distribution`; one rotation. Machines with legs or external springs are refused.
     gap
         Cells are halved down to this share of the box's longest edge.
     """
     h = hanging(machine)
+    if h.springs:
+        raise StiffmapError(f"{machine.name}: expected no external springs, got {h.springs[0][0].name}")
     low, high = read_box(machine, box)
     r = commanded(machine.compiled, low, rotation)[1]
-    w = np.atleast_2d(wrench_array(wrenches)) + weight(h, r, machine.compiled.gravity(gravity))
+    w = np.atleast_2d(wrench_array(wrenches)) + weight(h, low, r, machine.compiled.gravity(gravity))
     bounds = limits(h, lowest, highest)
     least = gap * float((high - low).max())
     cells = np.stack([low, high])[None]

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from stiffmap.common.broadcasting import Floats, refused, wrench_array
 from stiffmap.common.errors import StiffmapError
-from stiffmap.model.description import Body, Cable, Offset, Pose
+from stiffmap.model.description import Body, Cable, ExternalSpring, Offset, Point, Pose
 from stiffmap.model.description.machine import TASK
 from stiffmap.model.description.pose import Vector
 from stiffmap.solve.closing import commanded
@@ -29,6 +29,7 @@ class Hanging:
     com: Floats  # (3,) m, tcp axes
     rows: tuple[int, ...]  # components of a wrench that no guide takes
     length: float  # m, turns moments into forces: the mean arm of the cables, where they have any
+    springs: tuple[tuple[ExternalSpring, Floats], ...] = ()  # and (3,) m, where each pulls, tcp axes
 
 
 def hanging(machine: Machine) -> Hanging:
@@ -39,6 +40,7 @@ def hanging(machine: Machine) -> Hanging:
     tip = Pose()
     found: list[tuple[Cable, Vector]] = []
     bodies: list[tuple[Body, Vector]] = []
+    points: dict[str, Vector] = {}
     for e in d.platform:  # their points in the platform's first frame
         match e:
             case Offset():
@@ -47,6 +49,8 @@ def hanging(machine: Machine) -> Hanging:
                 found.append((e, (tip @ Pose(e.at)).translation))
             case Body():
                 bodies.append((e, (tip @ Pose(e.com)).translation))
+            case Point():
+                points[f"platform.{e.name}"] = (tip @ Pose(e.offset)).translation
     back = tip.inverse()
     at = np.array([(back @ Pose(p)).p for _, p in found])
     mass = sum(b.mass for b, _ in bodies)
@@ -61,6 +65,7 @@ def hanging(machine: Machine) -> Hanging:
         com=moment / mass if mass else np.zeros(3),
         rows=tuple(i for i, name in enumerate(TASK) if name in d.freedoms),
         length=float(np.sqrt(np.mean(np.sum(at**2, axis=1)))) or machine.compiled.length,
+        springs=tuple((s, (back @ Pose(points[s.point])).p) for s in d.external_springs if s.point in points),
     )
 
 
@@ -100,11 +105,16 @@ def matrix(unit: Floats, straight: Floats, arm: Floats) -> Floats:
     return np.swapaxes(np.concatenate([-unit, np.cross(arm, -unit)], axis=-1), -1, -2)
 
 
-def weight(h: Hanging, rotation: Floats, gravity: Floats) -> Floats:
-    """(..., 6) wrench of the platform's bodies at the tcp."""
-    force = h.mass * gravity
-    lever = np.einsum("...ij,j->...i", rotation, h.com)
-    return np.concatenate([np.broadcast_to(force, lever.shape), np.cross(lever, force)], axis=-1)
+def weight(h: Hanging, position: Floats, rotation: Floats, gravity: Floats) -> Floats:
+    """(..., 6) wrench of the platform's bodies and of the springs outside at the tcp."""
+    loads = [(np.einsum("...ij,j->...i", rotation, h.com), h.mass * gravity)]
+    for spring, at in h.springs:
+        arm = np.einsum("...ij,j->...i", rotation, at)
+        line = np.asarray(spring.anchor) - position - arm
+        straight = np.linalg.norm(line, axis=-1, keepdims=True)
+        stretch = np.maximum(straight - spring.length, 0.0 if spring.tension_only else -np.inf)
+        loads.append((arm, spring.stiffness * stretch * line / straight))
+    return sum((np.concatenate([f + 0.0 * arm, np.cross(arm, f)], axis=-1) for arm, f in loads), np.zeros(6))
 
 
 MOST_STEPS = 100
@@ -134,7 +144,7 @@ def tension_distribution(
     highest: ArrayLike | None = None,
     near: ArrayLike | None = None,
 ) -> TensionDistribution:
-    """Tensions that hold the platform at commanded poses against its weight and a wrench at the tcp, forces commanded.
+    """Tensions that hold the platform at commanded poses against its weight, external springs and a wrench at the tcp.
 
     position (..., 3) m, wrench (..., 6) N and N·m, rotation (..., 3, 3); gravity (3,) m/s², None: the machine file's.
     Of all tensions between `lowest` and `highest` (N, one or one per cable; None: what the machine file allows) those
@@ -145,7 +155,7 @@ def tension_distribution(
     p, r = commanded(machine.compiled, position, rotation)
     low, high = limits(h, lowest, highest)
     aim = low if near is None else _per_cable(h, near, "near")
-    w = wrench_array(wrench) + weight(h, r, machine.compiled.gravity(gravity))
+    w = wrench_array(wrench) + weight(h, p, r, machine.compiled.gravity(gravity))
     a = matrix(*lines(h, p, r))
     shape = np.broadcast_shapes(a.shape[:-2], w.shape[:-1])
     a, b = scaled(h, np.broadcast_to(a, (*shape, *a.shape[-2:])), -np.broadcast_to(w, (*shape, 6)))

@@ -14,6 +14,7 @@ import xarray as xr
 
 from stiffmap.common.broadcasting import Floats, instance_of
 from stiffmap.common.errors import StiffmapError
+from stiffmap.common.short import first_of
 from stiffmap.model.addresses import moved, number
 from stiffmap.model.description import MachineDescription
 from stiffmap.solve.machine import Machine
@@ -66,8 +67,9 @@ def uncertain_numbers(machine: Machine) -> Uncertain:
     kept = [n for n in plain if number(d, n.keys[0]) is not None]
     numbers = [*chain.from_iterable(n for n, _ in links), *kept]
     if not numbers:
+        only = f" that a map depends on (only {first_of([n.name for n in plain])})" if plain else ""
         raise StiffmapError(
-            f"uncertainty: the numbers of machine '{machine.name}' have none: give some as "
+            f"uncertainty: the numbers of machine '{machine.name}' have none{only}: give some as "
             "{value: ..., u: ...} or springs as {link: file} (docs/machine_files.md)"
         )
     from scipy.linalg import block_diag

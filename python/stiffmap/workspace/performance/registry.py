@@ -23,7 +23,6 @@ from stiffmap.workspace.performance.motion.closing import (
     drive_kinematics,
     kernel_starts,
 )
-from stiffmap.workspace.performance.motion.many_drives import inverse_rows
 from stiffmap.workspace.performance.motion.motion_files import Motion
 from stiffmap.workspace.performance.motion.velocity import VelocityTransmission, transmission_of
 
@@ -119,11 +118,6 @@ class Case:
     def factors(self) -> VelocityTransmission:
         """Velocity transmission at `positions`."""
         return transmission_of(self.machine, self.kinematics, length=self.length)
-
-    @cached_property
-    def inverse(self) -> Floats:
-        """(nodes³, drives, 6) rates of the drives per twist of the tool, at `positions`."""
-        return inverse_rows(self.kinematics.jacobian)
 
     @cached_property
     def coarse_kinematics(self) -> DriveKinematics:

@@ -137,6 +137,33 @@ def test_bad_values_are_refused() -> None:
         machine.with_number("forearm/length", 3.0)
 
 
+@pytest.mark.parametrize(
+    ("name", "address", "value"),
+    [
+        ("five-bar", "motor/force", -1.0),
+        ("orthoglide-revised", "actuator/speed", -1.0),
+        ("orthoglide-revised", "x.actuator/friction.coulomb", -1.0),
+        ("orthoglide-revised", "platform.platform/inertia.xx", -1.0),
+        ("every number", "hose/stiffness", -1.0),
+        ("every number", "hose/length", -0.1),
+        ("orthoglide-revised", "x.actuator/range.low", 5.0),
+        ("hexapod", "strut/range.high", 0.5),
+        ("ur10", "workspace/x.low", 1.0),
+    ],
+)
+def test_bounds_of_a_file_hold_for_numbers_at_addresses(name: str, address: str, value: float) -> None:
+    d = full_machine() if name == "every number" else sm.load_machine(name).description
+    with pytest.raises(
+        StiffmapError, match=f"^{address.rpartition('.')[0] or address}.*(not negative|is not below)"
+    ):
+        with_values(d, {address: value})
+
+
+def test_both_ends_of_a_range_change_together() -> None:
+    changed = sm.load_machine("ur10").with_numbers({"workspace/x.low": 1.0, "workspace/x.high": 2.0})
+    np.testing.assert_array_equal(changed.workspace[:, 0], [1.0, 2.0])
+
+
 @pytest.mark.parametrize("name", ["linear-delta", "ur10", "every number"])
 def test_moved_as_built_moves_that_number_by_as_much(name: str) -> None:
     """Every number that a machine as built can have otherwise; external springs among them."""

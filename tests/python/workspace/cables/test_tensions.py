@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.optimize import linprog
 from tests.python.workspace.cables.made import hanging
 
-from stiffmap import Machine, StiffmapError, inverse_kinematics, load_machine
-from stiffmap.model.description import Drive
+from stiffmap import Machine, StiffmapError, force_transmission, inverse_kinematics, load_machine
+from stiffmap.model.description import Drive, ExternalSpring, Point
 from stiffmap.workspace.cables import structure_matrix, tension_distribution, wrench_feasible
 from stiffmap.workspace.cables.feasible import changed, turned
 from stiffmap.workspace.cables.structure import hanging as hanging_of
@@ -68,6 +70,36 @@ def test_distribution_balances_and_is_the_least() -> None:
         np.testing.assert_allclose(z[free], d.tension[i, free] - 20.0, atol=1e-4)
         if np.linalg.matrix_rank(a[i][:, free]) == 6:
             assert (z[d.tension[i] <= 20.0] < 1e-4).all()
+
+
+@pytest.mark.parametrize("tension_only", [False, True])
+@pytest.mark.parametrize("length", [0.2, 1.5])
+@pytest.mark.parametrize("anchor", [(0.0, 0.0, 3.0), (1.0, 0.5, 2.0)])
+def test_springs_outside_pull_with_the_cables(
+    anchor: tuple[float, float, float], length: float, tension_only: bool
+) -> None:
+    """Tensions and held forces are those of the same pull as a wrench, by hand; boxes refuse."""
+    m, p, hook = frame(force=2000.0), np.array([0.2, -0.1, 1.05]), np.array([0.05, 0.0, 0.2])
+    spring = ExternalSpring("spine", "platform.hook", anchor, 80.0, length, tension_only)
+    d = m.description
+    sprung = Machine(
+        replace(d, platform=(*d.platform, Point("hook", tuple(hook))), external_springs=(spring,))
+    )
+    line = np.array(anchor) - p - hook
+    stretch = np.linalg.norm(line) - length
+    pull = 80.0 * (max(stretch, 0.0) if tension_only else stretch) * line / np.linalg.norm(line)
+    wrench = np.hstack([pull, np.cross(hook, pull)])
+    found = tension_distribution(sprung, p, lowest=50.0).tension
+    np.testing.assert_allclose(found, tension_distribution(m, p, wrench, lowest=50.0).tension, atol=1e-6)
+    none = force_transmission(sprung, p, gravity=[0, 0, 0])
+    np.testing.assert_allclose(structure_matrix(m, p) @ -none.bias, -wrench, atol=1e-5)
+    away = np.random.default_rng(0).normal(size=(500, 3))
+    away *= none.force_min / np.linalg.norm(away, axis=1)[:, None]
+    with_pull = np.hstack([away, 0 * away]) * np.array([0.999, 1.2])[:, None, None] + wrench
+    feasible = tension_distribution(m, p, with_pull, gravity=[0, 0, 0]).feasible
+    assert feasible[0].all() and not feasible[1].all()
+    with pytest.raises(StiffmapError, match=r"external springs.*spine"):
+        wrench_feasible(sprung, box=[p - 0.1, p + 0.1])
 
 
 def test_infeasible_is_what_a_linear_program_says() -> None:

@@ -211,7 +211,39 @@ def test_unreachable_poses_have_no_deviation(machine: Machine) -> None:
     assert np.isfinite(sm.uncertainty_ranking(ds)).all()
 
 
+BEAM = """
+name: cantilever
+units: {length: mm, force: N, angle: deg}
+home: {translation: [500, 0, 0]}
+legs:
+  arm:
+    elements:
+      - {actuator: drive, kind: prismatic, axis: x, rigid: true, home: %s}
+      - {offset: length, translation: [500, 0, 0]}
+      - {spring: bar, beam: {length: %s, %s, material: {E: %s, nu: 0.3}}}
+"""
+ROUND, MODULUS = "round: {diameter: 40}", "2.1e5"
+PARTS = {
+    "diameter": ("0", "500", "round: {diameter: {value: 40, u: 0.1}}", MODULUS, 4 * 0.1 / 40),
+    "height": ("0", "500", "rectangle: {width: 50, height: {value: 30, u: 0.1}}", MODULUS, 3 * 0.1 / 30),
+    "E": ("0", "500", ROUND, "{value: 2.1e5, u: 4e3}", 4e3 / 2.1e5),
+    "beam length": ("0", "{value: 500, u: 1}", ROUND, MODULUS, 3 * 1 / 500),
+}
+
+
+@pytest.mark.parametrize("part", PARTS)
+def test_numbers_of_a_beam_count(part: str) -> None:
+    """The bending F L³ / 3 E I of a cantilever: its relative deviation in closed form."""
+    *numbers, relative = PARTS[part]
+    ds = sm.error_map(BEAM % tuple(numbers), x=0.5, y=0.0, z=0.0, wrench=[0, 0, 100, 0, 0, 0],
+                      plane=None, uncertainty=True)  # fmt: skip
+    assert ds.deflection_std.item() == pytest.approx(relative * ds.deflection.item(), rel=1e-4)
+    assert ds.attrs["uncertainty_left_out"] == ""
+
+
 def test_bad_requests() -> None:
+    with pytest.raises(StiffmapError, match=r"'cantilever' have none that a map.*arm\.drive/home"):
+        uncertain_numbers(sm.load_machine(BEAM % ("{value: 0, u: 1}", "500", ROUND, MODULUS)))
     exact = sm.load_machine("tripteron")
     with pytest.raises(StiffmapError, match=r"uncertainty: the numbers of machine 'tripteron' have none"):
         sm.error_map(exact, x=0.5, y=0.5, z=0.5, wrench=[0, 0, 1.0, 0, 0, 0], uncertainty=True)

@@ -12,7 +12,7 @@ import scipy.linalg
 from scipy.interpolate import make_interp_spline
 
 import stiffmap as sm
-from stiffmap.model.description import Body, Offset
+from stiffmap.model.description import Body, ExternalSpring, Offset, Point
 from stiffmap.workspace.performance import fastest, line, timed
 from stiffmap.workspace.performance.motion.closing import drive_kinematics
 from stiffmap.workspace.performance.motion.efforts import acceleration_of
@@ -153,6 +153,31 @@ def test_peak_acceleration_at_the_isotropic_point():
     # along x: carriage 5, bars 2 x 2.4 along x; the two other legs' bars swing: half of each carriage end
     mass = 5 + 4.8 + 6 + 2 * 4.8 / 3
     assert float(reached) == pytest.approx(2000 / mass, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("name", "position"),
+    [
+        ("orthoglide-revised", [0.1, 0.05, -0.1]),
+        ("rotary-delta", [0.05, -0.02, -0.68]),
+        ("tripteron", [0.3, 0.4, 0.5]),
+    ],
+)
+def test_drives_hold_springs_without_gravity(name, position):
+    """Virtual work of the spring by hand; the tripteron has no masses at all."""
+    plain = sm.load_machine(name)
+    anchor, p = np.array([0.1, -0.2, 1.5]), np.array(position)
+    spring = ExternalSpring("balancer", "platform.hook", tuple(anchor), 100.0, 0.2)
+    d = plain.description
+    machine = sm.Machine(
+        replace(d, platform=(*d.platform, Point("hook", (0.0, 0.0, 0.0))), external_springs=(spring,))
+    )
+    line = anchor - p
+    pull = 100.0 * (1 - 0.2 / np.linalg.norm(line)) * line
+    found = sm.force_transmission(machine, p, limits=1e4, gravity=[0, 0, 0])
+    j = sm.velocity_transmission(machine, p).jacobian[:3]
+    np.testing.assert_allclose(found.bias, -j.T @ pull, rtol=1e-9, atol=1e-9 * np.abs(pull).max())
+    assert found.force_min < 0.999 * sm.force_transmission(plain, p, limits=1e4, gravity=[0, 0, 0]).force_min
 
 
 def test_time_optimal_path_keeps_all_limits_and_uses_one():

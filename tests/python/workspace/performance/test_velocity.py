@@ -7,7 +7,10 @@ import pytest
 
 import stiffmap as sm
 from stiffmap.model.files.shipped import machine_names
+from stiffmap.solve.starters import machine_text
 from stiffmap.workspace.performance.motion.closing import drive_kinematics
+from stiffmap.workspace.performance.motion.efforts import acceleration_of
+from stiffmap.workspace.performance.motion.inertia import rigid_dynamics
 
 RNG = np.random.default_rng(15)
 
@@ -183,3 +186,75 @@ def test_poses_continued_from_their_starts_alone(name):
     assert (lost.status == sm.Status.UNREACHABLE).all()
     with pytest.raises(sm.StiffmapError, match="only_start: needs start"):
         drive_kinematics(machine, p, only_start=True)
+
+
+ARM = """
+name: arm
+units: {length: mm, force: N, angle: deg}
+home: {translation: [700, 0, 900], solve: true}
+task: [x, y, z]
+legs:
+  arm:
+    elements:
+      - {actuator: j1, kind: revolute, axis: z, compliance: 1.0e-8}
+      - {offset: column, translation: [0, 0, 600]}
+      - {actuator: j2, kind: revolute, axis: -y, home: 70, compliance: 1.2e-8}
+      - {offset: upper, translation: [500, 0, 0]}
+      - {actuator: j3, kind: revolute, axis: y, home: 100, compliance: 3.0e-8}
+      - {offset: fore, translation: [550, 0, 0]}
+"""
+COMMANDED = {
+    "five-bar": [0.03, 0.42, 0.0],
+    "hybrid": [0.02, 0.03, 0.0],
+    ARM: [0.69, 0.02, 0.93],
+    "3-rrr": [0.02, 0.01, 0],
+}
+
+
+@pytest.mark.parametrize("name", COMMANDED, ids=lambda name: name.strip().partition("\n")[0])
+def test_speeds_in_a_plane_are_the_slopes_of_the_drives(name):
+    """What the closure decides, as the turn of a forearm, is free: rates by central differences of inverse kinematics."""
+    machine = sm.load_machine(machine_text(name, "planar", {}) if name == "3-rrr" else name)
+    p = np.array(COMMANDED[name])
+    if name in ("hybrid", "3-rrr"):
+        p += machine.description.home.p
+    steps = 1e-6 * np.eye(3)[:2]
+    ahead, behind = (sm.inverse_kinematics(machine, p + s * steps).actuators for s in (1, -1))
+    rates = (ahead - behind).T / 2e-6
+    angle = np.linspace(0, 2 * np.pi, 7201)
+    radius = 1 / np.abs(rates @ [np.cos(angle), np.sin(angle)]).max(axis=0)
+    found = sm.velocity_section(machine, p)
+    assert found.inner == pytest.approx(radius.min(), rel=1e-5)
+    assert found.outer == pytest.approx(radius.max(), rel=2e-3)
+
+
+@pytest.mark.parametrize("name", ["five-bar", "hybrid", "orthoglide-revised"])
+def test_acceleration_asks_a_drive_for_all_it_has(name):
+    machine, most = sm.load_machine(name), 50.0
+    commanded = [i for i, c in enumerate("xyz") if c in machine.description.task]
+    k = drive_kinematics(machine, machine.description.home.p + np.array([0.01, 0.02, 0.0]))
+    reached = float(acceleration_of(machine, k, efforts=most, gravity=[0, 0, 0]))
+    away = np.zeros((4000, 6))
+    away[:, commanded] = np.random.default_rng(0).normal(size=(4000, len(commanded)))
+    away *= reached / np.linalg.norm(away, axis=1)[:, None]
+    still = np.zeros_like(away)
+    efforts = rigid_dynamics(machine, np.tile(k.coordinates, (4000, 1)), still, away, still, [0, 0, 0])[
+        "effort"
+    ]
+    assert 0.98 * most < np.abs(efforts).max() <= (1 + 1e-9) * most
+
+
+@pytest.mark.parametrize(("name", "plane"), [("3-rps", "xy"), ("five-bar", "xz"), ("swing-table", "xy")])
+def test_planes_that_are_not_commanded_have_no_speed(name, plane):
+    machine = sm.load_machine(name)
+    with pytest.raises(sm.StiffmapError, match=rf"{name}: plane: expected commanded axes .*got {plane}"):
+        sm.velocity_section(machine, machine.description.home.p, plane=plane)
+    held = sm.force_transmission(
+        machine, machine.description.home.p, plane=plane, limits=1.0, gravity=[0, 0, 0]
+    ).plane
+    assert held.outer == np.inf and held.inner > 0.5  # legs hold across what drives move
+
+
+def test_a_pose_that_drives_do_not_hold_has_no_force():
+    held = sm.force_transmission("hexapod", [0, 0, 0.7], limits=1.0, gravity=[0, 0, -9.81]).plane
+    assert held.inner == 0.0 and held.outer == 0.0

@@ -10,9 +10,9 @@ from functools import partial
 import numpy as np
 
 from stiffmap.workspace.maps.inputs import plane_axes
-from stiffmap.workspace.performance.motion.closing import drive_values
+from stiffmap.workspace.performance.motion.closing import commanded_axes, commanded_jacobian, drive_values
 from stiffmap.workspace.performance.motion.efforts import acceleration_of, held_forces
-from stiffmap.workspace.performance.motion.many_drives import inner_radius
+from stiffmap.workspace.performance.motion.many_drives import inner_radius, inverse_rows
 from stiffmap.workspace.performance.motion.velocity import accuracy_of, distances
 from stiffmap.workspace.performance.registry import Case, Found, Measure, over_poses
 
@@ -48,7 +48,8 @@ def singularity(case: Case) -> Found:
 def velocity(case: Case) -> Found:
     """Over all poses of the box, drives within the speeds that the machine file declares."""
     speeds = drive_values(case.machine, "speed", None, "m/s or rad/s")
-    rates = case.inverse[..., list(plane_axes(case.plane))]
+    j, axes = commanded_jacobian(case.machine, case.kinematics), commanded_axes(case.machine, case.plane)
+    rates = inverse_rows(j)[..., axes]
     return over_poses(case.positions, inner_radius(rates, speeds), "high")
 
 

@@ -12,11 +12,12 @@ from stiffmap.common.broadcasting import Floats, batch, one_of, real_array, rows
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import place_text
 from stiffmap.model.description import Drive
+from stiffmap.model.description.machine import TASK
 from stiffmap.model.description.tree import joints
 from stiffmap.solve.closing import commanded
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.status import Status
-from stiffmap.workspace.maps.inputs import magnitude
+from stiffmap.workspace.maps.inputs import magnitude, plane_axes
 from stiffmap.workspace.performance.motion.many_drives import FLAT, drive_weights, of_motions
 
 PARTS = {"all": slice(0, 6), "translation": slice(0, 3), "rotation": slice(3, 6)}
@@ -85,6 +86,24 @@ def weighted(machine: Machine, jacobian: Floats, length: float, part: str) -> Fl
     out[..., 3:, :] *= length
     out[..., revolute_drives(machine)] /= length
     return out[..., PARTS[part], :]
+
+
+def commanded_jacobian(machine: Machine, k: DriveKinematics) -> Floats:
+    """(..., 6, drives) Jacobian without the motions that the closure decides: their rows are zero. Rotations about the axes of the tcp."""
+    out = k.jacobian.copy()
+    out[..., 3:, :] = np.swapaxes(k.rotation, -1, -2) @ out[..., 3:, :]
+    out[..., [name not in machine.description.task for name in TASK], :] *= 0.0
+    return out
+
+
+def commanded_axes(machine: Machine, plane: str) -> list[int]:
+    """Indices of the axes of a plane; StiffmapError where one of them is not commanded."""
+    axes, task = list(plane_axes(plane)), machine.description.task
+    if any(TASK[i] not in task for i in axes):
+        raise StiffmapError(
+            f"{machine.name}: plane: expected commanded axes ({', '.join(task)}), got {plane}"
+        )
+    return axes
 
 
 CHUNK = 16_384  # poses that are solved at once

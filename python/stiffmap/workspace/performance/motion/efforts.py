@@ -19,6 +19,7 @@ from stiffmap.workspace.maps.inputs import plane_axes
 from stiffmap.workspace.performance.motion.closing import (
     DriveKinematics,
     characteristic_length,
+    commanded_jacobian,
     declared,
     drive_kinematics,
     drive_limits,
@@ -41,6 +42,7 @@ from stiffmap.workspace.performance.motion.inertia import (
     rigid_dynamics,
 )
 from stiffmap.workspace.performance.motion.many_drives import (
+    NOTHING,
     Polygon,
     inner_radius,
     inverse_rows,
@@ -144,7 +146,7 @@ def acceleration_of(
     efforts: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
 ) -> Floats:
-    """(...) m/s²: acceleration of the tool that the drives reach in every direction, from rest, orientation kept.
+    """(...) m/s²: acceleration of the tool that the drives reach in every commanded direction, from rest, commanded turns kept.
 
     efforts: limits of the drives, N or N·m (one or one each); None: the machine file's. Gravity counts
     against them. StiffmapError where masses are missing.
@@ -158,7 +160,7 @@ def acceleration_of(
     flat = k.coordinates.reshape(-1, k.coordinates.shape[-1])
     zero = np.zeros((len(flat), 6))
     mass = rigid_dynamics(machine, flat, zero, zero, zero, np.zeros(3))["mass"].reshape((*shape, n, n))
-    needed = mass @ inverse_rows(k.jacobian)[..., :3]  # effort per acceleration of the TCP
+    needed = mass @ inverse_rows(commanded_jacobian(machine, k))[..., :3]
     return inner_radius(needed, most, bias)
 
 
@@ -202,7 +204,7 @@ def force_transmission(
     the machine exerts). Limits: ``declared`` in the machine file, ``unit``, or numbers (N, N·m).
 
     gravity
-        (3,) m/s²; None: what the machine file says. Its efforts count against the limits.
+        (3,) m/s²; None: what the machine file says. Its efforts and those of springs count against the limits.
     velocity
         (..., 3) m/s of the TCP, no acceleration, no rotation: inertia and friction at that speed count
         against the limits too; None: at rest, without friction.
@@ -235,7 +237,9 @@ def held_forces(
     """Forces (3,) on the tool that efforts up to `most` (drives,) hold next to those that the machine itself needs."""
     if (h := in_cables(machine, HELD)) is None:
         bias = rest_efforts(machine, k, gravity=gravity, velocity=velocity, sharing=sharing)
-        return -np.swapaxes(k.jacobian[..., :3, :], -1, -2), most, bias  # effort per force on the tool
+        j = np.abs(k.jacobian)
+        exact = np.where(j < NOTHING * j.max(axis=(-2, -1), keepdims=True), 0.0, k.jacobian)
+        return -np.swapaxes(exact[..., :3, :], -1, -2), most, bias  # effort per force on the tool
     if velocity is not None:
         raise StiffmapError(f"{machine.name}: velocity: for cables the force is known at rest alone")
     return held(machine, h, k, PUSHES, most, gravity)

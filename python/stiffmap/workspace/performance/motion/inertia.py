@@ -116,12 +116,10 @@ def rigid_dynamics(
 def rest_efforts(
     machine: Machine, k: DriveKinematics, *, gravity: ArrayLike | None, velocity: ArrayLike | None, sharing: str = "least_norm"
 ) -> Floats:  # fmt: skip
-    """(..., drives) efforts at rest under gravity, or at a constant velocity with friction."""
-    shape, drives = k.status.shape, k.actuators.shape[-1]
-    g = machine.compiled.gravity(gravity)
-    if velocity is None and not g.any():
-        return np.where(np.isnan(k.actuators), np.nan, 0.0)
-    need_masses(machine, "gravity" if velocity is None else "motion")
+    """(..., drives) efforts at rest against gravity and springs, or at a constant velocity with friction."""
+    shape, g = k.status.shape, machine.compiled.gravity(gravity)
+    if velocity is not None or g.any():
+        need_masses(machine, "gravity" if velocity is None else "motion")
     flat = k.coordinates.reshape(-1, k.coordinates.shape[-1])
     twist = np.zeros((len(flat), 6))
     if velocity is not None:
@@ -131,10 +129,8 @@ def rest_efforts(
         twist[:, :3] = rows(v, shape, (3,))
     zero = np.zeros_like(twist)
     out = rigid_dynamics(machine, flat, twist, zero, zero, g, sharing=sharing)
-    effort = out["effort"]
-    if velocity is not None:
-        effort = effort + friction_efforts(machine, out["rate"])
-    return effort.reshape((*shape, drives))
+    effort = out["effort"] + friction_efforts(machine, out["rate"])  # none at rest
+    return effort.reshape(k.actuators.shape)
 
 
 @short_repr
@@ -213,12 +209,12 @@ def held(
     machine: Machine, h: Hanging, k: DriveKinematics, columns: Floats, most: Floats, gravity: ArrayLike | None
 ) -> Held:
     """Coordinates v of a wrench, columns (..., 6, c) times v, that tensions from 0 to `most` (cables,) N hold at poses
-    next to the weight. The tensions' wrenches fill a zonotope, whose facets are the rows."""
+    next to weight and springs. The tensions' wrenches fill a zonotope, whose facets are the rows."""
     if len(most) < len(h.rows):
         raise StiffmapError(
             f"{machine.name}: {len(most)} cables for {len(h.rows)} freedoms hold no force in every direction"
         )
-    load = weight(h, k.rotation, machine.compiled.gravity(gravity))
+    load = weight(h, k.position, k.rotation, machine.compiled.gravity(gravity))
     wanted, _ = scaled(h, columns, load)
     a, load = scaled(h, matrix(*lines(h, k.position, k.rotation)), load)
     normals, distance = sides(a * (most / 2), len(h.rows))

@@ -45,9 +45,6 @@ def inverse_rows(j: Floats) -> Floats:
     """(..., drives, rows) pseudo-inverse: drive rates of a twist that the machine can do; NaN stays NaN."""
     out = np.full((*j.shape[:-2], j.shape[-1], j.shape[-2]), np.nan)
     ok = np.isfinite(j).all(axis=(-2, -1))
-    if j.shape[-1] > j.shape[-2]:
-        out[ok] = np.linalg.pinv(j[ok])
-        return out
     a = j[ok]
     t = np.swapaxes(a, -1, -2)
     gram = t @ a
@@ -102,6 +99,7 @@ def section_polygon(
     half, room, inner, toward = _nearest_border(rows, limits, bias)
     points = _crossings(half, room, 2 * n)
     vertices, outer, best = _ordered(points)
+    outer = np.where(np.isnan(vertices).all(axis=(-2, -1)) & (inner > 0.0), np.inf, outer)  # a strip
     bad = np.asarray(~np.isfinite(rows).all(axis=(-2, -1)))
     vertices = np.where(bad[..., None, None], np.nan, vertices)
     weakest = np.arctan2(toward[..., 1], toward[..., 0])

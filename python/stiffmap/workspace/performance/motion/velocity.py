@@ -20,6 +20,8 @@ from stiffmap.workspace.maps.inputs import plane_axes
 from stiffmap.workspace.performance.motion.closing import (
     DriveKinematics,
     characteristic_length,
+    commanded_axes,
+    commanded_jacobian,
     drive_kinematics,
     drive_limits,
     drive_values,
@@ -174,18 +176,18 @@ def velocity_section(
     limits: ArrayLike | str = "unit",
     threads: int | None = None,
 ) -> Polygon:
-    """Velocities that the TCP reaches in a plane, all other components of its twist zero (Figure 1c).
+    """Velocities that the TCP reaches in a plane, all other components of its twist that are commanded zero (Figure 1c).
 
     The polygon's vertices (..., 2 drives, 2), inner radius (the speed reached in every direction) and
     outer radius; m/s with ``limits="declared"`` or numbers, else per unit speed of the drives.
+    Raises StiffmapError for bad input and for a plane that the machine's task does not command, never for a pose.
     """
     k = drive_kinematics(machine, position, rotation, threads=threads)
     speeds = drive_limits(machine, "speed", limits, "m/s or rad/s")
-    j = weighted(machine, k.jacobian, 1.0, "all")
-    axes = list(plane_axes(plane))
+    j, axes = commanded_jacobian(machine, k), commanded_axes(machine, plane)
     if machine.compiled.redundancy:
         rank = _rank(of_motions(k.together, singular_values(j), machine.compiled.redundancy)[0])
-        rows, most = sides(k.jacobian * speeds, rank)
+        rows, most = sides(j * speeds, rank)
         return section_polygon(rows[..., axes], most, k.status)
     return section_polygon(inverse_rows(j)[..., axes], speeds, k.status)
 
