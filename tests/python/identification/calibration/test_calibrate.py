@@ -282,3 +282,21 @@ def test_a_minimal_set_spans_what_the_readings_determine() -> None:
     kept = independent(columns.T @ columns)
     assert len(kept) == 3 and 4 not in kept
     assert np.linalg.matrix_rank(columns[:, kept]) == 3
+
+
+@pytest.mark.parametrize("command", ["residual", "calibrate", "monitor"])
+def test_rows_out_of_reach_are_said_wherever_they_are_missed(
+    command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    _, data, _ = drawn("ur10", 3, poses=6)
+    far = data.position.copy()
+    far[0, 0] = 5.0
+    folder = str(tmp_path / "e")
+    save_experiment(replace(data, position=far), folder)
+    more = {"monitor": [folder, "--effect", "zero_offset elbow error=0mrad"]}.get(command, [])
+    said = "the machine has no equilibrium at 1 row"
+    main([command, "ur10", folder, *more])
+    assert f"left out: {said}" in capsys.readouterr().out
+    main([command, "ur10", folder, *more, "--json"])
+    found = json.loads(capsys.readouterr().out)
+    assert any(said in text for text in found.get("left_out", found.get("limitations")))
