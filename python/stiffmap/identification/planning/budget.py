@@ -106,8 +106,7 @@ def budgets(
             if not (u := real_number(given[p.name], f"others: {p.name}")) >= 0.0:
                 raise refused(f"others: {p.name}", "a standard uncertainty, 0 or more", f"{u:g}")
             shifts.append((f"{term.kind} of {term.element}: {p.name}", u, inverse @ move))
-    form = float(np.sqrt(max(0.0, found.misfit**2 - 1.0)))
-    freedom = float(max(found.freedom, 1))
+    form, freedom = float(np.sqrt(max(0.0, found.misfit**2 - 1.0))), float(max(found.freedom, 1))
     out = []
     for k, (name, unit, value) in enumerate(zip(found.names, found.units, found.values, strict=True)):
         sigma = float(found.sigma[k])
