@@ -88,7 +88,8 @@ def _tests(hint: Any) -> Iterator[Test]:
     ):
         yield lambda v: isinstance(v, origin), f"a{'n' * (origin.__name__[0] in 'AEIOU')} {origin.__name__}"
     elif origin is Sequence and hint not in (Sequence[float], Sequence[str]):  # arrays are numbers too
-        of = [test for test, _ in _tests(*inner)]
-        yield lambda v: isinstance(v, Collection) and all(any(_fits(t, e) for t in of) for e in v), "several"
+        of = [*_tests(*inner)]
+        each = f"several, each {' or '.join(words for _, words in of)}"
+        yield lambda v: isinstance(v, Collection) and all(any(_fits(t, e) for t, _ in of) for e in v), each
     else:
         yield PLAIN.get(hint) or PLAIN[origin]

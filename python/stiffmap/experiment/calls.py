@@ -26,7 +26,7 @@ from stiffmap.model.effects import parse_effect
 from stiffmap.model.effects.apply import place_of
 from stiffmap.model.effects.registry import get
 from stiffmap.model.files.load import Source
-from stiffmap.solve.machine import Machine, as_machine
+from stiffmap.solve.machine import Machine, as_machine, takes_machine
 
 Effects = str | AppliedEffect | Sequence[str | AppliedEffect]
 UNKNOWN = 1e-4
@@ -80,6 +80,15 @@ def residual(
         checks(e, e.reading, noise.sigma, ~out),
         [*limitations(e, noise, m), *([] if late is None else [str(late)])],
     )
+
+
+@takes_machine
+def predict(machine: Machine, experiment: Experiment | str | PathLike[str], terms: Effects = ()) -> Floats:
+    """(n, c) m, rad: what the instrument would show of a machine with `terms`, effects as text or records, added.
+
+    Raises StiffmapError for bad input, an unknown point or effect.
+    """
+    return Predictor(machine, as_experiment(experiment))(effects_of(machine, terms, "terms"))
 
 
 def _predicted(

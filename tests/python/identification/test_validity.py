@@ -90,7 +90,7 @@ def test_compensation_marks_rows_and_check_says_worse(
     said = json.loads(capsys.readouterr().out)
     assert said["verdict"].startswith("worse")
     assert said["rows beyond what the machine was calibrated by"] == "12 of 12"
-    assert said["promised by the file, mm"].startswith("0.05 ± 0.004 rms")
+    assert said["promised by the file, mm"].startswith("0.050 ± 0.004 rms")
     q = np.vstack([plan_at(0.0, 1).joints, other.joints])  # type: ignore[list-item]
     found = compensate(wrong, actuators=q, wrench=FORCE / 2)
     assert found.beyond is not None and list(found.beyond) == [False] * 12 + [True] * 12

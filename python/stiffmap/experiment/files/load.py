@@ -228,7 +228,8 @@ def _promise(reading: Floats, channels: tuple[Channel, ...], table: Table, parts
 def _wrench(model: ExperimentFile, table: Table) -> Floats:
     if model.quantity == "deflection" and not table.one_of(WRENCH):
         raise MissingColumnError(
-            "missing column: a deflection needs a load (fx, fy, fz, mx, my, mz)", file=table.file
+            "missing column: a deflection needs a load (fx, fy, fz, mx, my, mz), a position none",
+            file=table.file,
         )
     return table.block(WRENCH, blank=False, missing=0.0)
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from stiffmap.common.arguments import checked
 from stiffmap.common.outputs import make_folder, number_cells, putting, write_rows, write_text
 from stiffmap.common.yaml_text import text_of
 from stiffmap.experiment.experiment import ASKED, AXES, WRENCH, Channel, Experiment, Floats, Loop
@@ -20,6 +21,7 @@ MM = 1e3
 PLAIN = {"unloaded": "centre", "frame": "known", "tool": "known"}
 
 
+@checked
 def save_experiment(experiment: Experiment, folder: str | PathLike[str], title: str = "") -> None:
     """Write the folder; raises `FileError` where it cannot be written."""
     columns = _columns(experiment)

@@ -9,6 +9,8 @@ from functools import partial
 
 import numpy as np
 
+from stiffmap.common.arguments import checked
+from stiffmap.common.broadcasting import instance_of
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.fingerprints import code, digest
 from stiffmap.common.kept import MOST_BYTES, Kept
@@ -36,9 +38,13 @@ class Predictor:
     machine
         The declared machine; `terms` of a call come on top of the effects that it already has. Of these, too, the rows say what
         its file leaves open: the temperature, the branch.
+
+    Raises StiffmapError for an unknown point, joint or effect, and for what is no machine or experiment.
     """
 
     def __init__(self, machine: Machine, experiment: Experiment, *, threads: int | None = None) -> None:
+        instance_of(machine, Machine, "machine", "a Machine")
+        instance_of(experiment, Experiment, "experiment", "an Experiment")
         check_points(machine, experiment)
         check_joints(machine, experiment)
         self.threads = threads
@@ -53,6 +59,7 @@ class Predictor:
         self._set_aside()
         self._close_from_here()
 
+    @checked
     def __call__(self, terms: Sequence[AppliedEffect] = ()) -> Floats:
         """(n, c) m, rad predicted readings; NaN where a pose fails."""
         mechanical, load = _parts(terms)
@@ -209,14 +216,6 @@ class Predictor:
         out, solved = motions(self.with_terms(terms), plan, self.threads)
         self.solved += solved
         return out
-
-
-def predict(machine: Machine, experiment: Experiment, terms: Sequence[AppliedEffect] = ()) -> Floats:
-    """(n, c) m, rad: what the instrument would show of a machine with `terms` added.
-
-    Raises StiffmapError for an unknown point or effect.
-    """
-    return Predictor(machine, experiment)(terms)
 
 
 def true_wrench(experiment: Experiment, terms: Iterable[AppliedEffect]) -> Floats:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from stiffmap.common.arguments import checked
 from stiffmap.common.broadcasting import (
     instance_of,
     one_of,
@@ -23,7 +24,7 @@ from stiffmap.experiment.channels import AXES, AXIS_CHANNELS, Channel
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.readings.library.distance_and_height import DISTANCE
 from stiffmap.solve.kinematics import forward_kinematics, inverse_kinematics
-from stiffmap.solve.machine import Machine, as_machine
+from stiffmap.solve.machine import Machine, as_machine, takes_machine
 from stiffmap.workspace.maps.inputs import magnitude
 
 MICRO = {"deflection": 3e-6, "position": 8e-6}
@@ -145,6 +146,8 @@ def _each(loads: Floats | Sequence[Floats], number: int) -> list[Floats]:
     return each
 
 
+@takes_machine
+@checked
 def random_plan(
     machine: Machine,
     quantity: str = "deflection",
@@ -162,12 +165,14 @@ def random_plan(
         Largest force, N; the others are 5/8 and 1/4 of it.
     noise
         One standard deviation of a reading, m; None: 3 µm for deflections, 8 µm for positions.
+
+    Raises StiffmapError for bad input.
     """
     rng = random_numbers(seed)
     low, high = machine.workspace
-    where = np.round(rng.uniform(low, high, (poses, 3)), 4)
-    every = load_set("axes", [0.25 * force, 0.625 * force, force])
-    own = [every[rng.permutation(len(every))[: min(loads, len(every))]] for _ in range(poses)]
+    where = np.round(rng.uniform(low, high, (whole_number(poses, "poses", 1), 3)), 4)
+    every = load_set("axes", np.multiply([0.25, 0.625, 1.0], magnitude(force, "force", "N")).tolist())
+    own = [every[rng.permutation(len(every))[: whole_number(loads, "loads", 1)]] for _ in range(poses)]
     return plan_of_poses(machine, quantity, where, own, repeats=repeats, noise=noise)
 
 

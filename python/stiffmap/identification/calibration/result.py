@@ -140,6 +140,7 @@ class Calibration:
         out.append(f"holds where it was read: {self.validity}")
         if self.over_time is not None:
             out.append(str(self.over_time))
+        out += [f"left out: {text}" for text in self.experiment.out_of_reach]
         if self.rest:
             out.append(f"left: {self.rest}")
         return out + set_aside(self.outliers, self.swapped)
@@ -171,6 +172,7 @@ class Calibration:
         out["beyond"], out["table"] = plain(self.beyond), plain(self.rows)
         out["travel"] = plain(self.profiles)
         out["failed"] = [list(f) for f in self.failed]
+        out["left_out"] = list(self.experiment.out_of_reach)
         return out
 
     def __str__(self) -> str:

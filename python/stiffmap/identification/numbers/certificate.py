@@ -4,11 +4,11 @@ figures: its scale, and a frame that is known but for an uncertainty."""
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from stiffmap.common.broadcasting import instance_of
+from stiffmap.common.broadcasting import instance_of, real_number, refused
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.noise.nuisance import nuisance_columns
 from stiffmap.experiment.setups import setups_of
@@ -38,7 +38,7 @@ class Tolerances:
     tool
         The point that is read, in the tool's axes (m).
     frame, frame_direction
-        Place and turn of an instrument's frame that the experiment calls known (m, rad); 0: exact.
+        Place and turn of an instrument's frame that the experiment calls known (m, rad); 0: exact. StiffmapError below 0.
     """
 
     position: float = 2e-4
@@ -55,19 +55,22 @@ class Tolerances:
     frame: float = 0.0
     frame_direction: float = 0.0
 
+    def __post_init__(self) -> None:
+        for name, u in vars(self).items():
+            if not 0.0 <= real_number(u, name) < np.inf:
+                raise refused(name, "a standard uncertainty, 0 or more", str(u))
+
     def scaled(self, factor: float) -> Tolerances:
-        """All but the instrument's own, times a factor."""
-        own = ("instrument", "frame", "frame_direction")
-        names = [f.name for f in fields(self) if f.name not in own]
-        return replace(self, **{name: getattr(self, name) * factor for name in names})
+        """All but the instrument's own, times a factor; StiffmapError for one below 0."""
+        own, by = ("instrument", "frame", "frame_direction"), real_number(factor, "factor")
+        return replace(self, **{name: u * by for name, u in vars(self).items() if name not in own})
 
 
 def certified(tolerances: Tolerances | None, experiment: Experiment) -> Tolerances:
     """The tolerances with what the experiment's certificate says in place of the instrument's."""
     t: Tolerances = instance_of(tolerances or Tolerances(), Tolerances, "tolerances", "Tolerances")
-    given = dict(experiment.certificate)
     named = {"scale": "instrument", "tool": "tool", "frame": "frame", "frame_direction": "frame_direction"}
-    return replace(t, **{named[k]: v for k, v in given.items()})
+    return replace(t, **{named[k]: v for k, v in experiment.certificate})
 
 
 def scaled(description: MachineDescription, share: float) -> AppliedEffect:

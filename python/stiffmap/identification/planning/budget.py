@@ -8,16 +8,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from os import PathLike
 
 import numpy as np
 
+from stiffmap.common.arguments import checked
+from stiffmap.common.broadcasting import instance_of, real_number, refused
 from stiffmap.common.errors import StiffmapError
+from stiffmap.experiment.calls import as_experiment, effects_of
 from stiffmap.experiment.experiment import Experiment
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.identification.planning.estimate import Estimate, fitted, slopes
 from stiffmap.model.description import AppliedEffect
-from stiffmap.solve.machine import Machine
+from stiffmap.solve.machine import Machine, takes_machine
 
+PAIRS = "pairs of an effect and the standard uncertainties of its numbers"
 K = 2.0
 """Coverage factor."""
 
@@ -65,45 +70,43 @@ class NumberBudget:
         return "\n".join([f"{head}, {self.freedom:.0f} degrees of freedom", *rows])
 
 
+@takes_machine
+@checked
 def budgets(
     machine: Machine,
-    experiment: Experiment,
+    experiment: Experiment | str | PathLike[str],
     found: Estimate,
-    others: Sequence[tuple[AppliedEffect, Mapping[str, float]]] = (),
+    others: Sequence[tuple[str | AppliedEffect, Mapping[str, float]]] = (),
 ) -> list[NumberBudget]:
     """A budget for every number of an estimate.
 
-    Parameters
-    ----------
     found
         What `estimate` made of the experiment.
     others
         Effects that were not fitted, and the standard uncertainty (SI) of each of their numbers: dimensions of
         the machine, figures of an instrument's certificate. Each adds what it would have moved the fit by.
 
-    Notes
-    -----
     Lines: noise of the readings (A), misfit beyond noise (model form: what the residuals show above
     it, spread over the readings), and one per number of `others` (B).
 
-    Raises
-    ------
-    StiffmapError
-        For a number that does not exist.
+    Raises StiffmapError for a number that does not exist, and for an uncertainty below 0.
     """
-    predictor = Predictor(machine, experiment)
+    predictor = Predictor(machine, as_experiment(experiment))
     inverse = np.linalg.pinv(found.jacobian * found.scale) * found.scale[:, None]
     shifts = []
-    for term, given in others:
+    for pair in instance_of(others, Sequence, "others", PAIRS):
+        effect, given = instance_of(pair, tuple, "others", PAIRS)
+        (term,) = effects_of(machine, effect, "others")
         parameters = [p for _, p in fitted(machine.description, (term,)) if p.name in given]
         unknown = set(given) - {p.name for p in parameters}
         if unknown:
             raise StiffmapError(f"budget: {term.kind} has no number '{sorted(unknown)[0]}' at this place")
         moved = slopes(predictor, (*found.terms, term), [(len(found.terms), p) for p in parameters])
         for p, move in zip(parameters, found.problem.white(moved).T, strict=True):
-            shifts.append((f"{term.kind} of {term.element}: {p.name}", float(given[p.name]), inverse @ move))
-    form = float(np.sqrt(max(0.0, found.misfit**2 - 1.0)))
-    freedom = float(max(found.freedom, 1))
+            if not (u := real_number(given[p.name], f"others: {p.name}")) >= 0.0:
+                raise refused(f"others: {p.name}", "a standard uncertainty, 0 or more", f"{u:g}")
+            shifts.append((f"{term.kind} of {term.element}: {p.name}", u, inverse @ move))
+    form, freedom = float(np.sqrt(max(0.0, found.misfit**2 - 1.0))), float(max(found.freedom, 1))
     out = []
     for k, (name, unit, value) in enumerate(zip(found.names, found.units, found.values, strict=True)):
         sigma = float(found.sigma[k])

@@ -162,8 +162,11 @@ def _left(machine: Machine, a: Estimate, b: Estimate, numbers: Floats, residual:
     free = spared.matrix
     kernels, parts = {}, []
     points = ReadingPoints(rows, channel, np.ones(len(rows)))
+    # the hours of one session are not those of the other
+    together = block_diag(*(np.ones((len(r[0]), len(r[0]))) for r in read))
     for kernel in gaps(machine, e, points):
-        shown = white @ kernel.between(points, points) @ white.T
+        shown = kernel.between(points, points) * (together if kernel.kind == "time" else 1.0)
+        shown = white @ shown @ white.T
         size = float(np.sum(free * (shown @ free))) / free.shape[1]
         if size > 0.0:
             kernels[kernel.name] = shown / size

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from stiffmap.common.arguments import checked
 from stiffmap.common.broadcasting import Floats, one_of, random_numbers, trailing, whole_number, wrench_array
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.short import short_repr
@@ -32,7 +33,6 @@ from stiffmap.identification.planning.information import (
     map_weight,
     of_map,
 )
-from stiffmap.model.description import AppliedEffect
 from stiffmap.model.files.load import Source
 from stiffmap.solve.kinematics import inverse_kinematics
 from stiffmap.solve.machine import Machine, as_machine
@@ -193,9 +193,10 @@ def plan(
     )
 
 
+@checked
 def follow(
-    machine: Machine,
-    terms: Sequence[AppliedEffect],
+    machine: Machine | Source,
+    terms: Effects,
     measure: Callable[[Experiment], Experiment],
     *,
     until: float,
@@ -215,10 +216,11 @@ def follow(
     """
     found: list[tuple[int, Estimate]] = []
     data: Experiment | None = None
-    now = tuple(terms)
+    machine = as_machine(machine)
+    now = tuple(effects_of(machine, terms, "terms"))
     while data is None or len(data) < most:
         chosen = plan(machine, now, rows=batch, done=data, seed=seed + len(found), **options)  # type: ignore[arg-type]
-        new = measure(chosen.experiment)
+        new = as_experiment(measure(chosen.experiment))
         data = new if data is None else numbered_anew(joined(data, new))
         result = estimate(machine, data, now)
         found.append((len(data), result))
@@ -243,7 +245,10 @@ def in_limits(machine: Machine, rows: Experiment) -> Experiment:
 
 
 def joined(a: Experiment, b: Experiment) -> Experiment:
-    """The rows of both; what one of them does not record is recorded by neither."""
+    """The rows of both; what one of them does not record is recorded by neither. Raises StiffmapError for different readings."""
+    one, other = (", ".join((e.quantity, *(c.name for c in e.extra))) for e in (a, b))
+    if one != other:
+        raise StiffmapError(f"{b.name}: expected the same readings as in {a.name} ({one}), found {other}")
 
     def both(name: str) -> object:
         one, other = getattr(a, name), getattr(b, name)

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from os import PathLike
 from typing import Any
 
 import numpy as np
 
 from stiffmap.common.broadcasting import Floats
+from stiffmap.common.errors import StiffmapError
 from stiffmap.common.short import short_repr
+from stiffmap.experiment.calls import Effects, as_experiment, effects_of
 from stiffmap.experiment.experiment import Experiment
 from stiffmap.experiment.noise.level import noise_of
 from stiffmap.experiment.noise.whitening import LinearProblem
@@ -19,9 +21,9 @@ from stiffmap.identification.candidates.candidates import words
 from stiffmap.identification.candidates.sensitivity import step_of
 from stiffmap.identification.inference.optimum import covariance, optimum
 from stiffmap.model import effects
-from stiffmap.model.description import AppliedEffect, MachineDescription
+from stiffmap.model.description import MachineDescription
 from stiffmap.model.effects.types import Parameter
-from stiffmap.solve.machine import Machine
+from stiffmap.solve.machine import Machine, takes_machine
 
 STEP = 1e-3
 """Share of a parameter's typical size over which predictions are differenced."""
@@ -78,15 +80,18 @@ class Estimate:
         return [{"name": n, "unit": s, "value": v, "u": u} for n, s, v, u in each]
 
 
-def estimate(machine: Machine, experiment: Experiment, terms: Sequence[AppliedEffect]) -> Estimate:
+@takes_machine
+def estimate(machine: Machine, experiment: Experiment | str | PathLike[str], terms: Effects) -> Estimate:
     """Values of `terms`, which say effects, places and the values to start from.
 
     Raises StiffmapError for terms without a number to fit and for noise that is unknown.
     """
-    predictor = Predictor(machine, experiment)
-    e, begun = predictor.experiment, tuple(terms)
+    begun = tuple(effects_of(machine, terms, "terms"))
+    if not (parameters := fitted(machine.description, begun)):
+        raise StiffmapError("terms: expected at least one effect with a number to fit, got none")
+    predictor = Predictor(machine, as_experiment(experiment))
+    e = predictor.experiment
     problem = LinearProblem.of(e, noise_of(e).sigma, predictor())
-    parameters = fitted(machine.description, begun)
     scale, low, high = (np.array([getattr(p, s) for _, p in parameters]) for s in ("scale", "lower", "upper"))
 
     def at(x: Floats) -> Terms:

@@ -7,6 +7,7 @@ import numpy as np
 import typer
 
 from stiffmap.common.errors import StiffmapError
+from stiffmap.common.number_text import with_uncertainty
 from stiffmap.common.short import first_of
 from stiffmap.experiment.comparison.residual import Summary
 from stiffmap.machining import compensation
@@ -105,7 +106,8 @@ def _checked(m: Machine, folder: Path) -> dict[str, object]:
     found = compensation.check_compensation(m, folder)
     out = _sizes(found.whole)
     if (v := found.validity) is not None and v.error is not None:
-        out[f"promised by the file, m{v.unit}"] = f"{MM * v.error:.4g} ± {MM * v.error_u:.1g} rms ({v})"
+        promised = with_uncertainty(MM * v.error, MM * v.error_u)
+        out[f"promised by the file, m{v.unit}"] = f"{promised} rms ({v})"
     if found.beyond is not None:
         out[BEYOND] = f"{int(found.beyond.sum())} of {len(found.beyond)}"
     if found.there is not None:

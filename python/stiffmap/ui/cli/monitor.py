@@ -3,11 +3,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.experiment import load_experiment
 from stiffmap.identification.diagnosis.report.result import diagnosed
 from stiffmap.identification.planning.budget import budgets
 from stiffmap.identification.planning.changes import monitor
-from stiffmap.solve.machine import load_machine
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.options import argument, option
 from stiffmap.ui.cli.output import Answer
@@ -30,11 +28,10 @@ def command(
       [cyan]stiffmap monitor orthoglide-revised january june --effect 'dead_zone actuator y half_width=10um'[/cyan]
       [cyan]stiffmap monitor orthoglide-revised january june --diagnosis january/diagnosis.json --budget[/cyan]
     """
-    m = load_machine(machine)
     terms = [*(effect or ()), *(diagnosed(diagnosis) if diagnosis else ())]
     if not terms:
         raise StiffmapError("monitor: name what to follow, by --effect or --diagnosis")
-    found = monitor(m, before, after, terms)
-    now = budgets(m, load_experiment(after), found.second) if budget else []
+    found = monitor(machine, before, after, terms)
+    now = budgets(machine, after, found.second) if budget else []
     data = found.as_plain() | ({"budgets": now} if budget else {})
     return Answer(data, [str(found), *map(str, now)], finding=not found.common)

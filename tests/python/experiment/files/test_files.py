@@ -54,7 +54,7 @@ def test_decimal_commas_are_those_of_numbers_alone(tmp_path: Path) -> None:
         (HEAD, ROWS.replace(",dx\n", ",rx\n"), ["'angle' is not declared"]),
         (HEAD, ROWS.replace("3,10,0,0,100,0,0,\n", "3,10,0\n"), ["line 4", "expected 8 values"]),
         (HEAD.replace("deflection", "distance"), ROWS, ["quantity"]),
-        (HEAD, "id,x,y,z,dx\n1,0,0,0,0.1\n", ["needs a load"]),
+        (HEAD, "id,x,y,z,dx\n1,0,0,0,0.1\n", ["needs a load", "a position none"]),
         (HEAD + "colour: red\n", ROWS, ["unknown key 'colour'"]),
     ],
 )

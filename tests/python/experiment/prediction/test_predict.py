@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import stiffmap as sm
-from stiffmap.experiment import Predictor, predict, random_plan, simulate
+from stiffmap.experiment import Predictor, predict, random_plan, save_experiment, simulate
+from stiffmap.experiment.calls import placed
 from stiffmap.experiment.experiment import numbered
 from stiffmap.experiment.noise.checks import checks
 from stiffmap.experiment.noise.level import noise_of
@@ -162,3 +165,42 @@ def test_numbers_of_rows_are_those_of_sorted_different_rows() -> None:
     plain = np.hstack([np.round(np.nan_to_num(key, nan=9.0), 9) + 0.0, (np.array(words) == "up")[:, None]])
     np.testing.assert_array_equal(number, np.unique(plain, axis=0, return_inverse=True)[1].reshape(-1))
     assert numbered([np.array([-0.0, 0.0, 1e-12])]).tolist() == [0, 0, 0]
+
+
+TEXT = "compliance actuator x scale=1.5"
+WRONG: dict[str, Callable[[sm.Machine, sm.Experiment], object]] = {
+    "expected a machine: .* got int": lambda m, e: predict(3, e),  # type: ignore[arg-type]
+    "experiment: expected an Experiment, or its folder, got ndarray": lambda m, e: predict(m, e.reading),  # type: ignore[arg-type]
+    "terms: expected effects, .* got NoneType": lambda m, e: predict(m, e, None),  # type: ignore[arg-type]
+    "machine: expected a Machine, got 'ur10'": lambda m, e: Predictor("ur10", e),  # type: ignore[arg-type]
+    "experiment: expected an Experiment, got 'folder'": lambda m, e: Predictor(m, "folder"),  # type: ignore[arg-type]
+    "terms: expected several, each an AppliedEffect, got 'comp": lambda m, e: Predictor(m, e)(TEXT),  # type: ignore[arg-type]
+    "terms: expected several, each an AppliedEffect, got None": lambda m, e: Predictor(m, e)(None),  # type: ignore[arg-type]
+    "poses: expected 1 or more, got 0": lambda m, e: random_plan(m, poses=0),
+    "poses: expected a whole number, got '3'": lambda m, e: random_plan(m, poses="3"),  # type: ignore[arg-type]
+    "loads: expected 1 or more, got -1": lambda m, e: random_plan(m, loads=-1),
+    "force: expected a positive number .N., got 0": lambda m, e: random_plan(m, force=0.0),
+    "force: expected a number, got list": lambda m, e: random_plan(m, force=[400.0]),  # type: ignore[arg-type]
+    "experiment: expected an Experiment, got None": lambda m, e: save_experiment(None, "there"),  # type: ignore[arg-type]
+    "folder: expected text or a path, got None": lambda m, e: save_experiment(e, None),  # type: ignore[arg-type]
+}
+
+
+@pytest.mark.parametrize("message", WRONG)
+def test_what_is_no_input_is_refused_by_name(machine: sm.Machine, plan: sm.Experiment, message: str) -> None:
+    with pytest.raises(sm.StiffmapError, match=message):
+        WRONG[message](machine, plan)
+
+
+def test_names_folders_and_texts_serve_as_well(
+    machine: sm.Machine, plan: sm.Experiment, tmp_path: Path
+) -> None:
+    wanted = predict(machine, plan, [placed(machine, TEXT)])
+    save_experiment(simulate(machine, plan), tmp_path / "e")
+    for m, e, terms in (
+        (machine, plan, TEXT),
+        ("orthoglide-revised", plan, [TEXT]),
+        (machine, tmp_path / "e", TEXT),
+    ):
+        np.testing.assert_allclose(predict(m, e, terms), wanted, atol=1e-9)  # type: ignore[arg-type]
+    assert random_plan("orthoglide-revised", poses=2).machine == machine.name

@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from stiffmap.experiment import random_plan
-from stiffmap.experiment.prediction.predict import predict
+from stiffmap.experiment import predict, random_plan
 from stiffmap.model.description import Block, Branch, Element, Joint, Law, Leg, MachineDescription, Pose
 from stiffmap.solve.machine import Machine
 

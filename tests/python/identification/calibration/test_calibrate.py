@@ -282,3 +282,36 @@ def test_a_minimal_set_spans_what_the_readings_determine() -> None:
     kept = independent(columns.T @ columns)
     assert len(kept) == 3 and 4 not in kept
     assert np.linalg.matrix_rank(columns[:, kept]) == 3
+
+
+@pytest.mark.parametrize("command", ["residual", "calibrate", "monitor"])
+def test_rows_out_of_reach_are_said_wherever_they_are_missed(
+    command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    _, data, _ = drawn("ur10", 3, poses=6)
+    far = data.position.copy()
+    far[0, 0] = 5.0
+    folder = str(tmp_path / "e")
+    save_experiment(replace(data, position=far), folder)
+    more = {"monitor": [folder, "--effect", "zero_offset elbow error=0mrad"]}.get(command, [])
+    said = "the machine has no equilibrium at 1 row"
+    main([command, "ur10", folder, *more])
+    assert f"left out: {said}" in capsys.readouterr().out
+    main([command, "ur10", folder, *more, "--json"])
+    found = json.loads(capsys.readouterr().out)
+    assert any(said in text for text in found.get("left_out", found.get("limitations")))
+
+
+@pytest.mark.parametrize("wrong", [-1e-4, float("nan"), float("inf"), "1e-4", None])
+@pytest.mark.parametrize("name", ["position", "gain", "frame"])
+def test_a_tolerance_is_a_size(name: str, wrong: float) -> None:
+    with pytest.raises(sm.StiffmapError, match=f"{name}: expected"):
+        Tolerances(**{name: wrong})
+    with pytest.raises(sm.StiffmapError, match="expected"):
+        Tolerances().scaled(wrong if wrong != "1e-4" else float("-inf"))
+
+
+def test_no_endless_tolerance_at_the_command_line(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    for factor in ("inf", "nan"):
+        assert main(["calibrate", "ur10", str(tmp_path), "--tolerance", factor]) == 2
+    assert "position: expected a standard uncertainty, 0 or more, got inf" in capsys.readouterr().err

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,9 +13,13 @@ import pytest
 import stiffmap as sm
 from stiffmap.experiment import random_plan, save_experiment, simulate
 from stiffmap.experiment.calls import placed
+from stiffmap.experiment.channels import Channel
+from stiffmap.experiment.virtual.plans import with_distances, with_joints
+from stiffmap.identification.diagnosis.report.result import diagnosed
 from stiffmap.identification.planning.budget import BudgetLine, NumberBudget, budgets
 from stiffmap.identification.planning.changes import monitor as compare
-from stiffmap.identification.planning.estimate import estimate
+from stiffmap.identification.planning.design import follow
+from stiffmap.identification.planning.estimate import Estimate, estimate
 from stiffmap.ui.cli.app import main
 
 
@@ -73,6 +78,105 @@ def test_the_command_line(
     (tmp_path / "d.json").write_text("[]")
     assert main([*both, "--diagnosis", str(tmp_path / "d.json")]) == 2
     assert "d.json" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("name", "found"),
+    [
+        ("orthoglide-revised", ("compliance", "actuator", ["z"], {"scale": 1.2, "value": 1.69e-7})),
+        ("orthoglide-revised", ("compliance", "foot.k11", ["x"], {"scale": 1.2, "value": 3e-8})),
+        ("ur10", ("compliance", "shoulder", ["arm"], {"scale": 1.5, "value": 3e-6})),
+        ("orthoglide-revised", ("compliance", "actuator", ["z"], {"value": 1.69e-7})),
+        ("orthoglide-revised", ("periodic_error", "actuator", ["x"], {"amplitude": 1e-5, "period": 0.02})),
+    ],
+)
+def test_effects_of_a_diagnosis_are_followed_in_the_number_that_was_fitted(
+    name: str, found: tuple[str, str, list[str], dict[str, float]], tmp_path: Path
+) -> None:
+    kind, element, legs, numbers = found
+    parameters = {n: [v, 0.9 * v, 1.1 * v, ""] for n, v in numbers.items()}
+    effect = {"kind": kind, "element": element, "legs": legs, "parameters": parameters}
+    (tmp_path / "d.json").write_text(json.dumps({"effects": [effect]}))
+    (term,) = diagnosed(tmp_path / "d.json")
+    kept = dict(placed(sm.load_machine(name), term).parameters)
+    assert kept == (dict([*numbers.items()][:1]) if kind == "compliance" else numbers)
+
+
+@pytest.mark.parametrize("clock", ["order", "hours", "setup"])
+def test_drift_of_one_session_says_nothing_of_the_other(orthoglide: sm.Machine, clock: str) -> None:
+    """Each drifts by itself, though their clocks begin alike: 9 standard uncertainties of nothing, rms, where they share it."""
+
+    def session(seed: int) -> sm.Experiment:
+        plan = random_plan(orthoglide, "position", poses=60, repeats=1, seed=seed)
+        n = np.arange(60.0)
+        course = np.linalg.cholesky(np.exp(-np.abs(np.subtract.outer(n, n)) / 20.0))
+        drift = 5e-5 * course @ np.random.default_rng(seed).standard_normal((60, 3))
+        read = simulate(orthoglide, plan, seed=seed)
+        more = {"hours": {"hours": n / 10}, "setup": {"setup": ("A",) * 60}}.get(clock, {})
+        return replace(read, reading=read.reading + np.pad(drift, ((0, 0), (0, 3))), **more)  # type: ignore[arg-type]
+
+    found = [
+        compare(orthoglide, session(s), session(s + 1), "zero_offset actuator x error=0um")
+        for s in (10, 30, 50)
+    ]
+    pulls = [(c.after - c.before) / c.u for f in found for c in f.changes]
+    assert np.sqrt(np.mean(np.square(pulls))) < 2.5
+
+
+@pytest.mark.parametrize("other", ["quantity", "encoder", "distance"])
+def test_experiments_that_read_other_things_are_not_taken_together(
+    orthoglide: sm.Machine, other: str
+) -> None:
+    plan = random_plan(orthoglide, "position", poses=6, repeats=1)
+    unlike = {
+        "quantity": random_plan(orthoglide, poses=6, loads=2, repeats=1),
+        "encoder": with_joints(plan, [Channel("q_x", "m", "x.actuator")], [1e-6]),
+        "distance": with_distances(plan, 8e-6),
+    }[other]
+    first, then = (simulate(orthoglide, p) for p in (plan, unlike))
+    with pytest.raises(
+        sm.StiffmapError, match=r"plan: expected the same readings as in plan \(position\), found"
+    ):
+        compare(orthoglide, first, then, "length bar x error=1um")
+    with pytest.raises(sm.StiffmapError, match="expected the same readings"):
+        sm.plan(orthoglide, "length bar x error=1um", rows=2, candidates=first, done=then)
+
+
+WRONG: dict[str, Callable[[sm.Machine, sm.Experiment, Estimate], object]] = {
+    "terms: expected effects": lambda m, e, _: estimate(m, e, None),  # type: ignore[arg-type]
+    "terms: expected at least one effect": lambda m, e, _: estimate(m, e, []),
+    "experiment: expected an Experiment": lambda m, e, _: estimate(m, [e], TERM),  # type: ignore[arg-type]
+    "expected a machine": lambda m, e, _: estimate(3, e, TERM),  # type: ignore[arg-type]
+    "found: expected an Estimate": lambda m, e, _: budgets(m, e, 1.5),  # type: ignore[arg-type]
+    "others: expected pairs": lambda m, e, x: budgets(m, e, x, [TERM]),  # type: ignore[list-item]
+    "others: scale: expected a standard": lambda m, e, x: budgets(m, e, x, [(TERM, {"scale": -1.0})]),
+    "others: scale: expected a number": lambda m, e, x: budgets(m, e, x, [(TERM, {"scale": "1"})]),  # type: ignore[dict-item]
+    "measure: expected a function": lambda m, e, _: follow(m, TERM, e, until=1.0),  # type: ignore[arg-type]
+    "until: expected a number": lambda m, e, _: follow(m, TERM, lambda p: p, until=float("nan")),
+}
+TERM = "compliance actuator x scale=1"
+
+
+@pytest.mark.parametrize("message", WRONG)
+def test_what_is_no_input_is_refused_by_name(
+    orthoglide: sm.Machine, plan: sm.Experiment, message: str
+) -> None:
+    e = twin(orthoglide, plan, 1.2, 3)
+    with pytest.raises(sm.StiffmapError, match=message):
+        WRONG[message](orthoglide, e, estimate(orthoglide, e, TERM))
+
+
+def test_names_and_texts_serve_as_well(orthoglide: sm.Machine, plan: sm.Experiment, tmp_path: Path) -> None:
+    e = twin(orthoglide, plan, 1.2, 3)
+    save_experiment(e, tmp_path / "e")
+    whole = estimate(orthoglide, e, [placed(orthoglide, TERM)])
+    named = estimate("orthoglide-revised", tmp_path / "e", TERM)
+    assert named.values == pytest.approx(whole.values, rel=1e-6)
+    lines = [
+        budgets("orthoglide-revised", e, whole, [(other, {"scale": 0.05})])[0].lines[-1].u
+        for other in ("compliance foot x scale=1", placed(orthoglide, "compliance foot x scale=1"))
+    ]
+    assert lines[0] == lines[1] > 0.0
 
 
 def test_an_unfitted_dimension_moves_the_number_as_the_budget_says(

@@ -37,6 +37,7 @@ from stiffmap.identification.diagnosis.report.separation import Separation
 from stiffmap.identification.diagnosis.slips.axes import Slip
 from stiffmap.identification.inference.machines import HeldOut
 from stiffmap.identification.inference.shares import largest
+from stiffmap.model import effects
 from stiffmap.model.description import AppliedEffect
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.validity import Validity
@@ -243,6 +244,8 @@ def diagnosed(path: Path) -> list[AppliedEffect]:
             terms = []
             for e in data["effects"]:
                 values = tuple((n, float(v[0])) for n, v in e["parameters"].items())
+                if effects.get(e["kind"]).derived:
+                    values = values[:1]  # what follows from it says the same in other words
                 terms.append(AppliedEffect(e["kind"], e["element"], tuple(e["legs"]), values))
         except (ValueError, KeyError, TypeError, IndexError, AttributeError, OverflowError):
             raise FileError(
