@@ -86,7 +86,8 @@ def remembered(function: Residual) -> Residual:
 
 def triangular(whole: Residual, begin: Floats, bounds: tuple[Floats, Floats], **ends: float) -> Floats:
     """(n,) the least squares near `begin`, within the bounds; `whole`: (n,) -> (N, n + 1) the columns and the residual, infinite where
-    no step leads to. Their triangle has the same squares and the same steps in n + 1 rows."""
+    no step leads to. Their triangle has the same squares and the same steps in n + 1 rows. Numbers are in typical sizes: scaled by
+    their columns, those that hardly show would move furthest."""
 
     @remembered
     def triangle(x: Floats) -> Floats:
@@ -101,7 +102,7 @@ def triangular(whole: Residual, begin: Floats, bounds: tuple[Floats, Floats], **
     def columns(x: Floats) -> Floats:
         return triangle(x)[:, :-1]
 
-    return np.asarray(least_squares(residual, begin, columns, bounds, x_scale="jac", **ends).x)
+    return np.asarray(least_squares(residual, begin, columns, bounds, **ends).x)
 
 
 def possible(residual: Residual, x: Floats, n: int) -> Floats:

@@ -258,6 +258,19 @@ def test_a_fault_does_not_disappear_with_more_readings(name: str, what: str, pos
     assert not calibrate(machine, data.with_readings(quiet + more)).beyond
 
 
+@pytest.mark.parametrize(
+    ("name", "factor"),
+    [("rotary-delta", 1.5), ("rotary-delta", 3.0), ("rotary-delta", 0.6), ("five-bar", 3.0)],
+)
+def test_soft_drives_move_no_length_that_hardly_shows(name: str, factor: float) -> None:
+    machine = sm.load_machine(name)
+    plan = random_plan(machine, poses=20, loads=6, repeats=1, seed=2)
+    c = calibrate(machine, sm.simulate(machine, plan, f"compliance motor scale={factor}", seed=1))
+    assert c.after.rms < 1.05 * c.noise < 0.1 * c.before.rms
+    assert c.promise is not None
+    assert c.promise[0] < 1.15 * c.noise
+
+
 def test_a_group_that_is_off_as_a_whole_is_said() -> None:
     machine, data, _ = drawn("ur10", 4, size=4.0, poses=40)
     c = calibrate(machine, data)
