@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffmap.common.broadcasting import Floats, trailing
+from stiffmap.common.broadcasting import Floats, one_of, refused, trailing
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.short import short_repr
 from stiffmap.experiment.channels import AXES, AXIS_CHANNELS, Channel
@@ -31,6 +31,11 @@ PER_ROW = (
     *("seen", "seen_rotation", "asked"),
 )
 """Fields with one entry per row; None or empty where the experiment has none."""
+WORDS = {
+    "quantity": ("deflection", "position"), "unloaded": ("centre", "approach", "unknown"), "surface": ("known", "offset_unknown", "unknown"),
+    "frame": ("known", "offset_unknown", "unknown"), "tool": ("known", "offset_unknown", "unknown"),
+}  # fmt: skip
+"""Fields that are one of some words."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +61,8 @@ class Experiment:
 
     ``deflection``: loaded minus unloaded reading at the same commanded pose.
     ``position``: measured minus commanded.
+
+    Raises StiffmapError for a field that has not one entry for each row, for an unknown word and for noise below 0.
     """
 
     name: str
@@ -151,6 +158,17 @@ class Experiment:
     record: tuple[tuple[str, str], ...] = ()
     """Operator, instrument, certificate, date, temperature, source (of a sheet) with its sha256, notes: in words, of a report."""
     source: str = ""
+
+    def __post_init__(self) -> None:
+        for name, words in WORDS.items():
+            one_of(getattr(self, name), words, name)
+        for name in PER_ROW:
+            value = getattr(self, name)
+            absent = value is None or (isinstance(value, tuple) and not value)
+            if (name in PER_ROW[:5] or not absent) and np.shape(value)[:1] != (len(self),):
+                raise refused(name, f"{len(self)} entries, one for each row", f"the shape {np.shape(value)}")
+        if np.any(self.sigma < 0):
+            raise refused("sigma", "standard deviations of 0 or more, or NaN", f"{np.nanmin(self.sigma):g}")
 
     def _repr_html_(self) -> str:
         return experiment_html(self)

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+import stiffmap as sm
+from stiffmap.experiment import random_plan
 from stiffmap.ui.cli.app import main
 
 HEAD = (
@@ -158,3 +162,23 @@ def test_rows_outside_the_declared_box_are_a_limit(
     assert "limit: 1 row lies outside the workspace of the file" in residual_lines(
         write(tmp_path, rows=rows), capsys
     )
+
+
+@pytest.mark.parametrize(
+    ("name", "wrong", "words"),
+    [
+        ("quantity", "force", "one of deflection, position"),
+        ("frame", "nowhere", "one of known"),
+        ("sigma", np.full((9, 6), -1e-6), "0 or more"),
+        ("position", np.zeros((4, 3)), "9 entries, one for each row, got the shape .4, 3."),
+        ("wrench", None, "9 entries"),
+        ("temperature", 20.0, "9 entries"),
+        ("order", np.arange(2.0), "9 entries"),
+        ("setup", ("a",), "9 entries"),
+    ],
+)
+def test_an_experiment_has_one_entry_for_each_row(name: str, wrong: object, words: str) -> None:
+    plan = random_plan("linear-delta", poses=1, loads=9, repeats=1, seed=0)
+    assert len(plan) == 9
+    with pytest.raises(sm.StiffmapError, match=f"^{name}: expected .*{words}"):
+        replace(plan, **{name: wrong})

@@ -95,7 +95,7 @@ def plan_of_poses(
         name="plan",
         machine=as_machine(machine).name,
         quantity=quantity,
-        ids=(),
+        ids=("",) * n,
         position=np.repeat(position, repeats, axis=0),
         wrench=np.repeat(wrench, repeats, axis=0),
         repeat=np.tile(np.arange(repeats) + 1, len(position)),

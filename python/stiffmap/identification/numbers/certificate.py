@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from stiffmap.common.broadcasting import instance_of, real_number, refused
+from stiffmap.common.arguments import checked
+from stiffmap.common.broadcasting import real_number, refused
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.noise.nuisance import nuisance_columns
 from stiffmap.experiment.setups import setups_of
@@ -66,9 +67,10 @@ class Tolerances:
         return replace(self, **{name: u * by for name, u in vars(self).items() if name not in own})
 
 
+@checked
 def certified(tolerances: Tolerances | None, experiment: Experiment) -> Tolerances:
     """The tolerances with what the experiment's certificate says in place of the instrument's."""
-    t: Tolerances = instance_of(tolerances or Tolerances(), Tolerances, "tolerances", "Tolerances")
+    t = tolerances or Tolerances()
     named = {"scale": "instrument", "tool": "tool", "frame": "frame", "frame_direction": "frame_direction"}
     return replace(t, **{named[k]: v for k, v in experiment.certificate})
 

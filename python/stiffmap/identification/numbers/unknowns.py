@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from stiffmap.common.arguments import checked
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.identification.numbers.certificate import INSTRUMENT, SCALE, Tolerances, frame_errors
 from stiffmap.model.description import Block, Body, Element, Joint, MachineDescription, Offset, Spring
@@ -105,12 +106,14 @@ class Declared:
         return np.asarray(np.sqrt(variance + default**2 * np.clip(1.0 - covered, 0.0, 1.0)))
 
 
+@checked
 def unknowns(
     description: MachineDescription, experiment: Experiment, tolerances: Tolerances | None = None
 ) -> list[Unknown]:
     """All unknowns that readings of this kind can depend on.
 
-    Standard uncertainties are those of the machine file where it gives some, else of `tolerances`.
+    Standard uncertainties are those of the machine file where it gives some, else of `tolerances`. Raises StiffmapError for what is
+    no machine's description, experiment or tolerances.
     """
     t = tolerances or Tolerances()
     bare = description.declared or description

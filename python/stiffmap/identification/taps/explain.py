@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from stiffmap.common.arguments import checked
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.tasks import on_one_thread
 from stiffmap.experiment import Experiment
@@ -26,6 +27,7 @@ from stiffmap.identification.taps.predict import predict_taps
 from stiffmap.identification.taps.problem import LEAST, TapsProblem, causes
 from stiffmap.identification.taps.table import TapTest
 from stiffmap.solve.machine import Machine, takes_machine
+from stiffmap.workspace.maps.inputs import magnitude
 
 PARTS = ("statics", "taps")
 DISAGREE = 3.0
@@ -73,6 +75,7 @@ class TapDiagnosis:
 
 
 @takes_machine
+@checked
 @on_one_thread
 def explain_taps(
     machine: Machine,
@@ -97,7 +100,7 @@ def explain_taps(
 
     Raises StiffmapError for bad input.
     """
-    problem = TapsProblem(machine, taps, statics, default_u)
+    problem = TapsProblem(machine, taps, statics, magnitude(default_u, "default_u", "1"))
     tried = [c for c in causes(problem) if only is None or c.kind in only]
     if not tried:
         raise StiffmapError(f"only: no candidate of {', '.join(only or ())} on {machine.name}")

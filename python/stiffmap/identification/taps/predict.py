@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import linear_sum_assignment
 
+from stiffmap.common.arguments import checked
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.identification.taps.table import TapTest
@@ -50,6 +51,7 @@ class Predicted:
 
 
 @takes_machine
+@checked
 def predict_taps(
     machine: Machine, taps: TapTest, *, gravity: ArrayLike | None = None, modes: int = 16
 ) -> Predicted:

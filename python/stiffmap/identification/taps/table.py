@@ -9,10 +9,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from stiffmap.common.arguments import checked
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError
 from stiffmap.common.tables.named import WORD, Known, NamedTable, read_named
-from stiffmap.solve.machine import Machine
+from stiffmap.model.files.load import Source
+from stiffmap.solve.machine import Machine, as_machine
 from stiffmap.workspace.vibration.extraction import extract_modes
 from stiffmap.workspace.vibration.files import MeasuredResponse, read_responses
 
@@ -88,7 +90,8 @@ class TapTest:
         return once, back.reshape(-1)
 
 
-def load_taps(path: str | PathLike[str], machine: Machine | None = None) -> TapTest:
+@checked
+def load_taps(path: str | PathLike[str], machine: Machine | Source | None = None) -> TapTest:
     """Table of tap tests from a CSV file.
 
     Columns x_mm, y_mm, z_mm (commanded TCP) and frequency_Hz; where known u_Hz (else 1 %), damping_percent, u_damping_percent (else
@@ -130,7 +133,7 @@ def load_taps(path: str | PathLike[str], machine: Machine | None = None) -> TapT
         else:
             typed.append(_typed(n, at))
     if machine is not None:
-        _check_unit(np.array(places), machine, file, t.lines)
+        _check_unit(np.array(places), as_machine(machine), file, t.lines)
     found = typed + modes_of(measured)
     return TapTest(**{f.name: np.array([row[f.name] for row in found], float) for f in fields(TapTest)})
 

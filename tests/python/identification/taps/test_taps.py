@@ -292,3 +292,12 @@ def test_modes_as_modal_programs_list_them(head, row, tmp_path):
 def test_one_mode_of_a_bare_structure_may_be_damped_by_less_than_a_thousandth(tmp_path):
     (tmp_path / "t.csv").write_text("x_mm,y_mm,z_mm,f_Hz,damping_percent\n1,2,3,9,0.05\n1,2,3,20,0.8\n")
     np.testing.assert_allclose(load_taps(tmp_path / "t.csv").ratio, [0.0005, 0.008])
+
+
+@pytest.mark.parametrize("wrong", [None, "taps.csv", 3, []])
+def test_what_is_no_tap_test_is_refused_by_name(wrong):
+    for call in (predict_taps, explain_taps):
+        with pytest.raises(sm.StiffmapError, match=r"^taps: expected a TapTest"):
+            call("linear-delta", wrong)
+    with pytest.raises(sm.StiffmapError, match=r"^(path: expected text or a path|.*no such table)"):
+        load_taps(wrong)
