@@ -13,6 +13,7 @@ from stiffmap import _core
 from stiffmap.common.broadcasting import Floats, real_array
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.description import MachineDescription
+from stiffmap.model.description.machine import GRAVITY_LIMIT
 from stiffmap.model.description.tree import joints, of_same_sequence
 from stiffmap.solve.compiled.lowering import build_mechanism
 from stiffmap.solve.compiled.names import Names, names_of
@@ -107,9 +108,10 @@ class CompiledMachine:
         """(3,) m/s², base axes; the machine file's where nothing is given. StiffmapError for bad numbers."""
         if given is None:
             return np.array(self.description.gravity or (0.0, 0.0, 0.0))
-        g = real_array(given, "gravity", "3 finite numbers (m/s², base axes)")
-        if g.shape != (3,) or not np.isfinite(g).all():
-            raise StiffmapError(f"gravity: expected 3 finite numbers (m/s², base axes), got {given!r}")
+        expected = f"3 finite numbers of at most {GRAVITY_LIMIT:g} (m/s², base axes)"
+        g = real_array(given, "gravity", expected)
+        if g.shape != (3,) or not (abs(g) <= GRAVITY_LIMIT).all():
+            raise StiffmapError(f"gravity: expected {expected}, got {given!r}")
         return g
 
     def solve_one(self, position: object, wrench: object) -> _core.OneAnswer | None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field
@@ -18,7 +18,7 @@ from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.yaml_text import Document, read
 from stiffmap.model.description import MachineDescription
 from stiffmap.model.files.report import validated
-from stiffmap.model.files.schema.base import FileModel, Name
+from stiffmap.model.files.schema.base import EachOnce, FileModel, Name
 from stiffmap.model.files.shipped import find
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.redesign import on_branch_of, settled
@@ -67,13 +67,13 @@ class DesignFile(FileModel):
     machine: str
     requirements: str | None = None
     toolpath: str | None = None
-    beside: list[str] = Field(default_factory=list)
+    beside: Annotated[list[str], EachOnce] = Field(default_factory=list)
     variables: dict[str, VariableModel] = Field(default_factory=dict)
     catalogues: dict[str, list[dict[str, float | int | str]]] = Field(default_factory=dict)
     constants: dict[str, float | int] = Field(default_factory=dict)
     derived: dict[str, str | float | int] = Field(default_factory=dict)
     numbers: dict[str, str | float | int] = Field(min_length=1)
-    objectives: list[str] = Field(min_length=1)
+    objectives: Annotated[list[str], EachOnce] = Field(min_length=1)
     constraints: dict[str, BoundModel] = Field(default_factory=dict)
     search: SearchModel = SearchModel()
 

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from stiffmap.common.broadcasting import Floats, real_array, trailing
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.addresses import known_values
+from stiffmap.model.addresses.setting import TwiceError
 from stiffmap.solve.compiled import Status
 from stiffmap.solve.labels import (
     COMPLIANCE_UNITS,
@@ -85,6 +86,8 @@ def design_sweep(
         values = {name: float(a[i]) for (name, a), i in zip(axes.items(), index, strict=True)}
         try:
             made = machine.with_numbers(values)
+        except TwiceError:
+            raise
         except StiffmapError as problem:
             problems[index] = str(problem)
             continue

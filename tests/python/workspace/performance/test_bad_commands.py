@@ -22,6 +22,7 @@ FILES = {
     "crossed.yaml": "name: r\nrequirements: {deflection: {at_least: 3 mm, at_most: 2 mm}}\n",
     "through.yaml": "name: out\nline: {start: [0 mm, 0 mm, 0 mm], end: [-450 mm, -450 mm, -450 mm]}\nduration: 1 s\n",
     "unknown.yaml": DESIGN.replace("OBJECTIVE", "beauty"),
+    "doubled.yaml": DESIGN.replace("OBJECTIVE", "mass, mass"),
     "infeasible.yaml": DESIGN.replace("OBJECTIVE", "mass"),
 }
 
@@ -35,6 +36,8 @@ FILES = {
             ["at_least (3 mm) is above at_most (2 mm)"],
         ),
         ("measures orthoglide-revised --only beauty", ["unknown measure 'beauty'", "workspace"]),
+        ("measures five-bar --only mass,mass", ["only: expected different names", "'mass' twice"]),
+        ("optimize doubled.yaml -o out", ["objectives", "'mass' is given twice"]),
         ("efforts tripteron through.yaml", ["needs masses", "legs 1, 2, 3"]),
         ("efforts orthoglide-revised through.yaml", ["passes a singularity", f"-{PLACE:.1f}", "t = 0.59"]),
         ("optimize unknown.yaml -o out", ["unknown objective 'beauty'", "path_compliance"]),

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Sequence
 from functools import cache
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import (
+    AfterValidator,
     BaseModel,
     BeforeValidator,
     ConfigDict,
@@ -107,6 +109,14 @@ Name = Annotated[
 ]
 
 
+def _each_once(names: list[Any]) -> list[Any]:
+    if twice := [n for n, times in Counter(names).items() if times > 1]:
+        raise ValueError(f"'{twice[0]}' is given twice")
+    return names
+
+
+EachOnce = AfterValidator(_each_once)
+"""Of a list of names that are different."""
 Source = Annotated[
     Literal[SOURCES],  # type: ignore[valid-type]
     Field(description="Where numbers come from: reports say how much of an answer rests on those assumed."),
