@@ -5,7 +5,6 @@ from __future__ import annotations
 import difflib
 import math
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 
@@ -30,14 +29,11 @@ from stiffmap.model.description import (
 LENGTH = "length"
 
 
-class TwiceError(StiffmapError):
-    """Two addresses of the same number, which say it differently."""
-
-
 def with_values(description: MachineDescription, values: Mapping[str, float]) -> MachineDescription:
     """The declared machine (without effects) with numbers (SI) at these addresses, one after the other.
 
-    StiffmapError for an address that the machine has not (it names the nearest), a value that cannot be, or `TwiceError`.
+    StiffmapError for an address that the machine has not (it names the nearest), a value that cannot be, or an
+    address whose numbers a later one sets again.
     """
     for address, value in instance_of(values, Mapping, "values", "numbers by address").items():
         number = real_number(value, instance_of(address, str, "address", "text"), "a finite number (SI)")
@@ -49,22 +45,15 @@ def with_values(description: MachineDescription, values: Mapping[str, float]) ->
             text = str(problem)
             raise StiffmapError(text if address in text else f"{address}: {text}") from None
     for address, value in values.items():
-        if lost := _lost(description, address, value):
-            raise TwiceError(f"{address}: another address sets this number to {lost}; keep one of them")
+        now = known_values(description, address)
+        if not any(math.isclose(v, value) for v in now):
+            raise StiffmapError(f"{address}: another address sets this number to {now[0]:g}; keep one")
     for ends in [a.rpartition(".")[0] for a in values if a.endswith((".low", ".high"))]:
         low, high = (known_values(description, f"{ends}.{end}") for end in ("low", "high"))
         least, most = max(zip(low, high, strict=True), key=lambda pair: pair[0] - pair[1])
         if least >= most:
             raise StiffmapError(f"{ends}: the lower end {least:g} is not below the upper end {most:g}")
     return description
-
-
-def _lost(description: MachineDescription, address: str, value: float) -> str:
-    """What a number is that an address did not set, as a later one says it otherwise; empty where one at least is as set."""
-    now = []
-    with suppress(StiffmapError):  # a matrix has no beam any more
-        now = known_values(description, address)
-    return "" if not now or any(math.isclose(v, value) for v in now) else f"{now[0]:g}"
 
 
 def known_values(description: MachineDescription, address: str) -> list[float]:

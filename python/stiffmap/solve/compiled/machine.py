@@ -108,10 +108,9 @@ class CompiledMachine:
         """(3,) m/s², base axes; the machine file's where nothing is given. StiffmapError for bad numbers."""
         if given is None:
             return np.array(self.description.gravity or (0.0, 0.0, 0.0))
-        expected = f"3 finite numbers of at most {GRAVITY_LIMIT:g} (m/s², base axes)"
-        g = real_array(given, "gravity", expected)
+        g = real_array(given, "gravity", "3 finite numbers (m/s², base axes)")
         if g.shape != (3,) or not (abs(g) <= GRAVITY_LIMIT).all():
-            raise StiffmapError(f"gravity: expected {expected}, got {given!r}")
+            raise StiffmapError(f"gravity: expected 3 finite numbers up to 1000 (m/s²), got {given!r}")
         return g
 
     def solve_one(self, position: object, wrench: object) -> _core.OneAnswer | None:

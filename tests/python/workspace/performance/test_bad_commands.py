@@ -37,7 +37,7 @@ FILES = {
         ),
         ("measures orthoglide-revised --only beauty", ["unknown measure 'beauty'", "workspace"]),
         ("measures five-bar --only mass,mass", ["only: expected different names", "'mass' twice"]),
-        ("optimize doubled.yaml -o out", ["objectives", "'mass' is given twice"]),
+        ("optimize doubled.yaml -o out", ["objectives", "expected different names, got 'mass' twice"]),
         ("efforts tripteron through.yaml", ["needs masses", "legs 1, 2, 3"]),
         ("efforts orthoglide-revised through.yaml", ["passes a singularity", f"-{PLACE:.1f}", "t = 0.59"]),
         ("optimize unknown.yaml -o out", ["unknown objective 'beauty'", "path_compliance"]),

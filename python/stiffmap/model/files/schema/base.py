@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections import Counter
 from collections.abc import Sequence
 from functools import cache
 from typing import Annotated, Any, Literal, Self
@@ -23,6 +22,7 @@ from pydantic import (
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, InitErrorDetails, PydanticCustomError, PydanticKnownError
 
+from stiffmap.common.broadcasting import names_of
 from stiffmap.common.errors import suggestion
 from stiffmap.model.description.machine import SOURCES
 
@@ -109,14 +109,7 @@ Name = Annotated[
 ]
 
 
-def _each_once(names: list[Any]) -> list[Any]:
-    if twice := [n for n, times in Counter(names).items() if times > 1]:
-        raise ValueError(f"'{twice[0]}' is given twice")
-    return names
-
-
-EachOnce = AfterValidator(_each_once)
-"""Of a list of names that are different."""
+EachOnce = AfterValidator(lambda names: list(names_of(names, "list")))
 Source = Annotated[
     Literal[SOURCES],  # type: ignore[valid-type]
     Field(description="Where numbers come from: reports say how much of an answer rests on those assumed."),
