@@ -81,11 +81,9 @@ def instance_of(value: object, kind: Any, name: str, what: str) -> Any:
 def names_of(value: Any, name: str, least: int = 0) -> tuple[str, ...]:
     """Different names, of which one may stand by itself; StiffmapError with the argument's name for anything else."""
     given = (value,) if isinstance(value, str) else tuple(instance_of(value, Iterable, name, "names"))
-    if len(given) < least:
-        raise refused(name, "at least one name", "none")
-    for i, n in enumerate(given):
-        if instance_of(n, str, name, "names") in given[:i]:
-            raise refused(name, "different names", f"{n!r} twice")
+    twice = [n for i, n in enumerate(given) if instance_of(n, str, name, "names") in given[:i]]
+    if twice or len(given) < least:
+        raise refused(name, "different names", f"{twice[0]!r} twice" if twice else "none")
     return given
 
 

@@ -63,8 +63,7 @@ MOST = {"": (10.0, "10 (0.3 for 30 %)"), PRESSURE: (10.0, "10 times"), EDGE: (1e
 """Of a law's other numbers and their uncertainties: shares; pressures and edge forces by the main number."""
 THINNEST = 1e-7
 """m, feed per tooth: below, no edge of a tool cuts."""
-FASTEST = 1e6 * pi / 30
-"""rad/s, of a spindle."""
+FASTEST = 1e6 * pi / 30  # rad/s, of a spindle
 LONGEST = 1.0
 """m of a tool or a cut: above, millimetres were meant."""
 
@@ -106,9 +105,7 @@ class NumberReader:
         unit = max((u for u in FREQUENCIES if text.lower().endswith(u)), key=len, default="")
         out = self.positive(text.lower().removesuffix(unit), "", *keys) * FREQUENCIES[unit] if unit else 0.0
         if not 0 < 2 * pi * out <= FASTEST:
-            self.fail(
-                f"expected a speed of the spindle such as 6000 rpm, up to 1e6 rpm; found {text!r}", *keys
-            )
+            self.fail(f"expected a speed such as 6000 rpm, up to 1e6 rpm; found {text!r}", *keys)
         return 2 * pi * out
 
 

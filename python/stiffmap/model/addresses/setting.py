@@ -32,8 +32,7 @@ LENGTH = "length"
 def with_values(description: MachineDescription, values: Mapping[str, float]) -> MachineDescription:
     """The declared machine (without effects) with numbers (SI) at these addresses, one after the other.
 
-    StiffmapError for an address that the machine has not (it names the nearest), a value that cannot be, or an
-    address whose numbers a later one sets again.
+    StiffmapError for an address that the machine has not (it names the nearest), a bad value, or a number set twice.
     """
     for address, value in instance_of(values, Mapping, "values", "numbers by address").items():
         number = real_number(value, instance_of(address, str, "address", "text"), "a finite number (SI)")

@@ -163,8 +163,7 @@ def place_of(
     element = _element(effect, names, element)
     having = {leg for name, at in places for leg in at if name == element}
     order = [leg.name for leg in machine.legs]
-    legs = names_of(legs or (), "legs")
-    for leg in legs:
+    for leg in (legs := names_of(legs or (), "legs")):
         if leg not in having:
             there = ", ".join(n for n in order if n in having) or "none"
             raise StiffmapError(f"{effect.kind} of {element}: no leg {leg!r} has it; legs that do: {there}")

@@ -188,6 +188,8 @@ def test_a_number_has_one_value(name: str, values: dict[str, float]) -> None:
         machine.with_numbers(values)
     with pytest.raises(StiffmapError, match=f"^{first}: another address sets this number to "):
         sm.design_sweep(machine, {a: [v, 1.01 * v] for a, v in values.items()})
+    with pytest.raises(StiffmapError, match=": another address sets this number to "):
+        sm.design_sweep(machine, {a: [0.3, 0.31] for a in values})
     part = machine.with_numbers(dict(list(values.items())[-1:]))
     assert part != machine
 
