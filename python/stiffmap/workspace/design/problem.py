@@ -22,7 +22,7 @@ from stiffmap.model.files.schema.base import EachOnce, FileModel, Name
 from stiffmap.model.files.shipped import find
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.redesign import on_branch_of, settled
-from stiffmap.workspace.design.editing import Editor, described, edited, unshared
+from stiffmap.workspace.design.editing import Editor, described, edited, indices, unshared
 from stiffmap.workspace.performance.motion.motion_files import (
     Motion,
     given_or_shipped,
@@ -199,10 +199,8 @@ def load_design(path: str | PathLike[str]) -> DesignProblem:
     known = {m.name for m in all_measures()}
     for i, name in enumerate(model.objectives):
         if name not in known:
-            raise fail(
-                f"unknown objective '{name}' (number {i + 1}); known: {', '.join(sorted(known))}",
-                "objectives",
-            )
+            what = f"unknown objective '{name}' (number {i + 1}); known: {', '.join(sorted(known))}"
+            raise fail(what, "objectives")
     machine = find(near(model.machine, file))
     task = Requirements()
     if model.requirements is not None:
@@ -228,4 +226,7 @@ def load_design(path: str | PathLike[str]) -> DesignProblem:
             edited(design.document.data, {place: evaluate(text, names)})
         except StiffmapError as error:
             raise fail(str(error), "numbers", place) from None
+    at = [indices(design.document.data, place) for place in model.numbers]
+    if twice := [place for i, place in enumerate(model.numbers) if at[i] in at[:i]]:
+        raise fail("another place above is the same number", "numbers", twice[0])
     return design
