@@ -78,10 +78,13 @@ def instance_of(value: object, kind: Any, name: str, what: str) -> Any:
     return value
 
 
-def names_of(value: Any, name: str) -> tuple[str, ...]:
-    """Names, of which one may stand by itself; StiffmapError with the argument's name for what is none."""
+def names_of(value: Any, name: str, least: int = 0) -> tuple[str, ...]:
+    """Different names, of which one may stand by itself; StiffmapError with the argument's name for anything else."""
     given = (value,) if isinstance(value, str) else tuple(instance_of(value, Iterable, name, "names"))
-    return tuple(instance_of(n, str, name, "names") for n in given)
+    twice = [n for i, n in enumerate(given) if instance_of(n, str, name, "names") in given[:i]]
+    if twice or len(given) < least:
+        raise refused(name, "different names", f"{twice[0]!r} twice" if twice else "none")
+    return given
 
 
 def one_of(value: object, known: Collection[str], name: str) -> str:

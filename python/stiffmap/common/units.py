@@ -26,12 +26,27 @@ SIZES: dict[str, Fraction | float] = {**LENGTHS, **FORCES, **MASSES, **MOMENTS, 
 TIMES = {"s": Fraction(1), "min": Fraction(60)}
 SHORT_TIMES = {"ms": 1e-3, "us": 1e-6, "µs": 1e-6, "μs": 1e-6}
 """Of the time in tables alone."""
+FREQUENCIES = {
+    "hz": 1.0, "hertz": 1.0, "khz": 1e3, "rad/s": 0.5 / math.pi, "rad/sec": 0.5 / math.pi, "krpm": 1e3 / 60,
+    **dict.fromkeys(("rpm", "cpm", "1/min", "u/min", "rev/min", "r/min", "min^-1", "min-1", "min⁻¹"), 1 / 60),
+}  # fmt: skip
+"""Of what turns or swings, in Hz by their names in small letters."""
+FEEDS = {"ipm": "in/min", "ipr": "in/rev", "ipt": "in/tooth", "u": "rev", "r": "rev", "z": "tooth", "zahn": "tooth"}  # fmt: skip
+"""Other ways to write a feed, or what it is by."""
 QUANTITIES = {"m": "length", "N": "force", "N*m": "moment", "rad": "angle"}
 """By the unit of SI."""
 GRAVITY = Fraction("9.80665")
 """Standard acceleration of gravity, m/s²: the weight of a kilogram in N."""
 POUND = Fraction("4.4482216152605")
 """A pound-force, N."""
+
+
+def feed_unit(text: str) -> tuple[str, str]:
+    """The length of a feed (with its number, if any) by ``tooth`` or ``rev``, and which: mm/U is by rev; else a speed, and nothing."""
+    unit = re.sub(r"(?i)(?<![a-z])ip[mrt]$", lambda m: FEEDS[m[0].lower()], text.strip())
+    length, _, per = re.sub(r"_(?:per_)?(?=\w+$)", "/", unit).rpartition("/")
+    per = FEEDS.get(per.lower(), per.lower())
+    return (length.strip(), per) if per in ("tooth", "rev") else (unit, "")
 
 
 class Unit(NamedTuple):

@@ -25,12 +25,11 @@ from stiffmap.common.tables.header import meaning_of, split_unit
 from stiffmap.common.tables.lines import Spelling, finite_number, number
 from stiffmap.common.tables.sheet import Layout, read_sheet
 from stiffmap.common.tables.table import Table
-from stiffmap.common.units import QUANTITIES, SHORT_TIMES, unit_of
+from stiffmap.common.units import FREQUENCIES, QUANTITIES, SHORT_TIMES, feed_unit, unit_of
 
-SPELLED = {"s": SHORT_TIMES, "Hz": {"kHz": 1e3}, "percent": {"%": 1.0, "-": 100.0, "1": 100.0}}
+SPELLED = {"s": SHORT_TIMES, "percent": {"%": 1.0, "-": 100.0, "1": 100.0}}
 """SI unit -> others that tables of such columns have."""
-TURNING = {"rpm": math.pi / 30, "1/min": math.pi / 30, "rad/s": 1.0}
-PER = re.compile(r"_(?:per_)?(min|s|tooth)$")
+PER = re.compile(r"_(?:per_)?(min|s|tooth|rev)$")
 WORD = "word"
 """In place of a unit: the column holds text."""
 
@@ -169,8 +168,9 @@ def _meaning(head: str, known: Known, table: NamedTable) -> tuple[str, str, floa
 
 def size_in(unit: str, si: str) -> float:
     """SI size of a unit that has the dimension of `si`, as experiments, effects and workshops write it; StiffmapError."""
-    if si == "rad/s" and unit in TURNING:
-        return TURNING[unit]
+    if si in ("rad/s", "Hz") and unit.lower() in FREQUENCIES:
+        return FREQUENCIES[unit.lower()] * (1.0 if si == "Hz" else 2 * math.pi)
+    unit = feed_unit(unit)[0] if si == "m/s" else unit
     if unit == si:
         return 1.0
     if unit in SPELLED.get(si, ()):

@@ -12,7 +12,7 @@ from typing import Any, Literal, NoReturn
 from pydantic import Field
 
 from stiffmap.common.errors import FileError, StiffmapError, refuse_folder, suggestion
-from stiffmap.common.tables.named import TURNING
+from stiffmap.common.units import FREQUENCIES, feed_unit
 from stiffmap.common.yaml_text import Document, read
 from stiffmap.machining.process.description import Cut, EndMill, Kienzle, Law, Process, Tool, Trimming
 from stiffmap.model.files.report import key_text, validated
@@ -63,6 +63,7 @@ MOST = {"": (10.0, "10 (0.3 for 30 %)"), PRESSURE: (10.0, "10 times"), EDGE: (1e
 """Of a law's other numbers and their uncertainties: shares; pressures and edge forces by the main number."""
 THINNEST = 1e-7
 """m, feed per tooth: below, no edge of a tool cuts."""
+FASTEST = 1e6 * pi / 30  # rad/s, of a spindle
 LONGEST = 1.0
 """m of a tool or a cut: above, millimetres were meant."""
 
@@ -101,12 +102,11 @@ class NumberReader:
     def rate(self, value: object, *keys: str) -> float:
         """rad/s of ``6000 rpm`` or ``100 Hz``."""
         text = str(value).strip()
-        for unit, size in TURNING.items():
-            if text.lower().endswith(unit):
-                return self.positive(text[: -len(unit)], "", *keys) * size
-        if not text.endswith("Hz"):
-            self.fail(f"expected a speed of the spindle such as 6000 rpm, found {text!r}", *keys)
-        return self.positive(text, "Hz", *keys) * 2 * pi
+        unit = max((u for u in FREQUENCIES if text.lower().endswith(u)), key=len, default="")
+        out = self.positive(text.lower().removesuffix(unit), "", *keys) * FREQUENCIES[unit] if unit else 0.0
+        if not 0 < 2 * pi * out <= FASTEST:
+            self.fail(f"expected a speed such as 6000 rpm, up to 1e6 rpm; found {text!r}", *keys)
+        return 2 * pi * out
 
 
 def process_of(document: Document, file: str) -> Process:
@@ -151,9 +151,9 @@ def _tool(m: ProcessFile, r: NumberReader) -> Tool:
 
 
 def _feed(value: object, tool: Tool, spindle: float, r: NumberReader) -> float:
-    way, _, per = str(value).strip().rpartition("/")
-    if per not in ("tooth", "rev"):
-        return r.positive(value, "m/s", "feed")
+    way, per = feed_unit(str(value))
+    if not per:
+        return r.positive(way, "m/s", "feed")
     if per == "tooth" and not tool.teeth:
         r.fail("a coated tool has no feed per tooth; expected such as 10 m/min", "feed")
     return r.positive(way, "m", "feed") * (tool.teeth if per == "tooth" else 1) * spindle / (2 * pi)

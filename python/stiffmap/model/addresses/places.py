@@ -14,7 +14,8 @@ from typing import NamedTuple
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.addresses.fields import Field, declared, fields, vector_fields
 from stiffmap.model.description import Block, Element, MachineDescription, Spring, tree
-from stiffmap.model.description.numbers import with_entry
+from stiffmap.model.description.machine import GRAVITY_LIMIT
+from stiffmap.model.description.numbers import DeclaredNumber, with_entry
 from stiffmap.model.description.tree import of_same_sequence
 
 
@@ -100,7 +101,8 @@ def machine_fields(d: MachineDescription) -> Iterator[tuple[str, Field]]:
         lambda t: replace(d, home=replace(d.home, translation=t)),
     )
     if d.gravity is not None:
-        yield from vector_fields(d.gravity, "gravity/", "m/s²", lambda g: replace(d, gravity=g))
+        for key, number in vector_fields(d.gravity, "gravity/", "m/s²", lambda g: replace(d, gravity=g)):
+            yield key, number._replace(bounds=DeclaredNumber("", lower=-GRAVITY_LIMIT, upper=GRAVITY_LIMIT))
     if d.workspace is not None:
         low, high = d.workspace
         lows = vector_fields(low, "workspace/", "m", lambda v: replace(d, workspace=(v, high)))

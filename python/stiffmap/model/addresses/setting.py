@@ -32,7 +32,7 @@ LENGTH = "length"
 def with_values(description: MachineDescription, values: Mapping[str, float]) -> MachineDescription:
     """The declared machine (without effects) with numbers (SI) at these addresses, one after the other.
 
-    StiffmapError for an address that the machine has not (it names the nearest), or a value that cannot be.
+    StiffmapError for an address that the machine has not (it names the nearest), a bad value, or a number set twice.
     """
     for address, value in instance_of(values, Mapping, "values", "numbers by address").items():
         number = real_number(value, instance_of(address, str, "address", "text"), "a finite number (SI)")
@@ -43,6 +43,10 @@ def with_values(description: MachineDescription, values: Mapping[str, float]) ->
         except StiffmapError as problem:
             text = str(problem)
             raise StiffmapError(text if address in text else f"{address}: {text}") from None
+    for address, value in values.items():
+        now = known_values(description, address)
+        if not any(math.isclose(v, value) for v in now):
+            raise StiffmapError(f"{address}: another address sets this number to {now[0]:g}; keep one")
     for ends in [a.rpartition(".")[0] for a in values if a.endswith((".low", ".high"))]:
         low, high = (known_values(description, f"{ends}.{end}") for end in ("low", "high"))
         least, most = max(zip(low, high, strict=True), key=lambda pair: pair[0] - pair[1])

@@ -26,7 +26,7 @@ class Leg:
 class ExternalSpring:
     """A straight spring between two points: a cable, a hose, a counterbalance.
 
-    ``anchor`` is fixed in base axes (m); ``point`` is the full name of a `Point` on the machine.
+    ``anchor`` is fixed in base axes (m); ``point`` is the full name of a `Point` on the machine, or ``tcp``.
     Force ``stiffness * (distance - length)`` along the line; zero when slack if ``tension_only``.
     """
 
@@ -50,6 +50,7 @@ class AppliedEffect:
 
 
 TASK = ("x", "y", "z", "rx", "ry", "rz")
+GRAVITY_LIMIT = 1000.0  # m/s²; above it, mm/s² were given
 
 
 @dataclass(frozen=True)

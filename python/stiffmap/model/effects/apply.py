@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+from stiffmap.common.broadcasting import names_of
 from stiffmap.common.errors import StiffmapError, suggestion
 from stiffmap.common.kept import Kept
 from stiffmap.model.description import AppliedEffect, MachineDescription
@@ -162,9 +163,7 @@ def place_of(
     element = _element(effect, names, element)
     having = {leg for name, at in places for leg in at if name == element}
     order = [leg.name for leg in machine.legs]
-    if isinstance(legs, str):
-        legs = (legs,)
-    for leg in legs or ():
+    for leg in (legs := names_of(legs or (), "legs")):
         if leg not in having:
             there = ", ".join(n for n in order if n in having) or "none"
             raise StiffmapError(f"{effect.kind} of {element}: no leg {leg!r} has it; legs that do: {there}")

@@ -22,6 +22,7 @@ from stiffmap.model.description import (
     Offset,
     Pose,
 )
+from stiffmap.model.description.machine import GRAVITY_LIMIT
 from stiffmap.model.description.pose import Vector
 from stiffmap.model.description.strokes import as_rows
 from stiffmap.model.description.tree import ENDS, Elements, edit_path, point_names, walk
@@ -39,8 +40,6 @@ from stiffmap.model.files.schema import MachineFile
 from stiffmap.model.files.schema.base import BoxModel, Number
 from stiffmap.model.files.schema.elements import ElementModel
 from stiffmap.model.files.schema.machine import EffectModel, ExternalSpringModel, LegModel
-
-GRAVITY_LIMIT = 1000.0  # m/s²; above it, the file gave mm/s²
 
 
 def build(
@@ -79,7 +78,7 @@ def build(
     gathered = context.gathered
     description = with_strokes(description, gathered)
     context.raise_problems()
-    points = point_names(description)
+    points = ["tcp", *point_names(description)]
     for spring in description.external_springs:
         if spring.point not in points:
             here = context.at("external_springs", spring.name, "point")

@@ -11,6 +11,7 @@ from stiffmap.common.errors import FileError
 from stiffmap.common.yaml_text import read
 from stiffmap.model.files.report import validated
 from stiffmap.model.files.schema.base import FileModel
+from stiffmap.model.files.schema.machine import Components
 
 Numbers6 = Annotated[list[float], Field(min_length=6, max_length=6)]
 Matrix = Annotated[list[Numbers6], Field(min_length=6, max_length=6)]
@@ -55,7 +56,7 @@ class Sidecar(Strict):
     home: dict[str, float] = Field(default_factory=dict)
     actuators: dict[str, Elasticity] = Field(default_factory=dict)
     springs: dict[str, LinkSpring] = Field(default_factory=dict)
-    task: list[Literal["x", "y", "z", "rx", "ry", "rz"]] | None = None
+    task: Components | None = None
     workspace: (
         dict[Literal["x", "y", "z"], Annotated[list[float], Field(min_length=2, max_length=2)]] | None
     ) = None

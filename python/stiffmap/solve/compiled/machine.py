@@ -13,6 +13,7 @@ from stiffmap import _core
 from stiffmap.common.broadcasting import Floats, real_array
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.description import MachineDescription
+from stiffmap.model.description.machine import GRAVITY_LIMIT
 from stiffmap.model.description.tree import joints, of_same_sequence
 from stiffmap.solve.compiled.lowering import build_mechanism
 from stiffmap.solve.compiled.names import Names, names_of
@@ -108,8 +109,8 @@ class CompiledMachine:
         if given is None:
             return np.array(self.description.gravity or (0.0, 0.0, 0.0))
         g = real_array(given, "gravity", "3 finite numbers (m/s², base axes)")
-        if g.shape != (3,) or not np.isfinite(g).all():
-            raise StiffmapError(f"gravity: expected 3 finite numbers (m/s², base axes), got {given!r}")
+        if g.shape != (3,) or not (abs(g) <= GRAVITY_LIMIT).all():
+            raise StiffmapError(f"gravity: expected 3 finite numbers up to 1000 (m/s²), got {given!r}")
         return g
 
     def solve_one(self, position: object, wrench: object) -> _core.OneAnswer | None:

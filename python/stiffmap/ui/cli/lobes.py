@@ -36,7 +36,7 @@ def command(
         "Damping ratios of the modes in %, e.g. 2 or 3,1.5; default: the machine file's."
     ),
     mode: list[str] | None = option(
-        "A mode of spindle and tool besides: Hz, damping in %, modal mass in kg, direction x or y of the cut, e.g. "
+        "A mode of spindle and tool besides: Hz, damping in %, modal mass in kg, direction x, y or z of the cut, e.g. "
         "1243,6.2,0.048,x; repeatable."
     ),
     method: str = option("semi-discretization or 'zero order'.", "semi-discretization"),

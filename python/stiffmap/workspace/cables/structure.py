@@ -51,6 +51,7 @@ def hanging(machine: Machine) -> Hanging:
                 bodies.append((e, (tip @ Pose(e.com)).translation))
             case Point():
                 points[f"platform.{e.name}"] = (tip @ Pose(e.offset)).translation
+    points["tcp"] = tip.translation
     back = tip.inverse()
     at = np.array([(back @ Pose(p)).p for _, p in found])
     mass = sum(b.mass for b, _ in bodies)

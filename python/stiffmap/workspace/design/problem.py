@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field
@@ -18,11 +18,11 @@ from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.yaml_text import Document, read
 from stiffmap.model.description import MachineDescription
 from stiffmap.model.files.report import validated
-from stiffmap.model.files.schema.base import FileModel, Name
+from stiffmap.model.files.schema.base import EachOnce, FileModel, Name
 from stiffmap.model.files.shipped import find
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.redesign import on_branch_of, settled
-from stiffmap.workspace.design.editing import Editor, described, edited, unshared
+from stiffmap.workspace.design.editing import Editor, described, edited, indices, unshared
 from stiffmap.workspace.performance.motion.motion_files import (
     Motion,
     given_or_shipped,
@@ -67,13 +67,13 @@ class DesignFile(FileModel):
     machine: str
     requirements: str | None = None
     toolpath: str | None = None
-    beside: list[str] = Field(default_factory=list)
+    beside: Annotated[list[str], EachOnce] = Field(default_factory=list)
     variables: dict[str, VariableModel] = Field(default_factory=dict)
     catalogues: dict[str, list[dict[str, float | int | str]]] = Field(default_factory=dict)
     constants: dict[str, float | int] = Field(default_factory=dict)
     derived: dict[str, str | float | int] = Field(default_factory=dict)
     numbers: dict[str, str | float | int] = Field(min_length=1)
-    objectives: list[str] = Field(min_length=1)
+    objectives: Annotated[list[str], EachOnce] = Field(min_length=1)
     constraints: dict[str, BoundModel] = Field(default_factory=dict)
     search: SearchModel = SearchModel()
 
@@ -199,10 +199,8 @@ def load_design(path: str | PathLike[str]) -> DesignProblem:
     known = {m.name for m in all_measures()}
     for i, name in enumerate(model.objectives):
         if name not in known:
-            raise fail(
-                f"unknown objective '{name}' (number {i + 1}); known: {', '.join(sorted(known))}",
-                "objectives",
-            )
+            what = f"unknown objective '{name}' (number {i + 1}); known: {', '.join(sorted(known))}"
+            raise fail(what, "objectives")
     machine = find(near(model.machine, file))
     task = Requirements()
     if model.requirements is not None:
@@ -228,4 +226,7 @@ def load_design(path: str | PathLike[str]) -> DesignProblem:
             edited(design.document.data, {place: evaluate(text, names)})
         except StiffmapError as error:
             raise fail(str(error), "numbers", place) from None
+    at = [indices(design.document.data, place) for place in model.numbers]
+    if twice := [place for i, place in enumerate(model.numbers) if at[i] in at[:i]]:
+        raise fail("another place above is the same number", "numbers", twice[0])
     return design

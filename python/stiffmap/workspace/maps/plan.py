@@ -261,7 +261,7 @@ def map_plan(
     return MapPlan(
         loading, x, y, z, wrenches, names,
         shown_plane="xy" if plane is None else "".join("xyz"[i] for i in plane_axes(plane)), turning=plane is not None,
-        force=0.0 if plane is None else plane_force(wrenches, force), directions=directions,
-        tolerance=magnitude(tolerance, "tolerance", "m"), compliance=compliance,
+        directions=directions, tolerance=magnitude(tolerance, "tolerance", "m"), compliance=compliance,
         uncertain=uncertain_numbers(machine) if uncertainty else None,
+        force=0.0 if plane is None else plane_force(wrenches, force),  # last: who gives none may not have meant to
     )  # fmt: skip

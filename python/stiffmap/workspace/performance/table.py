@@ -158,7 +158,7 @@ def measures(
     """
     task = Requirements() if requirements is None else requirements
     task = task if isinstance(task, Requirements) else load_requirements(task)
-    chosen = all_measures() if only is None else tuple(get_measure(n) for n in names_of(only, "only"))
+    chosen = all_measures() if only is None else tuple(get_measure(n) for n in names_of(only, "only", 1))
     turned = None if rotation is None else real_array(rotation, "rotation")
     low, high, notes = _box(machine, box, task, turned)
     size = force if force is not None else task.force if task.force is not None else 100.0

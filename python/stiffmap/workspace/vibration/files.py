@@ -14,8 +14,9 @@ from stiffmap.common.errors import FileError, StiffmapError, needed, refuse_fold
 from stiffmap.common.tables.lines import complex_number
 from stiffmap.common.tables.named import WORD, Known, read_named
 from stiffmap.common.tables.workbook import TABLES
+from stiffmap.common.units import FREQUENCIES
 from stiffmap.workspace.vibration.response import Complex
-from stiffmap.workspace.vibration.response_units import FREQUENCIES, ResponseUnit, response_unit
+from stiffmap.workspace.vibration.response_units import ResponseUnit, response_unit
 
 PREFIX = re.compile(r"((frf|h[12]?(\(f\))?|\w+/\w+|dyn(amic|amische|\.)?)_)+(?=.)")
 """Before the part of a response, as in ``H1 Ch2/Ch1 Real [m/N]``."""

@@ -42,11 +42,6 @@ UNITS = {
     "mrad": ResponseUnit(1e-3),
     "deg": ResponseUnit(math.pi / 180),
 }  # fmt: skip
-FREQUENCIES = {
-    "hz": 1.0, "hertz": 1.0, "khz": 1e3, "rad/s": 0.5 / math.pi, "rad/sec": 0.5 / math.pi, "rpm": 1 / 60, "cpm": 1 / 60,
-    **dict.fromkeys(("1/min", "u/min", "rev/min", "min^-1", "min-1", "min⁻¹"), 1 / 60),
-}  # fmt: skip
-"""In Hz, by their names in small letters."""
 SPELLINGS = {
     "µ": "u", "μ": "u", "·": "*", "×": "*", ".": "*", "²": "^2", "⁻¹": "^-1", "⁻²": "^-2", "**": "^", "inch": "in",
 }  # fmt: skip

@@ -117,7 +117,7 @@ def test_statics_and_frequencies_must_say_the_same(arm, static_scale, agree):
         ),
         ("x_mm,y_mm,z_mm,frequency_Hz\n1,2,3\n", "expected 4 values, found 3"),
         ("", "the file is empty"),
-        ("x_mm,y_mm,z_mm,frequency_rad_s\n1,2,3,60\n", "expected a unit such as in frequency_Hz, found rad"),
+        ("x_mm,y_mm,z_mm,frequency_rad\n1,2,3,60\n", "expected a unit such as in frequency_Hz, found rad"),
         ("# by hand\nx_mm,y_mm,z_mm,frequency_Hz\n1,2,3,9\n\n1,2,3,-9\n", "line 5.*found -9"),
     ],
 )
@@ -126,6 +126,17 @@ def test_bad_tables_are_one_message(tmp_path, text, message):
     path.write_text(text)
     with pytest.raises(sm.StiffmapError, match=message):
         load_taps(path)
+
+
+@pytest.mark.parametrize(
+    ("unit", "size"),
+    [("Hz", 1), ("kHz", 1e-3), ("rpm", 60), ("1/min", 60), ("rad/s", 2 * np.pi), ("krpm", 0.06)],
+)
+def test_frequencies_have_the_units_of_responses(tmp_path, unit, size):
+    path = tmp_path / "taps.csv"
+    path.write_text(f"x_mm,y_mm,z_mm,frequency [{unit}],u [{unit}]\n1,2,3,{12 * size!r},{size!r}\n")
+    found = load_taps(path)
+    np.testing.assert_allclose([found.frequency[0], found.u[0]], [12, 1])
 
 
 def test_poses_out_of_reach_are_said(arm):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import pi
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +30,9 @@ BAD = [
     ({"tool": {**TOOL, "runout": {"offset": "20 mm"}}}, "quarter"),
     ({"tool": {**TOOL, "flutes": 2}}, "unknown key 'flutes'"),
     ({"spindle": "6000"}, "such as 6000 rpm"),
+    ({"spindle": "6000 m"}, "such as 6000 rpm"),
     ({"spindle": "0 rpm"}, "above zero"),
+    *(({"spindle": fast}, "up to 1e6 rpm") for fast in ("6000000 rpm", "6000 krpm", "20 kHz")),
     ({"feed": "0 mm/min"}, "above zero"),
     ({"feed": "0.075"}, "unit is missing"),
     ({"feed": "1 km/min"}, "unknown unit"),
@@ -123,3 +126,20 @@ def test_unknown_name() -> None:
 def test_endless_numbers(feed: object) -> None:
     with pytest.raises(FileError, match=r"feed: .*(endless|too large)"):
         sm.load_process(changed(feed=feed))
+
+
+@pytest.mark.parametrize(
+    "spindle", ["6 krpm", "6000 U/min", "6000 rpm", "6000 min-1", "0.1 kHz", "6000 r/min", "100Hz"]
+)
+@pytest.mark.parametrize(
+    "feed", ["0.3 mm/U", "0.3 mm/rev", "0.15 mm/Zahn", "0.15 mm/tooth", "1800 mm/min", "1.8 m/min"]
+)
+def test_speeds_and_feeds_as_workshops_write_them(spindle: str, feed: str) -> None:
+    p = sm.load_process(changed(spindle=spindle, feed=feed, tool=TOOL))
+    assert p.spindle == pytest.approx(200 * pi, rel=1e-12)
+    assert p.feed == pytest.approx(0.03, rel=1e-12)
+
+
+@pytest.mark.parametrize("feed", ["72 ipm", "0.012 ipr", "0.006 ipt", "72ipm", "0.012 in/rev", "72 in/min"])
+def test_feeds_in_inches(feed: str) -> None:
+    assert sm.load_process(changed(spindle="6000 rpm", feed=feed, tool=TOOL)).feed == pytest.approx(0.03048)

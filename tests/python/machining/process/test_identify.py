@@ -103,6 +103,20 @@ def test_letters_of_data_sheets_name_columns() -> None:
         )
 
 
+@pytest.mark.parametrize(
+    ("head", "size"),
+    [
+        ("feed [mm/rev]", 2), ("feed_mm_rev", 2), ("Vorschub [mm/U]", 2), ("f [mm/rev]", 2), ("feed [ipr]", 2 / 25.4),
+        ("feed [mm/Zahn]", 1), ("feed [ipt]", 1 / 25.4), ("feed [ipm]", 6000 / 25.4), ("vf [in/min]", 6000 / 25.4),
+    ],
+)  # fmt: skip
+def test_feeds_as_workshops_write_them(head: str, size: float) -> None:
+    table = {k: v for k, v in MEASURED.items() if k != "feed_per_tooth_mm"}
+    table |= {head: [c * size for c in MEASURED["feed_per_tooth_mm"]], "spindle [krpm]": 3.0, "teeth": 2}
+    found, same = read_table(table), read_table({**MEASURED, "spindle_rpm": 3000, "teeth": 2})
+    np.testing.assert_allclose([p.feed for p in found.cuts], [p.feed for p in same.cuts], rtol=1e-12)
+
+
 def test_straight_forces_come_back() -> None:
     law = sm.identify_process(made(noise=0.5))
     assert not law.bent
@@ -216,6 +230,9 @@ BAD = [
     ({"side": "up"}, "expected one of climb"),
     ({"teeth": 2.5}, "whole number"),
     ({"time_s": [1, 2, 3, 4, 5]}, "spindle_rpm"),
+    *((dict.fromkeys(("Fx_N", "Fy_N", "Fz_N"), 0.0) | more, "expected forces, found 0 N in every row") for more in ({}, {"diameter_mm": 25})),
+    ({"feed_mm_rev": 0.1}, "expected one feed, found 'feed_per_tooth_mm' and 'feed_mm_rev'"),
+    ({"spindle_rpm": 6e6}, "spindle_rpm: expected at most 1e6 rpm, found 6000000"),
 ]  # fmt: skip
 
 
@@ -240,7 +257,7 @@ def test_signals_that_miss_the_teeth_are_refused(slower: int, every: int, rpm: i
         read_table(given)
 
 
-@pytest.mark.parametrize("unit", ["krpm", "1/s", "x1000"])
+@pytest.mark.parametrize("unit", ["mrpm", "1/s", "x1000"])
 def test_a_unit_next_to_rpm_counts(unit: str, tmp_path: Path) -> None:
     def text(head: str) -> str:
         rows = "".join(f"{c},10,20,30,2,3,6000\n" for c in (0.05, 0.1, 0.15))

@@ -287,7 +287,7 @@ BAD = [
     (FORCES.splitlines()[0], r"no header line with rows of numbers below it"),
     ("", r"empty"),
     *((FORCES.replace("Fx_N", n), r"Fx.*expected a unit such as in Fx_N, found") for n in ("Fx", "Fx [lbx]", "Fx [mm]")),
-    *((FORCES.replace("feed_per_tooth_mm", n), r"mm/tooth or mm/min") for n in ("feed", "feed [mm]", "feed_per_tooth [mm/min]")),
+    *((FORCES.replace("feed_per_tooth_mm", n), r"mm/tooth, mm/rev or mm/min") for n in ("feed", "feed [mm]", "feed_per_tooth [mm/min]")),
     (FORCES.replace("feed_per_tooth_mm", "feed [mm/min]"), r"missing column 'spindle_rpm'"),
     (FORCES.replace("teeth", "feed [mm/min]"), r"expected one feed, found 'feed_per_tooth_mm' and 'feed \[mm/min\]'"),
     (FORCES.replace("Fy_N", "fx [N]"), r"a column is given twice, as 'Fx_N' and 'fx \[N\]'"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from math import acos, atan2, hypot
 from pathlib import Path
 
@@ -157,6 +158,40 @@ def test_bounds_of_a_file_hold_for_numbers_at_addresses(name: str, address: str,
         StiffmapError, match=f"^{address.rpartition('.')[0] or address}.*(not negative|is not below)"
     ):
         with_values(d, {address: value})
+
+
+@pytest.mark.parametrize("component", [(-9810.0, 0, 0), (0, 0, 9810.0), (0, 1000.1, 0)])
+def test_gravity_is_in_si_wherever_it_is_given(component: tuple[float, float, float]) -> None:
+    machine = sm.load_machine("five-bar")
+    machine = sm.Machine(replace(machine.description, gravity=(0.0, 0.0, -9.81)))
+    axis = int(np.argmax(np.abs(component)))
+    with pytest.raises(StiffmapError, match=f"^gravity/{'xyz'[axis]}: expected -1000 to 1000"):
+        machine.with_number(f"gravity/{'xyz'[axis]}", component[axis])
+    with pytest.raises(StiffmapError, match=r"^gravity: expected 3 finite numbers up to 1000"):
+        machine.solve(machine.description.home.p, gravity=component)
+
+
+SAME = [
+    ("five-bar", {"forearm/length": 0.41, "left.forearm/length": 0.42, "right.forearm/length": 0.43}),
+    ("five-bar", {"left.arm/length": 0.31, "arm/length": 0.32}),
+    ("five-bar", {"arm_length/translation.x": 0.31, "arm_length/length": 0.32}),
+    ("ur10", {"base/stiffness": 1e5, "arm.base/stiffness": 2e5}),
+    ("ur10", {"arm.base/stiffness": 1e5, "arm.base/compliance": 1e-6}),
+]
+
+
+@pytest.mark.parametrize(("name", "values"), SAME, ids=lambda v: v if isinstance(v, str) else " ".join(v))
+def test_a_number_has_one_value(name: str, values: dict[str, float]) -> None:
+    machine = sm.load_machine(name)
+    first = next(iter(values))
+    with pytest.raises(StiffmapError, match=f"^{first}: another address sets this number to "):
+        machine.with_numbers(values)
+    with pytest.raises(StiffmapError, match=f"^{first}: another address sets this number to "):
+        sm.design_sweep(machine, {a: [v, 1.01 * v] for a, v in values.items()})
+    with pytest.raises(StiffmapError, match=": another address sets this number to "):
+        sm.design_sweep(machine, {a: [0.3, 0.31] for a in values})
+    part = machine.with_numbers(dict(list(values.items())[-1:]))
+    assert part != machine
 
 
 def test_both_ends_of_a_range_change_together() -> None:

@@ -23,6 +23,7 @@ BAD = {
         "kind": "dead_zone", "element": "actuator", "legs": ["w"], "half_width": 1e-5,
     },
     "no leg 'xy' has it; legs that do: x, y, z": {**GAP, "legs": "xy", "half_width": 1e-5},
+    "legs: expected different names, got 'y' twice": {**GAP, "legs": ["y", "x", "y"], "half_width": 1e-5},
     "half_width: expected 0 to 0.01 m, got -1e-05": {"kind": "dead_zone", **DRIVE, "half_width": -1e-5},
     "half_width: expected 0 to 0.01 m, got 12": {"kind": "dead_zone", **DRIVE, "half_width": 12},
     "half_width: expected a finite number in m, got nan": {**GAP, "half_width": np.nan},

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.python.model.files.machine_text import BASE, changed, description, with_element
+from tests.python.model.files.machine_text import BASE, ELEMENTS, changed, description, with_element
 
 from stiffmap.common.units import Dimension, UnitSystem
 from stiffmap.model.beams import rectangle_section
-from stiffmap.model.description import Element, Joint, Law, Offset, Spring
+from stiffmap.model.description import Element, ExternalSpring, Joint, Law, Offset, Spring
 from stiffmap.model.link import LinkFile, save_link
 
 
@@ -217,3 +217,17 @@ def test_links_are_read_but_not_identified(named: bool, tmp_path: Path) -> None:
     )
     loaded = [name.rpartition(".")[2] for name in done.stdout.split()]
     assert loaded == (["linkfile", "transport"] if named else []), done.stderr
+
+
+@pytest.mark.parametrize("point", ["tcp", "a.tip", "platform.nose"])
+def test_springs_outside_pull_at_the_tool_or_at_named_points(point: str) -> None:
+    at = {"tip": (*ELEMENTS, 4), "nose": ("platform",)}
+    spring = {"point": point, "anchor": [0, 0, 100], "stiffness": 2.0, "length": 50}
+    d = description(
+        changed(
+            (at["tip"], {"point": "tip"}),
+            (at["nose"], [{"point": "nose"}]),
+            (("external_springs",), {"hose": spring}),
+        )
+    )
+    assert d.external_springs == (ExternalSpring("hose", point, (0.0, 0.0, 0.1), 2000.0, 0.05),)

@@ -87,6 +87,8 @@ BAD: list[tuple[str, tuple[tuple[Any, ...], Any], list[str]]] = [
     ("unknown joint", (("legs", "a", "home"), {"pim": 1.0}), ["legs.a.home.pim", "did you mean 'pin'"]),
     ("loose rotation", (("home",), {"rotation": [[1, 0.1, 0], [0, 1, 0], [0, 0, 1]]}), ["off by 0.1"]),
     ("left-handed", (("home",), {"axes": "yxz"}), ["home.axes", "left-handed"]),
+    *((f"{key} twice", ((key,), ["x", "y", "x"]), [key, "expected different names, got 'x' twice"]) for key in ("task", "freedoms")),
+    ("leg twice", (("effects",), [{"kind": "dead_zone", "element": "drive", "legs": ["a", "a"]}]), ["effects[0].legs", "expected different names, got 'a' twice"]),
     ("axes twice", (("home",), {"axes": "xxz"}), ["home.axes", "yzx"]),
     ("two rotations", (("home", "axes"), "yzx"), ["home", "only one of axes, turns"]),
     ("five terms", ((*SPRING, "compliance"), [1, 1, 1, 1, 1]), ["[1].compliance", "6 entries; found 5"]),

@@ -72,15 +72,20 @@ def test_distribution_balances_and_is_the_least() -> None:
             assert (z[d.tension[i] <= 20.0] < 1e-4).all()
 
 
+@pytest.mark.parametrize("point", ["platform.hook", "tcp"])
 @pytest.mark.parametrize("tension_only", [False, True])
 @pytest.mark.parametrize("length", [0.2, 1.5])
 @pytest.mark.parametrize("anchor", [(0.0, 0.0, 3.0), (1.0, 0.5, 2.0)])
 def test_springs_outside_pull_with_the_cables(
-    anchor: tuple[float, float, float], length: float, tension_only: bool
+    anchor: tuple[float, float, float], length: float, tension_only: bool, point: str
 ) -> None:
     """Tensions and held forces are those of the same pull as a wrench, by hand; boxes refuse."""
-    m, p, hook = frame(force=2000.0), np.array([0.2, -0.1, 1.05]), np.array([0.05, 0.0, 0.2])
-    spring = ExternalSpring("spine", "platform.hook", anchor, 80.0, length, tension_only)
+    m, p, hook = (
+        frame(force=2000.0),
+        np.array([0.2, -0.1, 1.05]),
+        np.array([0.05, 0.0, 0.2]) * (point != "tcp"),
+    )
+    spring = ExternalSpring("spine", point, anchor, 80.0, length, tension_only)
     d = m.description
     sprung = Machine(
         replace(d, platform=(*d.platform, Point("hook", tuple(hook))), external_springs=(spring,))

@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import stiffmap as sm
 from stiffmap.ui.cli.app import main
+from stiffmap.workspace.design import load_design
 
 DESIGN = """
 name: d
@@ -22,6 +24,7 @@ FILES = {
     "crossed.yaml": "name: r\nrequirements: {deflection: {at_least: 3 mm, at_most: 2 mm}}\n",
     "through.yaml": "name: out\nline: {start: [0 mm, 0 mm, 0 mm], end: [-450 mm, -450 mm, -450 mm]}\nduration: 1 s\n",
     "unknown.yaml": DESIGN.replace("OBJECTIVE", "beauty"),
+    "doubled.yaml": DESIGN.replace("OBJECTIVE", "mass, mass"),
     "infeasible.yaml": DESIGN.replace("OBJECTIVE", "mass"),
 }
 
@@ -35,6 +38,8 @@ FILES = {
             ["at_least (3 mm) is above at_most (2 mm)"],
         ),
         ("measures orthoglide-revised --only beauty", ["unknown measure 'beauty'", "workspace"]),
+        ("measures five-bar --only mass,mass", ["only: expected different names", "'mass' twice"]),
+        ("optimize doubled.yaml -o out", ["objectives", "expected different names, got 'mass' twice"]),
         ("efforts tripteron through.yaml", ["needs masses", "legs 1, 2, 3"]),
         ("efforts orthoglide-revised through.yaml", ["passes a singularity", f"-{PLACE:.1f}", "t = 0.59"]),
         ("optimize unknown.yaml -o out", ["unknown objective 'beauty'", "path_compliance"]),
@@ -62,3 +67,23 @@ def test_a_box_outside_the_reach_says_where(capsys):
     main(["measures", "orthoglide-revised", box, "--only", "velocity", "--nodes", "3"])
     said = capsys.readouterr().out
     assert "not within reach" in said and "-2000.0" in said
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        ("templates.leg.body[carriage].mass", "templates.leg[2].mass"),
+        ("templates.leg[2].mass", "templates.leg.body[carriage].mass"),
+        ("workspace.x[0]", "workspace[x][0]"),
+    ],
+)
+def test_a_number_of_a_design_has_one_place(tmp_path, one, other):
+    path = tmp_path / "design.yaml"
+    text = DESIGN.replace("OBJECTIVE", "mass").replace(
+        '"templates.leg.body[carriage].mass": c', f'"{one}": c'
+    )
+    path.write_text(text, encoding="utf-8")
+    load_design(path)
+    path.write_text(text.replace(": c}", f': c, "{other}": 2}}'), encoding="utf-8")
+    with pytest.raises(sm.StiffmapError, match=r"numbers.*another place above is the same number"):
+        load_design(path)

@@ -213,3 +213,12 @@ def test_a_failed_pose_has_no_direction_of_the_worst_force():
     assert np.abs(refined.position[:2]).max() < 0.2
     with pytest.raises(sm.StiffmapError, match="position: expected at least one"):
         worst_deflection(machine, np.zeros((0, 3)), force=1.0)
+
+
+@pytest.mark.parametrize(
+    ("only", "found"),
+    [([], "none"), ({}, "none"), ((), "none"), (["mass", "stroke", "mass"], "'mass' twice")],
+)
+def test_measures_are_named_once_and_one_at_least(only, found):
+    with pytest.raises(sm.StiffmapError, match=f"^only: expected different names, got {found}$"):
+        sm.measures("five-bar", only=only)

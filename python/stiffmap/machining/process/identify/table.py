@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import isclose, pi
@@ -18,26 +17,26 @@ from stiffmap.common.errors import FileError
 from stiffmap.common.tables.cells import Cells
 from stiffmap.common.tables.named import WORD, Known, NamedTable, named, read_named
 from stiffmap.common.tables.table import Table
+from stiffmap.common.units import feed_unit
 from stiffmap.machining.process.description import SIDES, Cut, EndMill, Process, Tool
-from stiffmap.machining.process.load import THINNEST
+from stiffmap.machining.process.load import FASTEST, THINNEST
 
 ForceColumns = str | PathLike[str] | Mapping[str, object] | DataFrame
 COLUMNS = {
     "feed_per_tooth": ("feed_per_tooth_mm", "m"), "fx": ("Fx_N", "N"), "fy": ("Fy_N", "N"), "fz": ("Fz_N", "N"),
     "teeth": ("teeth", ""), "axial": ("axial_mm", "m"), "radial": ("radial_mm", "m"), "diameter": ("diameter_mm", "m"),
     "spindle": ("spindle_rpm", "rad/s"), "side": ("side", ""), "helix": ("helix_deg", "rad"), "time": ("time_s", "s"),
-    "feed": ("feed_mm_min", "m/s"),
+    "feed": ("feed_mm_min", "m/s"), "feed_per_rev": ("feed_mm_rev", "m"),
 }  # fmt: skip
 """Name -> how a table usually writes it, and its SI unit."""
 NEEDED = ("feed_per_tooth", "fx", "fy", "fz", "teeth", "axial")
 ALIASES = {
-    "c": "feed_per_tooth", "chip": "feed_per_tooth", "depth": "axial", "ap": "axial", "ae": "radial", "width": "radial",
+    "c": "feed_per_tooth", "f": "feed", "chip": "feed_per_tooth", "depth": "axial", "ap": "axial", "ae": "radial", "width": "radial",
     "rpm": "spindle", "z": "teeth", "n_teeth": "teeth", "flutes": "teeth", "t": "time", "vf": "feed", "n": "spindle",
     "d": "diameter", "spindle_speed": "spindle", "a_p": "axial", "a_e": "radial", "axial_depth": "axial", "axial_depth_of_cut": "axial",
     "number_of_teeth": "teeth", "zähne": "teeth", "zeit": "time", "vorschub": "feed", "drehzahl": "spindle",
     **{f"{force}_{mean}": force for force in ("fx", "fy", "fz") for mean in ("mean", "avg", "average")},
 }  # fmt: skip
-PER_TOOTH = re.compile(r"(/|_per_|_)tooth$")
 PER_EDGE = ("feed_per_tooth", "c", "chip")
 
 
@@ -51,15 +50,15 @@ def above_zero(c: NamedTable, name: str, row: int, default: float = 0.0) -> floa
 
 def _renamed(name: str, unit: str) -> tuple[str, str]:
     """A feed by its unit: ``fz`` is a force in N, and a feed per tooth in mm."""
-    length = PER_TOOTH.sub("", unit)
-    if name == "feed" and length == unit and not unit.endswith(("/min", "/s")):
-        return name, f"{unit or 'none'}; a feed is in mm/tooth or mm/min"
-    if name == "feed_per_tooth" and unit.endswith(("/min", "/s")):
-        return name, f"{unit}; a feed is in mm/tooth or mm/min"
+    (length, per), is_feed = feed_unit(unit), ALIASES.get(name, name) == "feed"
+    speed = length.endswith(("/min", "/s"))
+    if (is_feed and not per and not speed) or (name == "feed_per_tooth" and (speed or per == "rev")):
+        return name, f"{unit or 'none'}; a feed is in mm/tooth, mm/rev or mm/min"
     if name == "rpm":
         return name, unit or "rpm"
-    feed = (name == "feed" and length != unit) or (name == "fz" and length in ("mm", "um", "µm", "in"))
-    return ("feed_per_tooth", length) if feed else (name, length if name in PER_EDGE else unit)
+    if (is_feed and per) or (name == "fz" and length in ("mm", "um", "µm", "in")):
+        return f"feed_per_{per or 'tooth'}", length
+    return name, length if name in PER_EDGE else unit
 
 
 KNOWN = Known(
@@ -78,19 +77,20 @@ def columns_of(table: ForceColumns, defaults: Mapping[str, object], sheet: str |
         out = read_named(given_path(table, "table", "a file or a mapping of columns"), KNOWN, sheet)
     if "side" in out.values:
         out.values["side"] = np.array(out.values["side"])
-    if {"feed", "feed_per_tooth"} <= set(out.values):
-        out.fail(f"expected one feed, found '{out.header['feed_per_tooth']}' and '{out.header['feed']}'")
+    way, *more = [n for n in ("feed", "feed_per_rev", NEEDED[0]) if n in out.values] or NEEDED[:1]
+    if more:
+        out.fail(f"expected one feed, found '{out.header[more[0]]}' and '{out.header[way]}'")
     for name, value in defaults.items():
         out.values.setdefault(name, np.full(len(out.lines), value))
-    needed = ("feed", "spindle", *NEEDED[1:]) if "feed" in out.values else NEEDED
+    needed = (way, *(["spindle"] if way == "feed" else []), *NEEDED[1:])
     if missing := [COLUMNS[n][0] for n in needed if n not in out.values]:
         out.fail(f"missing column '{missing[0]}'; needed: {', '.join(COLUMNS[n][0] for n in needed)}")
-    if "feed" in out.values:
-        each = [[above_zero(out, n, i) for n in ("feed", "spindle", "teeth")] for i in range(len(out.lines))]
-        feed, spindle, teeth = np.array(each).T
-        del out.values["feed"]
-        out.values["feed_per_tooth"] = feed * 2 * pi / spindle / teeth
-        out.header["feed_per_tooth"] = out.header["feed"]
+    if way != NEEDED[0]:
+        names = (way, "teeth", *(["spindle"] if way == "feed" else []))
+        feed, teeth, *spindle = np.array([[above_zero(out, n, i) for i in range(len(out))] for n in names])
+        del out.values[way]
+        out.values[NEEDED[0]] = (feed * 2 * pi / spindle[0] if spindle else feed) / teeth
+        out.header[NEEDED[0]] = out.header[way]
     return out
 
 
@@ -157,7 +157,10 @@ def read_table(table: ForceColumns, process: Process | None = None, sheet: str |
     of one cut become their mean over whole revolutions. Raises FileError naming file, line, column, expected and found.
     """
     c = columns_of(table, {} if process is None else _defaults(process), sheet)
+    c.check("spindle", lambda v: v <= FASTEST / c.size.get("spindle", 1.0), "at most 1e6 rpm")
     force = np.stack([c.values[n] for n in FORCES], axis=1)
+    if not force.any():
+        c.fail("expected forces, found 0 N in every row", "fx")
     given = frozenset(c.values)
     if "time" not in c.values:
         cuts = tuple(_cut(c, i) for i in range(len(c.lines)))

@@ -8,6 +8,7 @@ from functools import cache
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import (
+    AfterValidator,
     BaseModel,
     BeforeValidator,
     ConfigDict,
@@ -21,6 +22,7 @@ from pydantic import (
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, InitErrorDetails, PydanticCustomError, PydanticKnownError
 
+from stiffmap.common.broadcasting import names_of
 from stiffmap.common.errors import suggestion
 from stiffmap.model.description.machine import SOURCES
 
@@ -107,6 +109,7 @@ Name = Annotated[
 ]
 
 
+EachOnce = AfterValidator(lambda names: list(names_of(names, "list")))
 Source = Annotated[
     Literal[SOURCES],  # type: ignore[valid-type]
     Field(description="Where numbers come from: reports say how much of an answer rests on those assumed."),

@@ -9,6 +9,7 @@ from pydantic import Discriminator, Field, Tag, model_validator
 from stiffmap.model.description import TASK
 from stiffmap.model.files.schema.base import (
     BoxModel,
+    EachOnce,
     FileModel,
     FrameModel,
     HomeModel,
@@ -22,7 +23,7 @@ from stiffmap.model.files.schema.base import (
 from stiffmap.model.files.schema.elements import BodyModel, CableModel, ElementModel, OffsetModel, PointModel
 from stiffmap.model.files.schema.springs import MaterialModel
 
-Components = Annotated[list[Literal[TASK]], Field(min_length=1)]  # type: ignore[valid-type]
+Components = Annotated[list[Literal[TASK]], Field(min_length=1), EachOnce]  # type: ignore[valid-type]
 
 
 class UnitsModel(FileModel):
@@ -91,7 +92,7 @@ class EffectModel(FileModel):
 
     kind: str
     element: str
-    legs: list[Name] = Field(default_factory=list)
+    legs: Annotated[list[Name], EachOnce] = Field(default_factory=list)
     parameters: dict[str, Annotated[float, Field(allow_inf_nan=False)]] = Field(default_factory=dict)
     options: dict[str, str] = Field(default_factory=dict)
 
