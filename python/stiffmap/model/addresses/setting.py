@@ -43,9 +43,9 @@ def with_values(description: MachineDescription, values: Mapping[str, float]) ->
         except StiffmapError as problem:
             text = str(problem)
             raise StiffmapError(text if address in text else f"{address}: {text}") from None
-    for address, value in values.items():
+    for address, value in values.items() if len(values) > 1 else ():
         now = known_values(description, address)
-        if not any(math.isclose(v, value) for v in now):
+        if not any(math.isclose(v, value, abs_tol=1e-15) for v in now):
             raise StiffmapError(f"{address}: another address sets this number to {now[0]:g}; keep one")
     for ends in [a.rpartition(".")[0] for a in values if a.endswith((".low", ".high"))]:
         low, high = (known_values(description, f"{ends}.{end}") for end in ("low", "high"))
