@@ -137,14 +137,8 @@ def fitted(
         How much likelier that fit was than with heavy tails, ln; none are tried where one effect more can hardly change that.
     """
     given = start or {}
-    unnamed = np.array([False, *(p.kind in (*GAPS, "time") for p in parts)])
     first = np.array([given.get(NOISE, 0.0), *(given.get(p.name, BEGIN) for p in parts)])
-    even = np.ones(len(columns.rows))
-    light = _optimum(columns, tuple(parts), first, even)
-    square = float(np.mean(columns.residual**2))
-    if not given and square > 1.0:  # noise beyond its declaration and short gaps look much alike
-        noisy = np.where(unnamed, QUIET, [np.log(square), *first[1:]])
-        light = max(light, _optimum(columns, tuple(parts), noisy, even), key=lambda f: f.score)
+    light = _optimum(columns, tuple(parts), first, np.ones(len(columns.rows)))
     if weights is not None and np.any(weights != 1.0):
         heavy = _optimum(columns, tuple(parts), first, weights, heavy=True, beat=light.score)
         return max(light, heavy, key=lambda f: f.score)
@@ -154,7 +148,7 @@ def fitted(
     begun = np.array([2.0 * np.log(typical), *first[1:]])  # what sank may rise
     starts = [(begun, slips)]
     if not given:  # what nobody can name may have taken what stands out
-        quiet = np.where(unnamed, QUIET, begun)
+        quiet = np.where([False, *(p.kind in (*GAPS, "time") for p in parts)], QUIET, begun)
         starts.append((quiet, _standing_out(evaluated(columns, parts, quiet, light.weights))[1]))
     if columns.alone.any():
         starts.append((begun, np.where(columns.alone, NOTHING, 1.0)))
@@ -298,15 +292,20 @@ def _prior(fit: Fit) -> tuple[Floats, Floats]:
     return np.array([mean, *np.zeros(len(fit.parts))]), np.array([sd, *(p.sd for p in fit.parts)])
 
 
-def _priced(fit: Fit, information: Floats) -> Fit:
-    """The evidence: less the price of the amplitudes (Laplace), the mean over sizes of each effect."""
+def _price(fit: Fit, information: Floats) -> float:
+    """What the amplitudes cost that are no effects' (Laplace)."""
     _, sd = _prior(fit)
     wide = np.minimum(sd, WIDEST)
     wide[0] = declared_noise(fit.columns)[1]
     counted = np.array([True, *(p.kind != "effect" for p in fit.parts)])
     of_data = information - np.diag(1.0 / sd**2)
     some = (wide[:, None] * of_data * wide)[np.ix_(counted, counted)]
-    score = fit.score - 0.5 * float(np.linalg.slogdet(np.eye(int(counted.sum())) + some)[1])
+    return 0.5 * float(np.linalg.slogdet(np.eye(int(counted.sum())) + some)[1])
+
+
+def _priced(fit: Fit, information: Floats) -> Fit:
+    """The evidence: less the price of the amplitudes, the mean over sizes of each effect."""
+    score = fit.score - _price(fit, information)
     for p, x in zip(fit.parts, fit.t[1:], strict=True):
         if p.kind == "effect":
             assert p.factor is not None
@@ -360,6 +359,7 @@ def _optimum(
     t = np.minimum(t, most)
     fit, along = _evaluate(columns, parts, t, weights, noise)
     gradient, information = None, _information(fit, along)
+    price = _price(fit, information)
     for _ in range(WEIGHINGS if heavy else STEPS):
         if gradient is None:
             inverse = fit.inverse()
@@ -386,6 +386,10 @@ def _optimum(
         fit, along, gradient = moved, along_there, None
         information = _information(fit, along)
         damping = max(damping / 4.0, 1e-3)
-        if gain < (WEIGHED if heavy else ENOUGH) or fit.score + REACH * gain < beat:
+        before, price = price, _price(fit, information)
+        if (
+            max(gain, gain + before - price) < (WEIGHED if heavy else ENOUGH)
+            or fit.score + REACH * gain < beat
+        ):
             break
     return _priced(fit, information)

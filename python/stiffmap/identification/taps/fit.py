@@ -21,7 +21,7 @@ from stiffmap.identification.candidates.candidates import Candidate
 from stiffmap.identification.candidates.sensitivity import Variant
 from stiffmap.identification.inference.chosen import Chosen
 from stiffmap.identification.inference.columns import Columns, Free
-from stiffmap.identification.inference.constants import ODDS, RARE
+from stiffmap.identification.inference.constants import NOISE_SD, ODDS, RARE
 from stiffmap.identification.inference.names import put_instead, searched
 from stiffmap.identification.inference.optimum import Optimum, covariance, differences, optimum
 from stiffmap.identification.inference.places import Place, shape_of
@@ -199,7 +199,9 @@ def columns_of(problem: TapsProblem, tried: Sequence[Candidate], at: FittedCause
     unknowns = tuple(Unknown(key, key.rpartition("/")[2], "", u) for key, _, u in problem.numbers)
     found = (place_of(problem, c, at, free) for c in tried if c not in taken)
     places = tuple(p for p in found if p.shapes)
-    return replace(bare, unknowns=unknowns, numbers=free.T @ lines.jacobian, places=places)
+    # as if repeats had shown the noise: a mode that is paired wrongly is none
+    repeats = (0.5 / NOISE_SD**2,) * 2
+    return replace(bare, unknowns=unknowns, numbers=free.T @ lines.jacobian, places=places, repeats=repeats)
 
 
 def place_of(problem: TapsProblem, c: Candidate, at: FittedCauses, free: Floats) -> Place:
