@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,10 +31,10 @@ PER_ROW = (
     *("seen", "seen_rotation", "asked"),
 )
 """Fields with one entry per row; None or empty where the experiment has none."""
-WORDS = {
-    "quantity": ("deflection", "position"), "unloaded": ("centre", "approach", "unknown"), "surface": ("known", "offset_unknown", "unknown"),
-    "frame": ("known", "offset_unknown", "unknown"), "tool": ("known", "offset_unknown", "unknown"),
-}  # fmt: skip
+Quantity = Literal["deflection", "position"]
+Unloaded = Literal["centre", "approach", "unknown"]
+HowKnown = Literal["known", "offset_unknown", "unknown"]
+WORDS = {"quantity": Quantity, "unloaded": Unloaded, "surface": HowKnown, "frame": HowKnown, "tool": HowKnown}
 """Fields that are one of some words."""
 
 
@@ -161,12 +161,13 @@ class Experiment:
 
     def __post_init__(self) -> None:
         for name, words in WORDS.items():
-            one_of(getattr(self, name), words, name)
+            one_of(getattr(self, name), get_args(words), name)
         for name in PER_ROW:
             value = getattr(self, name)
-            absent = value is None or (isinstance(value, tuple) and not value)
-            if (name in PER_ROW[:5] or not absent) and np.shape(value)[:1] != (len(self),):
-                raise refused(name, f"{len(self)} entries, one for each row", f"the shape {np.shape(value)}")
+            shape = (len(value),) if isinstance(value, tuple) else np.shape(value)
+            absent = value is None or (shape == (0,) and isinstance(value, tuple))
+            if (name in PER_ROW[:5] or not absent) and shape[:1] != (len(self),):
+                raise refused(name, f"{len(self)} entries, one for each row", f"the shape {shape}")
         if np.any(self.sigma < 0):
             raise refused("sigma", "standard deviations of 0 or more, or NaN", f"{np.nanmin(self.sigma):g}")
 

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, create_model
 
+from stiffmap.experiment.experiment import HowKnown, Quantity, Unloaded
 from stiffmap.experiment.files.fields import DECLARED, quantity_of, read
 from stiffmap.experiment.readings import kinds
 from stiffmap.model.files.schema.base import FileModel
@@ -97,7 +98,7 @@ class SurfaceModel(FileModel):
     """
 
     normal: Axes3 = Field(default_factory=lambda: [0.0, 0.0, 1.0])
-    shape: Literal["known", "offset_unknown", "unknown"] = "known"
+    shape: HowKnown = "known"
 
 
 class CertificateModel(FileModel):
@@ -129,7 +130,7 @@ class ExperimentFile(FileModel):
     """One experiment."""
 
     machine: str
-    quantity: Literal["deflection", "position"]
+    quantity: Quantity
     units: ExperimentUnitsModel
     title: str = ""
     data: str = "data.csv"
@@ -142,9 +143,9 @@ class ExperimentFile(FileModel):
     zero_noise: NoiseModel = NoiseModel()
     joints: dict[str, EncoderModel] = Field(default_factory=dict)
     command: dict[str, CommandModel] = Field(default_factory=dict)
-    unloaded: Literal["centre", "approach", "unknown"] = "centre"
-    frame: Literal["known", "offset_unknown", "unknown"] = "known"
-    tool: Literal["known", "offset_unknown", "unknown"] = "known"
+    unloaded: Unloaded = "centre"
+    frame: HowKnown = "known"
+    tool: HowKnown = "known"
     target_orientation: Literal["rotvec", "xyz", "XYZ", "zyx", "ZYX", "ZYZ", "zyz"] = "rotvec"
     surface: SurfaceModel = SurfaceModel()
     anchor: Axes3 | None = None
