@@ -186,7 +186,7 @@ def _heavy(fit: Fit, mean: Floats, sd: Floats) -> Floats:
 def evaluated(columns: Columns, parts: Sequence[Part], t: Floats, weights: Floats) -> Fit:
     """The evidence at given amplitudes."""
     fit, along = _evaluate(columns, tuple(parts), t, weights, columns.spared.of_noise(1.0 / weights))
-    return _priced(fit, _information(fit, along))
+    return _priced(fit, _price(fit, _information(fit, along)))
 
 
 def declared_noise(columns: Columns) -> tuple[float, float]:
@@ -303,9 +303,9 @@ def _price(fit: Fit, information: Floats) -> float:
     return 0.5 * float(np.linalg.slogdet(np.eye(int(counted.sum())) + some)[1])
 
 
-def _priced(fit: Fit, information: Floats) -> Fit:
+def _priced(fit: Fit, price: float) -> Fit:
     """The evidence: less the price of the amplitudes, the mean over sizes of each effect."""
-    score = fit.score - _price(fit, information)
+    score = fit.score - price
     for p, x in zip(fit.parts, fit.t[1:], strict=True):
         if p.kind == "effect":
             assert p.factor is not None
@@ -392,4 +392,4 @@ def _optimum(
             or fit.score + REACH * gain < beat
         ):
             break
-    return _priced(fit, information)
+    return _priced(fit, price)

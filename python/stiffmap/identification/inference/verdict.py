@@ -271,23 +271,21 @@ def left(fit: Fit) -> tuple[str, str]:
     on = {p: t for p, t in zip(fit.parts, fit.t[1:], strict=True) if t > OFF + 1.0}
     gaps, over = [p for p in on if p.kind in GAPS], [p for p in on if p.kind == "time"]
 
-    centre, sd = declared_noise(fit.columns)
-    noise = float(fit.t[0])  # ln κ², at least: without gaps that it may stand for
-
-    def largest(some: list[Part], freedom: int = 0) -> str:
-        nonlocal noise
+    def largest(some: list[Part], freedom: int = 0) -> tuple[str, float]:
+        """The largest of some, and ln κ² of the noise: where they are not demanded, of one that stands for them."""
+        noise = float(fit.t[0])
         if not some:
-            return ""
+            return "", noise
         found, instead = _significant(fit, [p.name for p in some], freedom)
-        noise = noise if found else max(noise, instead)
-        return max(some, key=lambda p: on[p]).name if found else ""
+        return (max(some, key=lambda p: on[p]).name, noise) if found else ("", max(noise, instead))
 
-    rest, time = largest(gaps), largest(over)
-    if noise - centre > KAPPA_SDS * sd:
+    (rest, noise), (time, noisier) = largest(gaps), largest(over)
+    centre, sd = declared_noise(fit.columns)
+    if max(noise, noisier) - centre > KAPPA_SDS * sd:
         rest = rest or NOISIER
-    rest = rest or largest([p for p in over if on[p] > LARGEST_TIME])
+    rest = rest or largest([p for p in over if on[p] > LARGEST_TIME])[0]
     if not rest and not time and gaps and over:
-        rest = largest([*gaps, *over], len(gaps) + len(over))  # either may be the noise, not both
+        rest = largest([*gaps, *over], len(gaps) + len(over))[0]  # either may be the noise, not both
     return rest, time
 
 
