@@ -45,6 +45,11 @@ def point_names(description: MachineDescription) -> list[str]:
     return [name for name, element in all_elements(description) if isinstance(element, Point)]
 
 
+def spring_points(description: MachineDescription) -> list[str]:
+    """``tcp`` and the named points, where an external spring may pull."""
+    return ["tcp", *point_names(description)]
+
+
 def core_name(full: str) -> str:
     """What the core, and so an actuator or a coordinate, is called: without ``base.`` or ``platform.``."""
     sequence, _, rest = full.partition(".")

@@ -25,7 +25,7 @@ from stiffmap.model.description import (
 from stiffmap.model.description.machine import GRAVITY_LIMIT
 from stiffmap.model.description.pose import Vector
 from stiffmap.model.description.strokes import as_rows
-from stiffmap.model.description.tree import ENDS, Elements, edit_path, point_names, walk
+from stiffmap.model.description.tree import ENDS, Elements, edit_path, spring_points, walk
 from stiffmap.model.files.build_elements import HOME, build_elements
 from stiffmap.model.files.build_springs import with_strokes
 from stiffmap.model.files.build_values import (
@@ -78,7 +78,7 @@ def build(
     gathered = context.gathered
     description = with_strokes(description, gathered)
     context.raise_problems()
-    points = ["tcp", *point_names(description)]
+    points = spring_points(description)
     for spring in description.external_springs:
         if spring.point not in points:
             here = context.at("external_springs", spring.name, "point")

@@ -12,7 +12,7 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.description import Body, ExternalSpring, MachineDescription, Point, Spring
 from stiffmap.model.description.pose import vector
-from stiffmap.model.description.tree import Elements, all_elements, point_names
+from stiffmap.model.description.tree import Elements, all_elements, spring_points
 from stiffmap.model.effects.edit import change_sites, fresh
 from stiffmap.model.effects.evidence import Probe, Signature, Tried
 from stiffmap.model.effects.library.geometry import point, translation_of, translations
@@ -118,7 +118,7 @@ ANCHOR = tuple(
 
 def points(description: MachineDescription) -> list[Place]:
     """The TCP and the named points, by their full names."""
-    return [(name, ()) for name in ("tcp", *point_names(description))]
+    return [(name, ()) for name in spring_points(description)]
 
 
 def with_spring(description: MachineDescription, placed: Placed) -> MachineDescription:
