@@ -164,25 +164,28 @@ def test_noise_far_beyond_its_declaration_is_a_rest():
     assert verdict.left(amplitudes.fitted(c, ())) == ("", "")
 
 
-def beyond(factor: float, correlated: float) -> str:
-    """What is unexplained of noise `factor` times as large as stated, carried over to the next reading, where a gap is as short."""
+def beyond(factor: float, correlated: float) -> tuple[Any, Part]:
+    """Noise `factor` times as large as stated, carried over to the next reading, and a gap that is as short."""
     rng = np.random.default_rng(5)
     away = np.abs(np.subtract.outer(np.arange(READINGS), np.arange(READINGS)))
     c = columns(rng)
     short = Part("short", "field", full=c.free.T @ np.exp(-away / 1.0) @ c.free)
     drawn = np.linalg.cholesky(np.where(away, correlated**away, 1.0)) @ rng.normal(size=READINGS)
-    c = replace(c, residual=c.free.T @ (factor * drawn), zero=np.zeros((len(c), len(c))))
-    return verdict.left(amplitudes.fitted(c, [short]))[0]
+    return replace(c, residual=c.free.T @ (factor * drawn), zero=np.zeros((len(c), len(c)))), short
 
 
 @pytest.mark.parametrize("factor", [4.0, 10.0, 30.0])
 def test_noise_far_beyond_its_declaration_is_no_short_gap(factor: float) -> None:
-    assert beyond(factor, 0.0) == "noise larger than declared"
+    c, short = beyond(factor, 0.0)
+    assert verdict.left(amplitudes.fitted(c, [short]))[0] == "noise larger than declared"
+    all_gap = amplitudes.evaluated(c, [short], np.array([0.0, 2 * np.log(factor)]), FLAT)
+    assert verdict.left(all_gap)[0] == "noise larger than declared"
 
 
 @pytest.mark.parametrize("factor", [4.0, 10.0, 30.0])
 def test_a_gap_stays_one_that_noise_of_any_size_shows_badly(factor: float) -> None:
-    assert beyond(factor, 0.8) == "short"
+    c, short = beyond(factor, 0.8)
+    assert verdict.left(amplitudes.fitted(c, [short]))[0] == "short"
 
 
 @pytest.mark.parametrize(("width", "wave"), [(0.5, 1.0), (0.05, 1.0), (0.05, 60.0)])
