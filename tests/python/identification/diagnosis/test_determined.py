@@ -10,6 +10,7 @@ from tests.python.experiment.prediction.test_history import PLAIN, deflection, m
 
 import stiffmap as sm
 from stiffmap.experiment import Predictor, random_plan
+from stiffmap.identification.candidates.candidates import of_kind
 from stiffmap.identification.diagnosis import Effect
 from stiffmap.identification.inference.places import possible
 from stiffmap.model.description import AppliedEffect
@@ -84,3 +85,11 @@ def test_friction_is_named_without_a_play_that_is_not_there(tmp_path: Path) -> N
     d = sm.diagnose(str(folder / "gear.yaml"), folder, cross_validate=False)
     assert [e.kind for e in d.effects] == ["hysteresis"] and "seat" not in d.effects[0].parameters
     holds(d)
+
+
+def test_a_constant_force_is_no_spring_from_far_away() -> None:
+    """A leaning weight pulls as a spring does whose anchor is tens of metres off."""
+    m = sm.load_machine("ur10")
+    (spring,) = of_kind(registry.get("external_spring"), m.description)
+    anchor = [p for p in spring.parameters if p.name.startswith("anchor")]
+    assert [(p.lower, p.upper) for p in anchor] == [(-10.0, 10.0)] * 3

@@ -111,8 +111,11 @@ SLACK = (0.0, 0.7)
 """Free length as a share of the distance to the middle of the plan."""
 HARDEST = 1e4
 """N: no tool is pulled harder, whatever is read; a spring that shows by its stiffness alone would pull with meganewtons."""
+NEAR = (-10.0, 10.0)
+"""m: a spring from further away is a constant force, which a load or its direction is as well."""
 ANCHOR = tuple(
-    Parameter(f"anchor_{a}", "m", -100.0, 100.0, None, 0.1, f"fixed end, {a}", fitted=False) for a in "xyz"
+    Parameter(f"anchor_{a}", "m", -100.0, 100.0, None, 0.1, f"fixed end, {a}", fitted=False, plausible=NEAR)
+    for a in "xyz"
 )
 
 
