@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from itertools import chain
 from os import PathLike
 from pathlib import Path
 
@@ -12,7 +13,7 @@ import numpy as np
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError, StiffmapError, needed, refuse_folder
 from stiffmap.common.tables.lines import complex_number
-from stiffmap.common.tables.named import WORD, Known, read_named
+from stiffmap.common.tables.named import WORD, Known, NamedTable, read_named
 from stiffmap.common.tables.workbook import TABLES
 from stiffmap.common.units import FREQUENCIES
 from stiffmap.workspace.vibration.response import Complex
@@ -85,15 +86,33 @@ def read_responses(path: str | PathLike[str]) -> list[MeasuredResponse]:
 
 def _table(path: Path) -> MeasuredResponse:
     t = read_named(path, COLUMNS)
-    if {*FORMS[0], *FORMS[1]} <= {*t.values}:  # the same in another form
-        t.values = {n: v for n, v in t.values.items() if n not in FORMS[1]}
     if words := t.values.pop("response", None):
         parts = [complex_number(c) for c in words]
         if None in parts:
             t.fail("expected complex numbers, such as 0.1+0.2i", "response", parts.index(None))
         for n in ("real", "imag"):
             t.values[n], t.units[n] = getattr(np.array(parts, complex), n), t.units["response"]
-    form = next((pair for pair in FORMS if {*pair, "frequency"} == {*t.values} - {"coherence"}), ("", ""))
+    if t.units.get("coherence", "").endswith(("%", "percent")):
+        t.values["coherence"] = t.values["coherence"] / 100
+    if len(t.lines) < 2:
+        t.fail("expected two rows or more below the header")
+    given = {*t.values} - {"coherence", "frequency"}
+    forms = [pair for pair in FORMS if given >= {*pair}]
+    if not forms or "frequency" not in t.values or given != {*chain(*forms)}:
+        forms = [("", "")]
+    hertz = FREQUENCIES.get(t.units.get("frequency", "hz").lower())
+    if hertz is None:
+        t.fail("expected frequencies in Hz, kHz, rad/s or rpm, as in frequency_Hz", "frequency")
+    f = hertz * np.asarray(t.values.get("frequency", 0.0))
+    found, *others = [_in_form(t, form, f) for form in forms]
+    if any(np.median(np.abs(found - o)) > 0.1 * np.median(np.abs(found)) for o in others):
+        first, second = (t.header[a] for a, _ in forms)
+        t.fail(f"expected one response, found two: '{first}' and '{second}' are not the same; leave one out")
+    return MeasuredResponse(path.stem, f, found, t.values.get("coherence", np.full(len(f), np.nan)))
+
+
+def _in_form(t: NamedTable, form: tuple[str, str], frequency: Floats) -> Complex:
+    """(frequencies,) m/N, by the two columns of a form."""
     unit = written = t.units.get(form[0], "")
     if form == FORMS[1] and (level := LEVEL.fullmatch(unit)):
         unit = level[2] or t.fail("expected what 0 dB is, as in [dB re 1 m/N]", "magnitude")
@@ -101,32 +120,40 @@ def _table(path: Path) -> MeasuredResponse:
     t.check("magnitude", lambda v: v >= 0, "a size of zero or more ([dB re 1 m/N] where it is in decibels)")
     known = response_unit(unit)
     kind, power = (None, 1) if known is None else _kind(known)
-    if known is None or kind is None or t.units.get("imag", unit) != unit:
+    if known is None or kind is None or (form == FORMS[0] and t.units["imag"] != unit):
         t.fail(f"expected the columns {HEAD}, UNIT one of {EXAMPLES}; found {', '.join(t.header.values())}")
     name = PREFIX.sub(
         "", re.sub(r"[\W_]+", "_", t.header.get(form[0], "").replace(written, "").lower()).strip("_")
     )
     if MEANT.get(name, (kind, power)) != (kind, power):
         t.fail(f"expected a unit of {name.replace('_', ' ')}; found {unit}", form[0])
-    phase = t.values.get("phase", np.zeros(0))
-    steps = np.abs(np.diff(phase, prepend=phase[:1])) <= 2 * np.pi + 0.01
-    t.check(
-        "phase", lambda _: steps & (np.abs(phase) < 100), "steps of a turn at most (phase_deg: in degrees)"
-    )
-    if t.units.get("coherence", "").endswith(("%", "percent")):
-        t.values["coherence"] = t.values["coherence"] / 100
-    if len(t.lines) < 2:
-        t.fail("expected two rows or more below the header")
-    hertz = FREQUENCIES.get(t.units["frequency"].lower())
-    if hertz is None:
-        t.fail("expected frequencies in Hz, kHz, rad/s or rpm, as in frequency_Hz", "frequency")
-    f, (a, b) = hertz * t.values["frequency"], (t.values[n] for n in form)
-    values = np.asarray(known.size * (a + 1j * b if "real" in form else a * np.exp(1j * b)), complex)
+    a, b = (t.values[n] for n in form)
+    if form == FORMS[1]:
+        steps = np.abs(np.diff(b, prepend=b[:1])) <= 2 * np.pi + 0.01
+        t.check(
+            "phase", lambda _: steps & (np.abs(b) < 100), "steps of a turn at most (phase_deg: in degrees)"
+        )
+    values = np.asarray(known.size * (a + 1j * b if form == FORMS[0] else a * np.exp(1j * b)), complex)
     if power < 0:
         t.check(form[0], lambda _: values != 0, "a force by a motion above zero")
         values = 1 / values
-    coherence = t.values.get("coherence", np.full(len(f), np.nan))
-    return MeasuredResponse(path.stem, f, _receptance(f, values, kind), coherence)
+    out = _receptance(frequency, values, kind)
+    if form == FORMS[1]:
+        _check_turn(t, np.abs(out))
+    return out
+
+
+def _check_turn(t: NamedTable, size: Floats) -> None:
+    """Over a peak of a receptance the phase turns by 90 to 180 deg: 1.6 to 3.1 of the other unit, or 57 times as much."""
+    top = int(np.nanargmax(size)) if np.isfinite(size).any() else 0
+    low = np.flatnonzero(size < size[top] / np.sqrt(2))
+    ends = [*low[low < top][-1:], *low[low > top][:1]]
+    turn = np.ptp(t.values["phase"][slice(*ends) if len(ends) == 2 else slice(None)])
+    degrees = t.units["phase"] != "rad"
+    if len(ends) == 2 and turn < 0.1 if degrees else bool(ends) and turn > 20:
+        own, other = ("deg", "rad") if degrees else ("rad", "deg")
+        what = f"expected a turn by 90 to 180 deg over the peak, found {turn / t.size['phase']:.3g} {own}"
+        t.fail(f"{what}; write phase_{other} if that is meant", "phase")
 
 
 def _kind(unit: ResponseUnit) -> tuple[int | None, int]:
