@@ -70,14 +70,11 @@ def understand(m: Meant, loaded: bool = False) -> ImportedSheet:
         _refuse_loads(m, [c for c in used if c.meaning == meaning])
     both = ([c, k] for c in used for k in columns if k.meaning == "note" and guessed(k.name) == c.meaning)
     for c, k in both:  # one of which would go to the notes in silence
-        if c.meaning in (*AXES, *WRENCH) and c.meaning not in m.chosen and sheet.is_numeric(k.index):
-            own, other = m.metres([c.index, k.index], [c.meaning] * 2).T
+        if (of := c.meaning) in (*AXES, *WRENCH) and of not in m.chosen and sheet.is_numeric(k.index):
+            own, other = m.metres([c.index, k.index], [of] * 2).T
             if np.nanmax(np.abs(own - other), initial=0.0) > 0.01 * np.nanmax(np.abs(own), initial=0.0):
-                two = " and ".join(f"'{sheet.header[one.index]}'" for one in (c, k))
-                m.ask_column(
-                    f"which of {two} is {c.meaning}? Say --map {c.meaning}='HEADER', or 'HEADER|HEADER' of repeats",
-                    "reading" if c.meaning in AXES else "load",
-                )
+                two, way = f"'{c.name}' and '{k.name}'", f"--map {of}='HEADER', or 'HEADER|HEADER' of repeats"
+                m.ask_column(f"which of {two} is {of}? Say {way}", "reading" if of in AXES else "load")
     units = dict.fromkeys((c.meaning, m.unit(c.index, c.meaning)) for c in used if quantity_of(c.meaning))
     found = dict(list(units))
     for meaning in (name for name, unit in units if unit != found[name]):

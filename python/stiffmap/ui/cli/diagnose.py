@@ -24,9 +24,7 @@ def command(
     output: Path | None = written("Folder for report and files."),
     seed: int = option("Seed of the folds, and of the poses drawn of many.", 0),
     threads: options.Threads = None,
-    exclude: list[str] | None = option(
-        "Kind of effect or group of numbers known not to be; separated by commas, or repeated."
-    ),
+    exclude: list[str] | None = option("Kinds of effects or groups of numbers known not to be; repeatable."),
     budget: options.Budget = None,
     tolerance: options.Spread = 1.0,
     date: str | None = option("Date that the report bears, as you write it."),

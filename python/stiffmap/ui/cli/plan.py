@@ -112,7 +112,7 @@ def _sequential(
     found: list[dict[str, Any]] = [{"rows": n, "parameters": e.as_plain()} for n, e in steps]
     for step in found:
         each = (f"{p['name']} {with_uncertainty(p['value'], p['u'])} {p['unit']}" for p in step["parameters"])
-        told.append(f"{step['rows']} rows: {', '.join(e.removesuffix(' 1') for e in each)}")
+        told.append(f"{step['rows']} rows: {', '.join(each)}")
     why = f"every u is at most {until:g} of a typical size" if met else "rows used up"
     told.append(f"stopped: {why}")
     return Answer({"met": met, "steps": found}, told)

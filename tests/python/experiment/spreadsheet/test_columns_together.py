@@ -460,7 +460,8 @@ def test_two_columns_of_one_reading_are_asked_for(
     text = head + "".join(f"{k},0,300,-100,0.0{k},{0.5 * k * size}\n" for k in range(1, 5))
     noise = ("--noise", f"{way}=0.002")
     assert made(tmp_path / "a", text, *noise) is None
-    assert f"which of '{first}' and '{second}' is {way}?" in capsys.readouterr().err
+    two = [f"'{header.split(' [')[0]}'" for header in (first, second)]
+    assert f"which of {' and '.join(two)} is {way}?" in capsys.readouterr().err
     for named, value in ((first, 0.01e-3), (second, 0.5e-3)):
         e = made(tmp_path / named[:6].replace(" ", "") / str(value), text, "--map", f"{way}={named}", *noise)
         assert e is not None
@@ -472,4 +473,4 @@ def test_two_columns_of_one_reading_are_asked_for(
 def test_two_columns_of_one_load_are_asked_for(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     text = f"{POSES},Fx [N],Force x [N],dx [mm]\n0,0,300,100,200,0.1\n10,0,300,150,100,0.2\n"
     assert made(tmp_path, text, "--noise", "dx=0.002") is None
-    assert "which of 'Fx [N]' and 'Force x [N]' is fx?" in capsys.readouterr().err
+    assert "which of 'Fx' and 'Force x' is fx?" in capsys.readouterr().err

@@ -456,3 +456,13 @@ def test_two_forms_of_one_response_agree(other, tmp_path):
             np.testing.assert_allclose(read_responses(file)[0].receptance, h)
     with pytest.raises(sm.StiffmapError, match="expected one response, found two"):
         read_responses(file)
+
+
+@pytest.mark.parametrize("size", ["magnitude_dB", "magnitude [dB re 1 m/N]", "magnitude_m/N"])
+def test_a_second_form_may_be_in_decibels(size, tmp_path):
+    h = 1e-6 / (1 - (np.arange(5.0, 80) / 40) ** 2 + 0.06j)
+    m = abs(h) if size.endswith("_m/N") else 20 * np.log10(abs(h))
+    lines = zip(h.real, h.imag, m, np.degrees(np.angle(h)), strict=True)
+    rows = "".join(f"{k + 5},{','.join(map(str, line))}\n" for k, line in enumerate(lines))
+    (tmp_path / "db.csv").write_text(f"frequency_Hz,real_m/N,imag_m/N,{size},phase_deg\n{rows}")
+    np.testing.assert_allclose(read_responses(tmp_path / "db.csv")[0].receptance, h)

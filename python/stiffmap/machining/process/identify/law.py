@@ -285,10 +285,7 @@ def _doubts(numbers: Mapping[str, Number]) -> Iterator[str]:
     """Of coefficients that no material, or hardly one, has."""
     least, most = ({n: v[k] for n, v in numbers.items()} for k in (2, 3))  # the ends of their intervals
     if most["Ktc"] < 0:
-        yield (
-            "Ktc is below zero, which no tool has: the forces are to be those on the tool, along the feed, to its left (seen "
-            "against the tool) and from holder to tip; those on the part have the other signs"
-        )
+        yield "Ktc is below zero, which no tool has: the forces are to be those on the tool, along the feed, to its left (seen against the tool) and from holder to tip; those on the part have the other signs"
     elif most["Krc"] < 0 or max(least["Krc"], least["Kac"]) > most["Ktc"]:
         yield "Krc is below zero, or Krc or Kac above Ktc, which is rare: is the side right, and are Fx, Fy and Fz, with their signs?"
     if most["Ktc"] > 0 and (most["Ktc"] < MATERIALS[0] or least["Ktc"] > MATERIALS[1]):
