@@ -81,12 +81,12 @@ def within(value: float, u: float) -> str:
     To four digits where there is no uncertainty.
     """
     if not (u > 0 and isfinite(u) and isfinite(value)):
-        return f"{value:.4g}"
+        return f"{value + 0.0:.4g}"  # no -0
     exponent = floor(log10(u))
     last = exponent - (u < 1.95 * 10.0**exponent)
     if not -6 <= exponent <= 6:
         return f"{value:.{max(0, min(floor(log10(abs(value))) - last, 12)) if value else 0}e}"
-    return f"{round(value, -last):.{max(0, -last)}f}"
+    return f"{round(value, -last) + 0.0:.{max(0, -last)}f}"
 
 
 _MICRO = Fraction(1, 10**6)

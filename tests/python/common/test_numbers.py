@@ -142,3 +142,8 @@ def test_a_value_is_written_as_far_as_its_uncertainty_reaches(value: float, u: f
     assert decimals[0] == decimals[1]
     step = 10.0 ** -decimals[0] if decimals[0] else 10.0 ** (len(uncertain) - len(uncertain.rstrip("0")))
     assert 0.05 * u < step < 1.01 * u
+
+
+@pytest.mark.parametrize(("value", "u"), [(-1e-9, 0.01), (-0.0, 0.0), (-0.04, 3.0), (-4.0, 90.0)])
+def test_no_zero_has_a_sign(value: float, u: float) -> None:
+    assert with_uncertainty(value, u).split(" ± ")[0].strip("0.") == ""

@@ -61,3 +61,16 @@ def test_what_unpacks_to_too_much_is_refused_at_once(part: str, tmp_path: Path) 
         with pytest.raises(FileError, match="at most 200 MB when unpacked; found 201 MB"):
             call()
     assert time.process_time() - started < 1.0
+
+
+@pytest.mark.parametrize("last", [2, 3, 5])
+def test_a_header_reaches_as_far_as_the_rows_below_it(last: int, tmp_path: Path) -> None:
+    """Merged cells behind its first one are none in the file."""
+    book = openpyxl.Workbook()
+    book.active.append(["x [mm]", "dx [mm]"])
+    book.active.append([1.5] * last)
+    if last > 2:
+        book.active.merge_cells(start_row=1, end_row=1, start_column=2, end_column=last)
+    book.save(tmp_path / "merged.xlsx")
+    lines = [cells for _, cells in workbook_lines(tmp_path / "merged.xlsx", None)[1]()]
+    assert lines[0] == ["x [mm]", "dx [mm]", *[""] * (last - 2)]

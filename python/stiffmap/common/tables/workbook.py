@@ -136,6 +136,8 @@ def _lines(rows: Iterable[Sequence[object]], path: Path) -> list[tuple[int, list
         cells += len(row)
         if cells > MOST_CELLS:
             raise FileError(f"expected at most {MOST_CELLS} cells; found more", file=str(path), line=n)
+        if out:  # as far as the next one: merged cells behind its last are none to this reader
+            out[-1][1].extend([""] * (len(row) - len(out[-1][1])))
         out.append((n, [_text(v) for v in row]))
     return out
 

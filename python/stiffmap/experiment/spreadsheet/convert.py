@@ -21,7 +21,7 @@ from stiffmap.experiment.channels import AXES
 from stiffmap.experiment.experiment import WRENCH
 from stiffmap.experiment.files.fields import POSE, quantity_of
 from stiffmap.experiment.spreadsheet.answers import Meant
-from stiffmap.experiment.spreadsheet.guess import READINGS, Column, named_loads
+from stiffmap.experiment.spreadsheet.guess import READINGS, Column, guessed, named_loads
 from stiffmap.experiment.spreadsheet.instrument import load_instrument
 from stiffmap.experiment.spreadsheet.sides import side_of_run
 from stiffmap.experiment.spreadsheet.together import weight
@@ -68,6 +68,13 @@ def understand(m: Meant, loaded: bool = False) -> ImportedSheet:
     _ask(m, known, bool(drives))
     for meaning in dict.fromkeys(c.meaning for c in used if c.repeat):
         _refuse_loads(m, [c for c in used if c.meaning == meaning])
+    both = ([c, k] for c in used for k in columns if k.meaning == "note" and guessed(k.name) == c.meaning)
+    for c, k in both:  # one of which would go to the notes in silence
+        if (of := c.meaning) in (*AXES, *WRENCH) and of not in m.chosen and sheet.is_numeric(k.index):
+            own, other = m.metres([c.index, k.index], [of] * 2).T
+            if np.nanmax(np.abs(own - other), initial=0.0) > 0.01 * np.nanmax(np.abs(own), initial=0.0):
+                two, way = f"'{c.name}' and '{k.name}'", f"--map {of}='HEADER', or 'HEADER|HEADER' of repeats"
+                m.ask_column(f"which of {two} is {of}? Say {way}", "reading" if of in AXES else "load")
     units = dict.fromkeys((c.meaning, m.unit(c.index, c.meaning)) for c in used if quantity_of(c.meaning))
     found = dict(list(units))
     for meaning in (name for name, unit in units if unit != found[name]):

@@ -83,7 +83,7 @@ class Design:
             far = f"{self.value:.1f} standard deviations (random {self.random_value:.1f})"
             return [*out, f"  the two explanations differ by {far}"]
         for n, u, s, r in zip(self.names, self.units, self.sigma, self.random_sigma, strict=True):
-            out.append(f"  {n}: u = {s:.3g} {u} (random {r:.3g})")
+            out.append(f"  {n}: u = {s:.3g}{'' if u == '1' else f' {u}'} (random {r:.3g})")
         if self.aim == "map":
             out.append(f"  map: u = {1e3 * self.value:.3g} mm rms (random {1e3 * self.random_value:.3g})")
         return out

@@ -8,6 +8,7 @@ from stiffmap.identification.calibration import Calibration, calibrate
 from stiffmap.identification.inference.travel import Profile
 from stiffmap.identification.numbers import Tolerances
 from stiffmap.ui.cli import options
+from stiffmap.ui.cli.inputs import words
 from stiffmap.ui.cli.options import option, written
 from stiffmap.ui.cli.output import Answer, write_files
 
@@ -17,7 +18,7 @@ def command(
     data: options.Experiment,
     output: Path | None = written("Folder for calibration.json and table.txt."),
     tolerance: options.Spread = 1.0,
-    exclude: list[str] | None = option("Group that is known to be right; may be repeated."),
+    exclude: list[str] | None = option("Group that is known to be right; separated by commas, or repeated."),
     budget: options.Budget = None,
     rows: int = option("Unknowns to list.", 20),
     seed: int = option("Seed of the folds.", 0),
@@ -32,7 +33,7 @@ def command(
       [cyan]stiffmap calibrate linear-delta experiments/heights --exclude gains --tolerance 2[/cyan]
     """
     result = calibrate(
-        machine, data, tolerances=Tolerances().scaled(tolerance), exclude=exclude or (), time_limit=budget,
+        machine, data, tolerances=Tolerances().scaled(tolerance), exclude=words(",".join(exclude or ()) or None) or (), time_limit=budget,
         seed=seed, threads=threads,
     )  # fmt: skip
     if output is not None:

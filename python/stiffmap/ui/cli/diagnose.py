@@ -12,7 +12,7 @@ from stiffmap.identification.diagnosis import Diagnosis, diagnose
 from stiffmap.identification.diagnosis.report.sentences import next_step
 from stiffmap.identification.numbers import Tolerances
 from stiffmap.ui.cli import options
-from stiffmap.ui.cli.inputs import refuse_unused
+from stiffmap.ui.cli.inputs import refuse_unused, words
 from stiffmap.ui.cli.options import flag, option, written
 from stiffmap.ui.cli.output import Answer
 
@@ -24,7 +24,7 @@ def command(
     output: Path | None = written("Folder for report and files."),
     seed: int = option("Seed of the folds, and of the poses drawn of many.", 0),
     threads: options.Threads = None,
-    exclude: list[str] | None = option("Kind of effect or group of numbers known not to be; repeatable."),
+    exclude: list[str] | None = option("Kinds of effects or groups of numbers known not to be; repeatable."),
     budget: options.Budget = None,
     tolerance: options.Spread = 1.0,
     date: str | None = option("Date that the report bears, as you write it."),
@@ -45,7 +45,7 @@ def command(
     refuse_unused(context, {"without output": "date"})
     silent = quiet or as_json or not sys.stderr.isatty()
     result = diagnose(
-        machine, data, seed=seed, threads=threads, exclude=exclude or (), time_limit=budget,
+        machine, data, seed=seed, threads=threads, exclude=words(",".join(exclude or ()) or None) or (), time_limit=budget,
         tolerances=Tolerances().scaled(tolerance),
         progress=None if silent else partial(print, "trying:", file=sys.stderr),
     )  # fmt: skip

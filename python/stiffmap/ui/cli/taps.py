@@ -22,7 +22,7 @@ def command(
     ),
     statics: Path | None = option("Experiment folder of the same machine, explained together."),
     only: str | None = option("Kinds of effects to try, separated by commas."),
-    mass_u: float = option("Standard uncertainty of masses that declare none, %.", 5.0),
+    mass_u: str = option("Standard uncertainty of masses that declare none, %.", "5"),
     effect: options.Effects = None,
     output: options.Folder = None,
 ) -> Answer:
@@ -38,7 +38,7 @@ def command(
       [cyan]stiffmap taps examples/taps/kr210.yaml examples/taps/taps.csv -o result[/cyan]
       [cyan]stiffmap taps examples/taps/kr210.yaml examples/taps/taps.csv --only compliance --json[/cyan]
     """
-    default_u = float(percent(str(mass_u), "mass-u", 1)[0])
+    default_u = float(percent(mass_u, "mass-u", 1)[0])
     m = machine_with(machine, effect)
     measured = load_taps(table, m)
     readings = None if statics is None else load_experiment(statics)

@@ -18,7 +18,7 @@ DH = "theta [deg],d [mm],a [mm],alpha [deg]\n0,120,0,90\n0,0,-430,0\n0,0,-390,0\
 
 def made(folder: Path, text: str, *more: str, machine: str = "linear-delta") -> sm.Experiment | None:
     """The experiment of a sheet; None where it is refused."""
-    folder.mkdir(exist_ok=True)
+    folder.mkdir(parents=True, exist_ok=True)
     (folder / "sheet.csv").write_text(text, encoding="utf-8")
     by = ["--dh", str(folder / "dh.csv")] if machine == "dh" else ["--machine", machine]
     (folder / "dh.csv").write_text(DH)
@@ -441,3 +441,36 @@ def test_a_deviation_in_another_unit_names_the_file(
     text = f"{POSES},Fz [N],dz [mm],u_dz [um]\n0,0,300,-10,-0.02,2\n"
     assert made(tmp_path, text) is None
     assert "sheet.csv: columns dz and u_dz need the same unit; found mm and um" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "way", "axis"),
+    [
+        ("delta x [mm]", "dx [mm]", "dx", 0),
+        ("dx [mm]", "deviation x [um]", "dx", 0),
+        ("deflection y [mm]", "dy [mm]", "dy", 1),
+    ],
+)
+def test_two_columns_of_one_reading_are_asked_for(
+    first: str, second: str, way: str, axis: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """One of them would go to the notes in silence; of the same numbers in another unit it may."""
+    head = f"{POSES},fz [N],{first},{second}\n"
+    size = 1e3 if "um" in second else 1.0
+    text = head + "".join(f"{k},0,300,-100,0.0{k},{0.5 * k * size}\n" for k in range(1, 5))
+    noise = ("--noise", f"{way}=0.002")
+    assert made(tmp_path / "a", text, *noise) is None
+    two = [f"'{header.split(' [')[0]}'" for header in (first, second)]
+    assert f"which of {' and '.join(two)} is {way}?" in capsys.readouterr().err
+    for named, value in ((first, 0.01e-3), (second, 0.5e-3)):
+        e = made(tmp_path / named[:6].replace(" ", "") / str(value), text, "--map", f"{way}={named}", *noise)
+        assert e is not None
+        np.testing.assert_allclose(e.reading[0, axis], value)
+    same = head + "".join(f"{k},0,300,-100,0.0{k},{0.01 * k * size}\n" for k in range(1, 5))
+    assert made(tmp_path / "same", same, *noise) is not None
+
+
+def test_two_columns_of_one_load_are_asked_for(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = f"{POSES},Fx [N],Force x [N],dx [mm]\n0,0,300,100,200,0.1\n10,0,300,150,100,0.2\n"
+    assert made(tmp_path, text, "--noise", "dx=0.002") is None
+    assert "which of 'Fx' and 'Force x' is fx?" in capsys.readouterr().err

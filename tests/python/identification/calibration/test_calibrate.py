@@ -154,8 +154,11 @@ def test_at_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     last = capsys.readouterr().out.splitlines()[-1]
     many = len(told["table"])
     assert last == f"… {many - 3} more, which the readings determine less well (--rows {many})"
-    assert main(["calibrate", "linear-delta", str(tmp_path / "twin"), "--exclude", "wings"]) == 2
-    assert "unknown group 'wings'" in capsys.readouterr().err
+    for command in ("calibrate", "diagnose"):
+        for excluded in (["wings"], ["gains,wings"], ["zeros, gains", "wings"]):
+            more = [part for text in excluded for part in ("--exclude", text)]
+            assert main([command, "linear-delta", str(tmp_path / "twin"), *more]) == 2
+            assert "'wings'" in capsys.readouterr().err
 
 
 def test_columns_are_those_of_the_machine_that_is_found() -> None:

@@ -175,3 +175,14 @@ def test_the_command_plans_taps(tmp_path, capsys):
     assert "2 poses to tap" in capsys.readouterr().out
     assert len(out.read_text().splitlines()) == 3 and out.read_text().startswith("x_mm,y_mm,z_mm")
     assert main(["plan", str(ARM)]) == 2 and "--taps" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("share", "taken"), [("0.02%", True), ("5 %", True), ("0.05", False), ("120%", False)]
+)
+def test_shares_of_masses_are_written_as_the_refusal_says(
+    share: str, taken: bool, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["taps", "ur10", "none.csv", "--mass-u", share]) == 2
+    err = capsys.readouterr().err
+    assert ("none.csv" if taken else "--mass-u: expected % above 0") in err

@@ -289,3 +289,28 @@ def test_times_have_a_unit_in_a_line_of_units(units: str, tmp_path: Path) -> Non
     table_ = read_table(tmp_path / "record.txt")
     np.testing.assert_allclose(np.abs(table_.force), [[10, 20 * force, 30]])
     np.testing.assert_allclose(table_.signals[0].time[-1], 0.02, atol=0.0011)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda f: f, ""),
+        (lambda f: 1e-3 * f, "Ktc is not within"),  # kN below Fx_N
+        (lambda f: 1e3 * f, "Ktc is not within"),
+        (lambda f: f / 9.81e3, "Ktc is not within"),  # t
+        (lambda f: f[:, [0, 2, 1]], "Fx, Fy and Fz"),
+        (lambda f: f + [0.0, -60.0, 0.0], "An edge coefficient is below zero"),
+        (lambda f: f + [110.0, 0.0, 0.0], "An edge coefficient is below zero"),
+        (lambda f: f + [0.0, 0.0, 1900.0], "too large for an edge"),
+    ],
+)
+def test_coefficients_that_no_material_has_are_doubted(change, words):
+    """A slot in steel with four teeth, 2 mm deep, by the closed forms of its mean forces."""
+    n, a, c = 4, 2e-3, np.array([20e-6, 40e-6, 60e-6, 80e-6, 100e-6])[:, None]
+    chip, edge = [-600e6 / 4, 2000e6 / 4, 300e6 / np.pi], [-30e3 / np.pi, 20e3 / np.pi, 5e3 / 2]
+    force = n * a * (c * chip + edge) + np.random.default_rng(1).normal(0, 0.3, (5, 3))
+    table = {"feed_per_tooth_mm": 1e3 * c[:, 0], "teeth": n, "axial_mm": 2.0}
+    columns = dict(zip(("Fx_N", "Fy_N", "Fz_N"), change(force).T, strict=True))
+    notes = sm.identify_process(table | columns).table.notes
+    assert words in " ".join(notes)
+    assert bool(notes) == bool(words)

@@ -421,3 +421,48 @@ def test_degrees_are_not_taken_for_radians(degrees, tmp_path):
     (tmp_path / "mixed.csv").write_text((tmp_path / "deg.csv").read_text().replace("phase_deg", "phase_rad"))
     with pytest.raises(sm.StiffmapError, match="phase_rad: expected steps of a turn at most"):
         read_responses(tmp_path / "mixed.csv")
+
+
+@pytest.mark.parametrize("unit", ["m/N", "m/s/N", "m/s2/N", "N/m"])
+def test_phases_in_the_unit_of_the_other_header_are_refused(unit, tmp_path):
+    """One mass on a spring: whatever is measured of it, the phase turns by half a turn over its peak."""
+    f = np.linspace(5.0, 100.0, 1500)
+    power = {"m/N": 0, "m/s/N": 1, "m/s2/N": 2, "N/m": 0}[unit]
+    h = (TURN * 1j * f) ** power * 1e-6 / (1 - (f / 40) ** 2 + 0.06j * f / 40)
+    h = 1 / h if unit == "N/m" else h
+    for phase, other in ((np.angle(h), "deg"), (np.degrees(np.unwrap(np.angle(h)))[f < 39], "rad")):
+        rows = "".join(f"{a},{abs(b)},{c}\n" for a, b, c in zip(f, h, phase, strict=False))
+        file = tmp_path / "phase.csv"
+        file.write_text(f"frequency_Hz,magnitude_{unit},phase_{other}\n{rows}")
+        with pytest.raises(sm.StiffmapError, match=r"phase_\w+: expected"):
+            read_responses(file)
+        file.write_text(f"frequency_Hz,magnitude_{unit},phase_{'rad' if other == 'deg' else 'deg'}\n{rows}")
+        np.testing.assert_allclose(read_responses(file)[0].receptance[0], 1e-6, rtol=0.03)
+
+
+@pytest.mark.parametrize("other", [3.0, 1j, 0.5])
+def test_two_forms_of_one_response_agree(other, tmp_path):
+    """Of another channel they do not."""
+    h = 1e-6 / (1 - (np.arange(5.0, 80) / 40) ** 2 + 0.06j)
+    file = tmp_path / "two.csv"
+    for factor in (1.0, other):
+        m = factor * h
+        rows = "".join(
+            f"{k + 5},{a.real},{a.imag},{abs(b)},{np.degrees(np.angle(b))}\n"
+            for k, (a, b) in enumerate(zip(h, m, strict=True))
+        )
+        file.write_text(f"frequency_Hz,real_m/N,imag_m/N,magnitude_m/N,phase_deg\n{rows}")
+        if factor == 1.0:
+            np.testing.assert_allclose(read_responses(file)[0].receptance, h)
+    with pytest.raises(sm.StiffmapError, match="expected one response, found two"):
+        read_responses(file)
+
+
+@pytest.mark.parametrize("size", ["magnitude_dB", "magnitude [dB re 1 m/N]", "magnitude_m/N"])
+def test_a_second_form_may_be_in_decibels(size, tmp_path):
+    h = 1e-6 / (1 - (np.arange(5.0, 80) / 40) ** 2 + 0.06j)
+    m = abs(h) if size.endswith("_m/N") else 20 * np.log10(abs(h))
+    lines = zip(h.real, h.imag, m, np.degrees(np.angle(h)), strict=True)
+    rows = "".join(f"{k + 5},{','.join(map(str, line))}\n" for k, line in enumerate(lines))
+    (tmp_path / "db.csv").write_text(f"frequency_Hz,real_m/N,imag_m/N,{size},phase_deg\n{rows}")
+    np.testing.assert_allclose(read_responses(tmp_path / "db.csv")[0].receptance, h)

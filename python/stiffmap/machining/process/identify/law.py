@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from math import pi
 from os import PathLike
@@ -37,6 +37,8 @@ SIGNIFICANT = 0.01
 """Probability by chance below which a bend is stated."""
 APART = 0.02
 """Probability by chance below which the held-out errors of two laws are distinguished."""
+MATERIALS, DULLEST = (1e7, 2e10), 2e-4
+"""N/m², chip pressures from plastics to hard metals; m, edge forces by it: worn edges have half of that."""
 
 UNITS = {"e": (1e3, " N/mm"), **dict.fromkeys("ctra", (1e6, " N/mm²"))}
 """SI size and unit by the last letter of a coefficient."""
@@ -258,16 +260,7 @@ def identify_process(
             "are what does not change with the feed", file=t.file, key="feed_per_tooth_mm",
         )  # fmt: skip
     straight = fit(STRAIGHT, t)
-    tangential, radial = (straight.numbers[n][2:] for n in ("Ktc", "Krc"))  # the ends of their intervals
-    note = ""
-    if tangential[1] < 0:
-        note = (
-            "Ktc is below zero, which no tool has: the forces are to be those on the tool, along the feed, to its left (seen "
-            "against the tool) and from holder to tip; those on the part have the other signs"
-        )
-    elif radial[1] < 0 or radial[0] > tangential[1]:
-        note = "Krc is below zero or above Ktc, which is rare: is the side right, and are Fx and Fy, with their signs?"
-    t = replace(t, notes=(*t.notes, note)) if note else t
+    t = replace(t, notes=(*t.notes, *_doubts(straight.numbers)))
     runout = runout_of(t, straight)
     if runout is not None:  # with the coefficients of teeth that leave the cut
         runout = runout_of(t, fit(RUNOUT, t, np.array([runout.offset])))
@@ -286,6 +279,19 @@ def identify_process(
         runout,
         t,
     )
+
+
+def _doubts(numbers: Mapping[str, Number]) -> Iterator[str]:
+    """Of coefficients that no material, or hardly one, has."""
+    least, most = ({n: v[k] for n, v in numbers.items()} for k in (2, 3))  # the ends of their intervals
+    if most["Ktc"] < 0:
+        yield "Ktc is below zero, which no tool has: the forces are to be those on the tool, along the feed, to its left (seen against the tool) and from holder to tip; those on the part have the other signs"
+    elif most["Krc"] < 0 or max(least["Krc"], least["Kac"]) > most["Ktc"]:
+        yield "Krc is below zero, or Krc or Kac above Ktc, which is rare: is the side right, and are Fx, Fy and Fz, with their signs?"
+    if most["Ktc"] > 0 and (most["Ktc"] < MATERIALS[0] or least["Ktc"] > MATERIALS[1]):
+        yield "Ktc is not within 10 to 20000 N/mm², from plastics to hard metals: are all columns in the units of their headers?"
+    if any(most[n] < 0 or least[n] > DULLEST * abs(most["Ktc"]) for n in ("Kte", "Kre", "Kae")):
+        yield "An edge coefficient is below zero or too large for an edge: an offset of a channel goes into it; subtract an air cut's mean"
 
 
 def _left_out(model: ForceModel, t: ForceTable, known: Floats | None) -> Floats:
