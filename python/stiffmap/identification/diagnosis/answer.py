@@ -40,10 +40,10 @@ from stiffmap.identification.inference.machines import (
     written,
 )
 from stiffmap.identification.inference.names import Inferred, put_instead, terms, with_travel
-from stiffmap.identification.inference.parts import GAPS
+from stiffmap.identification.inference.parts import GAPS, NOISE
 from stiffmap.identification.inference.readings import Readings, readings
 from stiffmap.identification.inference.shares import gap_of, shares, tolerance_word, too_wide
-from stiffmap.identification.inference.verdict import Named, Verdict, judged, not_as_stated
+from stiffmap.identification.inference.verdict import NOISIER, Named, Verdict, judged, not_as_stated
 
 RIVALS = 3
 """Places in an effect's stead that are fitted; all are named."""
@@ -70,13 +70,13 @@ def answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, cross
     clock.say("readings that no fit saw")
     made = written(models, base, predictor, sigma, listed, seed, lambda: clock.over or not cross_validate)
     held, late = made.held_out, made.over_time
-    if len(v.refused) > len(nameless) and made.lacks(fit.noise):
+    if len(v.refused) > len(nameless) and made.lacks(v.noise):
         v = replace(v, rest=v.rest or v.refused[-1][1])  # those that stand do not stand for it
     each, gap = shares(columns, fit), gap_of(columns, fit)
     effects = _effects(v, best, each, fit)
     others = list(_alternatives(found, v, best, clock)) if best and effects else []
     several = bool(others or clock.left_out or any(n.numbers or n.equivalents[RIVALS:] for n in v.named))
-    noise = _noise(found, made, best)
+    noise = _noise(found, made, best, v.noise)
     rest, numbers = _rest(columns, fit, v, each, gap), _numbers(found, v, models.get(CORRECTED))
     cut_short = clock.stopped and noise.lack_of_fit_before < RARE
     return Diagnosis(
@@ -209,7 +209,7 @@ def _word(v: Verdict, effects: Sequence[Effect], rest: Sequence[Rest], several: 
     return "unattributed" if rest or v.word == "unattributed" or off else "none"
 
 
-def _noise(found: Inferred, made: Written, best: Corrected | None) -> NoiseReport:
+def _noise(found: Inferred, made: Written, best: Corrected | None, scale: float) -> NoiseReport:
     n, e = found.noise, found.columns.experiment
     frames = nuisance_columns(e, found.plan.base).shape[-1]
     values = 0 if best is None else sum(len(t.values) for t in best.terms)
@@ -223,7 +223,7 @@ def _noise(found: Inferred, made: Written, best: Corrected | None) -> NoiseRepor
         {c.name: float(v) for c, v, read in zip(e.channels, each, e.axis_read, strict=True) if read}
         for each in (n.floor, n.repeats, n.declared, n.consistency)
     )
-    lacks, scale = (lack(made.left[0], 0), lack(made.left[1], values)), found.search.best.fit.noise
+    lacks = lack(made.left[0], 0), lack(made.left[1], values)
     return NoiseReport(floor, repeats, declared, consistency, *lacks, n.rms, scale)
 
 
@@ -233,6 +233,9 @@ def _rest(columns: Columns, fit: Fit, v: Verdict, each: dict[str, float], gap: F
         return []
     e = columns.experiment
     gap = np.abs(np.nan_to_num(gap))
+    if v.rest == NOISIER:  # with all that is not demanded beside it
+        scatter = [NOISE, *(p.name for p in fit.parts if p.kind in (*GAPS, "time"))]
+        return [Rest(v.rest, sum(each.get(name, 0.0) for name in scatter))]
     share = sum(each.get(p.name, 0.0) for p in fit.parts if p.kind in GAPS or p.name == v.rest)
     noise = np.full(gap.shape, np.inf)
     noise[columns.rows, columns.channel] = columns.sigma
@@ -253,7 +256,7 @@ def _rest(columns: Columns, fit: Fit, v: Verdict, each: dict[str, float], gap: F
 
 def _first(fit: Fit, v: Verdict, stated: bool) -> list[str]:
     """What must be known of the noise before anything else."""
-    out = not_as_stated(fit.noise, "is stated" if stated else "repeats or steps show")
+    out = not_as_stated(v.noise, "is stated" if stated else "repeats or steps show")
     if np.any(fit.weights != 1.0):
         out.append("some readings lie far from the others and count less")
     if v.time:

@@ -77,6 +77,8 @@ class Verdict:
     """What is left that nobody can name; empty: nothing."""
     time: str
     """Correlation of the noise in time; empty: none."""
+    noise: float
+    """Of the readings over what is stated, with what could be more than noise but is not demanded."""
     as_effects: tuple[Unknown, ...] = ()
     """Numbers out of tolerance that are named as the effect that shows the same."""
 
@@ -116,13 +118,13 @@ def judged(columns: Columns, search: Search) -> Verdict:
             named.append(Named(effect, (), 0.5 * (b.value / b.sd) ** 2, 0.0, b.share))
     as_effects = tuple(b.unknown for b in beyond if called[id(b)] is not None)
     beyond = tuple(b for b in beyond if called[id(b)] is None)
-    rest, time = left(model.fit)
+    rest, time, noise = left(model.fit)
     slips = bool(np.any(model.fit.weights != 1.0))  # then those of one pose may be others
     explained = {TOLERABLE, ONE_POSE} if slips else {TOLERABLE}
     unexplained = [why for _, why in refused if why not in explained]
     rest = rest or (unexplained[0] if unexplained else "")
     named.sort(key=lambda n: -n.share)
-    return Verdict(tuple(named), tuple(refused), beyond, rest, time, as_effects)
+    return Verdict(tuple(named), tuple(refused), beyond, rest, time, noise, as_effects)
 
 
 def effect_of(columns: Columns, b: Beyond, taken: Sequence[Chosen]) -> Chosen | None:
@@ -266,8 +268,9 @@ def _of_logarithm(b: Beyond) -> tuple[float, float]:
     return float(np.log(scale)) / b.unknown.u, b.sd / scale
 
 
-def left(fit: Fit) -> tuple[str, str]:
-    """What is left unexplained by names and numbers, and the correlation of the noise in time; empty where there is none."""
+def left(fit: Fit) -> tuple[str, str, float]:
+    """What is left unexplained by names and numbers, and the correlation of the noise in time, empty where there is none; the noise
+    over what is stated."""
     on = {p: t for p, t in zip(fit.parts, fit.t[1:], strict=True) if t > OFF + 1.0}
     gaps, over = [p for p in on if p.kind in GAPS], [p for p in on if p.kind == "time"]
 
@@ -280,13 +283,14 @@ def left(fit: Fit) -> tuple[str, str]:
         return (max(some, key=lambda p: on[p]).name, noise) if found else ("", max(noise, instead))
 
     (rest, noise), (time, noisier) = largest(gaps), largest(over)
+    noise = max(noise, noisier)
     centre, sd = declared_noise(fit.columns)
-    if max(noise, noisier) - centre > KAPPA_SDS * sd:
+    if noise - centre > KAPPA_SDS * sd:
         rest = rest or NOISIER
     rest = rest or largest([p for p in over if on[p] > LARGEST_TIME])[0]
     if not rest and not time and gaps and over:
-        rest = largest([*gaps, *over], len(gaps) + len(over))[0]  # either may be the noise, not both
-    return rest, time
+        rest, noise = largest([*gaps, *over], len(gaps) + len(over))  # either may be the noise, not both
+    return rest, time, float(np.exp(0.5 * noise))
 
 
 def not_as_stated(noise: float, source: str = "is stated") -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -11,13 +12,15 @@ import pytest
 import stiffmap as sm
 from stiffmap.experiment import Predictor, random_plan
 from stiffmap.identification.candidates.candidates import candidates
-from stiffmap.identification.diagnosis.answer import _change
-from stiffmap.identification.diagnosis.report.findings import Effect
+from stiffmap.identification.diagnosis.answer import _change, _rest
+from stiffmap.identification.diagnosis.report.findings import Effect, effects_of
 from stiffmap.identification.diagnosis.report.sentences import next_step, opening
 from stiffmap.identification.diagnosis.report.separation import Separation
-from stiffmap.identification.inference.chosen import Chosen
+from stiffmap.identification.inference.chosen import Chosen, Term
 from stiffmap.identification.inference.kernels import WANDER
 from stiffmap.identification.inference.names import terms
+from stiffmap.identification.inference.places import Place
+from stiffmap.identification.inference.verdict import NOISIER
 
 
 @pytest.mark.parametrize(("slope", "there"), [(0.5, True), (40.0, False)])
@@ -105,3 +108,30 @@ def test_the_first_line_says_why_readings_differ_from_a_machine_that_is_as_decla
     assert words in opening(found) and next_step(found).startswith(
         (then, "Nothing to correct. " + then, "Nothing to correct at the machine. " + then)
     )
+
+
+@pytest.mark.parametrize("kind", ["field", "pose", "time"])
+def test_noise_beyond_its_declaration_has_the_share_of_what_is_not_demanded_and_no_place(kind: str) -> None:
+    part: Any = SimpleNamespace(name="short", kind=kind)
+    fit: Any = SimpleNamespace(parts=(part, SimpleNamespace(name="tool", kind="effect")))
+    v: Any = SimpleNamespace(rest=NOISIER)
+    columns: Any = SimpleNamespace(experiment=None)
+    (rest,) = _rest(columns, fit, v, {"noise": 0.5, "short": 0.2, "tool": 0.3}, np.full((4, 6), 1e-9))
+    assert (rest.what, rest.axis, rest.position) == (NOISIER, "", None)
+    assert rest.share == pytest.approx(0.7)
+
+
+@pytest.mark.parametrize("kind", ["sensor_gain", "load_gain", "compliance"])
+def test_an_effect_is_no_alias_of_itself_at_its_own_place(kind: str) -> None:
+    """A gain of all axes and one for each show alike where one axis is read."""
+    machine = sm.load_machine("five-bar")
+    e = random_plan(machine, "deflection", poses=6, loads=4, seed=1)
+    c = next(c for c in candidates(machine.description, e) if c.kind == kind)
+    other = next(c for c in candidates(machine.description, e) if c.kind == "zero_offset")
+    own = replace(c, parameters=c.parameters[:1])
+    found: Any = SimpleNamespace(
+        terms=[Term(own, np.array([1.1]), np.array([0.01]))],
+        given=SimpleNamespace(predictor=SimpleNamespace(machine=machine)),
+    )
+    (named,) = effects_of(found, [Place(own, (), (c, other), (c,))], [{}])
+    assert named.aliases == [{"kind": other.kind, "element": other.element, "legs": list(other.legs)}]

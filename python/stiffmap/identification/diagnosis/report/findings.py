@@ -142,7 +142,7 @@ def _effect(description: MachineDescription, term: Term, place: Place, evidence:
         c.element,
         c.legs,
         parameters | _derived(description, c, rows),
-        [as_place(a) for a in (*place.aliases, *place.wider)],
+        [a for a in map(as_place, (*place.aliases, *place.wider)) if a != as_place(c)],
         evidence,
         f"{e.doc} Pivot: {e.pivot}. Frame: {e.frame}. Moves: {e.moves}.",
         tuple(cut),
