@@ -51,27 +51,19 @@ RIVALS = 3
 
 def answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, cross_validate: bool) -> Diagnosis:
     """The diagnosis of an experiment."""
-    e, columns, fit = predictor.experiment, found.columns, found.search.best.fit
-    v = judged(columns, found.search)
-    base, sigma = found.plan.base, found.noise.sigma
+    e, columns, sigma, base = predictor.experiment, found.columns, found.noise.sigma, found.plan.base
     clock.say("corrected machine")
-    nameless = [_change(predictor, c) for c, _ in v.refused]
-
-    def given(fit: Fit) -> Readings:
-        return readings(
-            predictor, found.uncertain, columns, fit, sigma, found.suspects, nameless, v.as_effects
-        )
-
-    models, v, notes = _models(predictor, found, v, given(fit))
+    models, found, v, notes = _models(predictor, found)
+    fit = found.search.best.fit
     best = models.get(CORRECTED)
     if best and (more := with_travel(fit, anew=False)) is not fit:
-        models[CORRECTED] = along_travel(best, given(more))
+        models[CORRECTED] = along_travel(best, _given(predictor, found, v, more))
     listed = stands_out(columns, fit, found.suspects, models.values())
     clock.say("readings that no fit saw")
     made = written(models, base, predictor, sigma, listed, seed, lambda: clock.over or not cross_validate)
     held, late = made.held_out, made.over_time
-    if len(v.refused) > len(nameless) and made.lacks(v.noise):
-        v = replace(v, rest=v.rest or v.refused[-1][1])  # those that stand do not stand for it
+    if v.gone and made.lacks(v.noise):
+        v = replace(v, rest=v.rest or v.gone[-1][0].part.name)  # those that stand do not stand for it
     each, gap = shares(columns, fit), gap_of(columns, fit)
     effects = _effects(v, best, each, fit)
     others = list(_alternatives(found, v, best, clock)) if best and effects else []
@@ -113,7 +105,7 @@ def answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, cross
         set_aside=listed,
         gap=gap,
         calibration=numbers,
-        refused=[f"{c.place.candidate}: {why}" for c, why in v.refused],
+        refused=[f"{c.place.candidate}: {why}" for c, why in (*v.refused, *v.gone)],
         which=made.which,
         stopped=clock.stopped or bool(clock.left_out),
         not_tried=list(clock.left_out),
@@ -129,38 +121,42 @@ def _change(predictor: Predictor, c: Chosen) -> Floats:
         return np.zeros_like(predictor.experiment.reading)
 
 
+def _given(predictor: Predictor, found: Inferred, v: Verdict, fit: Fit) -> Readings:
+    """The readings under the amplitudes of a fit, with what a verdict refuses to name."""
+    nameless = [_change(predictor, c) for c, _ in v.refused]
+    own = found.uncertain, found.columns, fit, found.noise.sigma, found.suspects
+    return readings(predictor, *own, nameless, v.as_effects)
+
+
 def _models(
-    predictor: Predictor, found: Inferred, v: Verdict, given: Readings
-) -> tuple[dict[str, Corrected], Verdict, list[str]]:
-    """The machines that may be handed over besides the declared one, by name, the corrected one last; the verdict without effects
-    that are nothing at the optimum; and what must be said."""
+    predictor: Predictor, found: Inferred
+) -> tuple[dict[str, Corrected], Inferred, Verdict, list[str]]:
+    """The machines that may be handed over besides the declared one, by name, the corrected one last; what was found, and the verdict,
+    less effects that are nothing at the optimum; and what must be said."""
     out: dict[str, Corrected] = {}
-    plain = found.search.calibrated
+    search, v = found.search, judged(found.columns, found.search)
+    plain = search.calibrated
     if v.named and plain is not None:
         plain = with_travel(plain, anew=True)  # as a calibration has it
         own = readings(predictor, found.uncertain, found.columns, plain, found.noise.sigma, found.suspects)
         if len(own.spread):
             out[CALIBRATED] = corrected(own, ())
-    while v.named or len(given.spread):
+    while v.named or len(_given(predictor, found, v, search.best.fit).spread):
         chosen = [n.chosen for n in v.named]
         starts = [Term.of(c.place.candidate, t) for c, t in zip(chosen, terms(chosen), strict=True)]
         try:
-            best = corrected(given, starts)
+            best = corrected(_given(predictor, found, v, search.best.fit), starts)
         except StiffmapError as problem:
-            return out, v, [f"the effects have no corrected machine: {problem}"]
+            return out, found, v, [f"the effects have no corrected machine: {problem}"]
         if best.refused is None:
             out[CORRECTED] = best
             break
         k, why = best.refused
         gone = v.named[k]
-        heirs = gone.equivalents if best.terms[k].undetermined.any() else ()
-        places = (put_instead(found.search.best.fit, gone.chosen, p) for p in heirs[:1])
-        heir = [replace(gone, chosen=c, equivalents=heirs[1:]) for c in places]
-        kept = (*v.named[:k], *heir, *v.named[k + 1 :])
-        v = replace(
-            v, named=kept, refused=(*v.refused, (gone.chosen, why)), rest=v.rest or ("" if kept else why)
-        )
-    return out, v, []
+        search = search.less(gone.chosen, *(gone.equivalents[:1] if best.terms[k].undetermined.any() else ()))
+        found = replace(found, search=search)
+        v = judged(found.columns, search, (*v.gone, (gone.chosen, why)))
+    return out, found, v, []
 
 
 def _effects(v: Verdict, best: Corrected | None, each: dict[str, float], fit: Fit) -> list[Effect]:
@@ -236,12 +232,14 @@ def _rest(columns: Columns, fit: Fit, v: Verdict, each: dict[str, float], gap: F
     if v.rest == NOISIER:  # with all that is not demanded beside it
         scatter = [NOISE, *(p.name for p in fit.parts if p.kind in (*GAPS, "time"))]
         return [Rest(v.rest, sum(each.get(name, 0.0) for name in scatter))]
+    reasons = {c.part.name: f"{c.part.name}: {why}" for c, why in (*v.refused, *v.gone)}
+    what = reasons.get(v.rest, v.rest)
     share = sum(each.get(p.name, 0.0) for p in fit.parts if p.kind in GAPS or p.name == v.rest)
     noise = np.full(gap.shape, np.inf)
     noise[columns.rows, columns.channel] = columns.sigma
     in_noise = gap / noise
     if not in_noise.any():
-        return [Rest(v.rest, share)]
+        return [Rest(what, share)]
     pose = e.groups
     number = int(pose.max()) + 1
     count = np.maximum(np.bincount(pose, minlength=number), 1)
@@ -251,7 +249,7 @@ def _rest(columns: Columns, fit: Fit, v: Verdict, each: dict[str, float], gap: F
     axis, k = np.unravel_index(int(np.argmax(each_pose)), each_pose.shape)
     x, y, z = (float(c) for c in e.position[pose == k][0])
     size = float(np.sqrt(np.mean(gap[pose == k][:, axis] ** 2)))
-    return [Rest(v.rest, share, e.channels[int(axis)].name, (x, y, z), size)]
+    return [Rest(what, share, e.channels[int(axis)].name, (x, y, z), size)]
 
 
 def _first(fit: Fit, v: Verdict, stated: bool) -> list[str]:

@@ -150,7 +150,8 @@ class Chosen:
     @property
     def whole(self) -> Floats:
         """(p + q,) strengths and shape, in scales."""
-        return np.append(self.values, [v / p.scale for p, v in self.shaped])
+        given = dict(self.refined)
+        return np.append(self.values, [given.get(p.name, v) / p.scale for p, v in self.shaped])
 
     @property
     def limits(self) -> tuple[Floats, Floats]:

@@ -29,6 +29,7 @@ from stiffmap.identification.inference.world import (
     PROGRESS,
     Model,
     Predict,
+    Shapes,
     World,
     amplitudes,
     best_shape,
@@ -57,6 +58,25 @@ class Search:
     """Evidence without any effect where all declared numbers are as declared."""
     calibrated: Fit | None = None
     """The best fit without effects in a world where declared numbers are off; None where there are none."""
+
+    world: World | None = None
+    """Where the best model was found."""
+
+    def less(self, gone: Chosen, *heir: Place) -> Search:
+        """Without one of its effects, all else fitted anew; `heir`: the first of its equivalents, which takes its place."""
+        at = [c.place is gone.place for c in self.best.chosen]
+        if self.world is None or not any(at):  # a number out of tolerance by the name of an effect
+            return self
+        k = at.index(True)
+        order = [*(i for i in range(len(at)) if i != k), *(k for _ in heir)]
+        near = [*self.equivalents[:k], self.equivalents[k][1:], *self.equivalents[k + 1 :]]
+        return replace(
+            self,
+            best=self.world.without(self.best, gone, heir),
+            gain=tuple(self.gain[i] for i in order),
+            equivalents=tuple(near[i] for i in order),
+            instead=tuple(self.instead[i] for i in order),
+        )
 
 
 def searched(
@@ -94,7 +114,7 @@ def _worlds(columns: Columns, predict: Predict | None, over: Callable[[], bool],
     worlds: dict[str, tuple[Part, ...]] = {EXACT: ()}
     if columns.unknowns and not over():
         worlds |= {"together": parts.together, "groups": parts.numbers}
-    optima: dict[tuple[tuple[int, int], ...], Floats] = {}
+    optima: dict[Shapes, Floats] = {}
     return [World(columns, gaps, name, own, predict, over, optima) for name, own in worlds.items()]
 
 
@@ -107,7 +127,7 @@ def _with_rivals(model: Model, searches: Sequence[World], found: Mapping[str, Mo
     near = tuple(places for _, places in rivals)
     each = zip(model.chosen, near, strict=True)
     instead = tuple(_without(c, places, model, own.price, others, found) for c, places in each)
-    return Search(model, own.null, tuple(odds for odds, _ in rivals), near, instead)
+    return Search(model, own.null, tuple(odds for odds, _ in rivals), near, instead, world=own)
 
 
 def with_travel(fit: Fit, *, anew: bool) -> Fit:

@@ -71,10 +71,12 @@ class Verdict:
     named: tuple[Named, ...]
     refused: tuple[tuple[Chosen, str], ...]
     """Effects of the model without a name, and why."""
+    gone: tuple[tuple[Chosen, str], ...]
+    """Effects that a search named and that are nothing at the optimum, and why."""
     beyond: tuple[Beyond, ...]
     """As the names, the largest share of the readings first."""
     rest: str
-    """What is left that nobody can name; empty: nothing."""
+    """What is left that nobody can name, or the effect that has no name; empty: nothing."""
     time: str
     """Correlation of the noise in time; empty: none."""
     noise: float
@@ -90,8 +92,8 @@ class Verdict:
         return "unattributed" if self.rest else "effects" if self.beyond else "none"
 
 
-def judged(columns: Columns, search: Search) -> Verdict:
-    """Names that stand, numbers out of tolerance, and the rest."""
+def judged(columns: Columns, search: Search, gone: tuple[tuple[Chosen, str], ...] = ()) -> Verdict:
+    """Names that stand, numbers out of tolerance, and the rest; `gone`: effects that may not be named any more, and why."""
     model = search.best
     named, refused = [], []
     beyond = tuple(out_of_tolerance(columns, model.fit))
@@ -111,7 +113,7 @@ def judged(columns: Columns, search: Search) -> Verdict:
         else:
             share = float(np.linalg.norm(model.fit.mean(c.part)) / np.sqrt(len(columns)))
             named.append(Named(c, tuple(p for p, _ in near), odds, scatter, share, numbers, against))
-    called = {id(b): effect_of(columns, b, model.chosen) for b in beyond}
+    called = {id(b): effect_of(columns, b, (*model.chosen, *(c for c, _ in gone))) for b in beyond}
     for b in beyond:
         effect = called[id(b)]
         if effect is not None and effect.place not in [n.chosen.place for n in named]:
@@ -121,10 +123,11 @@ def judged(columns: Columns, search: Search) -> Verdict:
     rest, time, noise = left(model.fit)
     slips = bool(np.any(model.fit.weights != 1.0))  # then those of one pose may be others
     explained = {TOLERABLE, ONE_POSE} if slips else {TOLERABLE}
-    unexplained = [why for _, why in refused if why not in explained]
-    rest = rest or (unexplained[0] if unexplained else "")
+    unexplained = [c.part.name for c, why in refused if why not in explained]
+    if rest in ("", NOISIER):  # part of which an effect without a name may be
+        rest = next(iter(unexplained), rest) or (gone[-1][0].part.name if gone and not named else "")
     named.sort(key=lambda n: -n.share)
-    return Verdict(tuple(named), tuple(refused), beyond, rest, time, noise, as_effects)
+    return Verdict(tuple(named), tuple(refused), gone, beyond, rest, time, noise, as_effects)
 
 
 def effect_of(columns: Columns, b: Beyond, taken: Sequence[Chosen]) -> Chosen | None:

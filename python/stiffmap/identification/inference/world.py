@@ -35,6 +35,8 @@ SAME_EVIDENCE = 2.0
 """Evidence, ln, within which the coarsest part has the name."""
 AT_MOST, FAR = 25, 1e6
 """Steps to the optimum of effects that bend; the misfit of a machine that fails."""
+Shapes = tuple[tuple[int, int, tuple[tuple[str, float], ...]], ...]
+"""Of a set of effects: each with its place's `id`, its shape on the grid, and where that was refined."""
 Bound = tuple[float, Place, Fit]
 """Evidence with a place, from below, and the amplitudes that give it."""
 Predict = Callable[[Sequence[Chosen]], Floats]
@@ -63,7 +65,7 @@ class World:
     numbers: tuple[Part, ...]
     predict: Predict | None
     over: Callable[[], bool]
-    optima: dict[tuple[tuple[int, int], ...], Floats]
+    optima: dict[Shapes, Floats]
     known: dict[frozenset[tuple[int, int]], Model] = field(default_factory=dict)
     anchors: dict[int, tuple[Model, list[Fit]]] = field(default_factory=dict)
 
@@ -220,25 +222,28 @@ class World:
         return refitted(fit, self.columns.residual - missed), at
 
     def _refined(self, model: Model) -> Model:
-        """The set with its shapes (periods, knees) where they fit best, between those of the grid; the same where that is no better."""
-        if not self.predict or not any(c.shaped for c in model.chosen) or self.over():
-            return model
-        found = self._at_optimum(model.fit, model.chosen)
-        if not found:
-            return model
-        fit, at = found
-        gain = fit.score - model.fit.score
-        if gain <= PROGRESS or not all(c.is_possible for c in at):
-            return model
-        return replace(model, chosen=at, fit=fit, score=model.score + gain)
+        """The set with its shapes (periods, knees) where they fit best, between those of the grid; the same where that is no better. What
+        nobody can name has taken what the grid misses, so that each optimum is one under the amplitudes of the last one."""
+        for _ in range(CORRECTIONS):
+            if not self.predict or not any(c.shaped for c in model.chosen) or self.over():
+                return model
+            found = self._at_optimum(model.fit, model.chosen)
+            if not found:
+                return model
+            fit, at = found
+            gain = fit.score - model.fit.score
+            if gain <= PROGRESS or not all(c.is_possible for c in at):
+                return model
+            model = replace(model, chosen=at, fit=fit, score=model.score + gain)
+        return model
 
     def _optimum(self, fit: Fit, chosen: tuple[Chosen, ...]) -> tuple[Chosen, ...]:
         """The effects at the least squares of whole predictions, all else of the fit as it is; found once for each set."""
         assert self.predict
-        predict, key = self.predict, tuple((id(c.place), c.shape) for c in chosen)
+        predict, key = self.predict, tuple((id(c.place), c.shape, c.refined) for c in chosen)
         if key not in self.optima:
             rest = fit.without([c.part.name for c in chosen])
-            begin = np.concatenate([c.by_posterior(fit).whole for c in chosen])
+            begin = np.concatenate([c.whole if c.refined else c.by_posterior(fit).whole for c in chosen])
             low, high = (np.concatenate([c.limits[k] for c in chosen]) for k in (0, 1))
             inside = 1e-6 * np.minimum(np.nan_to_num(high - low, posinf=1.0), 1.0)
 
@@ -299,6 +304,11 @@ class World:
         """The effects of a model but one, in this world."""
         kept = tuple(o for o in model.chosen if o.part.name != c.part.name)
         return self._fit(kept, amplitudes(model.fit), model.fit.weights, model.fit.lighter)
+
+    def without(self, model: Model, gone: Chosen, heir: Sequence[Place]) -> Model:
+        """The model without an effect, or with another place in its stead, at its best shapes."""
+        fewer = self.less(model, gone)
+        return self._refined(self._with(fewer, heir, fewer.fit) if heir else fewer)
 
     def coarsest(self, model: Model) -> Model:
         """The set with the coarsest part in each effect's place, of those whose evidence is the same."""

@@ -77,7 +77,7 @@ def test_an_effect_that_one_pose_alone_shows_has_no_name():
     assert verdict.refusal(c, fit, chosen)[1] == "it rests on the readings of one pose"
 
 
-@pytest.mark.parametrize(("slips", "rest"), [(False, verdict.ONE_POSE), (True, "")])
+@pytest.mark.parametrize(("slips", "rest"), [(False, "effect"), (True, "")])
 def test_what_one_pose_shows_is_unexplained_unless_readings_slip(slips, rest):
     c, fit, chosen = flat(1, np.where(np.arange(READINGS) < 5, 30.0, 0.0))
     weights = np.where(np.arange(READINGS) == 7, 0.1 if slips else 1.0, 1.0)
