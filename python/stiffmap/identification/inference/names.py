@@ -24,6 +24,7 @@ from stiffmap.identification.inference.chosen import Chosen
 from stiffmap.identification.inference.columns import Columns, columns
 from stiffmap.identification.inference.parts import Part, Parts
 from stiffmap.identification.inference.places import Place
+from stiffmap.identification.inference.several import with_more_shapes
 from stiffmap.identification.inference.world import (
     EXACT,
     PROGRESS,
@@ -64,7 +65,7 @@ class Search:
 
     def less(self, gone: Chosen, *heir: Place) -> Search:
         """Without one of its effects, all else fitted anew; `heir`: the first of its equivalents, which takes its place."""
-        at = [c.place is gone.place for c in self.best.chosen]
+        at = [c.part.name == gone.part.name for c in self.best.chosen]
         if self.world is None or not any(at):  # a number out of tolerance by the name of an effect
             return self
         k = at.index(True)
@@ -97,7 +98,8 @@ def searched(
     searches.sort(key=lambda w: -w.null.score)
     found: dict[str, Model] = {}
     for w in searches:
-        found[w.name] = w.search(max(found.values(), key=lambda m: m.score, default=w.null))
+        begin = max(found.values(), key=lambda m: m.score, default=w.null)
+        found[w.name] = with_more_shapes(w, w.search(begin))
     best = _with_rivals(max(found.values(), key=lambda m: m.score), searches, found)
     likelier = [m for m, odds in filter(None, best.instead) if odds < 0.0]
     if likelier:  # without an effect, which may be at any place, in another world

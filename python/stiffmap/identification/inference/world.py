@@ -102,7 +102,7 @@ class World:
             if len(better.chosen) <= len(model.chosen) and better.score <= model.score + PROGRESS:
                 break
             model = better
-        return self._refined(model)
+        return self.refined(model)
 
     def _trials(self, model: Model, beat: float = -np.inf) -> tuple[Model, Floats] | None:
         """The model with the best further effect, and the gain of each place; None where none comes near the evidence to `beat`."""
@@ -221,7 +221,7 @@ class World:
         missed = shown - lines @ np.linalg.lstsq(lines, shown, rcond=1e-9)[0]
         return refitted(fit, self.columns.residual - missed), at
 
-    def _refined(self, model: Model) -> Model:
+    def refined(self, model: Model) -> Model:
         """The set with its shapes (periods, knees) where they fit best, between those of the grid; the same where that is no better. What
         nobody can name has taken what the grid misses, so that each optimum is one under the amplitudes of the last one."""
         for _ in range(CORRECTIONS):
@@ -308,7 +308,7 @@ class World:
     def without(self, model: Model, gone: Chosen, heir: Sequence[Place]) -> Model:
         """The model without an effect, or with another place in its stead, at its best shapes."""
         fewer = self.less(model, gone)
-        return self._refined(self._with(fewer, heir, fewer.fit) if heir else fewer)
+        return self.refined(self._with(fewer, heir, fewer.fit) if heir else fewer)
 
     def coarsest(self, model: Model) -> Model:
         """The set with the coarsest part in each effect's place, of those whose evidence is the same."""
