@@ -65,15 +65,18 @@ class Search:
 
     def less(self, gone: Chosen, *heir: Place) -> Search:
         """Without one of its effects, all else fitted anew; `heir`: the first of its equivalents, which takes its place."""
-        at = [c.part.name == gone.part.name for c in self.best.chosen]
-        if self.world is None or not any(at):  # a number out of tolerance by the name of an effect
+        number = {c.part.name: i for i, c in enumerate(self.best.chosen)}
+        if (
+            self.world is None or gone.part.name not in number
+        ):  # a number out of tolerance by the name of an effect
             return self
-        k = at.index(True)
-        order = [*(i for i in range(len(at)) if i != k), *(k for _ in heir)]
+        k = number[gone.part.name]
+        best = self.world.without(self.best, gone, heir)
+        order = [number.get(c.part.name, k) for c in best.chosen]
         near = [*self.equivalents[:k], self.equivalents[k][1:], *self.equivalents[k + 1 :]]
         return replace(
             self,
-            best=self.world.without(self.best, gone, heir),
+            best=best,
             gain=tuple(self.gain[i] for i in order),
             equivalents=tuple(near[i] for i in order),
             instead=tuple(self.instead[i] for i in order),

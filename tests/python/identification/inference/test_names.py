@@ -125,6 +125,23 @@ def test_what_shows_the_same_is_an_equivalent():
     assert judged_word(s) == "ambiguous"
 
 
+@pytest.mark.parametrize("number", [0, 1])
+def test_what_is_nothing_at_the_optimum_leaves_the_search_and_the_others_are_fitted_anew(number: int) -> None:
+    c = setting(1, (0.0, 40.0, 30.0))
+    c = replace(c, experiment=one_place(len(c.rows)))
+    s = searched(c)
+    gone, (other,) = s.best.chosen[number], [o for o in s.best.chosen if o is not s.best.chosen[number]]
+    t = s.less(gone)
+    assert [o.part.name for o in t.best.chosen] == [other.part.name]
+    assert t.gain == (s.gain[1 - number],) and t.equivalents == (s.equivalents[1 - number],)
+    assert t.best.fit.noise > 3.0 * s.best.fit.noise
+    v = judged(c, s.less(gone), ((gone, "nothing"),))
+    assert [why for _, why in v.gone] == ["nothing"] and gone.place not in [n.chosen.place for n in v.named]
+    heir = s.less(gone, gone.place).best.chosen
+    assert {id(o.place) for o in heir} == {id(other.place), id(gone.place)}
+    assert s.less(replace(gone, part=replace(gone.part, name="a number"))) is s
+
+
 def judged_word(s: Any) -> str:
     return "ambiguous" if any(s.equivalents) else "effects"
 
