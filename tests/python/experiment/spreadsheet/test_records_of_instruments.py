@@ -467,3 +467,32 @@ def test_differences_in_a_unit_that_no_machine_is_off_by(unit: str, warned: bool
     units = dict.fromkeys(("dx", "dy", "dz"), unit)
     found = made(tmp_path, text, "tripteron", quantity="position", noise=NOISE, units=units)
     assert any("are they differences, and in this unit?" in w for w in found.warnings) == warned
+
+
+@pytest.mark.parametrize(
+    ("unit", "size"),
+    [
+        ("N-m", 1.0),
+        ("N.m", 1.0),
+        ("N-mm", 1e-3),
+        ("N cm", 1e-2),
+        ("lbf-in", 0.112984829),
+        ("in-lb", 0.112984829),
+    ],
+)
+@pytest.mark.parametrize("name", ["T{}", "M{}"])
+def test_moments_of_load_cells_are_loads(name: str, unit: str, size: float, tmp_path: Path) -> None:
+    """Written with a hyphen or a point they went to the notes without a word."""
+    heads = ";".join(f"{name.format(a)} ({unit})" for a in "xyz")
+    text = f"x (mm);y (mm);z (mm);Fx (N);Fy (N);Fz (N);{heads};dx (mm)\n0;0;0;1;2;3;4;5;6;0.1\n9;0;0;1;2;3;4;5;6;0.1\n"
+    e = made(tmp_path, text).experiment
+    np.testing.assert_allclose(e.wrench[0], [1, 2, 3, 4 * size, 5 * size, 6 * size])
+
+
+@pytest.mark.parametrize("unit", ["", " (counts)"])
+def test_moments_of_an_unknown_unit_are_asked_for(unit: str, tmp_path: Path) -> None:
+    text = (
+        f"x (mm);y (mm);z (mm);Fx (N);Fy (N);Fz (N);Tz{unit};dx (mm)\n0;0;0;1;2;3;4;0.1\n9;0;0;1;2;3;4;0.1\n"
+    )
+    with pytest.raises(StiffmapError, match=r"column 'Tz' \(mz\).*unit"):
+        made(tmp_path, text)
