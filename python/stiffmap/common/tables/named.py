@@ -104,7 +104,8 @@ def named(sheet: Table, known: Known) -> NamedTable:
     """Columns of a sheet by their known names; raises FileError."""
     out = NamedTable(sheet.file, list(sheet.lines), sheet.top, {}, {}, {}, {})
     for i, head in enumerate(sheet.header):
-        if not known.has(head) and (meaning_of(head) == "id" or _counts(sheet, i)):
+        index = COUNTER.fullmatch(sheet.names[i]) and sheet.is_numeric(i) and np.diff(sheet.numbers(i)) == 1
+        if not known.has(head) and (meaning_of(head) == "id" or np.all(index)):
             continue
         name, unit, size = _meaning(head, known, out)
         if name in out.header:
@@ -115,12 +116,6 @@ def named(sheet: Table, known: Known) -> NamedTable:
             list(sheet.columns[i]) if words else size * _numbers(sheet, i, name, out, known.blank)
         )
     return out
-
-
-def _counts(sheet: Table, column: int) -> bool:
-    """Whether a column without a name, or of indices, numbers the rows one by one."""
-    index = COUNTER.fullmatch(sheet.names[column]) and sheet.is_numeric(column)
-    return bool(index) and bool((np.diff(sheet.numbers(column)) == 1).all())
 
 
 def _numbers(sheet: Table, column: int, name: str, table: NamedTable, blank: bool) -> Floats:
