@@ -89,10 +89,10 @@ SPELLINGS = {
         ("deg|°|grad|degree|degrees", "deg", 1), ("arcmin|'", "deg", 1 / 60), ("arcsec|sec", "deg", 1 / 3600),
     ),
     "moment": _table(
-        ("nm|n*m|n·m", "N*m", 1), ("nmm|n*mm|n·mm", "N*mm", 1), ("knm|kn*m|kn·m", "kN*m", 1),
+        ("nm|n*m", "N*m", 1), ("nmm|n*mm", "N*mm", 1), ("ncm|n*cm", "N*mm", 10), ("knm|kn*m", "kN*m", 1),
         ("kgfm|kpm|kgf*m|kp*m|mkp", "N*m", GRAVITY),
-        ("lbfft|ftlbf|lbf*ft|ft*lbf|ft-lb|ft·lb|lbf·ft", "N*m", float(POUND) * 0.3048),
-        ("lbfin|lbf*in|in*lbf|in-lb|lbf·in", "N*m", float(POUND) * 0.0254),
+        ("lbfft|ftlbf|ftlb|lbf*ft|lb*ft|ft*lbf|ft*lb", "N*m", float(POUND) * 0.3048),
+        ("lbfin|inlbf|inlb|lbf*in|lb*in|in*lbf|in*lb", "N*m", float(POUND) * 0.0254),
     ),
     "temperature": _table(("°c|degc|c|celsius", "degC", 1), ("k|kelvin", "K", 1)),
 }  # fmt: skip
@@ -110,7 +110,8 @@ def unit_of(text: str, quantity: str | None = None) -> Unit | None:
     """A unit as a sheet writes it, of one quantity or of any; None for what is none."""
     if text.strip() in ("MN", "mN"):  # a factor of 1e9 between the two: here the case decides
         return Unit("MN") if text.strip() == "MN" and quantity in (None, "force") else None
-    key = re.sub(r"\s+|^\[|\]$", "", text.strip().lower()).replace(",", ".").rstrip(".")
+    key = re.sub(r"\s+|^\[|\]$", "", text.strip().lower())
+    key = re.sub(r"(?<=[a-z])[-·⋅.](?=[a-z])", "*", key).replace(",", ".").rstrip(".")
     tables = SPELLINGS.values() if quantity is None else (SPELLINGS[quantity],)
     return next((t[key] for t in tables if key in t), None)
 
@@ -123,11 +124,11 @@ def known(quantity: str | None = None) -> str:
 def name_and_unit(header: str) -> tuple[str, str]:
     """``x [mm]`` is x in mm; an empty unit where none stands in brackets, as in joint[1]."""
     match = re.fullmatch(
-        r"(?s)\s*(.*?)\s*(?:(?!\b\[(?:\w+_)?\d+\])(?:\[\s*([^]]*?)\s*\]|[\[(]\s*([^])]*?)\s*[])]))?\s*",
+        r"(?s)\s*(.*?)\s*(?:(?!\b\[(?:\w+_)?\d+\])(?:\[\s*([^]]*?)\s*\]|\(\s*((?:[^()]|\([^()]*\))*?)\s*\)|[\[(]\s*([^])]*?)\s*[])]))?\s*",
         header,
     )
     assert match is not None  # any text is a name
-    return match[1], match[2] or match[3] or ""
+    return match[1], match[2] or match[3] or match[4] or ""
 
 
 def size_of(unit: str) -> float:

@@ -37,14 +37,17 @@ def header_of(
     """Line number and names of the columns, from the lines above the first row of data; None where none is a header.
 
     `known`: whether a name without its unit and the group over it has a meaning of its own; `repeated`: whether names may come again.
+    Below the names there may be lines of devices and rates, and above them one of units with a word for it.
     """
     width = sum(bool(c.strip()) for c in first)
     lines = [(n, [_plain(c) for c in cells]) for n, cells in above]
     lines = [(n, cells) for n, cells in lines if any(c.strip("-=_–—: ") for c in cells)]
-    lines = [
-        (n, cells) for n, cells in lines if not any(m and m["text"] for m in map(STATED.fullmatch, cells))
-    ][-MOST_LINES:]
-    units: list[str] = []
+    whole = {n for n, c in lines if _units(c) and sum(map(bool, c)) >= width}
+    said = [k for k, (n, c) in enumerate(lines) if n in whole and UNIT_LABEL.fullmatch(c[0])]
+    units = lines.pop(said[-1])[1] if said else []
+    stated = {n for n, c in lines if any(m and m["text"] for m in map(STATED.fullmatch, c))} - whole
+    lines = [(n, cells) for n, cells in lines if n not in stated][-MOST_LINES:]
+    last = lines[-1:]
     if len(lines) > 2 and _units(lines[-2][1]) and _completes(lines[-3][1], lines[-1][1], width):
         lines[-2:] = lines[:-3:-1]  # runs are counted below the units
     while lines and not fits(lines[-1][1], width):
@@ -56,8 +59,8 @@ def header_of(
         lines.pop()
     if lines and _units(lines[-1][1]) and len(lines) > 1:
         units = lines.pop()[1]
-    if not lines:
-        return None
+    if not lines or (lines[-1:] != last and any(map(NUMBER.fullmatch, lines[-1][1]))):
+        return None  # numbers with remarks below them are no names
     number, names = lines[-1]
     names = [*names, *[""] * (len(units) - len(names))]
     if len(lines) > 1 and (marks := [c for c in lines[-2][1] if c]) and all(map(DIRECTIONS.fullmatch, marks)):
@@ -73,7 +76,22 @@ def header_of(
     names = names if repeated else _held(names, first, known)
     if units:
         names = [_with_own_unit(n, units[i] if i < len(units) else "") for i, n in enumerate(names)]
-    return number, _of_metres(names)
+    names = _off_path(_of_metres(names), known)
+    for k in () if any(known(split_unit(n)[0]) for n in names) else range(len(above) - 1, 0, -1):
+        over = [split_unit(_plain(c))[0] for c in above[k - 1][1] if c.strip()]
+        if fits(over, width) and len({*over}) == len(over) and sum(map(known, over)) > 1:
+            below = [line for line in above[k:] if _units([_plain(c) for c in line[1]])]
+            return header_of([*above[:k], *below[:1]], first, known, repeated)
+    return number, names
+
+
+def _off_path(names: list[str], known: Callable[[str], bool]) -> list[str]:
+    """``Untitled/X``, ``"DB1".X``: names without the one path before them, where more than a position has a meaning then."""
+    pairs = [split_unit(n) for n in names]
+    parts = [re.fullmatch(r"(.*[/.\\])(['\"]?)([^/.\\\s'\"]+)\2", name) for name, _ in pairs]
+    bare = [with_unit(m[3], unit) if m else n for n, (_, unit), m in zip(names, pairs, parts, strict=True)]
+    meant = sum(known(m[3]) for m in parts if m)
+    return bare if meant > 3 and len({m[1] for m in parts if m}) == 1 and len({*bare}) == len(bare) else names
 
 
 def _of_metres(names: Sequence[str]) -> list[str]:
@@ -137,6 +155,10 @@ def stated_unit(above: Sequence[str], quantity: str) -> str:
     return ""
 
 
+UNIT_LABEL = re.compile(r"(?i)[\w -]*(unit|einheit|unité|unidad)[\w ]*")
+"""Before the units of all columns, as in ``Y_Unit_Label``."""
+
+
 def _plain(cell: str) -> str:
     text = re.sub(r"\s+", " ", cell.strip())
     bare = text.lstrip("#%").strip() if text.startswith(("#", "%")) else text
@@ -149,7 +171,8 @@ def fits(cells: Sequence[str], width: int) -> bool:
 
 
 def _bare(cell: str) -> str:
-    inside = re.fullmatch(r"\[(.*)\]|\(((?:[^()]|\([^()]*\))*)\)", text := cell.strip())
+    text = (match["text"] if (match := STATED.fullmatch(cell)) else "") or cell.strip()
+    inside = re.fullmatch(r"\[(.*)\]|\(((?:[^()]|\([^()]*\))*)\)", text)
     return (inside[1] or inside[2] or "").strip() if inside else text
 
 
@@ -163,7 +186,8 @@ def _is_unit(text: str) -> bool:
 
 def _units(cells: Sequence[str]) -> bool:
     """Whether a line holds nothing but units."""
-    filled = [_bare(c) for c in cells if _bare(c) and _bare(c) not in ("-", "–", "—", "#", "1")]
+    cells = [_bare(c) for c in cells if not UNIT_LABEL.fullmatch(c)]
+    filled = [c for c in cells if c not in ("", "-", "–", "—", "#", "1")]
     named = [c for c in filled if _is_unit(c)]
     return bool(named) and len(named) >= 0.6 * len(filled)
 

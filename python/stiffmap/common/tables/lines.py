@@ -31,6 +31,7 @@ MARKED = re.compile(r"^(#|%|//)\s+")
 THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(\.\d{3})+")
 """``1.000`` is a thousand in a table with decimal commas; ``0.041`` is not."""
 COMMA = re.compile(r"^[ \t]*[+-]?[\d.]*,\d+(?:[eEdD][+-]?\d+)?[ \t]*$", re.M)
+DIGIT = re.compile(r"\s*[-+−–]?[.,]?\d")
 QUOTED = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
 POINT = re.compile(rf"^[ \t]*(?!{THOUSANDS.pattern}[ \t]*$)[+-]?[\d,]*\.\d+(?:[eEdD][+-]?\d+)?[ \t]*$", re.M)
 """A number with a decimal point, which no `THOUSANDS` are."""
@@ -184,7 +185,9 @@ def with_points(cells: Cells) -> Cells:
 def decimal_comma(rows: Iterable[list[str]], separator: str) -> bool:
     """Whether numbers have commas and none has a point; where cells stand between commas, ``"1,500"`` does not tell."""
     commas = False
-    for block in blocks(rows):
+    for k, block in enumerate(blocks(rows)):
+        # the number of a version or a rate, alone above the table, does not tell
+        block = block if k else [r for r in block if sum(map(bool, map(DIGIT.match, r))) > 1] or block
         text = "\n".join(chain.from_iterable(block))
         if text.count("\n") != sum(map(len, block)) - 1:
             text = "\n".join(c.replace("\n", " ") for row in block for c in row)

@@ -1,7 +1,7 @@
 """Tables whose columns have known names, each with its unit, for all commands that take points, forces or frequencies; tables of poses
 among them, one convention for all commands.
 
-``x [mm]``, ``x (mm)``, ``x in mm`` or ``x_mm``; order and case are free, a column of names of rows is left out, and all that
+``x [mm]``, ``x (mm)``, ``x in mm`` or ``x_mm``; order and case are free, a column of names or numbers of rows is left out, and all that
 `read_sheet` understands is read: groups, units in a line of their own or in the cells, lines above the header. Of poses x, y, z are the
 commanded TCP, rx, ry, rz its rotation vector from home, fx … mz the wrench on the tool, t the time, feed the speed along the path;
 docs/machine_files.md lists the columns.
@@ -30,6 +30,8 @@ from stiffmap.common.units import FREQUENCIES, QUANTITIES, SHORT_TIMES, feed_uni
 SPELLED = {"s": SHORT_TIMES, "percent": {"%": 1.0, "-": 100.0, "1": 100.0}}
 """SI unit -> others that tables of such columns have."""
 PER = re.compile(r"_(?:per_)?(min|s|tooth|rev)$")
+COUNTER = re.compile(r"(?i)column \d+|unnamed: ?\d+|index|idx|line|sample|frame|record")
+"""Names of columns that may number the rows; programs leave out the name, or write ``Unnamed: 0``."""
 WORD = "word"
 """In place of a unit: the column holds text."""
 
@@ -102,7 +104,8 @@ def named(sheet: Table, known: Known) -> NamedTable:
     """Columns of a sheet by their known names; raises FileError."""
     out = NamedTable(sheet.file, list(sheet.lines), sheet.top, {}, {}, {}, {})
     for i, head in enumerate(sheet.header):
-        if not known.has(head) and meaning_of(head) == "id":
+        index = COUNTER.fullmatch(sheet.names[i]) and sheet.is_numeric(i) and np.diff(sheet.numbers(i)) == 1
+        if not known.has(head) and (meaning_of(head) == "id" or np.all(index)):
             continue
         name, unit, size = _meaning(head, known, out)
         if name in out.header:

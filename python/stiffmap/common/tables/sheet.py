@@ -43,10 +43,11 @@ STATISTICS = re.compile(
     r"(((gesamt|grand|overall)[ -]?)?(mean|average|avg|mittel(wert)?e?|total)|mw|ø|x̄|x̅|m[aá]x\.? ?[-–] ?min|sum|summe|gesamt|std\.?( ?dev\.?)?|stdev|stabw|s|sigma|σ|m[ií]n(imum|imo|i)?|"
     r"m[aá]x(imum|imo|i)?|median|range|spannweite|rms|durchschnitt|standardabweichung|streuung|[1-6] ?(sigma|σ|s)|count|anzahl|n|uncertainty|unsicherheit|toleran(ce|z)|"
     r"varian(ce|z|za)|deviation|moyenne|somme|m[ée]diane|[ée]cart([ -]?type)?|[ée]tendue|promedio|media|mediana|suma|desviación|"
-    r"desv(est)?|rango|somma|totale|deviazione|scarto|massimo|minimo)\.?:?( .*)?",
+    r"desv(est)?|rango|somma|totale|deviazione|scarto|massimo|minimo|"
+    r"(sampl(e|ing)|abtast)[ _-]?(rate|time|interval|zeit)|samples|block ?size|delta_x|x0|offset|sensitivity|empfindlichkeit)\.?:?( .*)?",
     re.IGNORECASE,
 )
-"""First cell of a row that is no reading but what a spreadsheet computed of them."""
+"""First cell of a row that is no reading but what a spreadsheet computed of them, or how they were sampled."""
 MEAN = re.compile(
     r"(?i)(mean|average|avg|median|mittel(wert)?|mw|ø|x̄|x̅|durchschnitt|moyenne|promedio|std( ?dev)?|stdev|stabw|standardabweichung)\.?:?"
 )
@@ -121,7 +122,7 @@ def read_sheet(path: Path, sheet: str | None = None, layout: Layout = PLAIN) -> 
         refuse_twice(names, str(path), number_, way)
     width = len(names)
     said = [*header, *(c.strip() for _, cells in above for c in cells)]
-    aside = [f"row {n}, of numbers above the header" for n, _ in begun[:-1]]
+    aside = [f"row {n}, of numbers above the header" for n, _ in begun[:-1] if not layout.strict]
     clear = (
         b if _all_readings(b) else _data(b, first, header, said, spelling, aside, layout, str(path))
         for b in blocks(chain([first], kept(rows, None if layout.strict else aside)))
@@ -245,7 +246,7 @@ def _begun(
 ) -> tuple[Iterator[Line], list[Line], list[Line], tuple[int, list[str]] | None]:
     """Lines from the second row of data on, those above the first, the first row behind rows of numbers above the header, such as
     numbers of channels, and the header. The very first row counts unless another line names the columns better."""
-    for skip in (*range(1 if layout.strict or layout.header else MOST_LINES), 0):
+    for skip in (*range(1 if layout.header else MOST_LINES), 0):
         above = list[Line]()
         rows = iter(lines() if layout.table is None else _one_table(lines(), spelling, layout, file))
         data = list(islice(_above(rows, spelling, above), skip + 1))
@@ -315,7 +316,8 @@ def _data(
             aside.append(f"row {n}, '{last}', is no reading")
         elif not any(is_finite(c, spelling) for c in cells):
             if _begins_table(cells, names, len(header), spelling, layout):
-                what = "another table begins here: say --table 1 for the one above, --table 2 for this one"
+                way = "" if layout.strict else ": say --table 1 for the one above, --table 2 for this one"
+                what = f"another table begins here{way}"
                 raise FileError(what, file=file, line=n)
             again = [c.strip() for c in cells[:2]] == list(header[:2])
             aside.append(f"row {n} {'repeats the header' if again else f'is a remark: {first[:40]}'}")

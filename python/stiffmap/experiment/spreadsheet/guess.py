@@ -15,7 +15,7 @@ from stiffmap.experiment.files.fields import APPROACH, SEEN
 
 REPEATED = re.compile(r"^(.*?)[ _.-]*(?:#|run|messung|wdh|rep|repeat)?[ _.-]*(\d+)$", re.IGNORECASE)
 TORQUE = re.compile(r"^[tT](?=[ _]?[xyzXYZ]$)")
-"""Tx, Ty, Tz of a load cell, where the unit is one of moments."""
+"""Tx, Ty, Tz of a load cell, where the unit is one of moments or, next to Fx, Fy, Fz, one that nobody knows."""
 READINGS = (*AXES, "dd", "ll", *SEEN)
 
 
@@ -46,6 +46,7 @@ def guess(headers: Sequence[str], chosen: Mapping[str, Sequence[str]]) -> list[C
         for i, h in enumerate(many, 1)
     }
     out = []
+    cell = {"fx", "fy", "fz"} <= {meaning_of(split_unit(h)[0]) for h in headers}
     for index, header in enumerate(headers):
         name, unit = split_unit(header)
         if index in given:
@@ -53,7 +54,8 @@ def guess(headers: Sequence[str], chosen: Mapping[str, Sequence[str]]) -> list[C
             out.append(Column(index, name, unit, meaning, repeat if len(chosen[meaning]) > 1 else 0))
         else:
             time = unit in (*TIMES, "ms", "h") or (name == "t" and not unit)  # T is a temperature
-            plain = TORQUE.sub("m", name) if unit_of(unit, "moment") else name
+            torque = unit_of(unit, "moment") or (cell and not unit_of(unit))
+            plain = TORQUE.sub("m", name) if torque else name
             meaning, repeat = ("note", 0) if time else _meaning(plain)
             place = unit and meaning in APPROACH  # a point from which it came, no direction
             out.append(Column(index, name, unit, "note" if place or meaning in chosen else meaning, repeat))

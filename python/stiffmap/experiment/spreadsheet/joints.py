@@ -23,6 +23,7 @@ BEFORE = r"(?:.*[/.\[]|rob_?\d+ |(?:(?:ist|soll|act(?:ual)?|cmd)[ _-]?)?(?:pos(?
 BEHIND = r"(?:[/._ ](?:position|pos|angle|winkel))?"
 NUMBERED = rf"(?!.*(?:veloc|accel|effort|torque|current))(?:{BEFORE}{{}}(?:joint_a|joint|axis|achse|gelenk|theta|θ|关节|rax|q|j|a)|.*[/.]position)[ _.-]?\[?{{}}\]?{BEHIND}"
 """Also as logs have them: ``/joint_states/joint_1/position``, ``field.position0``, ``position[0]`` of a message."""
+JOINT = re.compile(NUMBERED.format("", r"\d"), re.IGNORECASE)
 OF_MESSAGE = re.compile(r"(?i)(.*[/.])position(\[?\d+\]?)")
 """A joint of a message that names its joints next to it: ``field.name0`` says whose ``field.position0`` is."""
 MEASURED = r"([xyz])[ _.-]?(?:meas(?:ured|\.)?|gemessen|mesuré|misurat[oa]|medid[oa])"

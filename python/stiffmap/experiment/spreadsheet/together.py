@@ -56,7 +56,7 @@ TURNS = (
     ),
 )
 """Names of three angles, how they turn, and that in words."""
-WXYZ = tuple(rf"(.*[./])?(q|quat(ernion)?|rot(ation)?|orientation)[ _./]?{a}" for a in "wxyz")
+WXYZ = tuple(rf"(.*[./ ])?(q|quat(ernion)?|rot(ation)?|orientation)[ _./]?{a}" for a in "wxyz")
 ROUNDED = 0.01
 """By how much digits of a table may change the length of a quaternion."""
 
@@ -248,6 +248,8 @@ def _turns(m: Meant, taken: set[int]) -> None:
         or (m.columns and not seen)
         or not set(position) <= {*meanings, *([] if turns else m.constants)}
     ):
+        if not turns:  # half angles are no readings
+            m.chosen["note"] = [*m.chosen.get("note", ()), *(m.sheet.header[i] for i in columns)]
         return
     of_pose = {"": QUATERNION, "rotvec": VECTOR}.get(turns, EULER)
     of_seen = SEEN_TURNED if turns else [f"p{c}" for c in QUATERNION]

@@ -20,7 +20,7 @@ from stiffmap.common.units import FREQUENCIES
 from stiffmap.workspace.vibration.response import Complex
 from stiffmap.workspace.vibration.response_units import ResponseUnit, response_unit
 
-PREFIX = re.compile(r"((frf|h[12]?(\(f\))?|\w+/\w+|dyn(amic|amische|\.)?)_)+(?=.)")
+PREFIX = re.compile(r"((frf|tf|h[12]?(\(f\))?|\w+/\w+|dyn(amic|amische|\.)?)[_/])+(?=.)")
 """Before the part of a response, as in ``H1 Ch2/Ch1 Real [m/N]``."""
 LEVEL = re.compile(r"(?i)db(?: ?re[fl]?[.:]?)? ?([\d.]+(?:e-?\d+)?)? ?(.*)")
 MEANT = {

@@ -467,3 +467,106 @@ def test_differences_in_a_unit_that_no_machine_is_off_by(unit: str, warned: bool
     units = dict.fromkeys(("dx", "dy", "dz"), unit)
     found = made(tmp_path, text, "tripteron", quantity="position", noise=NOISE, units=units)
     assert any("are they differences, and in this unit?" in w for w in found.warnings) == warned
+
+
+@pytest.mark.parametrize(
+    ("unit", "size"),
+    [
+        ("N-m", 1.0),
+        ("N.m", 1.0),
+        ("N-mm", 1e-3),
+        ("N cm", 1e-2),
+        ("lbf-in", 0.112984829),
+        ("in-lb", 0.112984829),
+    ],
+)
+@pytest.mark.parametrize("name", ["T{}", "M{}"])
+def test_moments_of_load_cells_are_loads(name: str, unit: str, size: float, tmp_path: Path) -> None:
+    """Written with a hyphen or a point they went to the notes without a word."""
+    heads = ";".join(f"{name.format(a)} ({unit})" for a in "xyz")
+    text = f"x (mm);y (mm);z (mm);Fx (N);Fy (N);Fz (N);{heads};dx (mm)\n0;0;0;1;2;3;4;5;6;0.1\n9;0;0;1;2;3;4;5;6;0.1\n"
+    e = made(tmp_path, text).experiment
+    np.testing.assert_allclose(e.wrench[0], [1, 2, 3, 4 * size, 5 * size, 6 * size])
+
+
+@pytest.mark.parametrize("unit", ["", " (counts)"])
+def test_moments_of_an_unknown_unit_are_asked_for(unit: str, tmp_path: Path) -> None:
+    text = (
+        f"x (mm);y (mm);z (mm);Fx (N);Fy (N);Fz (N);Tz{unit};dx (mm)\n0;0;0;1;2;3;4;0.1\n9;0;0;1;2;3;4;0.1\n"
+    )
+    with pytest.raises(StiffmapError, match=r"column 'Tz' \(mz\).*unit"):
+        made(tmp_path, text)
+
+
+TWO = "{0}0{1}0{1}0{1}-100{1}-41\n{2}50{1}0{1}0{1}-200{1}-83\n"
+
+
+@pytest.mark.parametrize(
+    "above",
+    [
+        "Channels;5\nY_Unit_Label;mm;mm;mm;N;µm\nX_Dimension;Time;Time;Time;Time;Time\nX0;0,0;0,0;0,0;0,0;0,0\n***End***\nX_Value;x;y;z;Fz;dz\n",
+        "VUnit;mm;mm;mm;N;µm\nTraceName;x;y;z;Fz;dz\nBlockSize;2;2;2;2;2\n;;;;;\n",
+        "t;x;y;z;Fz;dz\nEinheit = s;Einheit = mm;Einheit = mm;Einheit = mm;Einheit = N;Einheit = µm\n",
+        "t;x;y;z;Fz;dz\n100 Hz;100 Hz;100 Hz;100 Hz;100 Hz;100 Hz\ns;mm;mm;mm;N;µm\nMX840;MX840;MX840;MX840;MX840;MX840\n",
+        "t [s];x [mm];y [mm];z [mm];Fz [N];dz [µm]\nCH 1;CH 2;CH 3;CH 4;CH 5;CH 6\nEinheit = s;Einheit = mm;Einheit = mm;Einheit = mm;Einheit = N;Einheit = µm\n",
+    ],
+    ids=["units above", "units, rates", "units below", "rates, units, devices", "channels"],
+)  # fmt: skip
+def test_names_and_units_in_a_block_of_lines(above: str, tmp_path: Path) -> None:
+    """As LabVIEW, oscilloscopes and catman write them, with lines of devices and rates between."""
+    truth(made(tmp_path, above + TWO.format("0;", ";", "0,1;")).experiment)
+
+
+@pytest.mark.parametrize(
+    "path", ["Untitled/{}", '"DB1".{}', "/'Untitled'/'{}'", r"Group\{}", "GVL.stAxis.{}"]
+)
+def test_names_behind_one_path(path: str, tmp_path: Path) -> None:
+    """As of groups of channels and blocks of a controller."""
+    names = ";".join(
+        f'"{path.format(n)}"' if '"' not in path else path.format(n) for n in ("x", "y", "z", "Fz", "dz")
+    )
+    found = made(
+        tmp_path,
+        f"Time stamp;{names}\n{TWO.format('0;', ';', '1;')}",
+        units={"length": "mm", "dz": "um", "force": "N"},
+    )
+    truth(found.experiment)  # fmt: skip
+
+
+def test_a_vector_behind_a_path_is_no_position(tmp_path: Path) -> None:
+    text = "/imu/acceleration/x;/imu/acceleration/y;/imu/acceleration/z;Fz [N];dz [µm]\n" + TWO.format(
+        "", ";", ""
+    )
+    with pytest.raises(StiffmapError, match="which column is the position x"):
+        made(tmp_path, text)
+
+
+@pytest.mark.parametrize("above", ["Version;2.1", "Sample rate;1000.0;Hz", "Scale factor [-];1.0;;;"])
+def test_a_number_above_the_table_does_not_tell_its_decimal_sign(above: str, tmp_path: Path) -> None:
+    truth(made(tmp_path, f"{above}\n{HEAD}0,0;0,0;0;-100;-41,0\n50,0;0;0;-200;-83,0\n").experiment)
+
+
+@pytest.mark.parametrize(
+    "above", ["TIME_STAMP\t2024-05-03\t1234.5\nMARKER_NAMES\ttool\n", "Rate\t100\tHz\nTake\tA\nTools\tB\n"]
+)
+def test_a_line_of_numbers_above_remarks_is_no_header(above: str, tmp_path: Path) -> None:
+    with pytest.raises(StiffmapError, match=r"no header line.*--header"):
+        made(tmp_path, above + "1\t0\t0\t0\t-100\n2\t50\t0\t0\t-200\n")
+
+
+@pytest.mark.parametrize("over", [",,,arm:tool,,", ",,,Rotation,,", "Frame,Time,,Position,,"])
+def test_a_group_does_not_reach_over_joints(over: str, tmp_path: Path) -> None:
+    """Of motion capture, whose columns others follow; the quaternion is no reading."""
+    joints = ",".join(f"J{k + 1} [rad]" for k in range(6))
+    text = (
+        f"{over},,,,,,,,,\n,,,Rotation,Rotation,Rotation,Rotation,Position,Position,Position,Error,,,,,,\n"
+        f"Frame,Time,Ball,X,Y,Z,W,X,Y,Z,,{joints}\n"
+        + "".join(f"{i},{i},1,0,0,0.6,0.8,{1400 + i},200,300,0,{','.join(COMMANDS)}\n" for i in range(3))
+    )
+    columns = {f"p{a}": f"Position {a.upper()}" for a in "xyz"}
+    made(tmp_path, text, machine="ur10", columns=columns, units={"length": "mm"})
+    data = (tmp_path / "e" / "data.csv").read_text().splitlines()
+    assert data[0].startswith("px,py,pz,q1,q2,q3,q4,q5,q6")
+    assert data[1].split(",")[:3] == ["1400.0", "200.0", "300.0"] and data[1].split(",")[3:9] == list(
+        COMMANDS
+    )

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import stiffmap as sm
+from stiffmap.common.errors import StiffmapError
 from stiffmap.workspace.vibration.files import read_responses
 from stiffmap.workspace.vibration.response_units import response_unit
 
@@ -398,17 +399,32 @@ def test_a_response_that_contradicts_its_name_is_refused(columns, message, tmp_p
         ("Freq (Hz),Real Part (m/s2/N),Imaginary Part (m/s2/N),Coh", lambda a: (a.real, a.imag, 0 * abs(a) + 0.9)),
         ("f [Hz],Accelerance [(m/s^2)/N],Phase [deg]", lambda a: (abs(a), np.degrees(np.angle(a)))),
         ("Frequenz [Hz],H1 Realteil [m/s²/N],H1 Imaginärteil [m/s²/N]", lambda a: (a.real, a.imag)),
+        ("Frequency (Hz),Real ((m/s2)/N),Imaginary ((m/s2)/N)", lambda a: (a.real, a.imag)),
+        ("Frequency (Hz),Amplitude ((m/s²)/N),Phase (deg)", lambda a: (abs(a), np.degrees(np.angle(a)))),
+        ("Frequency (Hz),TF_Acc/Force/Real ((m/s2)/N),TF_Acc/Force/Imag ((m/s2)/N)", lambda a: (a.real, a.imag)),
+        (",Frequency (Hz),Real (m/s2/N),Imag (m/s2/N)", lambda a: (a.real, a.imag)),
+        ("Unnamed: 0,Frequency (Hz),Real (m/s2/N),Imag (m/s2/N)", lambda a: (a.real, a.imag)),
+        ("Line,Frequency (Hz),Real (m/s2/N),Imag (m/s2/N)", lambda a: (a.real, a.imag)),
         ("f [Hz],FRF Real [m/s²/N],FRF Imag [m/s²/N],Magnitude [m/s²/N],Phase [deg]", lambda a: (a.real, a.imag, abs(a), np.degrees(np.angle(a)))),
     ],
 )  # fmt: skip
 def test_names_of_analysers(header, columns, tmp_path):
     f = np.array([10.0, 20.0, 30.0])
     receptance = np.array([1e-6 - 2e-7j, -1e-6 - 3e-6j, -2e-7 - 1e-7j])
-    rows = np.column_stack([f, *columns(-((2 * np.pi * f) ** 2) * receptance)])
+    numbers = [range(3)] * (not header.startswith(("F", "f")))  # of the rows
+    rows = np.column_stack([*numbers, f, *columns(-((2 * np.pi * f) ** 2) * receptance)])
     text = "\n".join(",".join(map(repr, row.tolist())) for row in rows)
     (tmp_path / "r.csv").write_text(f"{header}\n{text}\n", encoding="utf-8")
     (one,) = read_responses(tmp_path / "r.csv")
     np.testing.assert_allclose(one.receptance, receptance, rtol=1e-12)
+
+
+def test_a_column_without_a_name_that_counts_no_rows_is_refused(tmp_path):
+    (tmp_path / "r.csv").write_text(
+        ",f [Hz],Re [m/N],Im [m/N]\n0,1,2,3\n2,2,2,3\n3,3,2,3\n", encoding="utf-8"
+    )
+    with pytest.raises(StiffmapError, match="unknown column 'column 1'"):
+        read_responses(tmp_path / "r.csv")
 
 
 @pytest.mark.parametrize("degrees", [[0, -20, -170], [179, -179, 170], [-100, -101, -102]])
