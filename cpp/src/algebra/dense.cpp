@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "stiffmap/algebra/dense.hpp"
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/SVD>
-
 namespace stiffmap {
 
 void Lu::compute(const MatX& A) { lu_.compute(A); }
@@ -17,11 +14,6 @@ void Orthogonal::compute(const MatX& A, double threshold) {
 }
 void Orthogonal::solve(const VecX& b, VecX& x) const { x = cod_.solve(b); }
 void Orthogonal::solve(const MatX& B, MatX& X) const { X = cod_.solve(B); }
-
-Singular singular_vectors(const MatX& A) {
-  const Eigen::JacobiSVD<MatX> svd(A, Eigen::ComputeFullV);  // BDCSVD is for larger ones, 20 s more to compile
-  return {svd.singularValues(), svd.matrixV()};
-}
 
 MatX Orthogonal::null_vectors() const {
   return cod_.colsPermutation() * cod_.matrixZ().transpose().rightCols(cod_.cols() - cod_.rank());
@@ -50,27 +42,7 @@ MatX left_null_vectors(const MatX& A, double threshold) {
   return Q.rightCols(A.rows() - qr.rank());
 }
 
-Singular6 singular_vectors(const Mat6& A) {
-  const Eigen::JacobiSVD<Mat6> svd(A, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  return {svd.singularValues(), svd.matrixV()};
-}
-
 Mat6 inverse(const Mat6& A) { return A.partialPivLu().inverse(); }
-
-Eigen6 symmetric_eigen(const Mat6& A) {
-  const Eigen::SelfAdjointEigenSolver<Mat6> eigen(A);
-  return {eigen.eigenvalues(), eigen.eigenvectors()};
-}
-
-EigenX symmetric_eigen(const MatX& A) {
-  const Eigen::SelfAdjointEigenSolver<MatX> eigen(A);
-  return {eigen.eigenvalues(), eigen.eigenvectors()};
-}
-
-ComplexEigen general_eigen(const MatX& A) {
-  const Eigen::EigenSolver<MatX> eigen(A);
-  return {eigen.eigenvalues(), eigen.eigenvectors()};
-}
 
 bool cholesky(MatX& A) {
   const Eigen::LLT<Eigen::Ref<MatX>> llt(A);

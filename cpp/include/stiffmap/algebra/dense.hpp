@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Factorisations of dense matrices. They take minutes to compile, so that only dense.cpp does.
+// Factorisations of dense matrices. They take minutes to compile, so that only dense.cpp and eigenvalues.cpp do.
 #pragma once
 
 #include <Eigen/Cholesky>
