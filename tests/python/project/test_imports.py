@@ -39,6 +39,7 @@ INNER = {
         "amplitudes",
         "chosen",
         "world",
+        "several",
         ("names", "shares"),
         ("verdict", "readings"),
         "corrected",

@@ -248,7 +248,7 @@ def _turns(m: Meant, taken: set[int]) -> None:
         or (m.columns and not seen)
         or not set(position) <= {*meanings, *([] if turns else m.constants)}
     ):
-        if not turns:  # half angles are no readings
+        if columns and not turns:  # half angles are no readings
             m.chosen["note"] = [*m.chosen.get("note", ()), *(m.sheet.header[i] for i in columns)]
         return
     of_pose = {"": QUATERNION, "rotvec": VECTOR}.get(turns, EULER)
