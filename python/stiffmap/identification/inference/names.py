@@ -42,6 +42,9 @@ from stiffmap.model import effects
 from stiffmap.model.description import AppliedEffect
 from stiffmap.solve.machine import Machine
 
+BEHIND = 30.0
+"""Evidence, ln, by which a world may fall short of the best one for its effects to get further shapes; effort only."""
+
 
 @dataclass(frozen=True, eq=False)
 class Search:
@@ -102,7 +105,9 @@ def searched(
     found: dict[str, Model] = {}
     for w in searches:
         begin = max(found.values(), key=lambda m: m.score, default=w.null)
-        found[w.name] = with_more_shapes(w, w.search(begin))
+        found[w.name] = m = w.search(begin)
+        if m.score > begin.score - BEHIND:
+            found[w.name] = with_more_shapes(w, m)
     best = _with_rivals(max(found.values(), key=lambda m: m.score), searches, found)
     likelier = [m for m, odds in filter(None, best.instead) if odds < 0.0]
     if likelier:  # without an effect, which may be at any place, in another world

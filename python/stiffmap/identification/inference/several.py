@@ -6,8 +6,9 @@ to its own. Once the shapes are refined, what is left may ask for another shape.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import chain, count
 
 import numpy as np
 
@@ -45,31 +46,38 @@ def _better(world: World, model: Model) -> Iterator[Model]:
         m for m in fewer if m.score > model.score - odds
     )  # between the points of the grid it is not needed
     if len(model.chosen) < MOST_EFFECTS:
-        yield from (m for m in _further(world, model, limit) if m.score > limit)
+        yield from (m for m in _further(world, model, limit, model) if m.score > limit)
     for less in fewer:
-        yield from (m for m in _further(world, less, model.score) if m.score > model.score + PROGRESS)
+        yield from (m for m in _further(world, less, model.score, model) if m.score > model.score + PROGRESS)
 
 
-def _further(world: World, model: Model, beat: float) -> Iterator[Model]:
-    """The model with the best further shape at each of its places, as far as that comes near the evidence to `beat`."""
+def _further(world: World, model: Model, beat: float, whole: Model) -> Iterator[Model]:
+    """The model with the best further shape at each of its places, which is none of those that the `whole` model has there, as far as
+    that comes near the evidence to `beat`."""
     fit = model.fit
     for place in {id(c.place): c.place for c in model.chosen if c.shaped}.values():
         if clash(place.candidate, [place.candidate]):
             continue
-        own = [c for c in model.chosen if c.place is place]
+        own = [c for c in whole.chosen if c.place is place]
         apart = [all(_apart(s, place.shapes[c.shape]) for c in own) for s in place.shapes]
         gain = np.where(apart, evidence(fit, (place,))[0], -np.inf)
         if model.score + gain.max() < beat - SHORT:
             continue
         k = int(np.argmax(gain))
         bare = Chosen.at(place, k)
-        part = replace(bare.part, name=f"{place.candidate}, {len(own) + 1}")
+        part = replace(bare.part, name=_free(str(place.candidate), [c.part.name for c in own]))
         start = amplitudes(fit) | {part.name: largest_gain(fit, part)}
         more = fitted(fit.columns, (*fit.parts, part), start, fit.weights, fit.lighter)
         score = model.score + more.score - fit.score + float(log_mean(gain)) - float(gain[k])
         added = replace(bare, part=part).by_posterior(more)
         if added.is_possible:
             yield world.refined(replace(model, chosen=(*model.chosen, added), fit=more, score=score))
+
+
+def _free(name: str, taken: Sequence[str]) -> str:
+    """The name, or with the first number that no other effect at that place has."""
+    numbered = chain([name], (f"{name}, {k}" for k in count(2)))
+    return next(n for n in numbered if n not in taken)
 
 
 def _apart(one: Shape, other: Shape) -> bool:
