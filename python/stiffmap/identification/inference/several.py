@@ -22,6 +22,8 @@ from stiffmap.identification.inference.world import PROGRESS, SHORT, Model, Worl
 
 APART = 0.5
 """Mean squared cosine between the directions of two shapes, below which they are two effects."""
+MOST = 2
+"""Shapes at one place: a gear has two periods, while enough waves make any curve."""
 
 
 def with_more_shapes(world: World, model: Model) -> Model:
@@ -46,19 +48,21 @@ def _better(world: World, model: Model) -> Iterator[Model]:
         m for m in fewer if m.score > model.score - odds
     )  # between the points of the grid it is not needed
     if len(model.chosen) < MOST_EFFECTS:
-        yield from (m for m in _further(world, model, limit, model) if m.score > limit)
-    for less in fewer:
-        yield from (m for m in _further(world, less, model.score, model) if m.score > model.score + PROGRESS)
+        yield from (m for m in _further(world, model, limit) if m.score > limit)
+    for c, less in zip(model.chosen, fewer, strict=False):
+        if (
+            sum(o.place is c.place for o in model.chosen) == 1
+        ):  # else one shape would count for the other, too
+            yield from (m for m in _further(world, less, model.score) if m.score > model.score + PROGRESS)
 
 
-def _further(world: World, model: Model, beat: float, whole: Model) -> Iterator[Model]:
-    """The model with the best further shape at each of its places, which is none of those that the `whole` model has there, as far as
-    that comes near the evidence to `beat`."""
+def _further(world: World, model: Model, beat: float) -> Iterator[Model]:
+    """The model with the best further shape at each of its places, as far as that comes near the evidence to `beat`."""
     fit = model.fit
     for place in {id(c.place): c.place for c in model.chosen if c.shaped}.values():
-        if clash(place.candidate, [place.candidate]):
+        own = [c for c in model.chosen if c.place is place]
+        if clash(place.candidate, [place.candidate]) or len(own) >= MOST:
             continue
-        own = [c for c in whole.chosen if c.place is place]
         apart = [all(_apart(s, place.shapes[c.shape]) for c in own) for s in place.shapes]
         gain = np.where(apart, evidence(fit, (place,))[0], -np.inf)
         if model.score + gain.max() < beat - SHORT:

@@ -184,7 +184,7 @@ class World:
         for c in chosen:
             if len(c.place.shapes) > 1:
                 each = evidence(fit.without([c.part.name]), (c.place,))[0]
-                shapes += min(0.0, float(log_mean(each) - each[c.shape]))  # a better shape is another set
+                shapes += float(log_mean(each) - each[c.shape])
         possible = all(c.is_possible for c in chosen)
         self.known[key] = Model(self.name, chosen, fit, fit.score + shapes if possible else -np.inf)
         return self.known[key]
