@@ -44,9 +44,8 @@ def _better(world: World, model: Model) -> Iterator[Model]:
     if not any(c.shaped for c in model.chosen):
         return
     fewer = [world.refined(world.less(model, c)) for c in model.chosen if len(model.chosen) > 1]
-    yield from (
-        m for m in fewer if m.score > model.score - odds
-    )  # between the points of the grid it is not needed
+    # between the points of the grid an effect may not be needed
+    yield from (m for m in fewer if m.score > model.score - odds)
     if len(model.chosen) < MOST_EFFECTS:
         yield from (m for m in _further(world, model, limit) if m.score > limit)
     for c, less in zip(model.chosen, fewer, strict=False):
