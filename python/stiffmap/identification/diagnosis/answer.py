@@ -141,11 +141,14 @@ def _models(
         own = readings(predictor, found.uncertain, found.columns, plain, found.noise.sigma, found.suspects)
         if len(own.spread):
             out[CALIBRATED] = corrected(own, ())
-    while v.named or len(_given(predictor, found, v, search.best.fit).spread):
+    while True:
+        given = _given(predictor, found, v, search.best.fit)
+        if not v.named and not len(given.spread):
+            break
         chosen = [n.chosen for n in v.named]
         starts = [Term.of(c.place.candidate, t) for c, t in zip(chosen, terms(chosen), strict=True)]
         try:
-            best = corrected(_given(predictor, found, v, search.best.fit), starts)
+            best = corrected(given, starts)
         except StiffmapError as problem:
             return out, found, v, [f"the effects have no corrected machine: {problem}"]
         if best.refused is None:
