@@ -1,14 +1,13 @@
-"""Several effects of one kind at one place, such as two periods of one drive.
+"""Two effects of one kind at one place, such as two periods of one drive.
 
 A search has each place once: the effect there, at a shape of the grid, leaves so much that the next best shape would often be next
-to its own. Once the shapes are refined, what is left may ask for another shape.
+to its own. Once the shapes are refined, what is left may ask for another shape; for no third one, since enough waves make any curve.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
-from itertools import chain, count
 
 import numpy as np
 
@@ -17,13 +16,11 @@ from stiffmap.identification.inference.amplitudes import fitted
 from stiffmap.identification.inference.chosen import Chosen, evidence
 from stiffmap.identification.inference.constants import MOST_EFFECTS, ODDS
 from stiffmap.identification.inference.parts import log_mean
-from stiffmap.identification.inference.places import Shape
+from stiffmap.identification.inference.places import Place, Shape
 from stiffmap.identification.inference.world import PROGRESS, SHORT, Model, World, amplitudes, largest_gain
 
 APART = 0.5
 """Mean squared cosine between the directions of two shapes, below which they are two effects."""
-MOST = 2
-"""Shapes at one place: a gear has two periods, while enough waves make any curve."""
 
 
 def with_more_shapes(world: World, model: Model) -> Model:
@@ -49,9 +46,7 @@ def _better(world: World, model: Model) -> Iterator[Model]:
     if len(model.chosen) < MOST_EFFECTS:
         yield from (m for m in _further(world, model, limit) if m.score > limit)
     for c, less in zip(model.chosen, fewer, strict=False):
-        if (
-            sum(o.place is c.place for o in model.chosen) == 1
-        ):  # else one shape would count for the other, too
+        if len(_at(model, c.place)) == 1:  # else one shape would count for the other, too
             yield from (m for m in _further(world, less, model.score) if m.score > model.score + PROGRESS)
 
 
@@ -59,28 +54,27 @@ def _further(world: World, model: Model, beat: float) -> Iterator[Model]:
     """The model with the best further shape at each of its places, as far as that comes near the evidence to `beat`."""
     fit = model.fit
     for place in {id(c.place): c.place for c in model.chosen if c.shaped}.values():
-        own = [c for c in model.chosen if c.place is place]
-        if clash(place.candidate, [place.candidate]) or len(own) >= MOST:
+        own, *second = _at(model, place)
+        if second or clash(place.candidate, [place.candidate]):
             continue
-        apart = [all(_apart(s, place.shapes[c.shape]) for c in own) for s in place.shapes]
+        apart = [_apart(s, place.shapes[own.shape]) for s in place.shapes]
         gain = np.where(apart, evidence(fit, (place,))[0], -np.inf)
         if model.score + gain.max() < beat - SHORT:
             continue
         k = int(np.argmax(gain))
         bare = Chosen.at(place, k)
-        part = replace(bare.part, name=_free(str(place.candidate), [c.part.name for c in own]))
-        start = amplitudes(fit) | {part.name: largest_gain(fit, part)}
-        more = fitted(fit.columns, (*fit.parts, part), start, fit.weights, fit.lighter)
+        if own.part.name == bare.part.name:
+            bare = replace(bare, part=replace(bare.part, name=f"{bare.part.name}, 2"))
+        start = amplitudes(fit) | {bare.part.name: largest_gain(fit, bare.part)}
+        more = fitted(fit.columns, (*fit.parts, bare.part), start, fit.weights, fit.lighter)
         score = model.score + more.score - fit.score + float(log_mean(gain)) - float(gain[k])
-        added = replace(bare, part=part).by_posterior(more)
+        added = bare.by_posterior(more)
         if added.is_possible:
             yield world.refined(replace(model, chosen=(*model.chosen, added), fit=more, score=score))
 
 
-def _free(name: str, taken: Sequence[str]) -> str:
-    """The name, or with the first number that no other effect at that place has."""
-    numbered = chain([name], (f"{name}, {k}" for k in count(2)))
-    return next(n for n in numbered if n not in taken)
+def _at(model: Model, place: Place) -> list[Chosen]:
+    return [c for c in model.chosen if c.place is place]
 
 
 def _apart(one: Shape, other: Shape) -> bool:
