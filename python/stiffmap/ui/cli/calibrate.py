@@ -8,7 +8,7 @@ from stiffmap.identification.calibration import Calibration, calibrate
 from stiffmap.identification.inference.travel import Profile
 from stiffmap.identification.numbers import Tolerances
 from stiffmap.ui.cli import options
-from stiffmap.ui.cli.inputs import words
+from stiffmap.ui.cli.inputs import words_of_all
 from stiffmap.ui.cli.options import option, written
 from stiffmap.ui.cli.output import Answer, write_files
 
@@ -33,7 +33,7 @@ def command(
       [cyan]stiffmap calibrate linear-delta experiments/heights --exclude gains --tolerance 2[/cyan]
     """
     result = calibrate(
-        machine, data, tolerances=Tolerances().scaled(tolerance), exclude=words(",".join(exclude or ()) or None) or (), time_limit=budget,
+        machine, data, tolerances=Tolerances().scaled(tolerance), exclude=words_of_all(exclude), time_limit=budget,
         seed=seed, threads=threads,
     )  # fmt: skip
     if output is not None:

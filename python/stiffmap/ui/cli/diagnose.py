@@ -12,7 +12,7 @@ from stiffmap.identification.diagnosis import Diagnosis, diagnose
 from stiffmap.identification.diagnosis.report.sentences import next_step
 from stiffmap.identification.numbers import Tolerances
 from stiffmap.ui.cli import options
-from stiffmap.ui.cli.inputs import refuse_unused, words
+from stiffmap.ui.cli.inputs import refuse_unused, words_of_all
 from stiffmap.ui.cli.options import flag, option, written
 from stiffmap.ui.cli.output import Answer
 
@@ -45,7 +45,7 @@ def command(
     refuse_unused(context, {"without output": "date"})
     silent = quiet or as_json or not sys.stderr.isatty()
     result = diagnose(
-        machine, data, seed=seed, threads=threads, exclude=words(",".join(exclude or ()) or None) or (), time_limit=budget,
+        machine, data, seed=seed, threads=threads, exclude=words_of_all(exclude), time_limit=budget,
         tolerances=Tolerances().scaled(tolerance),
         progress=None if silent else partial(print, "trying:", file=sys.stderr),
     )  # fmt: skip

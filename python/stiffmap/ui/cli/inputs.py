@@ -54,6 +54,11 @@ def words(text: str | None) -> list[str] | None:
     return None if text is None else [part.strip() for part in text.split(",")]
 
 
+def words_of_all(texts: Sequence[str] | None) -> list[str]:
+    """What stands between the commas of an option that may be repeated."""
+    return [word for text in texts or () for word in words(text) or ()]
+
+
 def pairs(given: Sequence[str] | None, name: str) -> dict[str, str]:
     """The values of NAME=VALUE by their names."""
     out = {}
