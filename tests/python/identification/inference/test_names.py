@@ -137,8 +137,10 @@ def test_what_is_nothing_at_the_optimum_leaves_the_search_and_the_others_are_fit
     assert t.best.fit.noise > 3.0 * s.best.fit.noise
     v = judged(c, s.less(gone), ((gone, "nothing"),))
     assert [why for _, why in v.gone] == ["nothing"] and gone.place not in [n.chosen.place for n in v.named]
-    heir = s.less(gone, gone.place).best.chosen
-    assert {id(o.place) for o in heir} == {id(other.place), id(gone.place)}
+    again = s.less(gone, gone.place)
+    assert {id(o.place) for o in again.best.chosen} == {id(other.place), id(gone.place)}
+    of = [dict(zip((o.part.name for o in x.best.chosen), x.gain, strict=True)) for x in (s, again)]
+    assert of[0] == of[1]
     assert s.less(replace(gone, part=replace(gone.part, name="a number"))) is s
 
 
@@ -196,6 +198,19 @@ def test_what_numbers_within_their_tolerance_show_has_no_name(strengths, word):
     assert v.word == word
     if word == "effects":
         assert [x.chosen.place.candidate.element for x in v.named] == ["leg 2"] or v.beyond
+
+
+def test_a_number_out_of_tolerance_is_no_effect_that_has_gone() -> None:
+    c = setting(2, (0.0, 200.0, 0.0))
+    d = 10.0 * np.stack([p.shapes[0].directions[:, 0] for p in c.places[:3]], axis=1)
+    unknowns = tuple(Unknown(f"length of leg {k}", "link lengths", "m", 1e-4) for k in range(3))
+    c = replace(c, numbers=d, unknowns=unknowns, experiment=one_place(len(c.rows)))
+    s = searched(c)
+    s = replace(s, best=Model("together", (), s.calibrated, 0.0), gain=(), equivalents=(), instead=())
+    (one,) = judged(c, s).named
+    v = judged(c, s, ((one.chosen, "nothing"),))
+    assert judged(c, s).as_effects and not v.named and not v.as_effects
+    assert [b.unknown.name for b in v.beyond] == ["length of leg 1"]
 
 
 def one_place(n: int) -> Any:

@@ -87,6 +87,14 @@ def test_what_one_pose_shows_is_unexplained_unless_readings_slip(slips, rest):
     assert found.rest == rest and found.word == ("none" if slips else "unattributed")
 
 
+def test_an_effect_without_a_name_goes_before_noise_that_it_may_be_part_of():
+    c, fit, chosen = flat(1, np.where(np.arange(READINGS) < 5, 30.0, 0.0))
+    loud = replace(fit, t=np.array([6.0, *fit.t[1:]]), weights=np.ones(READINGS))
+    model = Model("exact", (chosen,), loud, 0.0)
+    assert verdict.left(loud)[0] == verdict.NOISIER
+    assert verdict.judged(c, Search(model, model, (50.0,), ((),), (None,))).rest == "effect"
+
+
 def test_thirds_keep_equal_values_together():
     assert len(set(verdict.thirds(np.array([0.0, 0, 0, 0, 1, 2]))[:4])) == 1
     assert np.ptp(np.bincount(verdict.thirds(np.arange(9.0)))) <= 2
