@@ -102,19 +102,18 @@ def instead(found: Corrected, terms: Sequence[Term]) -> Corrected:
 
 def along_travel(found: Corrected, given: Readings) -> Corrected:
     """The optimum of readings whose drives err along their travel, next to effects that keep their values: what they leave."""
-    more = corrected(given, found.terms, np.zeros_like(found.slopes))
+    more = corrected(given, (), found.effects)
     return replace(more, terms=found.terms, slopes=found.slopes)
 
 
-def corrected(given: Readings, terms: Sequence[Term], held: Floats | None = None) -> Corrected:
-    """The optimum, from the values of the terms and the declared numbers; `held`: slopes (k, n, c) that are taken wherever the search
-    stands, in place of those there: where they are zero, the terms keep their values."""
-    found = _optimum(given, terms, held=held)
+def corrected(given: Readings, terms: Sequence[Term], fixed: Sequence[AppliedEffect] = ()) -> Corrected:
+    """The optimum, from the values of the terms and the declared numbers, next to effects that are `fixed`."""
+    found = _optimum(given, terms, fixed=fixed)
     for _ in range(WEIGHINGS):
         if _bends(given, found):
             anew = sensitivity_at(given.predictor, given.sensitivity, found.numbers)
             given = replace(given, sensitivity=anew)
-            found = _optimum(given, found.terms, found.others, held)
+            found = _optimum(given, found.terms, found.others, fixed=fixed)
         left = given.white(np.nan_to_num(given.predictor.experiment.reading - found.prediction))
         q = given.frames(found.prediction)
         noise = (
@@ -125,8 +124,8 @@ def corrected(given: Readings, terms: Sequence[Term], held: Floats | None = None
             break
         weights = (DEGREES + 1.0) / (DEGREES + (noise / given.kappa) ** 2)
         given = given.weighed(np.minimum(weights, 1.0))
-        found = _optimum(given, found.terms, found.others, held)
-    return found if held is not None else _determined(found)
+        found = _optimum(given, found.terms, found.others, fixed=fixed)
+    return _determined(found)
 
 
 def _determined(found: Corrected) -> Corrected:
@@ -150,18 +149,22 @@ def _each(terms: Sequence[Term], x: Floats) -> list[Floats]:
 
 
 def _optimum(
-    given: Readings, terms: Sequence[Term], others: Floats | None = None, held: Floats | None = None
+    given: Readings,
+    terms: Sequence[Term],
+    others: Floats | None = None,
+    held: Floats | None = None,
+    fixed: Sequence[AppliedEffect] = (),
 ) -> Corrected:
-    """The optimum under the weights of `given`, from the values of the terms and of all `others` (p + m,), None: zero; `held`: slopes
-    (k, n, c) that are taken wherever the search stands, in place of those there."""
+    """The optimum under the weights of `given`, from the values of the terms and of all `others` (p + m,), None: zero, next to `fixed`
+    effects; `held`: slopes (k, n, c) that are taken wherever the search stands, in place of those there."""
     steps = STEPS if held is None else STEPS_OF_A_FOLD
     e = given.predictor.experiment
     k, p = sum(len(t.values) for t in terms), len(given.spread)
-    columns, along = given.columns, given.along
+    numbers_and_travel, along = -np.hstack([given.columns, given.along]), given.along
     m = along.shape[1]
 
     def effects(x: Floats) -> list[AppliedEffect]:
-        return [t.effect(v) for t, v in zip(terms, _each(terms, x), strict=True)]
+        return [*fixed, *(t.effect(v) for t, v in zip(terms, _each(terms, x), strict=True))]
 
     @remembered
     def at(x: Floats) -> Floats:
@@ -180,16 +183,16 @@ def _optimum(
     def raw(x: Floats) -> Floats:
         return given.white(e.reading - shown(x)) - along @ x[k + p :]
 
-    def jacobian(x: Floats, q: Floats) -> Floats:
-        whole = -np.column_stack([*(given.white(c) for c in slopes(x[: k + p])), columns, along])
-        whole -= q @ (q.T @ whole)
-        return np.vstack([whole, np.hstack([np.zeros((p + m, k)), np.eye(p + m)])])
-
-    def whole(x: Floats, q: Floats) -> Floats:
+    def moving(x: Floats, q: Floats) -> Floats:
         left = raw(x)
         if not np.isfinite(left).all():
-            return np.full((len(left) + p + m, len(x) + 1), np.inf)
-        return np.column_stack([jacobian(x, q), np.append(left - q @ (q.T @ left), x[k:])])
+            return np.full((len(left) + p + m, k + 1), np.inf)
+        of_terms = given.white(np.moveaxis(slopes(x[: k + p]), 0, -1))
+        priors = np.hstack([np.zeros((p + m, k)), x[k:, None]])
+        return np.vstack([_clear(np.column_stack([-of_terms, left]), q), priors])
+
+    def held_columns(q: Floats) -> Floats:
+        return np.vstack([_clear(numbers_and_travel, q), np.eye(p + m)])
 
     low = np.concatenate([*(t.bounds[0] for t in terms), np.full(p + m, -np.inf)])
     high = np.concatenate([*(t.bounds[1] for t in terms), np.full(p + m, np.inf)])
@@ -200,18 +203,25 @@ def _optimum(
         raise StiffmapError("the machine has no equilibrium with the effects that were found")
     q = given.frames(shown(x))
     for _ in range(FRAMINGS if len(x) else 0):
-        x = triangular(partial(whole, q=q), x, (low, high), ftol=LITTLE, xtol=LITTLE, max_nfev=steps)
+        x = triangular(
+            partial(moving, q=q), held_columns(q), x, (low, high), ftol=LITTLE, xtol=LITTLE, max_nfev=steps
+        )
         left, before = raw(x), q
         q = given.frames(shown(x))
         if np.linalg.norm(before @ (before.T @ left) - q @ (q.T @ left)) < SETTLED:
             break
-    spread = covariance(jacobian(x, q))[0]
+    spread = covariance(np.hstack([moving(x, q)[:, :k], held_columns(q)]))[0]
     numbers, travel = x[k : k + p] * given.spread, x[k + p :]
     found = profiles(given.drives, travel, spread[k + p :, k + p :])
     shows = given.predicted(numbers, effects(x), given.knots(found)) if found else shown(x)
     own = zip(terms, _each(terms, x), _each(terms, np.sqrt(np.diag(spread))), strict=True)
     at_best = tuple(replace(t, values=v, sd=sd) for t, v, sd in own)
     return Corrected(at_best, numbers, shows, slopes(x[: k + p]), given, travel, found)
+
+
+def _clear(columns: Floats, directions: Floats) -> Floats:
+    """(N, k) columns without what lies along orthonormal directions (N, q)."""
+    return columns - directions @ (directions.T @ columns)
 
 
 def columns_of(found: Corrected) -> tuple[Floats, Floats]:

@@ -84,17 +84,31 @@ def remembered(function: Residual) -> Residual:
     return value
 
 
-def triangular(whole: Residual, begin: Floats, bounds: tuple[Floats, Floats], **ends: float) -> Floats:
-    """(n,) the least squares near `begin`, within the bounds; `whole`: (n,) -> (N, n + 1) the columns and the residual, infinite where
-    no step leads to. Their triangle has the same squares and the same steps in n + 1 rows. Numbers are in typical sizes: scaled by
-    their columns, those that hardly show would move furthest."""
+def triangular(
+    moving: Residual, held: Floats, begin: Floats, bounds: tuple[Floats, Floats], **ends: float
+) -> Floats:
+    """(n,) the least squares near `begin`, within the bounds: the triangle of the columns and the residual has the same squares and the
+    same steps in n + 1 rows. Numbers are in typical sizes: scaled by their columns, those that hardly show would move furthest.
+
+    moving
+        (n,) -> (N, n - h + 1) columns of the first numbers, and the residual; infinite where no step leads to.
+    held
+        (N, h) columns of the last numbers, wherever the search stands.
+    """
+    first, none = len(begin) - held.shape[1], np.full((len(begin) + 1, len(begin) + 1), np.inf)
+    q, above = np.linalg.qr(held)
 
     @remembered
     def triangle(x: Floats) -> Floats:
-        rows = whole(x)
+        rows = moving(x)
         if not np.isfinite(rows).all():
-            return np.full((min(rows.shape), rows.shape[1]), np.inf)
-        return np.asarray(np.linalg.qr(rows, mode="r"))
+            return none
+        along = q.T @ rows
+        own = np.asarray(np.linalg.qr(rows - q @ along, mode="r"))
+        below = np.zeros((len(own), held.shape[1]))
+        return np.block(
+            [[along[:, :first], above, along[:, first:]], [own[:, :first], below, own[:, first:]]]
+        )
 
     def residual(x: Floats) -> Floats:
         return triangle(x)[:, -1]
