@@ -147,3 +147,10 @@ def test_a_corrected_machine_has_what_waves_leave_along_the_travel(monkeypatch: 
     assert dict(kept.parameters)["amplitude"] == y.parameters["amplitude"][0]
     beside, alone = (Predictor(m, plan)() for m in (machine_of(models["calibrated"]), c.machine))
     assert beside == pytest.approx(alone, abs=1e-9, nan_ok=True)  # it competes with what `calibrate` gives
+    best = models["corrected"]  # its numbers and its travel are at their optimum, too: no slope is left
+    given = best.given
+    q = given.frames(best.prediction)
+    left = given.white(np.nan_to_num(e.reading - best.prediction))
+    columns = np.hstack([given.columns, given.along])
+    slope = columns.T @ (left - q @ (q.T @ left)) - best.others
+    assert np.linalg.norm(slope) < 0.02 * np.linalg.norm(best.others)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 
 import stiffmap as sm
 from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment import Predictor
 from stiffmap.experiment.calls import placed
-from stiffmap.identification.inference.optimum import covariance, differences, optimum
+from stiffmap.identification.inference.optimum import covariance, differences, optimum, triangular
 from stiffmap.identification.planning import plan as design
 from stiffmap.identification.planning.estimate import fitted, slopes, values_of, with_values
 
@@ -37,6 +38,30 @@ def test_a_bound_holds_and_the_others_take_their_optimum_there():
     found = optimum(lambda x: A @ x - y, np.zeros(3), (WIDE[0], high), lambda x: A, 50)
     best = np.linalg.lstsq(A[:, :2], y - 2.5 * A[:, 2])[0]
     np.testing.assert_allclose(found.x, [*best, 2.5], atol=1e-4)
+
+
+def test_columns_that_are_held_leave_the_optimum_where_it_is():
+    """Of three numbers one bends and is bounded, two are on straight lines with a prior; the oracle has all columns at once."""
+    rng = np.random.default_rng(1)
+    line, wave, prior = rng.standard_normal((40, 2)), np.linspace(0.0, 3.0, 40), np.eye(2, 3, 1)
+    y = 3.0 * np.sin(0.9 * wave) + rng.standard_normal(40)
+
+    def left(x: np.ndarray) -> np.ndarray:
+        return y - 3.0 * np.sin(x[0] * wave) - line @ x[1:]
+
+    def moving(x: np.ndarray) -> np.ndarray:
+        if x[0] > 1.6:
+            return np.full((42, 2), np.inf)
+        bent = np.column_stack([-3.0 * wave * np.cos(x[0] * wave), left(x)])
+        return np.vstack([bent, np.column_stack([np.zeros(2), x[1:]])])
+
+    held = np.vstack([-line, np.eye(2)])
+    for high in (np.inf, 0.5):
+        bounds = np.array([-np.inf] * 3), np.array([high, np.inf, np.inf])
+        found = triangular(moving, held, np.array([0.3, 0.0, 0.0]), bounds, ftol=1e-12, xtol=1e-12)
+        best = least_squares(lambda x: np.append(left(x), prior @ x), found, bounds=bounds, xtol=1e-14)
+        np.testing.assert_allclose(found, best.x, atol=1e-4)
+        assert (abs(found[0] - high) < 1e-4) == np.isfinite(high)
 
 
 def test_no_step_leads_where_the_machine_cannot_be():
