@@ -97,10 +97,10 @@ def triangular(whole: Residual, begin: Floats, bounds: tuple[Floats, Floats], **
         return np.asarray(np.linalg.qr(rows, mode="r"))
 
     def residual(x: Floats) -> Floats:
-        return triangle(x)[:, -1]
+        return np.append(triangle(x)[:, -1], np.zeros(len(x)))
 
     def columns(x: Floats) -> Floats:
-        return triangle(x)[:, :-1]
+        return _held(triangle(x)[:, :-1])
 
     return np.asarray(least_squares(residual, begin, columns, bounds, **ends).x)
 

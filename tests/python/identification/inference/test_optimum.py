@@ -9,7 +9,7 @@ import stiffmap as sm
 from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment import Predictor
 from stiffmap.experiment.calls import placed
-from stiffmap.identification.inference.optimum import covariance, differences, optimum
+from stiffmap.identification.inference.optimum import covariance, differences, optimum, triangular
 from stiffmap.identification.planning import plan as design
 from stiffmap.identification.planning.estimate import fitted, slopes, values_of, with_values
 
@@ -29,6 +29,14 @@ def test_a_direction_without_information_is_left_where_it_begins():
     spread, rank = covariance(found.jacobian)
     assert rank == 2 and np.isinf(np.diag(spread)).tolist() == [False, True, True]
     assert spread[0, 0] == pytest.approx(np.linalg.inv(read[:, :2].T @ read[:, :2])[0, 0])
+
+
+def test_nor_does_the_triangle_of_many_readings_move_along_it():
+    """What no reading shows keeps its value, next to numbers that settle; scipy's own step leaves it anywhere."""
+    read = np.column_stack([A[:, 0], A[:, 1], A[:, 1] * (1 + 1e-13)])
+    y = read @ [2.0, 3.0, 5.0]
+    found = triangular(lambda x: np.column_stack([read, read @ x - y]), np.array([0.0, 100.0, 40.0]), WIDE)
+    np.testing.assert_allclose(found, [2.0, 34.0, -26.0], atol=1e-6)
 
 
 def test_a_bound_holds_and_the_others_take_their_optimum_there():
