@@ -150,13 +150,22 @@ def _models(
         try:
             best = corrected(given, starts)
         except StiffmapError as problem:
-            return out, found, v, [f"the effects have no corrected machine: {problem}"]
-        if best.refused is None:
-            out[CORRECTED] = best
-            break
-        k, why = best.refused
+            if not chosen:
+                return out, found, v, [f"the numbers have no corrected machine: {problem}"]
+            shown = [np.linalg.norm(np.nan_to_num(_change(predictor, c))) for c in chosen]
+            k, why, impossible = (
+                int(np.argmin(shown)),
+                str(problem),
+                True,
+            )  # none of what the machine cannot have
+        else:
+            if best.refused is None:
+                out[CORRECTED] = best
+                break
+            (k, why), impossible = best.refused, False
         gone = v.named[k]
-        search = search.less(gone.chosen, *(gone.equivalents[:1] if best.terms[k].undetermined.any() else ()))
+        heir = impossible or best.terms[k].undetermined.any()
+        search = search.less(gone.chosen, *(gone.equivalents[:1] if heir else ()))
         found = replace(found, search=search)
         v = judged(found.columns, search, (*v.gone, (gone.chosen, why)))
     return out, found, v, []

@@ -233,7 +233,7 @@ def infer(
         whole = any(effects.get(t.kind).drive for t in added)  # what drives remember is of the rows before
         try:
             shown = predictor(added)[used] if whole else drawn(added)
-        except StiffmapError:  # too large for the machine: the columns alone must do
+        except StiffmapError:  # too large for the machine
             return np.full(len(found), np.nan)
         return found.rotated(shown[at] - before)
 

@@ -111,10 +111,10 @@ def triangular(
         )
 
     def residual(x: Floats) -> Floats:
-        return triangle(x)[:, -1]
+        return np.append(triangle(x)[:, -1], np.zeros(len(x)))
 
     def columns(x: Floats) -> Floats:
-        return triangle(x)[:, :-1]
+        return _held(triangle(x)[:, :-1])
 
     return np.asarray(least_squares(residual, begin, columns, bounds, **ends).x)
 

@@ -178,7 +178,10 @@ class World:
         if any(c.by_posterior(fit).is_too_large for c in chosen):
             return self.known.setdefault(key, Model(self.name, chosen, fit, -np.inf))
         if self.predict and chosen:
-            fit, chosen = self._corrected(fit, chosen)
+            found = self._corrected(fit, chosen)
+            if found is None:
+                return self.known.setdefault(key, Model(self.name, chosen, fit, -np.inf))
+            fit, chosen = found
         chosen = tuple(c if len(c.values) else c.by_posterior(fit) for c in chosen)
         shapes = 0.0
         for c in chosen:
@@ -189,9 +192,9 @@ class World:
         self.known[key] = Model(self.name, chosen, fit, fit.score + shapes if possible else -np.inf)
         return self.known[key]
 
-    def _corrected(self, fit: Fit, chosen: tuple[Chosen, ...]) -> tuple[Fit, tuple[Chosen, ...]]:
+    def _corrected(self, fit: Fit, chosen: tuple[Chosen, ...]) -> tuple[Fit, tuple[Chosen, ...]] | None:
         """The fit on a residual less what straight lines miss of the effects; where that does not settle, at their own optimum,
-        with their values there."""
+        with their values there; None where the machine cannot have them."""
         assert self.predict
         now, shown = fit, None
         for _ in range(CORRECTIONS + 1):
@@ -207,7 +210,7 @@ class World:
             shown = line
             now = refitted(now, self.columns.residual - missed)
         found = self._at_optimum(fit, chosen)
-        return found if found and all(len(c.strengths) for c in found[1]) else (fit, chosen)
+        return found if found is None or all(len(c.strengths) for c in found[1]) else (fit, chosen)
 
     def _at_optimum(self, fit: Fit, chosen: tuple[Chosen, ...]) -> tuple[Fit, tuple[Chosen, ...]] | None:
         """The fit on a residual less what the effects' columns miss at their own optimum, and the effects there; None where the

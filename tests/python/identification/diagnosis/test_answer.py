@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -12,6 +13,7 @@ import pytest
 import stiffmap as sm
 from stiffmap.experiment import Predictor, random_plan
 from stiffmap.identification.candidates.candidates import candidates
+from stiffmap.identification.diagnosis import answer
 from stiffmap.identification.diagnosis.answer import _change, _rest
 from stiffmap.identification.diagnosis.report.findings import Effect, effects_of
 from stiffmap.identification.diagnosis.report.sentences import next_step, opening
@@ -21,6 +23,8 @@ from stiffmap.identification.inference.kernels import WANDER
 from stiffmap.identification.inference.names import terms
 from stiffmap.identification.inference.places import Place
 from stiffmap.identification.inference.verdict import NOISIER
+
+DATA = Path(__file__).parents[3] / "data/experiments"
 
 
 @pytest.mark.parametrize(("slope", "there"), [(0.5, True), (40.0, False)])
@@ -135,3 +139,20 @@ def test_an_effect_is_no_alias_of_itself_at_its_own_place(kind: str) -> None:
     )
     (named,) = effects_of(found, [Place(own, (), (c, other), (c,))], [{}])
     assert named.aliases == [{"kind": other.kind, "element": other.element, "legs": list(other.legs)}]
+
+
+def test_an_effect_without_a_corrected_machine_is_refused_and_its_readings_are_not_called_noise(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Effects fail together at rows that the search did not draw: what shows least goes, and the answer is not that nothing is there."""
+    fitted = answer.corrected
+
+    def fails(given: Any, starts: Any, *more: Any) -> Any:
+        if any(t.candidate.kind == "compliance" for t in starts):
+            raise sm.StiffmapError("no equilibrium")
+        return fitted(given, starts, *more)
+
+    monkeypatch.setattr(answer, "corrected", fails)
+    found = sm.diagnose("orthoglide-revised", DATA / "A-servo", seed=0, cross_validate=False)
+    assert "compliance" not in [e.kind for e in found.effects] and found.verdict != "none"
+    assert any(r.endswith("no equilibrium") for r in found.refused)

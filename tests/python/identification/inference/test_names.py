@@ -112,6 +112,21 @@ def test_no_machine_is_asked_for_what_none_can_have() -> None:
     assert max(asked, default=0.0) <= limited.most
 
 
+def test_an_effect_that_the_machine_cannot_have_gives_way_to_what_shows_nearly_the_same() -> None:
+    """As a compliance that falls below zero within the travel: named, it would have no corrected machine, and no other a name."""
+    c = setting(2, (0.0, 30.0, 0.0))
+    impossible = c.places[1]
+    near = impossible.shapes[0].directions[:, 0] + 0.03 * c.places[0].shapes[0].directions[:, 0]
+    c = replace(c, places=(*c.places, place("near leg 2", near, c.free)))
+
+    def predict(chosen: Any) -> np.ndarray:
+        shown = np.sum([s.rotated(c) @ s.values for s in chosen], axis=0)
+        return np.full_like(shown, np.nan) if any(s.place is impossible for s in chosen) else shown
+
+    assert found(c) == {"leg 2"}
+    assert [s.place.candidate.element for s in searched(c, predict).best.chosen] == ["near leg 2"]
+
+
 def test_what_shows_the_same_is_an_equivalent():
     c = setting(1, (0.0, 30.0, 0.0))
     twin = place("twin of leg 2", c.places[1].shapes[0].directions[:, 0] + 1e-3, c.free)

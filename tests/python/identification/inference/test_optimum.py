@@ -32,6 +32,14 @@ def test_a_direction_without_information_is_left_where_it_begins():
     assert spread[0, 0] == pytest.approx(np.linalg.inv(read[:, :2].T @ read[:, :2])[0, 0])
 
 
+def test_nor_does_the_triangle_of_many_readings_move_along_it():
+    """What no reading shows keeps its value, next to numbers that settle; scipy's own step leaves it anywhere."""
+    read = np.column_stack([A[:, 0], A[:, 1], A[:, 1] * (1 + 1e-13)])
+    y = read @ [2.0, 3.0, 5.0]
+    found = triangular(lambda x: np.column_stack([read, read @ x - y]), np.array([0.0, 100.0, 40.0]), WIDE)
+    np.testing.assert_allclose(found, [2.0, 34.0, -26.0], atol=1e-6)
+
+
 def test_a_bound_holds_and_the_others_take_their_optimum_there():
     y = A @ [1.0, 2.0, 3.0]
     high = np.array([np.inf, np.inf, 2.5])
