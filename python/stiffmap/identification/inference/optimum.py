@@ -88,33 +88,34 @@ def triangular(
     moving: Residual, held: Floats, begin: Floats, bounds: tuple[Floats, Floats], **ends: float
 ) -> Floats:
     """(n,) the least squares near `begin`, within the bounds: the triangle of the columns and the residual has the same squares and the
-    same steps in n + 1 rows. Numbers are in typical sizes: scaled by their columns, those that hardly show would move furthest.
+    same steps in next to n rows. Numbers are in typical sizes: scaled by their columns, those that hardly show would move furthest.
 
     moving
         (n,) -> (N, n - h + 1) columns of the first numbers, and the residual; infinite where no step leads to.
     held
-        (N, h) columns of the last numbers, wherever the search stands.
+        (N, h) columns of the last numbers, wherever the search stands; of full rank.
     """
-    first, none = len(begin) - held.shape[1], np.full((len(begin) + 1, len(begin) + 1), np.inf)
+    h, first = held.shape[1], len(begin) - held.shape[1]
     q, above = np.linalg.qr(held)
 
     @remembered
     def triangle(x: Floats) -> Floats:
         rows = moving(x)
         if not np.isfinite(rows).all():
-            return none
+            return np.full((2 * first + h + 1, first + h + 1), np.inf)
         along = q.T @ rows
-        own = np.asarray(np.linalg.qr(rows - q @ along, mode="r"))
-        below = np.zeros((len(own), held.shape[1]))
+        own = np.zeros((first + 1, first + 1))
+        own[: len(rows)] = np.linalg.qr(rows - q @ along, mode="r")
+        below, last = _held(own[:, :first]), np.append(own[:, first], np.zeros(first))
         return np.block(
-            [[along[:, :first], above, along[:, first:]], [own[:, :first], below, own[:, first:]]]
+            [[along[:, :first], above, along[:, first:]], [below, np.zeros((len(below), h)), last[:, None]]]
         )
 
     def residual(x: Floats) -> Floats:
-        return np.append(triangle(x)[:, -1], np.zeros(len(x)))
+        return triangle(x)[:, -1]
 
     def columns(x: Floats) -> Floats:
-        return _held(triangle(x)[:, :-1])
+        return triangle(x)[:, :-1]
 
     return np.asarray(least_squares(residual, begin, columns, bounds, **ends).x)
 

@@ -36,7 +36,9 @@ def test_nor_does_the_triangle_of_many_readings_move_along_it():
     """What no reading shows keeps its value, next to numbers that settle; scipy's own step leaves it anywhere."""
     read = np.column_stack([A[:, 0], A[:, 1], A[:, 1] * (1 + 1e-13)])
     y = read @ [2.0, 3.0, 5.0]
-    found = triangular(lambda x: np.column_stack([read, read @ x - y]), np.array([0.0, 100.0, 40.0]), WIDE)
+    none = np.zeros((len(y), 0))
+    begin = np.array([0.0, 100.0, 40.0])
+    found = triangular(lambda x: np.column_stack([read, read @ x - y]), none, begin, WIDE)
     np.testing.assert_allclose(found, [2.0, 34.0, -26.0], atol=1e-6)
 
 
