@@ -18,6 +18,7 @@ from stiffmap.experiment.files.table import read_table
 from stiffmap.machining.process import load_process
 from stiffmap.machining.toolpath.load import load_path
 from stiffmap.model.link.readers import read_csv_field
+from stiffmap.model.urdf import import_urdf
 from stiffmap.workspace.vibration.files import read_responses
 
 SPELLINGS = {
@@ -303,7 +304,7 @@ TIMES = "{0},fx [N],{1},dx [um]\n0,100,0,40\n1,200,{2},80\n2,300,{3},90\n"
 def test_channels_with_times_of_their_own_are_refused(names: tuple[str, str], tmp_path: Path) -> None:
     file = tmp_path / "scope.csv"
     file.write_text(TIMES.format(*names, 2, 4))
-    with pytest.raises(FileError, match="where it is the time of each channel, export all"):
+    with pytest.raises(FileError, match="where it is the time of each channel"):
         read_sheet(file)
     file.write_text(TIMES.format("Time 1", "Time 2", "1.0", 2))
     assert len(read_sheet(file)) == 3
@@ -320,3 +321,13 @@ def test_the_unit_of_a_title_is_none_of_the_columns(title: str, tmp_path: Path) 
     assert read_sheet(tmp_path / "t.csv").header == ("x", "fx", "dx")
     (tmp_path / "t.csv").write_text(f"{title}\ndx;dy;dz\n0;1;2\n1;2;3\n")
     assert all("[" in h for h in read_sheet(tmp_path / "t.csv").header)
+
+
+@pytest.mark.parametrize("name", ["a.LS", "a.mod", "a.src", "a.script"])
+@pytest.mark.parametrize("reader", [read_sheet, read_pose_table, sm.load_machine, import_urdf])
+def test_a_robots_program_is_said_to_be_one(
+    reader: Callable[[Path], object], name: str, tmp_path: Path
+) -> None:
+    (tmp_path / name).write_text("P[1] 1 2 3\n")
+    with pytest.raises(FileError, match=r"a robot's program .* is not read; expected a machine file or URDF"):
+        reader(tmp_path / name)

@@ -54,9 +54,9 @@ MEAN = re.compile(
     r"(?i)(mean|average|avg|median|mittel(wert)?|mw|ø|x̄|x̅|durchschnitt|moyenne|promedio|std( ?dev)?|stdev|stabw|standardabweichung)\.?:?"
 )
 """All of the last cell of such a row, where the first row is a reading."""
-TIMED = re.compile(r"(?i)time|zeit|temps|t|x[ _]value|column")
+TIMED = re.compile(r"(?i)(time|zeit|temps|t|x[ _]value|column)([ ._]?\d+)?")
 """Names of times, or none, before each channel of a scope."""
-ONE_TIME = "where it is the time of each channel, export all channels resampled to one time"
+ONE_TIME = "where it is the time of each channel, export all resampled to one"
 WAY = "--header id,x,y,z,dx,dy,dz (nothing between two commas for a column that is not used)"
 LONGEST_HEADER, MOST_COLUMNS, MOST_ABOVE = 300, 1000, 50
 
@@ -143,27 +143,19 @@ def read_sheet(path: Path, sheet: str | None = None, layout: Layout = PLAIN) -> 
     for i in range(width):
         names[i], columns[i] = _united(names[i], columns[i], file, lines_)
     top = tuple(said[len(header) :])
-    table = Table(
-        file, tuple(names), tuple(columns), lines_, number_, comma, record_of(above), top, tuple(aside)
-    )
-    _refuse_times(table)
+    found_ = (file, tuple(names), tuple(columns), lines_, number_, comma, record_of(above), top, tuple(aside))
+    return _with_one_time(Table(*found_))
+
+
+def _with_one_time(table: Table) -> Table:
+    """The table; FileError where a scope wrote a time before each channel, and they differ."""
+    every = range(0, len(table.names), 2)
+    named = [i for i in every if table.unit(i) in (*TIMES, *SHORT_TIMES) or TIMED.fullmatch(table.names[i])]
+    times = [table.numbers(i) for i in named if table.is_numeric(i)]
+    if len(times) == len(every) > 1 and all((np.diff(t) > 0).all() for t in times):
+        what = f"'{table.names[0]}' stands again, with other numbers, before each column; {ONE_TIME}"
+        table.check(np.ptp(times, axis=0) == 0, lambda row: what)
     return table
-
-
-def _refuse_times(table: Table) -> None:
-    """FileError where a scope wrote a time before each channel, and they differ."""
-    times = range(0, len(table.names), 2)
-    bare = {i: re.sub(r"(?<=\D)[ ._]?\d+$", "", table.names[i]) for i in times}
-    if (
-        all(table.unit(i) in (*TIMES, *SHORT_TIMES) or TIMED.fullmatch(bare[i]) for i in times)
-        and len(times) > 1
-    ):
-        values = [table.numbers(i) for i in times if table.is_numeric(i)]
-        if len(values) == len(times) and all((np.diff(v) > 0).all() for v in values):
-            what = (
-                f"the numbers of '{table.names[0]}' stand again, and differ, before each column; {ONE_TIME}"
-            )
-            table.check(np.ptp(values, axis=0) == 0, lambda row: what)
 
 
 def _turned(lines: Iterable[Line], spelling: Spelling, layout: Layout) -> list[Line]:
