@@ -315,8 +315,8 @@ def test_gauges_next_to_their_loads_are_no_times(tmp_path: Path) -> None:
     assert len(read_sheet(tmp_path / "t.csv").header) == 4
 
 
-@pytest.mark.parametrize("title", ["Deflection of the arm [um];;", "Test of May, in mm;;"])
-def test_the_unit_of_a_title_is_none_of_the_columns(title: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("title", ["Deflection of the arm [um];;", "Verschiebung in um;;"])
+def test_the_unit_of_a_title_of_one_quantity_is_none_of_all_columns(title: str, tmp_path: Path) -> None:
     (tmp_path / "t.csv").write_text(f"{title}\nx;fx;dx\n0;1;2\n1;2;3\n")
     assert read_sheet(tmp_path / "t.csv").header == ("x", "fx", "dx")
     (tmp_path / "t.csv").write_text(f"{title}\ndx;dy;dz\n0;1;2\n1;2;3\n")
