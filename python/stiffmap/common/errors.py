@@ -82,9 +82,16 @@ def needed(what: str, extra: str, otherwise: str = "") -> Iterator[None]:
         ) from error
 
 
+ROBOT_PROGRAMS = {".ls": "Fanuc", ".mod": "RAPID", ".src": "KRL", ".script": "URScript"}
+
+NO_PROGRAM = "a machine file or URDF of the robot, G-code or APT of the part, or a table of the poses"
+
+
 @contextmanager
 def reading(path: object) -> Iterator[None]:
-    """FileError where the system refuses to read a file."""
+    """FileError where the system refuses to read a file, and for a robot's program."""
+    if language := ROBOT_PROGRAMS.get(Path(str(path)).suffix.lower()):
+        raise FileError(f"a robot's program ({language}) is not read; expected {NO_PROGRAM}", file=str(path))
     try:
         yield
     except OSError as error:

@@ -18,6 +18,7 @@ from stiffmap.experiment.files.table import read_table
 from stiffmap.machining.process import load_process
 from stiffmap.machining.toolpath.load import load_path
 from stiffmap.model.link.readers import read_csv_field
+from stiffmap.model.urdf import import_urdf
 from stiffmap.workspace.vibration.files import read_responses
 
 SPELLINGS = {
@@ -136,7 +137,7 @@ ROWS = "x [mm],fx [N],dx [um]\n0,100,40\n1,200,80\n"
             ROWS.replace("200,80", "200,7,5"),
             "line 3: expected 3 values, found 4",
         ),
-        ('x [mm],fx [N],dx [um]\n"1",0,100,40\n"2",1,200,80\n', "line 2: expected 3 values"),
+        ("x [mm],fx [N],dx [um]\n1,0,100,40\n2,1,200,80\n", "line 2: expected 3 values"),
         (ROWS.replace(",", " ").replace("200 80", "200"), "line 3: expected 3 values, found 2"),
         (f"Nr {ROWS.replace(',', ' ')}", "line 2: expected 4 values, found 3"),
     ],
@@ -282,3 +283,51 @@ def test_tabs_part_cells_that_have_blanks(text: str, tmp_path: Path) -> None:
     t = read_sheet(tmp_path / "t.txt")
     assert len(t.header) == 3
     np.testing.assert_array_equal(t.numbers(1), [1.5, 2.5])
+
+
+@pytest.mark.parametrize("between", [",", " ", "\t"])
+@pytest.mark.parametrize("rows", [("1", "2"), ("5", "9"), ("pose 1", "pose 2")])
+def test_row_names_in_quotes_need_no_header(between: str, rows: tuple[str, str], tmp_path: Path) -> None:
+    lines = ['"x"', '"fx"'], [f'"{rows[0]}"', "0", "100.5"], [f'"{rows[1]}"', "1", "200.5"]
+    (tmp_path / "r.txt").write_text("".join(between.join(cells) + "\n" for cells in lines))
+    found = read_sheet(tmp_path / "r.txt")
+    assert found.header == ("row", "x", "fx")
+    assert found.numbers(2).tolist() == [100.5, 200.5]
+
+
+TIMES = "{0},fx [N],{1},dx [um]\n0,100,0,40\n1,200,{2},80\n2,300,{3},90\n"
+
+
+@pytest.mark.parametrize(
+    "names", [("X [ms]", "X [ms]"), ("Name", "Name"), ("Time 1", "Time 2"), ("t.1 [s]", "t.2 [s]"), ("", "")]
+)
+def test_channels_with_times_of_their_own_are_refused(names: tuple[str, str], tmp_path: Path) -> None:
+    file = tmp_path / "scope.csv"
+    file.write_text(TIMES.format(*names, 2, 4))
+    with pytest.raises(FileError, match="where it is the time of each channel"):
+        read_sheet(file)
+    file.write_text(TIMES.format("Time 1", "Time 2", "1.0", 2))
+    assert len(read_sheet(file)) == 3
+
+
+def test_gauges_next_to_their_loads_are_no_times(tmp_path: Path) -> None:
+    (tmp_path / "t.csv").write_text(TIMES.format("Gauge 1", "Gauge 2", 2, 4))
+    assert len(read_sheet(tmp_path / "t.csv").header) == 4
+
+
+@pytest.mark.parametrize("title", ["Deflection of the arm [um];;", "Verschiebung in um;;"])
+def test_the_unit_of_a_title_of_one_quantity_is_none_of_all_columns(title: str, tmp_path: Path) -> None:
+    (tmp_path / "t.csv").write_text(f"{title}\nx;fx;dx\n0;1;2\n1;2;3\n")
+    assert read_sheet(tmp_path / "t.csv").header == ("x", "fx", "dx")
+    (tmp_path / "t.csv").write_text(f"{title}\ndx;dy;dz\n0;1;2\n1;2;3\n")
+    assert all("[" in h for h in read_sheet(tmp_path / "t.csv").header)
+
+
+@pytest.mark.parametrize("name", ["a.LS", "a.mod", "a.src", "a.script"])
+@pytest.mark.parametrize("reader", [read_sheet, read_pose_table, sm.load_machine, import_urdf])
+def test_a_robots_program_is_said_to_be_one(
+    reader: Callable[[Path], object], name: str, tmp_path: Path
+) -> None:
+    (tmp_path / name).write_text("P[1] 1 2 3\n")
+    with pytest.raises(FileError, match=r"a robot's program .* is not read; expected a machine file or URDF"):
+        reader(tmp_path / name)

@@ -12,7 +12,7 @@ from itertools import pairwise, takewhile, zip_longest
 from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.number_text import terms
 from stiffmap.common.tables.lines import COMMENTS, NUMBER
-from stiffmap.common.units import SHORT_TIMES, TIMES, name_and_unit, unit_of
+from stiffmap.common.units import FREQUENCIES, SHORT_TIMES, TIMES, name_and_unit, unit_of
 
 Line = tuple[int, list[str]]
 MOST_LINES = 4
@@ -66,9 +66,12 @@ def header_of(
     if len(lines) > 1 and (marks := [c for c in lines[-2][1] if c]) and all(map(DIRECTIONS.fullmatch, marks)):
         each = zip_longest(names, lines.pop(-2)[1], fillvalue="")
         names = [" ".join(filter(None, pair)) for pair in each]
+    several = len({re.sub("[xyzXYZ]$", "", split_unit(n)[0]) for n in names if n}) > 1
     if len(lines) > 1 and not repeated and _needs_group(names, lines[-2][1], first):
         names = _grouped(lines[-2][1], names, known)
-    elif len(lines) > 1:  # Position [mm] over x y z
+    elif len(lines) > 1 and not (
+        several and sum(map(bool, lines[-2][1])) == 1 and OF_SOME.search("".join(lines[-2][1]))
+    ):  # Position [mm] over x y z
         names = [_with_own_unit(n, _of_group(g)[1]) if n else n for n, g in _under(lines[-2][1], names)]
     for _, group in reversed([] if repeated else lines[:-2]):
         if len({*names}) < len(names) and _needs_group(names, group, first):
@@ -281,7 +284,8 @@ def split_unit(header: str) -> tuple[str, str]:
     if name != header.strip():
         return name, unit
     found = (pattern.fullmatch(header) for pattern in BEHIND)
-    match = next((m for m in found if m and unit_of(m[2]) and not unit_of(header)), None)
+    units = (m for m in found if m and (unit_of(m[2]) or m[2].lower() in FREQUENCIES))
+    match = None if unit_of(header) else next(units, None)
     return (match[1].strip(), match[2].strip()) if match else (header.strip(), "")
 
 
@@ -291,6 +295,8 @@ DEFLECTION = (
     "defl|deflection|displ?\\.?|displacement|déplacement|flèche|verschiebung|verlagerung|verformung|durchbiegung|"
     "spostamento|freccia|desplazamiento|deflexión|flecha"
 )
+OF_SOME = re.compile(f"(?i){DEFLECTION}|{FORCE}|{MOMENT}")
+"""In a title whose unit is not that of all columns."""
 COMMANDED = "target|cmd|nom|nominal|command|commanded|ref|desired|r?soll?"
 MEASURED = "act|actual|meas|measured|achieved|attained|r?ist|gemessen"
 PATTERNS: tuple[tuple[str, str], ...] = (

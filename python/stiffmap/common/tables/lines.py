@@ -26,6 +26,8 @@ COMMENTS = ("#", "%", "//")
 SEPARATORS = ";\t|,& "
 BLANKS = re.compile(r"[ \t]+(?![\[(])")
 """Between cells, but not before a unit in brackets."""
+QUOTED_WORD = re.compile(r'(?<!\S)"([^"]*)"(?!\S)')
+"""A cell between blanks that may have blanks of its own."""
 MARKED = re.compile(r"^(#|%|//)\s+")
 """The mark of a comment, which is no cell."""
 THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(\.\d{3})+")
@@ -299,6 +301,11 @@ def _text(path: Path) -> tuple[str, Lines, str]:
         except csv.Error as error:
             raise FileError(f"is no table: {error}", file=str(path), line=reader.line_num) from error
 
+    # R's row names stand in quotes below a header that has no name for them
+    quoted = len(sample) > 1 and all(line.startswith('"') for line in sample)
+    (top, names), *rows = [*islice(kept(lines()), SAMPLE if quoted else 0)] or [(0, [])]
+    if rows and all(len(cells) == len(names) + 1 and all(map(str.strip, cells)) for _, cells in rows):
+        return "", lambda: ((n, ["row", *cells] if n == top else cells) for n, cells in lines()), best
     return "", lines, best
 
 
@@ -320,4 +327,5 @@ def _numbers_between(separator: str, lines: Sequence[str]) -> tuple[int, int, in
 def _cut(line: str) -> list[str]:
     if len(line) > csv.field_size_limit():
         raise csv.Error("field larger than field limit")
-    return BLANKS.split(MARKED.sub(r"\1", line.strip()))
+    whole = QUOTED_WORD.sub(lambda m: (m[1] or "NA").replace(" ", "\u00a0"), line) if '"' in line else line
+    return BLANKS.split(MARKED.sub(r"\1", whole.strip()))

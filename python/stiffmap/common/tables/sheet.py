@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from itertools import chain, islice, zip_longest
 from pathlib import Path
 
+import numpy as np
+
 from stiffmap.common.errors import FileError
 from stiffmap.common.number_text import LARGEST
 from stiffmap.common.tables.cells import Cells, blocks, filled, packed
@@ -37,7 +39,7 @@ from stiffmap.common.tables.lines import (
     parted,
 )
 from stiffmap.common.tables.table import Table
-from stiffmap.common.units import unit_of
+from stiffmap.common.units import SHORT_TIMES, TIMES, unit_of
 
 STATISTICS = re.compile(
     r"(((gesamt|grand|overall)[ -]?)?(mean|average|avg|mittel(wert)?e?|total)|mw|ø|x̄|x̅|m[aá]x\.? ?[-–] ?min|sum|summe|gesamt|std\.?( ?dev\.?)?|stdev|stabw|s|sigma|σ|m[ií]n(imum|imo|i)?|"
@@ -52,6 +54,9 @@ MEAN = re.compile(
     r"(?i)(mean|average|avg|median|mittel(wert)?|mw|ø|x̄|x̅|durchschnitt|moyenne|promedio|std( ?dev)?|stdev|stabw|standardabweichung)\.?:?"
 )
 """All of the last cell of such a row, where the first row is a reading."""
+TIMED = re.compile(r"(?i)(time|zeit|temps|t|x[ _]value|column)([ ._]?\d+)?")
+"""Names of times, or none, before each channel of a scope."""
+ONE_TIME = "where it is the time of each channel, export all resampled to one"
 WAY = "--header id,x,y,z,dx,dy,dz (nothing between two commas for a column that is not used)"
 LONGEST_HEADER, MOST_COLUMNS, MOST_ABOVE = 300, 1000, 50
 
@@ -119,6 +124,7 @@ def read_sheet(path: Path, sheet: str | None = None, layout: Layout = PLAIN) -> 
     if not layout.repeated:
         way = " (names with blanks in them?)" if separator == " " else ""
         way += "" if layout.strict or layout.names else f"; name the columns: {WAY}"
+        way += f"; {ONE_TIME}" if len({*names[::2]}) == 1 < len(names) - 2 else ""
         refuse_twice(names, str(path), number_, way)
     width = len(names)
     said = [*header, *(c.strip() for _, cells in above for c in cells)]
@@ -137,9 +143,19 @@ def read_sheet(path: Path, sheet: str | None = None, layout: Layout = PLAIN) -> 
     for i in range(width):
         names[i], columns[i] = _united(names[i], columns[i], file, lines_)
     top = tuple(said[len(header) :])
-    return Table(
-        file, tuple(names), tuple(columns), lines_, number_, comma, record_of(above), top, tuple(aside)
-    )
+    found_ = (file, tuple(names), tuple(columns), lines_, number_, comma, record_of(above), top, tuple(aside))
+    return _with_one_time(Table(*found_))
+
+
+def _with_one_time(table: Table) -> Table:
+    """The table; FileError where a scope wrote a time before each channel, and they differ."""
+    every = range(0, len(table.names), 2)
+    named = [i for i in every if table.unit(i) in (*TIMES, *SHORT_TIMES) or TIMED.fullmatch(table.names[i])]
+    times = [table.numbers(i) for i in named if table.is_numeric(i)]
+    if len(times) == len(every) > 1 and all((np.diff(t) > 0).all() for t in times):
+        what = f"'{table.names[0]}' stands again, with other numbers, before each column; {ONE_TIME}"
+        table.check(np.ptp(times, axis=0) == 0, lambda row: what)
+    return table
 
 
 def _turned(lines: Iterable[Line], spelling: Spelling, layout: Layout) -> list[Line]:

@@ -16,6 +16,8 @@ from stiffmap.experiment.files.fields import APPROACH, SEEN
 REPEATED = re.compile(r"^(.*?)[ _.-]*(?:#|run|messung|wdh|rep|repeat)?[ _.-]*(\d+)$", re.IGNORECASE)
 TORQUE = re.compile(r"^[tT](?=[ _]?[xyzXYZ]$)")
 """Tx, Ty, Tz of a load cell, where the unit is one of moments or, next to Fx, Fy, Fz, one that nobody knows."""
+AXIS = r"(?i)(?:(?<![a-z])|(?<=\b[dp]))[xyz](?![a-z])"
+"""In a header."""
 READINGS = (*AXES, "dd", "ll", *SEEN)
 
 
@@ -46,6 +48,8 @@ def guess(headers: Sequence[str], chosen: Mapping[str, Sequence[str]]) -> list[C
         for i, h in enumerate(many, 1)
     }
     out = []
+    names = [split_unit(h)[0].lower() for h in headers]
+    sets = {meaning[:-1]: names[i] for i, (meaning, _) in given.items() if re.search(AXIS, names[i])}
     cell = {"fx", "fy", "fz"} <= {meaning_of(split_unit(h)[0]) for h in headers}
     for index, header in enumerate(headers):
         name, unit = split_unit(header)
@@ -58,7 +62,9 @@ def guess(headers: Sequence[str], chosen: Mapping[str, Sequence[str]]) -> list[C
             plain = TORQUE.sub("m", name) if torque else name
             meaning, repeat = ("note", 0) if time else _meaning(plain)
             place = unit and meaning in APPROACH  # a point from which it came, no direction
-            out.append(Column(index, name, unit, "note" if place or meaning in chosen else meaning, repeat))
+            own = re.sub(AXIS, meaning[-1], sets.get(meaning[:-1], ""))  # next to the column that was chosen
+            other = place or meaning in chosen or (own in names and own != name.lower())
+            out.append(Column(index, name, unit, "note" if other else meaning, repeat))
     if "ll" not in chosen and any(c.meaning in READINGS and c.meaning != "ll" for c in out):
         # a length of something else
         out = [replace(c, meaning="note") if c.meaning == "ll" else c for c in out]

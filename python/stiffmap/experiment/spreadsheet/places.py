@@ -19,7 +19,7 @@ from stiffmap.experiment.experiment import Mask
 from stiffmap.experiment.files.fields import POSE, SEEN
 from stiffmap.experiment.poses.handeye import own_frame
 from stiffmap.experiment.spreadsheet.answers import Meant, Question
-from stiffmap.experiment.spreadsheet.guess import READINGS, Column
+from stiffmap.experiment.spreadsheet.guess import AXIS, READINGS, Column
 from stiffmap.solve.kinematics import forward_kinematics
 from stiffmap.solve.machine import Machine
 
@@ -36,8 +36,6 @@ NINES = [*(round(10.0**k - 0.1**j, 4) for k in range(3, 9) for j in range(5)), 9
 """999, 9999.99, overload and no number of SCPI, and the like, which stand for no reading."""
 BEYOND = 5.0
 """How many times the others such a number is, where it is the only one of its row."""
-AXIS = r"(?i)(?:(?<![a-z])|(?<=\b[dp]))[xyz](?![a-z])"
-"""In a header."""
 MEASURED_AXIS = rf"\*[ ._-]?({MEASURED})|({MEASURED})[ ._-]?\*"
 SELDOM = 0.5
 """Share of rows that have places of their own, at most, where a ball stood in sockets."""

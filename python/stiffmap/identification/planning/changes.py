@@ -17,6 +17,7 @@ from stiffmap.common.short import short_repr
 from stiffmap.experiment.calls import Effects, as_experiment, effects_of
 from stiffmap.experiment.experiment import Experiment
 from stiffmap.experiment.noise.whitening import basis, readings_of
+from stiffmap.identification.diagnosis.report.sentences import DISPLAY_UNITS
 from stiffmap.identification.inference.amplitudes import fitted
 from stiffmap.identification.inference.columns import Columns, Free, drawn
 from stiffmap.identification.inference.kernels import ReadingPoints, gaps
@@ -54,10 +55,11 @@ class Change:
         if not np.isfinite(self.u):
             return f"{self.name}: not identifiable from these readings"
         word = "changed" if self.changed else "as before"
-        step = self.after - self.before
+        size, unit = DISPLAY_UNITS.get(self.unit, (1.0, self.unit))
+        before, after, u = (size * v for v in (self.before, self.after, self.u))
         return (
-            f"{self.name}: {word}, {within(self.before, self.u)} -> {within(self.after, self.u)} {self.unit} "
-            f"({with_uncertainty(step, 2 * self.u)}, p = {self.p:.2g})"
+            f"{self.name}: {word}, {within(before, u)} -> {within(after, u)} {unit} "
+            f"({with_uncertainty(after - before, 2 * u)}, p = {self.p:.2g})"
         )
 
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from stiffmap.common.errors import StiffmapError
+from stiffmap.model import beams
 from stiffmap.model.description import (
     BeamStroke,
     Block,
@@ -149,7 +150,12 @@ def _law(law: Law | None) -> Plain:
 
 def _spring(spring: Spring) -> Plain:
     plain: Plain = {"spring": spring.name}
-    for word in ("compliance", "stiffness"):
+    if spring.beam and not spring.stroke and beams.compliance(spring.beam) == spring.compliance:
+        plain["beam"] = {"along": spring.beam.along}
+        for key, value in spring.beam.numbers:
+            *outer, inner = key.split(".")
+            (plain["beam"].setdefault(*outer, {}) if outer else plain["beam"])[inner] = value
+    for word in () if "beam" in plain else ("compliance", "stiffness"):
         if getattr(spring, word) is not None and not isinstance(spring.stroke, TableStroke):
             plain[word] = dump_matrix(getattr(spring, word))
     if spring.laws:

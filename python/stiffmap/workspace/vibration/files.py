@@ -32,14 +32,14 @@ COLUMNS = Known(
     {**dict.fromkeys(("frequency", "real", "imag", "magnitude", "coherence"), ""), "phase": "rad", "response": WORD},
     {"frequency": "frequency_Hz", **{n: f"{n}_m/N" for n in ("real", "imag", "magnitude")}, "phase": "phase_deg"},
     {
-        **dict.fromkeys(("freq", "f", "hz", "frequenz"), "frequency"), **dict.fromkeys(("coh", "kohärenz"), "coherence"),
+        **dict.fromkeys(("freq", "f", "hz", "frequenz", "linear"), "frequency"), **dict.fromkeys(("coh", "kohärenz"), "coherence"),
         **dict.fromkeys(("phase_angle", "arg(h)", "arg_h"), "phase"), **dict.fromkeys(("h", "frf", "h1", "h2", "h(f)", "complex"), "response"),
         **dict.fromkeys(("n", "drehzahl", "speed", "rotational_speed", "omega", "ω", "kreisfrequenz", "angular_frequency"), "frequency"),
         **dict.fromkeys(("re", "re(h)", "re(frf)", "real_part", "realteil"), "real"),
         **dict.fromkeys(("im", "im(h)", "im(frf)", "imaginary", "imaginary_part", "imag_part", "imaginärteil"), "imag"),
         **dict.fromkeys(("mag", "amplitude", "|h|", "|frf|", "betrag", "gain", *MEANT), "magnitude"),
     },
-    lambda name, unit: (PREFIX.sub("", name).removesuffix("_db"), f"dB {unit}" if name.endswith("_db") else unit),
+    lambda name, unit: ("frequency", unit) if unit.lower() in FREQUENCIES else (PREFIX.sub("", name).removesuffix("_db"), f"dB {unit}" if name.endswith("_db") else unit),
 )  # fmt: skip
 FORMS = (("real", "imag"), ("magnitude", "phase"))
 EXAMPLES = "m/N, mm/N, um/N, m/s/N, m/s2/N, g/N and the like, N/m, N/um"

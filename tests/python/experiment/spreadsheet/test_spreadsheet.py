@@ -182,3 +182,18 @@ def test_endless_cells_are_refused_at_once(tmp_path: Path, text: str, words: str
     (tmp_path / "t.csv").write_text(text)
     with pytest.raises(sm.StiffmapError, match=words):
         read_sheet(tmp_path / "t.csv")
+
+
+@pytest.mark.parametrize(
+    ("headers", "chosen", "meanings"),
+    [
+        (["coordinate x", "coordinate y", "MODEL_X", "MODEL_Y", "MODEL_Z"], {"z": ["MODEL_Z"]}, {"z"}),
+        (["dx", "dy", "cam dx", "cam dy"], {"dx": ["cam dx"]}, {"dx"}),
+        (["x", "y", "height"], {"z": ["height"]}, {"x", "y", "z"}),
+        (["Fx", "Fy", "Channel Z"], {"fz": ["Channel Z"]}, {"fx", "fy", "fz"}),
+    ],
+)
+def test_axes_next_to_a_chosen_column_are_not_taken_from_another_set(
+    headers: list[str], chosen: dict[str, list[str]], meanings: set[str]
+) -> None:
+    assert {c.meaning for c in guess(headers, chosen)} - {"note"} == meanings

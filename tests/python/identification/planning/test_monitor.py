@@ -17,6 +17,7 @@ from stiffmap.experiment.channels import Channel
 from stiffmap.experiment.virtual.plans import with_distances, with_joints
 from stiffmap.identification.diagnosis.report.result import diagnosed
 from stiffmap.identification.planning.budget import BudgetLine, NumberBudget, budgets
+from stiffmap.identification.planning.changes import Change
 from stiffmap.identification.planning.changes import monitor as compare
 from stiffmap.identification.planning.design import follow
 from stiffmap.identification.planning.estimate import Estimate, estimate
@@ -46,6 +47,14 @@ def test_a_change_is_seen_and_none_is_invented(orthoglide: sm.Machine, plan: sm.
     assert moved.changes[0].after - moved.changes[0].before == pytest.approx(0.2, abs=4 * moved.changes[0].u)
     p_values = [compare(orthoglide, first, twin(orthoglide, plan, 1.3, s), term).p for s in range(2, 14)]
     assert min(p_values) > 1e-4
+
+
+@pytest.mark.parametrize(
+    ("unit", "shown"), [("m", "0.0100 -> 0.0130 mm (0.003"), ("1", "0.0000100 -> 0.0000130 1")]
+)
+def test_lengths_of_changes_are_in_millimetres(unit: str, shown: str) -> None:
+    text = str(Change("gap: half_width", unit, 1e-5, 1.3e-5, 1e-6, 0.0))
+    assert shown in text and " m " not in text
 
 
 def test_rows_out_of_reach_are_said(orthoglide: sm.Machine, plan: sm.Experiment) -> None:

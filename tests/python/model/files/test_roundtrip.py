@@ -9,6 +9,7 @@ import pytest
 from tests.python.model.files.full_machine import full_machine
 
 from stiffmap.common.errors import FileError, StiffmapError
+from stiffmap.model.addresses import number
 from stiffmap.model.description import AppliedEffect, Body, Leg, MachineDescription, Point
 from stiffmap.model.files import description_text, load_description, save_description
 from stiffmap.model.files.shipped import machine_names
@@ -76,3 +77,21 @@ def test_effects_are_saved_beside_the_declared_machine(
 def test_effects_without_the_declared_machine_are_refused() -> None:
     with pytest.raises(StiffmapError, match="declared"):
         description_text(replace(load_description("tripteron"), effects=(RECORD,)))
+
+
+@pytest.mark.parametrize(
+    "section",
+    ["round: {diameter: {value: 0.03, u: 0.0001}}", "tube: {outer: 0.03, inner: {value: 0.02, u: 0.001}}"],
+)
+def test_a_beam_is_saved_with_the_numbers_that_are_uncertain(section: str, tmp_path: Path) -> None:
+    units = "{length: m, force: N, angle: rad}"
+    beam = f"{{length: 0.3, along: y, {section}, material: {{E: {{value: 7.0e10, u: 1.0e9}}, nu: 0.3}}}}"
+    joint = "{actuator: q, kind: revolute, axis: z, rigid: true}"
+    text = f"name: a\nunits: {units}\nlegs:\n  arm:\n    elements:\n    - {joint}\n    - {{spring: s, beam: {beam}}}\n"
+    (tmp_path / "a.yaml").write_text(text)
+    machine = load_description(tmp_path / "a.yaml")
+    save_description(machine, tmp_path / "b.yaml")
+    again = load_description(tmp_path / "b.yaml")
+    assert again == machine
+    assert len(again.uncertainty) == 2
+    assert all(number(again, address) == number(machine, address) for address, _ in machine.uncertainty)

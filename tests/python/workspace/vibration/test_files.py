@@ -402,6 +402,7 @@ def test_a_response_that_contradicts_its_name_is_refused(columns, message, tmp_p
         ("Frequency (Hz),Real ((m/s2)/N),Imaginary ((m/s2)/N)", lambda a: (a.real, a.imag)),
         ("Frequency (Hz),Amplitude ((m/s²)/N),Phase (deg)", lambda a: (abs(a), np.degrees(np.angle(a)))),
         ("Frequency (Hz),TF_Acc/Force/Real ((m/s2)/N),TF_Acc/Force/Imag ((m/s2)/N)", lambda a: (a.real, a.imag)),
+        *((f"{name},Real [m/s2/N],Imag [m/s2/N]", lambda a: (a.real, a.imag)) for name in ("f/Hz", "Frequency Hz", "F_Hz", "freq in Hz")),
         (",Frequency (Hz),Real (m/s2/N),Imag (m/s2/N)", lambda a: (a.real, a.imag)),
         ("Unnamed: 0,Frequency (Hz),Real (m/s2/N),Imag (m/s2/N)", lambda a: (a.real, a.imag)),
         ("Line,Frequency (Hz),Real (m/s2/N),Imag (m/s2/N)", lambda a: (a.real, a.imag)),
@@ -417,6 +418,12 @@ def test_names_of_analysers(header, columns, tmp_path):
     (tmp_path / "r.csv").write_text(f"{header}\n{text}\n", encoding="utf-8")
     (one,) = read_responses(tmp_path / "r.csv")
     np.testing.assert_allclose(one.receptance, receptance, rtol=1e-12)
+
+
+@pytest.mark.parametrize("axis", ["X [Hz]", "x_Hz", "Linear [Hz]", "Linear Hz"])
+def test_what_is_in_hertz_is_the_frequency(axis, tmp_path):
+    (tmp_path / "r.csv").write_text(f"{axis},Real [m/N],Imag [m/N]\n10,1e-6,0\n20,2e-6,-1e-6\n")
+    assert read_responses(tmp_path / "r.csv")[0].frequency.tolist() == [10.0, 20.0]
 
 
 def test_a_column_without_a_name_that_counts_no_rows_is_refused(tmp_path):
