@@ -119,7 +119,10 @@ def possible(p: Parameter) -> tuple[float, float]:
     """Least and largest value of a parameter (SI) that a machine can have."""
     if p.plausible:
         return p.plausible
-    null, most = float(p.null or 0.0), LARGEST_ERROR.get(p.unit, np.inf)
+    null = float(p.null or 0.0)
+    most = (
+        np.inf if p.lower == null else LARGEST_ERROR.get(p.unit, np.inf)
+    )  # a width or an amplitude is no error
     return max(p.lower, null - most), min(p.upper, null + most)
 
 

@@ -13,7 +13,8 @@ from tests.python.identification.inference.test_amplitudes import dense
 from stiffmap.identification.inference import amplitudes
 from stiffmap.identification.inference import chosen as candidates
 from stiffmap.identification.inference.constants import SIZES
-from stiffmap.identification.inference.places import Place, Shape
+from stiffmap.identification.inference.places import Place, Shape, possible
+from stiffmap.model.effects import get
 
 AT = np.array([0.1, -1.0, -0.5])
 
@@ -69,3 +70,10 @@ def test_two_effects_together_are_worth_the_mean_over_both_sizes():
         expected = np.logaddexp.reduce(sizes) - np.log(len(sizes)) - likelihood(c, v, [])
         assert found[i, j] == found[j, i] == pytest.approx(expected, abs=1e-7)
     assert np.all(np.isneginf(np.diag(found)))
+
+
+def test_a_width_is_as_large_as_a_file_allows_and_an_error_no_larger_than_what_is_seen() -> None:
+    """A printed gear plays by a tenth of a radian; a zero that is off by as much was seen when the machine was built."""
+    play, zero = (get(kind).parameters[0].turning for kind in ("dead_zone", "zero_offset"))
+    assert possible(play) == (0.0, play.upper) == (0.0, 0.5)
+    assert possible(zero) == (-0.05, 0.05) and zero.upper == 0.1
