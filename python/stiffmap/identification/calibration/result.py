@@ -10,6 +10,7 @@ from typing import Any
 from stiffmap.common.json_text import json_text, plain
 from stiffmap.common.number_text import with_uncertainty, within
 from stiffmap.common.short import short_repr
+from stiffmap.common.units import DISPLAY_UNITS
 from stiffmap.experiment.comparison.residual import Summary
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.noise.outliers import set_aside
@@ -25,7 +26,7 @@ APART = ("rows", "beyond", "shares", "profiles", "failed", "validity")
 """Fields that JSON has in another form, behind all others."""
 MOST = 6
 """Parts that a line names."""
-DISPLAY_UNITS = {"m": (1e3, "mm"), "rad": (1e3, "mrad"), "1": (1e6, "ppm")}
+SHOWN = DISPLAY_UNITS | {"1": (1e6, "ppm")}
 FACTOR = 0.5
 """Logarithm of a factor from which it is written as one: ×1.65."""
 
@@ -183,7 +184,7 @@ def in_display_units(value: float, unit: str) -> str:
     """A number in the units of the screen; the logarithm of a factor as the per cent that it adds, or as the factor."""
     if unit == "ln":
         return f"{100.0 * math.expm1(value):.4g} %" if abs(value) < FACTOR else f"×{math.exp(value):.4g}"
-    factor, name = DISPLAY_UNITS[unit]
+    factor, name = SHOWN[unit]
     return f"{value * factor:.4g} {name}"
 
 
@@ -193,5 +194,5 @@ def measured(value: float, u: float, unit: str) -> str:
         if abs(value) < FACTOR:
             return f"{with_uncertainty(100.0 * math.expm1(value), 100.0 * math.exp(value) * u)} %"
         return f"×{within(math.exp(value), math.exp(value) * u)} ± {within(100.0 * u, 100.0 * u)} %"
-    factor, name = DISPLAY_UNITS[unit]
+    factor, name = SHOWN[unit]
     return f"{with_uncertainty(factor * value, factor * u)} {name}"

@@ -32,14 +32,14 @@ from stiffmap.solve.machine import Machine
 
 STEP = 1e-3
 """Of a parameter's scale, for differences."""
-STEPS, STEPS_OF_A_FOLD = 30, 4
+STEPS, STEPS_OF_A_FOLD = 30, 3
 """Evaluations at most, of all readings and of those outside a fold."""
 LITTLE = 1e-4
 """Of the squares, and of the size of all values: a change that ends a fit. Below it steps go to and fro, since the columns of
 numbers are held."""
 FRAMINGS, SETTLED = 4, 0.3
 """Fits with frames and tools where the machine of the last one stands, and their change, in noise, that ends them: within a fit
-they are held, since a tool that hardly turns takes up another pattern with every small turn of the machine. One does in a fold."""
+they are held, since a tool that hardly turns takes up another pattern with every small turn of the machine."""
 WEIGHINGS = 3
 """Fits with weights of heavy tails."""
 Effects = Callable[[Floats], Sequence[AppliedEffect]]
@@ -202,7 +202,7 @@ def _optimum(
     if not np.isfinite(raw(x)).all():
         raise StiffmapError("the machine has no equilibrium with the effects that were found")
     q = given.frames(shown(x))
-    for _ in range(0 if not len(x) else FRAMINGS if held is None else 1):
+    for _ in range(FRAMINGS if len(x) else 0):
         x = triangular(
             partial(moving, q=q), held_columns(q), x, (low, high), ftol=LITTLE, xtol=LITTLE, max_nfev=steps
         )

@@ -15,6 +15,7 @@ import numpy as np
 from stiffmap.common.arguments import checked
 from stiffmap.common.broadcasting import instance_of, real_number, refused
 from stiffmap.common.errors import StiffmapError
+from stiffmap.common.units import DISPLAY_UNITS
 from stiffmap.experiment.calls import as_experiment, effects_of
 from stiffmap.experiment.experiment import Experiment
 from stiffmap.experiment.prediction.predict import Predictor
@@ -65,8 +66,10 @@ class NumberBudget:
         return K * self.u
 
     def __str__(self) -> str:
-        head = f"{self.name}: {self.value:.5g} {self.unit}, u = {self.u:.3g}, U (k = 2) = {self.expanded:.3g}"
-        rows = [f"  {line.source} ({line.kind}): {line.u:.3g}" for line in self.lines]
+        size, unit = DISPLAY_UNITS.get(self.unit, (1.0, self.unit))
+        value, u, expanded = (size * v for v in (self.value, self.u, self.expanded))
+        head = f"{self.name}: {value:.5g} {unit}, u = {u:.3g}, U (k = 2) = {expanded:.3g}"
+        rows = [f"  {line.source} ({line.kind}): {size * line.u:.3g}" for line in self.lines]
         return "\n".join([f"{head}, {self.freedom:.0f} degrees of freedom", *rows])
 
 

@@ -14,10 +14,10 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import with_uncertainty, within
 from stiffmap.common.short import short_repr
+from stiffmap.common.units import DISPLAY_UNITS
 from stiffmap.experiment.calls import Effects, as_experiment, effects_of
 from stiffmap.experiment.experiment import Experiment
 from stiffmap.experiment.noise.whitening import basis, readings_of
-from stiffmap.identification.diagnosis.report.sentences import DISPLAY_UNITS
 from stiffmap.identification.inference.amplitudes import fitted
 from stiffmap.identification.inference.columns import Columns, Free, drawn
 from stiffmap.identification.inference.kernels import ReadingPoints, gaps

@@ -213,6 +213,7 @@ def test_welch_and_satterthwaite() -> None:
     assert b.u == pytest.approx(np.hypot(25.0, 9.7))
     assert b.freedom == pytest.approx(b.u**4 / (25.0**4 / 18 + 9.7**4 / 25.6))
     assert b.expanded == pytest.approx(2 * b.u)
+    assert str(b).startswith("length: 50 mm, u = 2.68e+04,") and "\n  repeats (A): 9.7e+03" in str(b)
 
 
 def test_what_a_model_leaves_is_no_change(orthoglide: sm.Machine) -> None:

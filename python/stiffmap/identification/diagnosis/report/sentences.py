@@ -7,6 +7,7 @@ from math import isfinite
 from typing import Any
 
 from stiffmap.common.number_text import with_uncertainty, within
+from stiffmap.common.units import DISPLAY_UNITS
 from stiffmap.identification.candidates.candidates import words
 from stiffmap.identification.diagnosis.report.findings import Effect
 from stiffmap.identification.diagnosis.report.separation import Separation
@@ -15,7 +16,6 @@ from stiffmap.identification.inference.kernels import WANDER
 from stiffmap.identification.inference.verdict import CLEARLY, NOISIER
 from stiffmap.model.effects import registry
 
-DISPLAY_UNITS = {"m": (1e3, "mm"), "m/N": (1e3, "mm/N"), "rad": (1e3, "mrad"), "1/m": (1e-3, "1/mm")}
 LISTED = 5
 """Steps left out, numbers, and what cannot be distinguished from an effect: how many are named."""
 UNITS = {
