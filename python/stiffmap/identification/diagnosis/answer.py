@@ -106,7 +106,7 @@ def answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, cross
         gap=gap,
         calibration=numbers,
         refused=[f"{c.place.candidate}: {why}" for c, why in (*v.refused, *v.gone)],
-        which=made.which,
+        which=CALIBRATED if made.which == CORRECTED and not effects else made.which,
         stopped=clock.stopped or bool(clock.left_out),
         not_tried=list(clock.left_out),
         seed=seed,

@@ -20,7 +20,7 @@ import numpy as np
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.experiment import Floats, Mask
-from stiffmap.experiment.noise.outliers import MANY
+from stiffmap.experiment.noise.outliers import GROSS, MANY
 from stiffmap.identification.inference.chosen import WIDE, Term
 from stiffmap.identification.inference.constants import DEGREES, STANDS_OUT
 from stiffmap.identification.inference.optimum import covariance, remembered, triangular
@@ -119,8 +119,9 @@ def corrected(given: Readings, terms: Sequence[Term], fixed: Sequence[AppliedEff
         noise = (
             given.rest.noise_part(left - q @ (q.T @ left)) * given.kappa**2 / given.weights / given.rest.noise
         )
-        far = np.abs(noise) > STANDS_OUT * given.kappa
-        if np.all(given.weights == 1.0) and not 0.0 < far.mean() <= MANY:  # many are no outliers
+        plain = bool(np.all(given.weights == 1.0))
+        far = np.abs(noise) > (STANDS_OUT if plain else GROSS) * given.kappa
+        if (plain and not far.any()) or far.mean() > MANY:  # many are no outliers
             break
         weights = (DEGREES + 1.0) / (DEGREES + (noise / given.kappa) ** 2)
         given = given.weighed(np.minimum(weights, 1.0))

@@ -173,6 +173,24 @@ def test_machines_twice_as_soft_are_no_lever() -> None:
         assert found("five-bar", e) is None, element
 
 
+@pytest.mark.parametrize(("shoulder", "elbow", "axis"), [(2.0, 2.1, 2), (2.1, 2.4, 2), (2.4, 2.7, 0)])
+def test_two_soft_drives_before_one_gauge_are_no_unit(shoulder: float, elbow: float, axis: int) -> None:
+    """Near a factor of 2, 2.205 or 2.54, but two parts explain more than that factor and a part do; the factor itself is named."""
+    machine, every = sm.load_machine("ur10"), effects.get("compliance")
+    scales = {"shoulder": shoulder, "elbow": elbow}
+    terms = [
+        AppliedEffect("compliance", element, legs, (("scale", scales[element]),))
+        for element, legs in every.places(machine.description)
+        if element in scales and len(legs) == 1
+    ]
+    plan = random_plan(machine, "deflection", poses=12, seed=7)
+    soft, sound = simulate(machine, plan, terms, seed=5), simulate(machine, plan, [], seed=5)
+    one = np.where(np.arange(6) == axis, 1.0, np.nan)
+    assert found("ur10", replace(soft, reading=soft.reading * one)) is None
+    f = found("ur10", gauges(2.0)(replace(sound, reading=sound.reading * one)))
+    assert f is not None and "a lever at the gauge" in f[0].check
+
+
 @pytest.mark.parametrize("case", ["sign of y", "swap", "direction", "sign of a force", "one row down"])
 def test_undoing_gives_the_readings_back(case: str) -> None:
     e = readings("orthoglide-revised")

@@ -76,6 +76,16 @@ def test_a_part_that_would_have_to_be_larger_than_it_can_is_none() -> None:
     assert gain(bounded, of=0.5 * DATA) == pytest.approx(4.0)
 
 
+def test_the_best_two_parts_leave_what_neither_explains() -> None:
+    """Of (3, 4, 2): the first two axes leave 4; where the second may not be large enough, the first and the third leave 16."""
+    of, parts = DATA + 2 * E[2], [variant(str(k), E[k]) for k in range(3)]
+    assert Screen.of(problem_of(DATA), parts).left_by_two(of) == pytest.approx(4.0)
+    short = tuple(replace(p, lower=-3.5e-4, upper=3.5e-4) for p in parts[1].candidate.linear)
+    parts[1] = replace(parts[1], candidate=replace(parts[1].candidate, parameters=short))
+    assert Screen.of(problem_of(DATA), parts).left_by_two(of) == pytest.approx(16.0)
+    assert Screen.of(problem_of(DATA), []).left_by_two(of) == pytest.approx(29.0)
+
+
 def test_what_a_measurement_does_is_no_part_of_the_machine() -> None:
     kind = next(k for k in effects.kinds() if effects.get(k).measurement)
     v = variant("one", E[0])

@@ -124,6 +124,25 @@ def test_what_is_far_off_in_rows_that_the_search_did_not_have_is_weighed_down() 
     assert rows[np.argmin(weights)] == 5 and weights.min() < 1e-3 < 0.2 < np.sort(weights)[1]
 
 
+@pytest.mark.parametrize("far", [2, 12])
+def test_what_is_far_off_in_many_rows_is_weighed_no_further(far: int) -> None:
+    """Of 40 rows, next to one that the search weighed: two are outliers, twelve are what the machine does not explain."""
+    machine = sm.load_machine("orthoglide-revised")
+    p = Predictor(machine, random_plan(machine, "position", poses=40, repeats=1, seed=1))
+    rng = np.random.default_rng(0)
+    more = rng.normal(size=(40, 6))
+    more[:far] = 12.0 * np.sign(more[:far])
+    p = Predictor(machine, p.experiment.with_readings(p() + np.nan_to_num(p.experiment.sigma) * more))
+    e = p.experiment
+    rows, channel = np.nonzero(e.read)
+    n = len(rows)
+    weights = np.where(rows == 39, 0.9, 1.0)
+    rest, s = Covariance(1.0 / weights, np.zeros((n, 0))), sensitivity(p, [])
+    found = corrected(Readings(p, e.sigma, rows, channel, 1.0, weights, rest, s, np.zeros(0)), ())
+    aside = found.given.weights < machines.SET_ASIDE
+    assert aside.sum() == (6 if far == 2 else 0) and (aside == (rows < far)).all() == (far == 2)
+
+
 def test_a_promise_goes_from_the_model_to_what_the_poses_show() -> None:
     few, many = (machines.borne_out((1.0, 0.2), 2.0, n) for n in (0, 100_000))
     assert few[0] == 1.0 and many[0] == pytest.approx(2.0, rel=1e-3)

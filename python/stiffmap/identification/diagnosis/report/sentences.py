@@ -207,7 +207,7 @@ def next_step(d: Any) -> str:
         return "Inspect all of these places: no reading that this machine can show distinguishes them with a sensible effort."
     if all(registry.get(e.kind).measurement for e in d.effects) and d.effects:
         return "Check the instrument and how the load was applied, correct the readings and diagnose again: this is no fault of the machine."
-    if d.which == "calibrated":
+    if d.effects and d.which == "calibrated":
         return "Inspect this place. machine.yaml has the machine's numbers adjusted in its stead: it predicts unseen readings better."
     if d.which == "declared":
         return "Inspect this place, and read more poses: no corrected machine predicts unseen readings better than the declared one yet."

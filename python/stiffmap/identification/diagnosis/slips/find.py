@@ -1,7 +1,7 @@
 """Which mistake of writing or mounting explains readings better than any part of the machine does.
 
-A mistake is named only where it takes away all but `LEFT` of the squared misfit and no single part of the machine
-comes near that; what a part of the machine may show as well (a factor of two) only where none does.
+A mistake is named only where it takes away all but `LEFT` of the squared misfit, alone or with one part of the machine; what
+parts of the machine may show as well (a factor of two) only where no single part comes near that and no two do better.
 """
 
 from __future__ import annotations
@@ -32,6 +32,8 @@ MISFIT, FEWEST = 2.0, 6
 """Misfit per reading, in noise variances, below which nothing is looked for; readings that must be there."""
 BETTER = 0.5
 """Share of what the best part of the machine leaves that a mistake may leave."""
+PAIRED = 24
+"""Parts of the machine, those that take most alone, with which each other one is tried; effort only."""
 SAME = 0.1
 """Relative difference of what two mistakes leave below which the readings do not distinguish them."""
 KEPT = 2.0
@@ -66,21 +68,41 @@ class Screen:
 
     def gain(self, residual: Floats) -> float:
         """What the best part takes from chi-square of a residual (N,), its strengths within their bounds."""
-        along = [(s.sign, s.directions.T @ residual) for s in self.shapes]
-        gains = np.array([a @ a if not sign or sign * a[0] > 0.0 else 0.0 for sign, a in along])
-        best = (k for k in np.argsort(-gains) if self._is_possible(self.shapes[k].variant, residual))
+        gains = self._gains(residual)
+        best = (k for k in np.argsort(-gains) if np.isfinite(self._left_by(residual, k)))
         return float(gains[k]) if (k := next(best, None)) is not None else 0.0
 
     def left(self, residual: Floats) -> float:
         """Chi-square that the best part leaves of a residual (N,)."""
         return float(residual @ residual) - self.gain(residual)
 
-    def _is_possible(self, v: Variant, residual: Floats) -> bool:
-        """Whether the strengths that explain most are within the bounds of their parameters."""
-        if v.start is not None:
-            return True
-        strengths = np.linalg.lstsq(_white(self.problem, v), residual, rcond=1e-5)[0]
-        return all(p.lower <= x <= p.upper for p, x in v.candidate.strengths(np.asarray(strengths)))
+    def left_by_two(self, residual: Floats) -> float:
+        """Chi-square that the best two parts together leave of a residual (N,)."""
+        parts = np.argsort(-self._gains(residual))
+        pairs = ((a, b) for k, a in enumerate(parts[:PAIRED]) for b in parts[k + 1 :])
+        return min([self.left(residual), *(self._left_by(residual, *two) for two in pairs)])
+
+    def _gains(self, residual: Floats) -> Floats:
+        """What each part takes from chi-square, whatever its bounds."""
+        along = [(s.sign, s.directions.T @ residual) for s in self.shapes]
+        return np.array([a @ a if not sign or sign * a[0] > 0.0 else 0.0 for sign, a in along])
+
+    def _left_by(self, residual: Floats, *parts: int) -> float:
+        """Chi-square that parts leave together; infinite where a strength that explains most is not within its bounds."""
+        white = np.hstack([self._white[k] for k in parts])
+        strengths = np.linalg.lstsq(white, residual, rcond=1e-5)[0]
+        left = float(np.sum((residual - white @ strengths) ** 2))
+        for v in (self.shapes[k].variant for k in parts):
+            own, strengths = np.split(strengths, [len(v.sign)])
+            known = v.candidate.strengths(own) if v.start is None else ()
+            if not all(p.lower <= x <= p.upper for p, x in known):
+                return np.inf
+        return left
+
+    @cached_property
+    def _white(self) -> list[Floats]:
+        """(N, p) columns of each part."""
+        return [_white(self.problem, s.variant) for s in self.shapes]
 
 
 def _white(problem: LinearProblem, v: Variant) -> Floats:
@@ -135,7 +157,8 @@ def find_slip(predictor: Predictor, plan: CandidatePlan) -> tuple[Slip, Experime
     # shifted rows look like noise where they are repeats: of that the noise of the readings holds too much
     noise = float(np.nanmedian((sigma / s.sigma) ** 2))
     possible = h.physical or h.kind != "factor"
-    if possible and first.with_part > BETTER * best_part(s, noise * problem.freedom) - slack:
+    one, two = best_parts(s, noise * problem.freedom)
+    if possible and first.with_part > min(BETTER * one - slack, two + slack):
         return None
     also = (j.hypothesis.check for j in others if j.hypothesis.changes <= h.changes)
     same = tuple(dict.fromkeys(check for check in also if check != h.check))[:3]
@@ -207,10 +230,12 @@ def _left(h: Hypothesis, problem: LinearProblem) -> float:
     return _excess(values[0], values[1], own.freedom)
 
 
-def best_part(s: SlipReadings, freedom: float) -> float:
-    """Share of the misfit beyond noise that the best single part of the machine leaves."""
+def best_parts(s: SlipReadings, freedom: float) -> tuple[float, float]:
+    """Shares of the misfit beyond noise that the best single part of the machine and the best two leave."""
     residual = s.problem.residual(s.base)
-    return _excess(s.screen.left(residual), float(residual @ residual), freedom)
+    of = float(residual @ residual)
+    one, two = (_excess(x, of, freedom) for x in (s.screen.left(residual), s.screen.left_by_two(residual)))
+    return one, two
 
 
 def _evidence(before: Experiment, after: Experiment) -> tuple[str, ...]:
