@@ -134,15 +134,14 @@ def _models(
     """The machines that may be handed over besides the declared one, by name, the corrected one last; what was found, and the verdict,
     less effects that are nothing at the optimum; and what must be said."""
     out: dict[str, Corrected] = {}
-    search, v = found.search, judged(found.columns, found.search)
-    plain = search.calibrated
+    v, plain = judged(found.columns, found.search), found.search.calibrated
     if v.named and plain is not None:
         plain = with_travel(plain, anew=True)  # as a calibration has it
         own = readings(predictor, found.uncertain, found.columns, plain, found.noise.sigma, found.suspects)
         if len(own.spread):
             out[CALIBRATED] = corrected(own, ())
     while True:
-        given = _given(predictor, found, v, search.best.fit)
+        given = _given(predictor, found, v, found.search.best.fit)
         if not v.named and not len(given.spread):
             break
         chosen = [n.chosen for n in v.named]
@@ -152,22 +151,17 @@ def _models(
         except StiffmapError as problem:
             if not chosen:
                 return out, found, v, [f"the numbers have no corrected machine: {problem}"]
-            shown = [np.linalg.norm(np.nan_to_num(_change(predictor, c))) for c in chosen]
-            k, why, impossible = (
-                int(np.argmin(shown)),
-                str(problem),
-                True,
-            )  # none of what the machine cannot have
+            # of effects that no machine has together, that which shows least
+            k = int(np.argmin([np.linalg.norm(np.nan_to_num(_change(predictor, c))) for c in chosen]))
+            why, heirs = str(problem), v.named[k].equivalents[:1]
         else:
             if best.refused is None:
                 out[CORRECTED] = best
                 break
-            (k, why), impossible = best.refused, False
-        gone = v.named[k]
-        heir = impossible or best.terms[k].undetermined.any()
-        search = search.less(gone.chosen, *(gone.equivalents[:1] if heir else ()))
-        found = replace(found, search=search)
-        v = judged(found.columns, search, (*v.gone, (gone.chosen, why)))
+            k, why = best.refused
+            heirs = v.named[k].equivalents[: int(best.terms[k].undetermined.any())]
+        found = replace(found, search=found.search.less(chosen[k], *heirs))
+        v = judged(found.columns, found.search, (*v.gone, (chosen[k], why)))
     return out, found, v, []
 
 

@@ -69,9 +69,8 @@ class Search:
     def less(self, gone: Chosen, *heir: Place) -> Search:
         """Without one of its effects, all else fitted anew; `heir`: the first of its equivalents, which takes its place."""
         number = {c.part.name: i for i, c in enumerate(self.best.chosen)}
-        if (
-            self.world is None or gone.part.name not in number
-        ):  # a number out of tolerance by the name of an effect
+        # a number out of tolerance may have the name of an effect
+        if self.world is None or gone.part.name not in number:
             return self
         k = number[gone.part.name]
         best = self.world.without(self.best, gone, heir)

@@ -154,9 +154,8 @@ def covariance(jacobian: Floats) -> tuple[Floats, int]:
 
 def _directions(jacobian: Floats) -> tuple[Floats, Floats, Floats]:
     """(r,) singular values of columns (N, k), and (r, k) their directions, as far as determined; (k - r, k) the other directions."""
-    triangle = np.asarray(
-        np.linalg.qr(jacobian, mode="r")
-    )  # of as many rows as columns, quicker than all of them
+    # of as many rows as columns, quicker than all of them
+    triangle = np.asarray(np.linalg.qr(jacobian, mode="r"))
     _, size, v = np.linalg.svd(triangle, full_matrices=len(triangle) < triangle.shape[1])
     size = np.append(size, np.zeros(len(v) - len(size)))
     told = size > max(RANK * size.max(initial=0.0), LEAST)
