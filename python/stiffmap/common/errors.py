@@ -83,15 +83,18 @@ def needed(what: str, extra: str, otherwise: str = "") -> Iterator[None]:
 
 
 ROBOT_PROGRAMS = {".ls": "Fanuc", ".mod": "RAPID", ".src": "KRL", ".script": "URScript"}
-
-NO_PROGRAM = "a machine file or URDF of the robot, G-code or APT of the part, or a table of the poses"
+"""Languages of robots by the ending of their files."""
 
 
 @contextmanager
 def reading(path: object) -> Iterator[None]:
     """FileError where the system refuses to read a file, and for a robot's program."""
     if language := ROBOT_PROGRAMS.get(Path(str(path)).suffix.lower()):
-        raise FileError(f"a robot's program ({language}) is not read; expected {NO_PROGRAM}", file=str(path))
+        raise FileError(
+            f"a robot's program ({language}) is not read; "
+            "expected a machine file or URDF of the robot, G-code or APT of the part, or a table of the poses",
+            file=str(path),
+        )
     try:
         yield
     except OSError as error:

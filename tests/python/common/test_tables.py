@@ -293,6 +293,7 @@ def test_row_names_in_quotes_need_no_header(between: str, rows: tuple[str, str],
     found = read_sheet(tmp_path / "r.txt")
     assert found.header == ("row", "x", "fx")
     assert found.numbers(2).tolist() == [100.5, 200.5]
+    assert tuple(found.columns[0]) == rows
 
 
 TIMES = "{0},fx [N],{1},dx [um]\n0,100,0,40\n1,200,{2},80\n2,300,{3},90\n"

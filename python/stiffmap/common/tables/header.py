@@ -66,12 +66,9 @@ def header_of(
     if len(lines) > 1 and (marks := [c for c in lines[-2][1] if c]) and all(map(DIRECTIONS.fullmatch, marks)):
         each = zip_longest(names, lines.pop(-2)[1], fillvalue="")
         names = [" ".join(filter(None, pair)) for pair in each]
-    several = len({re.sub("[xyzXYZ]$", "", split_unit(n)[0]) for n in names if n}) > 1
     if len(lines) > 1 and not repeated and _needs_group(names, lines[-2][1], first):
         names = _grouped(lines[-2][1], names, known)
-    elif len(lines) > 1 and not (
-        several and sum(map(bool, lines[-2][1])) == 1 and OF_SOME.search("".join(lines[-2][1]))
-    ):  # Position [mm] over x y z
+    elif len(lines) > 1 and not _is_of_some(lines[-2][1], names):  # Position [mm] over x y z
         names = [_with_own_unit(n, _of_group(g)[1]) if n else n for n, g in _under(lines[-2][1], names)]
     for _, group in reversed([] if repeated else lines[:-2]):
         if len({*names}) < len(names) and _needs_group(names, group, first):
@@ -275,6 +272,13 @@ def _under(group: Sequence[str], names: Sequence[str]) -> Iterator[tuple[str, st
     for above, name in zip_longest(group, names, fillvalue=""):
         current = above or (current if name else "")
         yield name, current
+
+
+def _is_of_some(title: Sequence[str], names: Sequence[str]) -> bool:
+    """Whether a title names one quantity above columns of several, none of which it says more of than of the others."""
+    (first, *more) = [c for c in title if c] or [""]
+    columns = {re.sub("[xyzXYZ]$", "", split_unit(n)[0]) for n in names if n}
+    return not more and len(columns) > 1 and OF_SOME.search(first) is not None
 
 
 def split_unit(header: str) -> tuple[str, str]:

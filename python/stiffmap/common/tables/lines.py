@@ -26,6 +26,8 @@ COMMENTS = ("#", "%", "//")
 SEPARATORS = ";\t|,& "
 BLANKS = re.compile(r"[ \t]+(?![\[(])")
 """Between cells, but not before a unit in brackets."""
+HARD = "\u00a0"
+"""A blank at which no line is cut."""
 QUOTED_WORD = re.compile(r'(?<!\S)"([^"]*)"(?!\S)')
 """A cell between blanks that may have blanks of its own."""
 MARKED = re.compile(r"^(#|%|//)\s+")
@@ -327,5 +329,7 @@ def _numbers_between(separator: str, lines: Sequence[str]) -> tuple[int, int, in
 def _cut(line: str) -> list[str]:
     if len(line) > csv.field_size_limit():
         raise csv.Error("field larger than field limit")
-    whole = QUOTED_WORD.sub(lambda m: (m[1] or "NA").replace(" ", "\u00a0"), line) if '"' in line else line
-    return BLANKS.split(MARKED.sub(r"\1", whole.strip()))
+    if '"' not in line:
+        return BLANKS.split(MARKED.sub(r"\1", line.strip()))
+    whole = QUOTED_WORD.sub(lambda m: (m[1] or "NA").replace(" ", HARD), line)
+    return [c.replace(HARD, " ") for c in BLANKS.split(MARKED.sub(r"\1", whole.strip()))]

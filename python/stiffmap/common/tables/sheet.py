@@ -143,19 +143,23 @@ def read_sheet(path: Path, sheet: str | None = None, layout: Layout = PLAIN) -> 
     for i in range(width):
         names[i], columns[i] = _united(names[i], columns[i], file, lines_)
     top = tuple(said[len(header) :])
-    found_ = (file, tuple(names), tuple(columns), lines_, number_, comma, record_of(above), top, tuple(aside))
-    return _with_one_time(Table(*found_))
+    record = record_of(above)
+    found_ = Table(file, tuple(names), tuple(columns), lines_, number_, comma, record, top, tuple(aside))
+    _refuse_many_times(found_)
+    return found_
 
 
-def _with_one_time(table: Table) -> Table:
-    """The table; FileError where a scope wrote a time before each channel, and they differ."""
+def _refuse_many_times(table: Table) -> None:
+    """FileError where a scope wrote a time before each channel, and they differ."""
     every = range(0, len(table.names), 2)
-    named = [i for i in every if table.unit(i) in (*TIMES, *SHORT_TIMES) or TIMED.fullmatch(table.names[i])]
-    times = [table.numbers(i) for i in named if table.is_numeric(i)]
-    if len(times) == len(every) > 1 and all((np.diff(t) > 0).all() for t in times):
+    units = (*TIMES, *SHORT_TIMES)
+    named = all(table.unit(i) in units or TIMED.fullmatch(table.names[i]) for i in every)
+    if len(every) < 2 or not named or not all(map(table.is_numeric, every)):
+        return
+    times = [table.numbers(i) for i in every]
+    if all((np.diff(t) > 0).all() for t in times):
         what = f"'{table.names[0]}' stands again, with other numbers, before each column; {ONE_TIME}"
         table.check(np.ptp(times, axis=0) == 0, lambda row: what)
-    return table
 
 
 def _turned(lines: Iterable[Line], spelling: Spelling, layout: Layout) -> list[Line]:

@@ -66,6 +66,8 @@ def answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, cross
         v = replace(v, rest=v.rest or v.gone[-1][0].part.name)  # those that stand do not stand for it
     each, gap = shares(columns, fit), gap_of(columns, fit)
     effects = _effects(v, best, each, fit)
+    # where nothing is named, the numbers alone are corrected
+    which = CALIBRATED if made.which == CORRECTED and not effects else made.which
     others = list(_alternatives(found, v, best, clock)) if best and effects else []
     several = bool(others or clock.left_out or any(n.numbers or n.equivalents[RIVALS:] for n in v.named))
     noise = _noise(found, made, best, v.noise)
@@ -97,7 +99,7 @@ def answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, cross
             *([] if late is None else [str(late)]),
         ],
         shares=each,
-        machine=vouched(predictor, made, _said(made, effects, e), columns),
+        machine=vouched(predictor, made, _said(which, effects, e), columns),
         declared=predictor.machine,
         experiment=e,
         residual_before=made.left[0],
@@ -106,7 +108,7 @@ def answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, cross
         gap=gap,
         calibration=numbers,
         refused=[f"{c.place.candidate}: {why}" for c, why in (*v.refused, *v.gone)],
-        which=CALIBRATED if made.which == CORRECTED and not effects else made.which,
+        which=which,
         stopped=clock.stopped or bool(clock.left_out),
         not_tried=list(clock.left_out),
         seed=seed,
@@ -295,9 +297,9 @@ def _unobservable(found: Inferred) -> list[str]:
     return [str(c) for k, c in all_.items() if k not in seen] + failed
 
 
-def _said(made: Written, effects: Sequence[Effect], e: Experiment) -> str:
+def _said(which: str, effects: Sequence[Effect], e: Experiment) -> str:
     """What the file of the machine says that it has."""
-    if made.which == CORRECTED and effects:
+    if which == CORRECTED:
         names = "; ".join(f"{x.kind} of {x.element} {' '.join(x.legs)}".strip() for x in effects)
         return f"Effects added by a diagnosis: {names}, from experiment {e.name}."
     return f"Numbers calibrated by experiment {e.name}."

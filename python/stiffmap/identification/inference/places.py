@@ -120,9 +120,8 @@ def possible(p: Parameter) -> tuple[float, float]:
     if p.plausible:
         return p.plausible
     null = float(p.null or 0.0)
-    most = (
-        np.inf if p.lower == null else LARGEST_ERROR.get(p.unit, np.inf)
-    )  # a width or an amplitude is no error
+    # a width or an amplitude is no error
+    most = np.inf if p.lower == null else LARGEST_ERROR.get(p.unit, np.inf)
     return max(p.lower, null - most), min(p.upper, null + most)
 
 

@@ -175,13 +175,14 @@ class World:
         chosen = tuple(replace(c, values=np.zeros(0), refined=()) for c in chosen)
         parts = (*self.numbers, *self.gaps, *(c.part for c in chosen))
         fit = fitted(self.columns, parts, start, weights, lighter)
+        found: tuple[Fit, tuple[Chosen, ...]] | None = fit, chosen
         if any(c.by_posterior(fit).is_too_large for c in chosen):
-            return self.known.setdefault(key, Model(self.name, chosen, fit, -np.inf))
-        if self.predict and chosen:
+            found = None
+        elif self.predict and chosen:
             found = self._corrected(fit, chosen)
-            if found is None:
-                return self.known.setdefault(key, Model(self.name, chosen, fit, -np.inf))
-            fit, chosen = found
+        if found is None:
+            return self.known.setdefault(key, Model(self.name, chosen, fit, -np.inf))
+        fit, chosen = found
         chosen = tuple(c if len(c.values) else c.by_posterior(fit) for c in chosen)
         shapes = 0.0
         for c in chosen:

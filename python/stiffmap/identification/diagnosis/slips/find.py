@@ -56,15 +56,17 @@ class JudgedSlip(NamedTuple):
 class Screen:
     """The directions of all parts of the machine in whitened readings (N,)."""
 
-    problem: LinearProblem
     shapes: tuple[Shape, ...]
+    white: tuple[Floats, ...]
+    """(N, p) columns of each."""
 
     @staticmethod
     def of(problem: LinearProblem, variants: Sequence[Variant]) -> Screen:
-        """Of variants that are no fault of the measurement."""
+        """Of variants that are no fault of the measurement; the readings of the problem are the first of their own."""
         parts = [v for v in variants if not get(v.candidate.kind).measurement]
-        found = (shape_of(v, _white(problem, v)) for v in parts)
-        return Screen(problem, tuple(s for s in found if s is not None))
+        white = [problem.white_lines(v.lines(np.arange(len(problem.used)))) for v in parts]
+        found = [(s, w) for v, w in zip(parts, white, strict=True) if (s := shape_of(v, w)) is not None]
+        return Screen(tuple(s for s, _ in found), tuple(w for _, w in found))
 
     def gain(self, residual: Floats) -> float:
         """What the best part takes from chi-square of a residual (N,), its strengths within their bounds."""
@@ -89,7 +91,7 @@ class Screen:
 
     def _left_by(self, residual: Floats, *parts: int) -> float:
         """Chi-square that parts leave together; infinite where a strength that explains most is not within its bounds."""
-        white = np.hstack([self._white[k] for k in parts])
+        white = np.hstack([self.white[k] for k in parts])
         strengths = np.linalg.lstsq(white, residual, rcond=1e-5)[0]
         left = float(np.sum((residual - white @ strengths) ** 2))
         for v in (self.shapes[k].variant for k in parts):
@@ -98,16 +100,6 @@ class Screen:
             if not all(p.lower <= x <= p.upper for p, x in known):
                 return np.inf
         return left
-
-    @cached_property
-    def _white(self) -> list[Floats]:
-        """(N, p) columns of each part."""
-        return [_white(self.problem, s.variant) for s in self.shapes]
-
-
-def _white(problem: LinearProblem, v: Variant) -> Floats:
-    """(N, p) columns of a variant at the readings of a problem, which are the first of its own."""
-    return problem.white_lines(v.lines(np.arange(len(problem.used))))
 
 
 class SlipReadings:
