@@ -15,7 +15,7 @@ from stiffmap.experiment.channels import AXIS_CHANNELS
 from stiffmap.identification.candidates.candidates import Candidate
 from stiffmap.identification.inference import machines
 from stiffmap.identification.inference.chosen import Term
-from stiffmap.identification.inference.corrected import Corrected, corrected, without
+from stiffmap.identification.inference.corrected import Corrected, along_travel, corrected, without
 from stiffmap.identification.inference.kernels import Covariance
 from stiffmap.identification.inference.readings import Readings
 from stiffmap.identification.numbers import unknowns
@@ -203,8 +203,8 @@ def test_an_effect_has_a_name_by_what_is_determined(
     assert (refused is None) if why is None else (refused is not None and why in refused[1])
 
 
-def test_a_fold_is_the_fit_of_its_own_readings() -> None:
-    """With the slopes of the whole; a strong effect, and half of the rows, so that the fold lies clearly apart from the whole."""
+def offset_tool() -> tuple[Corrected, Term]:
+    """An arm fitted to readings of a tool far from where it is declared, and the effect before the fit."""
     machine = sm.load_machine("ur10")
     p = Predictor(machine, random_plan(machine, "position", poses=16, seed=1))
     kind = registry.get("tcp_offset")
@@ -219,11 +219,24 @@ def test_a_fold_is_the_fit_of_its_own_readings() -> None:
     n = len(rows)
     rest = Covariance(np.ones(n), np.zeros((n, 0)))
     whole = corrected(Readings(p, e.sigma, rows, channel, 1.0, np.ones(n), rest, s, np.zeros(0)), (term,))
-    keep = np.arange(len(e)) % 2 == 0
+    return whole, term
+
+
+def test_a_fold_is_the_fit_of_its_own_readings() -> None:
+    """With the slopes of the whole; a strong effect, and half of the rows, so that the fold lies clearly apart from the whole."""
+    whole, term = offset_tool()
+    keep = np.arange(len(whole.prediction)) % 2 == 0
     fold, own = without(whole, keep), corrected(whole.given.only(keep), (term,))
     sd = own.terms[0].sd
     np.testing.assert_allclose(fold.terms[0].values, own.terms[0].values, atol=1e-2 * sd.min())
     assert np.abs(fold.terms[0].values - whole.terms[0].values).max() > 0.1 * sd.min()
+
+
+def test_effects_keep_their_values_where_drives_may_err_along_their_travel() -> None:
+    whole, _ = offset_tool()
+    more = along_travel(whole, whole.given)
+    assert more.terms == whole.terms and more.slopes is whole.slopes
+    np.testing.assert_allclose(more.prediction, whole.prediction, atol=1e-12)
 
 
 @pytest.mark.parametrize(
