@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.special import chdtrc
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.comparison.limitations import limitations
@@ -35,6 +34,7 @@ from stiffmap.identification.inference.machines import (
     CALIBRATED,
     CORRECTED,
     Written,
+    lack_of_fit,
     stands_out,
     vouched,
     written,
@@ -45,6 +45,7 @@ from stiffmap.identification.inference.readings import Readings, readings
 from stiffmap.identification.inference.shares import gap_of, shares, tolerance_word, too_wide
 from stiffmap.identification.inference.verdict import NOISIER, Named, Verdict, judged, not_as_stated
 
+UNFITTED = "more than noise stays at the best fit"
 RIVALS = 3
 """Places in an effect's stead that are fitted; all are named."""
 
@@ -62,15 +63,15 @@ def answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, cross
     clock.say("readings that no fit saw")
     made = written(models, base, predictor, sigma, listed, seed, lambda: clock.over or not cross_validate)
     held, late = made.held_out, made.over_time
-    if v.gone and made.lacks(v.noise):
-        v = replace(v, rest=v.rest or v.gone[-1][0].part.name)  # those that stand do not stand for it
+    noise = _noise(found, made, best, v.noise)
     each, gap = shares(columns, fit), gap_of(columns, fit)
+    if not (v.rest or v.time) and noise.lack_of_fit_after < RARE:
+        v, gap = replace(v, rest=v.gone[-1][0].part.name if v.gone else UNFITTED), made.left[1]
     effects = _effects(v, best, each, fit)
     # where nothing is named, the numbers alone are corrected
     which = CALIBRATED if made.which == CORRECTED and not effects else made.which
     others = list(_alternatives(found, v, best, clock)) if best and effects else []
     several = bool(others or clock.left_out or any(n.numbers or n.equivalents[RIVALS:] for n in v.named))
-    noise = _noise(found, made, best, v.noise)
     rest, numbers = _rest(columns, fit, v, each, gap), _numbers(found, v, models.get(CORRECTED))
     cut_short = clock.stopped and noise.lack_of_fit_before < RARE
     return Diagnosis(
@@ -217,18 +218,17 @@ def _noise(found: Inferred, made: Written, best: Corrected | None, scale: float)
     n, e = found.noise, found.columns.experiment
     frames = nuisance_columns(e, found.plan.base).shape[-1]
     values = 0 if best is None else sum(len(t.values) for t in best.terms)
-
-    def lack(left: Floats, values: int) -> float:
-        z = (left / n.sigma)[~made.listed]
-        z = z[np.isfinite(z)]
-        return float(chdtrc(max(1, len(z) - frames - values), float(z @ z)))
+    heavy = bool(np.any(found.search.best.fit.weights != 1.0))
 
     floor, repeats, declared, consistency = (
         {c.name: float(v) for c, v, read in zip(e.channels, each, e.axis_read, strict=True) if read}
         for each in (n.floor, n.repeats, n.declared, n.consistency)
     )
-    lacks = lack(made.left[0], 0), lack(made.left[1], values)
-    return NoiseReport(floor, repeats, declared, consistency, *lacks, n.rms, scale)
+    before, after = (
+        lack_of_fit((left / (scale * n.sigma))[~made.listed], heavy, frames + k, len(found.columns))
+        for left, k in zip(made.left, (0, values), strict=True)
+    )
+    return NoiseReport(floor, repeats, declared, consistency, before, after, n.rms, scale)
 
 
 def _rest(columns: Columns, fit: Fit, v: Verdict, each: dict[str, float], gap: Floats) -> list[Rest]:
@@ -248,6 +248,9 @@ def _rest(columns: Columns, fit: Fit, v: Verdict, each: dict[str, float], gap: F
     in_noise = gap / noise
     if not in_noise.any():
         return [Rest(what, share)]
+    share = share or min(
+        1.0, float(np.sum(in_noise**2) / np.sum(columns.residual**2))
+    )  # of what stays at the fit
     pose = e.groups
     number = int(pose.max()) + 1
     count = np.maximum(np.bincount(pose, minlength=number), 1)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
-from scipy.special import chdtrc
+from scipy.special import fdtrc
 
 from stiffmap.experiment.channels import metres
 from stiffmap.experiment.comparison.residual import Summary, summary
@@ -18,7 +18,7 @@ from stiffmap.experiment.noise.whitening import LinearProblem, folds, left_unsee
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.identification.inference.amplitudes import Fit
 from stiffmap.identification.inference.columns import MOST_READINGS, Columns, drawn
-from stiffmap.identification.inference.constants import DEGREES, RARE, STANDS_OUT
+from stiffmap.identification.inference.constants import DEGREES, STANDS_OUT
 from stiffmap.identification.inference.corrected import Corrected, columns_of, machine_of, without
 from stiffmap.identification.validity import covered
 from stiffmap.solve.machine import Machine
@@ -65,11 +65,6 @@ class Written:
     """The same in numbers, rows that stand alone left out."""
     over_time: OverTime | None
     """What this machine leaves over time; None where no times were recorded."""
-
-    def lacks(self, noise: float) -> bool:
-        """Whether this machine leaves more than noise, in what is stated, does once in a thousand times."""
-        left = self.sizes[1]
-        return float(chdtrc(left.n, left.n * (left.ratio / noise) ** 2)) < RARE
 
 
 def written(
@@ -205,6 +200,16 @@ def promised(found: Corrected) -> tuple[float, float]:
         count += int(test.sum())
     size = float(np.sqrt(max(total, 0.0) / count)) if count else float("nan")
     return size, size / float(np.sqrt(2.0 * number))
+
+
+def lack_of_fit(left: Floats, heavy: bool, fitted: int, known_by: int) -> float:
+    """p-value (F) of what a machine leaves of the readings, in noise that is independent and of a size known by so many readings.
+    `heavy`: of heavy tails, of which the bounded squares have the mean of one as well; `fitted`: how many numbers were."""
+    square = left[np.isfinite(left)] ** 2
+    if heavy:
+        square *= (DEGREES + 1.0) / (DEGREES + square)
+    free = max(1, len(square) - fitted)
+    return float(fdtrc(free, max(1, known_by), square.sum() / free))
 
 
 def vouched(predictor: Predictor, made: Written, said: str, columns: Columns) -> Machine:

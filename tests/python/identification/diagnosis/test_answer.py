@@ -20,6 +20,7 @@ from stiffmap.identification.diagnosis.report.sentences import next_step, openin
 from stiffmap.identification.diagnosis.report.separation import Separation
 from stiffmap.identification.inference.chosen import Chosen, Term
 from stiffmap.identification.inference.kernels import WANDER
+from stiffmap.identification.inference.machines import written
 from stiffmap.identification.inference.names import terms
 from stiffmap.identification.inference.places import Place
 from stiffmap.identification.inference.verdict import NOISIER
@@ -156,3 +157,19 @@ def test_an_effect_without_a_corrected_machine_is_refused_and_its_readings_are_n
     found = sm.diagnose("orthoglide-revised", DATA / "A-servo", seed=0, cross_validate=False)
     assert "compliance" not in [e.kind for e in found.effects] and found.verdict != "none"
     assert any(r.endswith("no equilibrium") for r in found.refused)
+
+
+def test_more_than_noise_that_stays_at_the_best_fit_is_no_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever the search made of its columns, it is what the machine that is handed over leaves that is judged."""
+    good = sm.diagnose("orthoglide-revised", DATA / "B-none", seed=0, cross_validate=False)
+    assert good.verdict == "none" and good.noise.lack_of_fit_after > 1e-3
+
+    def worse(*given: Any) -> Any:
+        made = written(*given)
+        return replace(made, left=(made.left[0], 1.5 * made.left[1]))
+
+    monkeypatch.setattr(answer, "written", worse)
+    bad = sm.diagnose("orthoglide-revised", DATA / "B-none", seed=0, cross_validate=False)
+    assert bad.verdict == "unattributed" and bad.noise.lack_of_fit_after < 1e-3
+    assert bad.unexplained[0].what == answer.UNFITTED and 0.0 < bad.unexplained[0].share <= 1.0
+    assert not any("nothing unexplained" in line for line in bad.lines())

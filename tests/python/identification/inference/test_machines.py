@@ -15,6 +15,7 @@ from stiffmap.experiment.channels import AXIS_CHANNELS
 from stiffmap.identification.candidates.candidates import Candidate
 from stiffmap.identification.inference import machines
 from stiffmap.identification.inference.chosen import Term
+from stiffmap.identification.inference.constants import RARE
 from stiffmap.identification.inference.corrected import Corrected, along_travel, corrected, without
 from stiffmap.identification.inference.kernels import Covariance
 from stiffmap.identification.inference.readings import Readings
@@ -240,10 +241,15 @@ def test_effects_keep_their_values_where_drives_may_err_along_their_travel() -> 
 
 
 @pytest.mark.parametrize(
-    ("ratio", "noise", "lacks"), [(1.1, 1.0, False), (2.5, 1.0, True), (2.5, 2.4, False)]
+    ("heavy", "times", "lacks"), [(False, 1.0, False), (True, 1.0, False), (True, 2.5, True)]
 )
 def test_what_a_machine_leaves_is_compared_with_noise_as_it_is(
-    ratio: float, noise: float, lacks: bool
+    heavy: bool, times: float, lacks: bool
 ) -> None:
-    made: Any = SimpleNamespace(sizes=(None, SimpleNamespace(n=100, ratio=ratio)))
-    assert machines.Written.lacks(made, noise) is lacks
+    """Of heavy tails, a thousand readings have squares half as large again as their scale says, and are no lack of fit."""
+    rng = np.random.default_rng(4)
+    noise = rng.standard_t(machines.DEGREES, (500, 2)) if heavy else rng.normal(size=(500, 2))
+    noise[0, 0] = np.nan
+    p = machines.lack_of_fit(times * noise, heavy, 3, 1000)
+    assert (p < RARE) is lacks and (lacks or p < 0.999)
+    assert not heavy or machines.lack_of_fit(noise, False, 3, 1000) < RARE

@@ -92,7 +92,9 @@ class NoiseReport:
     consistency: dict[str, float]
     """p-value of repeats that differ so much from the stated noise."""
     lack_of_fit_before: float
+    """p-value of what the declared machine leaves, in the noise of `scale`, where that is independent."""
     lack_of_fit_after: float
+    """The same of the machine that is handed over."""
     rms: float
     scale: float = 1.0
     """Noise of the readings over `floor`, as the inference has it."""

@@ -35,6 +35,7 @@ from stiffmap.identification.diagnosis.report.sentences import (
 )
 from stiffmap.identification.diagnosis.report.separation import Separation
 from stiffmap.identification.diagnosis.slips.axes import Slip
+from stiffmap.identification.inference.constants import RARE
 from stiffmap.identification.inference.machines import HeldOut
 from stiffmap.identification.inference.shares import largest
 from stiffmap.model import effects
@@ -217,7 +218,8 @@ def _left(d: Diagnosis) -> str:
     if d.separations:
         return f"to separate: {separation_text(d.separations[0])}"
     out = f"{len(d.outliers)} outliers listed" if d.outliers else "no outliers"
-    return f"nothing unexplained: lack of fit p = {d.noise.lack_of_fit_after:.2g}; {out}"
+    chance = d.noise.lack_of_fit_after
+    return f"nothing unexplained{f': lack of fit p = {chance:.2g}' if chance > RARE else ''}; {out}"
 
 
 def _place(p: Rest) -> str:
