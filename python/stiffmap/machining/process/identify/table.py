@@ -111,9 +111,8 @@ SLOT_SIGNS = (-1.0, 1.0, 1.0)
 SAME = 2
 """Decimals of the logarithm of feeds per tooth that count as one feed, which is about 1 %."""
 
-LONGEST_STEP, PART, IDLE = 3.0, 32, 1 / 3
-"""Of a signal: the longest step in time, in usual ones; samples that show whether a tool cuts; and the share of the usual force that is
-no cut."""
+LONGEST_STEP, PART, IDLE = 3.0, 32, 0.1
+"""Of a signal: its longest step in time, in usual ones; samples that show a cut; squares of forces without one, in usual squares."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,19 +196,16 @@ def _whole_turns(c: NamedTable, here: NDArray[np.intp], force: Floats) -> Signal
             f"{time[-1] - time[0] + step:g} s", "time", here[0],
         )  # fmt: skip
     keep = min(len(time), round(turns * turn / step))
-    cut = Signals(time[:keep], force[here[:keep]])
-    parts = np.array_split(cut.force, max(1, min(turns, keep // PART)))
-    quiet = int(np.argmin([np.ptp(f, axis=0).sum() for f in parts]))
-    zero = parts[quiet].mean(axis=0)
-    size = [float(np.sqrt(np.mean((f - zero) ** 2))) for f in parts]
+    cut = force[here[:keep]]
+    parts = np.array_split(cut, max(1, min(turns, keep // PART)))
+    quiet = min(parts, key=lambda f: float(np.ptp(f, axis=0).sum())).mean(axis=0)
+    size = [np.mean((f - quiet) ** 2) for f in parts]
     if min(size) < IDLE * np.quantile(size, 0.9):
-        row = sum(map(len, parts[:quiet]))
-        c.fail(
-            f"expected the same cut in every revolution, found one that stays at Fx, Fy, Fz = "
-            f"{', '.join(f'{v:.3g}' for v in zero)} N and others that do not: leave out the rows without a cut, "
-            "and take their mean force off the others", "time", here[row],
-        )  # fmt: skip
-    return cut
+        at = ", ".join(f"{v:.3g}" for v in quiet)
+        what = f"one that stays at Fx, Fy, Fz = {at} N and others that do not"
+        way = "leave out the rows without a cut, and take their mean force off the others"
+        c.fail(f"expected the same cut in every revolution, found {what}: {way}", "time", here[0])
+    return Signals(time[:keep], cut)
 
 
 def _slot_signs(table: ForceTable) -> ForceTable:
