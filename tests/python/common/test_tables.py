@@ -90,6 +90,8 @@ def test_a_workbook_is_a_table_of_every_command(tmp_path: Path) -> None:
         ("x [kg],y [mm],z [mm]\n1,2,3\n1,2,4\n", r"line 1: x \[kg\]: expected a unit such as in x.*, found kg"),
         ("# one\n\nx [mm],y [mm],z [mm]\n1,2,3\n\n1,2\n", "line 6: expected 3 values, found 2"),
         ("x [mm],y [mm],z [mm]\n1,2,3\n1,2,3,4\n", "line 3: expected 3 values, found 4"),
+        *((f"x_mm y_mm z_mm\n{n} 10 20 30\n{m} 10 20 40\n".replace(" ", sep), "line 2: expected 3 values, found 4; where the first counts or names the rows, write row")
+          for n, m in (("1", "2"), ("p1", "p2")) for sep in "\t, "),
         ("x [mm],y [mm],z [mm]\n1,2,3\nsigned: A. Smith,,\n", "expected rows of numbers alone below the header; row 3 is a remark"),
         ("x [mm],y [mm],z [mm],w\n1,2,3,4\n1,2,4,4\n", "line 1: unknown column 'w'"),
         ("1,2,3\n1,2,4\n", r"no header line with rows of numbers below it was found; expected its names of columns, such as x.*, y"),

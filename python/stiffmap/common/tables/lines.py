@@ -76,6 +76,7 @@ NOTHING = {
     *["#####", "1.#qnan", "-1.#ind", "1.#ind"],
 }  # fmt: skip
 DASHES = re.compile(r"[-–—_.· ]+")
+UNNAMED = "; where the first counts or names the rows, write row ahead of the header"
 
 
 class Spelling(NamedTuple):
@@ -147,7 +148,9 @@ def _even(
         found = max(i for i, c in enumerate(cells, 1) if i == width or c.strip())
     unclear = NUMBER.fullmatch(more[0]) if more else separator == " "
     if separator and found != width and (unclear or not short):
-        raise FileError(f"expected {width} values, found {found}", file=file, line=n)
+        raise FileError(
+            f"expected {width} values, found {found}{UNNAMED * (found == width + 1)}", file=file, line=n
+        )
     if more:
         behind.append(f"row {n}, '{' '.join(more)[:40]}' behind the last column")
     return [*cells, *[""] * width][:width]

@@ -12,7 +12,7 @@ import math
 import re
 import unicodedata
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -55,7 +55,7 @@ WORDS = {
     "high": r"((q|theta|θ)[ _]?)?(high|max|upper)([ _]limit)?",
 }
 FIXED = re.compile(r"(?i)tool|tcp|(tool )?flange|flansch|werkzeug|eef?|end[ _-]?effector|gripper|greifer")
-"""Names of a row that is no joint."""
+"""Names of a row that is no joint; a last one is the fixed frame of the tool where the joints have coordinates."""
 MODIFIED = re.compile(
     r"(?i)modified[ -]?(dh|denavit)|(dh|denavit|convention)\W+modified\b|\b(mdh|craig|khalil)\b"
 )
@@ -91,6 +91,8 @@ class DHRow:
     alpha: float
     slides: bool
     range: tuple[float, float] | None
+    behind: Floats = field(default_factory=lambda: np.eye(4), compare=False)
+    """(4, 4) frame of the tool behind the last joint's own."""
 
 
 def read_dh(given: Table, units: Mapping[str, str], convention: str) -> list[DHRow]:
@@ -136,13 +138,20 @@ def read_dh(given: Table, units: Mapping[str, str], convention: str) -> list[DHR
     plain = [n for n in angles if not np.nan_to_num(sheet.numbers(at[n])).any()]  # zero in any unit
     units_of = {n: 1.0 if n in plain else m.unit(at[n], n, quantity=q).size for n, q in QUANTITIES.items()}
     numbers = {n: np.nan_to_num(_in_si(sheet, at[n], units_of[n], q)) for n, q in QUANTITIES.items()}
-    count = len(sheet.lines)
+    joints = count = len(sheet.lines)
     said = [*sheet.columns[at["name"]]] if "name" in at else [""] * count
     if "type" not in at:
         each = zip(types, said, strict=True)
         whole = [w != "" or not (any(types) or FIXED.fullmatch(n.strip())) for w, n in each]
-        why = "no joint's coordinate, which others have" if any(types) else "a name that no joint has"
-        sheet.check(whole, lambda _: f"{why}: leave a fixed frame out, or say R or P in a column 'type'")
+        while any(types) and not whole[joints - 1] and FIXED.fullmatch(said[joints - 1].strip()):
+            joints -= 1
+            whole[joints] = True
+        why = (
+            "no joint's coordinate, which others have: leave a fixed frame out"
+            if any(types)
+            else "a name that no joint has: write the joints' theta as q1, q2 - 90"
+        )
+        sheet.check(whole, lambda _: f"{why}, or say R or P in a column 'type'")
     slides = [re.fullmatch(SLIDES, w) is not None for w in types]
     for i, w in enumerate(types):
         if not slides[i] and not re.fullmatch(TURNS, w):
@@ -157,7 +166,8 @@ def read_dh(given: Table, units: Mapping[str, str], convention: str) -> list[DHR
         known = math.isfinite(low) and math.isfinite(high)
         theta, d, a, alpha = (float(numbers[n][i]) for n in NUMBERS)
         out.append(DHRow(names[i], theta, d, a, alpha, slides[i], (low, high) if known else None))
-    return out
+    tool = forward(out[joints:], convention == "standard", np.zeros(count - joints))
+    return [*out[: joints - 1], replace(out[joints - 1], behind=tool)]
 
 
 def _turning(sheet: Table, at: Mapping[str, int]) -> bool:
@@ -285,7 +295,7 @@ def arm(
         kind = "prismatic" if r.slides else "revolute"
         drive = None if r.range is None else Drive(range=r.range)
         elements.append(Joint(r.name, kind, ((0.0, 0.0, 1.0),), (float(q[i]),), actuated=True, drive=drive))
-        behind = own @ link if standard else own
+        behind = (own @ link if standard else own) @ r.behind
         if np.any(behind - np.eye(4)):
             elements.append(Offset(f"link_{i + 1}" if standard else f"{r.name}_end", _pose(behind)))
     at = forward(rows, standard, q)
@@ -303,7 +313,7 @@ def forward(rows: Sequence[DHRow], standard: bool, q: Floats) -> Floats:
     for r, v in zip(rows, q, strict=True):
         own = _screw("z", r.theta + (0.0 if r.slides else v), r.d + (v if r.slides else 0.0))
         link = _screw("x", r.alpha, r.a)
-        out = out @ (own @ link if standard else link @ own)
+        out = out @ (own @ link if standard else link @ own) @ r.behind
     return out
 
 

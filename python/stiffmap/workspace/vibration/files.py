@@ -146,16 +146,20 @@ def _in_form(t: NamedTable, form: tuple[str, str], frequency: Floats) -> Complex
         t.check(form[0], lambda _: values != 0, "a force by a motion above zero")
         values = 1 / values
     out = _receptance(frequency, values, kind)
-    if polar and np.isfinite(out).any():  # over a peak by 90 to 180 deg: 2 to 3 rad, or 57 times as much
+    if np.isfinite(out).any():  # over a peak by 90 to 180 deg: 2 to 3 rad, or 57 times as much
         top = np.nanargmax(np.abs(out))
         low = np.flatnonzero(np.abs(out) < abs(out[top]) / np.sqrt(2))
         ends = [*low[low < top][-1:], *low[low > top][:1]]
-        turn, degrees = np.ptp(b[slice(*ends) if len(ends) == 2 else slice(None)]), t.units["phase"] != "rad"
-        if len(ends) == 2 and turn < 0.1 if degrees else bool(ends) and turn > 20:
+        over = slice(*ends) if len(ends) == 2 else slice(None)
+        turn, degrees = np.ptp(b[over]), t.units.get("phase") != "rad"
+        if polar and (len(ends) == 2 and turn < 0.1 if degrees else bool(ends) and turn > 20):
             found, other = f"{turn / t.size['phase']:.3g}", "rad" if degrees else "deg"
             t.fail(
                 f"expected a turn by 90 to 180 deg over the peak, found {found}: is it in {other}?", "phase"
             )
+        rise = np.diff(np.unwrap(np.angle(out[over])))
+        if len(ends) == 2 and len(rise) > 2 and (rise > 0).all() and rise.sum() > 1:
+            t.fail("expected a phase that falls over the peak, found one that rises: turn its sign", form[1])
     return out
 
 

@@ -671,10 +671,14 @@ def test_a_convention_that_nobody_says_is_said(tmp_path: Path, capsys: pytest.Ca
         ("1,0,0\n3,0,0\n2,0,0", "line 4: expected joints in their order"),
         ("joint_2,0,0\njoint_1,0,0", "line 3: expected joints in their order"),
         ("1->2,0,0\n0->1,0,0", "line 3: expected joints in their order"),
-        ("1,q1,0\n2,q2 + 90,0\ntool,0,100", "line 4: no joint's coordinate"),
-        ("1,0,d1\n2,θ2,0\nEE,90,100", "line 4: no joint's coordinate"),
+        ("1,q1,0\n2,q2 + 90,0\n3,0,100", "line 4: no joint's coordinate"),
+        ("1,q1,0\ntool,0,100\n2,q2,0", "line 3: no joint's coordinate"),
+        ("tool,0,100\nflange,0,10", "line 2: a name that no joint has"),
         ("base,0,200\n1,q1,0", "line 2: no joint's coordinate"),
-        ("1,0,0\n2,0,0\nTool flange,0,100", "line 4: a name that no joint has: leave a fixed frame out"),
+        (
+            "1,0,0\n2,0,0\nTool flange,0,100",
+            "line 4: a name that no joint has: write the joints' theta as q1",
+        ),
     ],
 )
 def test_rows_that_are_no_joints_one_behind_the_other_are_refused(
@@ -684,6 +688,35 @@ def test_rows_that_are_no_joints_one_behind_the_other_are_refused(
     file = write(tmp_path, "dh.csv", f"joint,theta [deg],d [mm],a [mm],alpha [deg]\n{lines}\n")
     with pytest.raises(StiffmapError, match=words):
         read_dh(read_sheet(Path(file)), {}, "standard")
+
+
+@pytest.mark.parametrize("convention", ["standard", "modified"])
+@pytest.mark.parametrize(
+    ("thetas", "sliding", "tool"),
+    [
+        (("θ1", "θ2 - 90"), "0", ["Flange,0,107,20,30"]),
+        (("θ1*", "q2-90"), "0", ["TCP,90,100,-5,0"]),
+        (("q1", "0"), "q2", ["flansch,0,50,0,0", "Werkzeug,45,0,100,90"]),
+    ],
+)
+def test_a_tool_behind_the_last_joint_stays(
+    thetas: tuple[str, str], sliding: str, tool: list[str], convention: str, tmp_path: Path
+) -> None:
+    head = "joint,theta [deg],d [mm],a [mm],alpha [deg]"
+    lines = [f"1,{thetas[0]},400,25,-90", f"2,{thetas[1]},{sliding},560,0"]
+    q = np.array([0.3, 0.7])
+    whole, bare = (
+        sm.forward_kinematics(imported(tmp_path, "\n".join([head, *t]), convention, "--overwrite"), q)
+        for t in ([*lines, *tool], lines)
+    )
+    expected = np.eye(4)
+    expected[:3, :3], expected[:3, 3] = bare.rotation, bare.position
+    for line in tool:
+        theta, d, a, alpha = (float(v) for v in line.split(",")[1:])
+        own, link = turn_z(np.radians(theta), 1e-3 * d), turn_x(np.radians(alpha), 1e-3 * a)
+        expected = expected @ (own @ link if convention == "standard" else link @ own)
+    np.testing.assert_allclose(whole.position, expected[:3, 3], atol=1e-12)
+    np.testing.assert_allclose(whole.rotation, expected[:3, :3], atol=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -257,6 +257,40 @@ def test_signals_that_miss_the_teeth_are_refused(slower: int, every: int, rpm: i
         read_table(given)
 
 
+def forces_of(given: dict[str, Any]) -> np.ndarray:
+    return np.stack([given[n] for n in ("Fx_N", "Fy_N", "Fz_N")], axis=1)
+
+
+@pytest.mark.parametrize("offset", [(0.0, 0.0, 0.0), (3.2, -1.7, 40.0), (-300.0, 200.0, 900.0)])
+@pytest.mark.parametrize("idle", [slice(0, 200), slice(600, 800), slice(1350, 1600)])
+@pytest.mark.parametrize("ripple", [1.0, 0.0], ids=["two teeth", "many teeth"])
+def test_a_signal_with_a_part_without_a_cut_is_refused(
+    offset: tuple[float, ...], idle: slice, ripple: float
+) -> None:
+    given = made(signals=True)
+    force = np.array([60.0, 100.0, 30.0]) + ripple * forces_of(given)
+    force[idle] = 0.0
+    force += offset + np.random.default_rng(5).normal(0.0, 1.0, force.shape)
+    with pytest.raises(StiffmapError, match="leave out the rows without a cut, and take their mean"):
+        read_table(given | dict(zip(("Fx_N", "Fy_N", "Fz_N"), force.T, strict=True)))
+
+
+@pytest.mark.parametrize("noise", [0.0, 1.0, 30.0, 300.0])
+@pytest.mark.parametrize("every", [1, 7, 20])
+def test_a_steady_signal_is_read_under_noise(noise: float, every: int) -> None:
+    given = made(noise, signals=True, runout=10e-6)
+    given |= {n: v[::every] for n, v in given.items() if np.ndim(v)}
+    assert len(read_table(given).signals) == 4
+
+
+@pytest.mark.parametrize("lost", [slice(150, 160), slice(100, 300), slice(10, 390)])
+def test_a_signal_with_a_gap_is_refused(lost: slice) -> None:
+    given = made(signals=True)
+    given |= {n: np.delete(v, lost) for n, v in given.items() if np.ndim(v)}
+    with pytest.raises(StiffmapError, match="in even steps, found"):
+        read_table(given)
+
+
 @pytest.mark.parametrize("unit", ["mrpm", "1/s", "x1000"])
 def test_a_unit_next_to_rpm_counts(unit: str, tmp_path: Path) -> None:
     def text(head: str) -> str:

@@ -420,6 +420,27 @@ def test_names_of_analysers(header, columns, tmp_path):
     np.testing.assert_allclose(one.receptance, receptance, rtol=1e-12)
 
 
+@pytest.mark.parametrize("size", [1.0, -1.0], ids=["at the tool", "across"])
+@pytest.mark.parametrize("power", [0, 1, 2])
+@pytest.mark.parametrize("head", ["Real [{0}],Imag [{0}]", "Magnitude [{0}],Phase [deg]"])
+def test_a_phase_that_rises_over_the_peak_is_refused(size, power, head, tmp_path):
+    """Some analysers count the lag behind the force, or have exp(-iωt): a mode would be damped otherwise."""
+    f = np.arange(4.0, 200.0, 2.0)
+    response = size * 1e-7 / (1 - (f / 120) ** 2 + 0.06j * f / 120) * (2j * np.pi * f) ** power
+    for turned in (response, response.conj()):
+        polar = "Phase" in head
+        pair = (abs(turned), np.angle(turned, deg=True)) if polar else (turned.real, turned.imag)
+        lines = [",".join(f"{v:.9g}" for v in row) for row in zip(f, *pair, strict=True)]
+        unit = ("m/N", "m/s/N", "m/s²/N")[power]
+        (tmp_path / "f.csv").write_text("\n".join([f"f [Hz],{head.format(unit)}", *lines]), encoding="utf-8")
+        if turned is response:
+            assert len(read_responses(tmp_path / "f.csv")) == 1
+    with pytest.raises(
+        StiffmapError, match="expected a phase that falls over the peak, found one that rises"
+    ):
+        read_responses(tmp_path / "f.csv")
+
+
 @pytest.mark.parametrize("axis", ["X [Hz]", "x_Hz", "Linear [Hz]", "Linear Hz"])
 def test_what_is_in_hertz_is_the_frequency(axis, tmp_path):
     (tmp_path / "r.csv").write_text(f"{axis},Real [m/N],Imag [m/N]\n10,1e-6,0\n20,2e-6,-1e-6\n")

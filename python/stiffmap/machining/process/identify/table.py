@@ -111,6 +111,9 @@ SLOT_SIGNS = (-1.0, 1.0, 1.0)
 SAME = 2
 """Decimals of the logarithm of feeds per tooth that count as one feed, which is about 1 %."""
 
+LONGEST_STEP, PART, IDLE = 3.0, 32, 0.1
+"""Of a signal: its longest step in time, in usual ones; samples that show a cut; squares of forces without one, in usual squares."""
+
 
 @dataclass(frozen=True, eq=False)
 class Signals:
@@ -181,10 +184,11 @@ def read_table(table: ForceColumns, process: Process | None = None, sheet: str |
 
 def _whole_turns(c: NamedTable, here: NDArray[np.intp], force: Floats) -> Signals:
     time, turn = c.values["time"][here], 2 * pi / above_zero(c, "spindle", int(here[0]))
-    for i in np.flatnonzero(np.diff(time) <= 0)[:1]:
-        what = f"expected rising times in a cut, found {time[i + 1]:g} s behind {time[i]:g} s"
+    steps = np.diff(time)
+    step = float(np.median(steps)) if len(time) > 1 else 0.0
+    for i in np.flatnonzero((steps <= 0) | (steps > LONGEST_STEP * abs(step)))[:1]:
+        what = f"expected rising times in a cut, in even steps, found {time[i + 1]:g} s behind {time[i]:g} s"
         c.fail(what, "time", here[i + 1])
-    step = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
     turns = int((time[-1] - time[0] + step) / turn * (1 + 1e-9))
     if len(time) < 8 or turns < 1 or step > turn / 8:
         c.fail(
@@ -192,7 +196,16 @@ def _whole_turns(c: NamedTable, here: NDArray[np.intp], force: Floats) -> Signal
             f"{time[-1] - time[0] + step:g} s", "time", here[0],
         )  # fmt: skip
     keep = min(len(time), round(turns * turn / step))
-    return Signals(time[:keep], force[here[:keep]])
+    cut = force[here[:keep]]
+    parts = np.array_split(cut, max(1, min(turns, keep // PART)))
+    quiet = min(parts, key=lambda f: float(np.ptp(f, axis=0).sum())).mean(axis=0)
+    size = [np.mean((f - quiet) ** 2) for f in parts]
+    if min(size) < IDLE * np.quantile(size, 0.9):
+        at = ", ".join(f"{v:.3g}" for v in quiet)
+        what = f"one that stays at Fx, Fy, Fz = {at} N and others that do not"
+        way = "leave out the rows without a cut, and take their mean force off the others"
+        c.fail(f"expected the same cut in every revolution, found {what}: {way}", "time", here[0])
+    return Signals(time[:keep], cut)
 
 
 def _slot_signs(table: ForceTable) -> ForceTable:
