@@ -288,7 +288,8 @@ def _numbers(found: Inferred, v: Verdict, best: Corrected | None) -> FoundNumber
         return None
     fit, known = found.search.best.fit, {u.name for u in best.given.sensitivity.unknowns}
     table = tuple(n for n in table_of(found.columns, fit, best)[0] if n.name in known)
-    off, wide = {b.unknown.name for b in v.beyond}, too_wide(fit)
+    off = {b.unknown.name for b in v.beyond}
+    wide = too_wide(fit, [*(b.unknown for b in v.beyond), *v.as_effects])
     beyond = tuple(sorted((n for n in table if n.name in off), key=lambda n: -n.share))
     return FoundNumbers(tolerance_word(", ".join(n.name for n in beyond), wide), wide, beyond, table)
 

@@ -189,6 +189,8 @@ def columns(
 
     sigma
         (n, c) standard deviation of each reading, m or rad.
+
+    Raises StiffmapError for noise that is unknown and where unknown frames take up all readings.
     """
     e, base = predictor.experiment, plan.base
     all_rows, all_channels = readings_of(e, base)
@@ -206,6 +208,10 @@ def columns(
     q = basis(frames) if frames.shape[1] else frames
     spared = Free.across(q, mean)
     free = spared.matrix
+    if not free.shape[1]:
+        raise StiffmapError(
+            f"{e.name}: unknown frames, tools and zeros take up all {len(rows)} readings; read more poses or declare what is known"
+        )
     within = raw - mean @ (mean.T @ raw)
     s = zeros_anew(sensitivity(predictor, unknowns), e)
     numbers = free.T @ (s.columns[index] / noise[:, None])

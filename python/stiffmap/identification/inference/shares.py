@@ -9,10 +9,12 @@ import numpy as np
 
 from stiffmap.common.number_text import percents
 from stiffmap.experiment.experiment import Floats
-from stiffmap.identification.inference.amplitudes import OFF, Fit, evaluated, noise_part
+from stiffmap.identification.inference.amplitudes import OFF, Fit, evaluated, fitted, noise_part
 from stiffmap.identification.inference.columns import Columns
 from stiffmap.identification.inference.constants import ODDS, STANDS_OUT
-from stiffmap.identification.inference.parts import GAPS, NOISE
+from stiffmap.identification.inference.parts import GAPS, NOISE, Part
+from stiffmap.identification.inference.world import amplitudes
+from stiffmap.identification.numbers.unknowns import Unknown
 
 LEAST = 0.005
 """Share from which a part is named."""
@@ -75,9 +77,12 @@ def gap_of(columns: Columns, fit: Fit) -> Floats:
     return out
 
 
-def too_wide(fit: Fit) -> tuple[WideGroup, ...]:
-    """Groups whose standard uncertainties are too small without doubt."""
-    out = []
+def too_wide(fit: Fit, named: Sequence[Unknown] = ()) -> tuple[WideGroup, ...]:
+    """Groups whose standard uncertainties are too small without doubt, whatever the numbers are that are `named` out of tolerance."""
+    c, out = fit.columns, []
+    own = tuple(Part(u.name, "effect", c.numbers[:, [c.unknowns.index(u)]]) for u in named)
+    if own:
+        fit = fitted(c, (*fit.parts, *own), amplitudes(fit), fit.weights)
     for k, p in enumerate(fit.parts):
         t = float(fit.t[1 + k])
         if p.kind != "number" or t <= max(0.0, OFF):

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+import stiffmap as sm
+from stiffmap.common.errors import StiffmapError
 from stiffmap.identification.inference.columns import drawn, repeated
 
 
@@ -37,3 +42,25 @@ def test_repeats_that_are_rounded_to_the_same_number_say_nothing_of_the_noise() 
     assert repeated(np.append(np.kron([0, 0, 0, 1], apart), 0.0), mean) == (0.0, 0.0)
     assert repeated(np.append(np.kron([0, 2, 1, 1], apart), 0.0), mean) == (3.0, 4.0)
     assert repeated(np.zeros(4), np.eye(4)) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize("question", [sm.diagnose, sm.calibrate])
+@pytest.mark.parametrize(("poses", "angles"), [(3, False), (1, True)])
+def test_readings_that_unknown_frames_take_up_are_refused(
+    question: Callable[..., object], poses: int, angles: bool, tmp_path: Path
+) -> None:
+    drives = ("base", "shoulder", "elbow", "wrist_1", "wrist_2", "wrist_3")
+    lines = ["machine: ur10", "quantity: position", "units: {length: mm, angle: deg}", "frame: unknown"]
+    lines += [f"tool: {'unknown' if angles else 'offset_unknown'}", "command:"]
+    lines += [f"  {d}: {{actuator: arm.{d}, unit: deg}}" for d in drives]
+    lines += ["noise: {dx: 0.03, dy: 0.03, dz: 0.03, rx: 0.01, ry: 0.01, rz: 0.01}"]
+    (tmp_path / "experiment.yaml").write_text("\n".join(lines), encoding="utf-8")
+    sees = ["px", "py", "pz"] + ["prx", "pry", "prz"] * angles
+    rows = [
+        [20 * k, -60 - 15 * k, 90, 25 * k, -90 + 30 * k, 5, 90 * k, 40 * k * k, 70] + [1, 2, 3] * angles
+        for k in range(poses)
+    ]
+    table = [",".join(map(str, r)) for r in [[*drives, *sees], *rows]]
+    (tmp_path / "data.csv").write_text("\n".join(table), encoding="utf-8")
+    with pytest.raises(StiffmapError, match=r"take up all \d+ readings; read more poses"):
+        question(sm.load_machine("ur10"), tmp_path)
