@@ -13,11 +13,12 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from stiffmap.common.broadcasting import Floats, real_array
+from stiffmap.common.broadcasting import Floats, real_array, refused
 from stiffmap.common.errors import StiffmapError
 from stiffmap.machining.compensation.commands import compensate
 from stiffmap.solve.machine import Machine, takes_machine
 from stiffmap.workspace.maps.files import read_dataset
+from stiffmap.workspace.maps.inputs import place, rising
 
 LETTERS = "XYZABC"
 
@@ -99,12 +100,10 @@ def axis_errors(
     if position is None:
         low, high = machine.workspace
         position = np.linspace(low[i], high[i], max(points, 1))
-    nodes = real_array(position, "position")
-    if nodes.ndim != 1 or nodes.size < 2 or not (np.diff(nodes) > 0).all():
-        raise StiffmapError("points, position: expected two or more rising numbers (m)")
-    point = real_array(machine.description.home.p if through is None else through, "through")
-    if point.shape != (3,) or not np.isfinite(point).all():
-        raise StiffmapError("through: expected a position of three numbers (m)")
+    nodes = rising(position, "points, position", expected := "two or more rising numbers (m)")
+    if nodes.size < 2:
+        raise refused("points, position", expected, "one")
+    point = place(machine.description.home.p if through is None else through, "through")
     middle = (nodes[:-1] + nodes[1:]) / 2
     everywhere = np.r_[nodes, middle]
     line = np.tile(point, (everywhere.size, 1))
