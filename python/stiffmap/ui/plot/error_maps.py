@@ -233,8 +233,7 @@ def draw_directions(ax: Axes, m: Drawn, index: int) -> None:
     ax.plot([], [], color="white", label="direction of the force", path_effects=halo(2.5, "#444444"))
 
 
-def _spread(count: int, most: int = 9) -> NDArray[np.intp]:
+def _spread(count: int) -> NDArray[np.intp]:
     """Indices of at most nine evenly spaced grid values, none at the border."""
-    if count <= most:
-        return np.arange(count)
+    most = min(count, 9)
     return np.unique(np.round((np.arange(most) + 0.5) * count / most - 0.5).astype(int))
