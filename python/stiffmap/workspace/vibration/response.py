@@ -10,6 +10,7 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from stiffmap.common.broadcasting import Floats, one_of, thread_count
+from stiffmap.model.description import TASK
 from stiffmap.model.files.load import Source
 from stiffmap.solve.labels import WRENCH, batch_dims
 from stiffmap.solve.machine import Machine, as_machine
@@ -103,7 +104,6 @@ def direct(m: TipModes, i: int, s: Complex) -> Complex:
 
 KINDS = {"receptance": 0, "mobility": 1, "accelerance": 2}
 """Displacement, velocity, acceleration by force: derivatives of a receptance by time."""
-MOTION = ("x", "y", "z", "rx", "ry", "rz")
 
 
 @keywords_of(tip_modes)
@@ -174,7 +174,7 @@ def frequency_response(
         attrs["symmetrised"] = "the symmetric part of the loaded stiffness was taken"
     dims = (*poses, "frequency", "response", "force")
     coords = {
-        "frequency": ("frequency", f, {"units": "Hz"}), "response": list(MOTION), "force": list(WRENCH),
+        "frequency": ("frequency", f, {"units": "Hz"}), "response": list(TASK), "force": list(WRENCH),
         "status": (poses, found.status.reshape(batch)),
     }  # fmt: skip
     return xr.DataArray(values.reshape(*batch, *values.shape[1:]), coords, dims, kind, attrs)
