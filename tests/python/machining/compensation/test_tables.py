@@ -146,6 +146,11 @@ def test_lists_that_must_rise_name_the_entry_that_does_not() -> None:
         axis_errors(machine, "z", [0.7])
     with pytest.raises(sm.StiffmapError, match="through: expected a position"):
         axis_errors(machine, "z", through=[0.1, 0.2])
+    flat = sm.error_map(
+        machine, x=[0.0], y=[0.97], z=[0.7, 0.8, 0.9], wrench=[0, 0, -100, 0, 0, 0], plane=None
+    )
+    with pytest.raises(sm.StiffmapError, match="through: expected a position"):
+        axis_errors_of_map(flat, "z", through=[0.1, 0.2])
     with pytest.raises(
         sm.StiffmapError, match=r"speeds: expected rising numbers above zero .* entry 1 is -1"
     ):
