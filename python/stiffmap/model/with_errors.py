@@ -15,6 +15,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from stiffmap.model.description import (
+    TASK,
     Body,
     CommandError,
     Element,
@@ -31,7 +32,6 @@ from stiffmap.model.effects.edit import built as as_built
 from stiffmap.model.effects.library.geometry import about, home_position
 from stiffmap.model.effects.library.links import longer
 
-FRAME = ("x", "y", "z", "rx", "ry", "rz")
 END = "end"
 """Name of the frame behind the last element of a leg, and of the tool."""
 Knots = tuple[tuple[float, float], ...]
@@ -61,7 +61,7 @@ def _sequence(elements: Elements, path: str, of: Mapping[str, Mapping[str, objec
     out: list[Element] = []
     for e in elements:
         change = of.get(f"{path}.{e.name}", {})
-        if isinstance(e, Joint) and any(k in change for k in FRAME):
+        if isinstance(e, Joint) and any(k in change for k in TASK):
             frame = _pose(change)
             turned = about(home_position(e), frame.r)
             out.append(as_built(f"{e.name}_frame", Pose.of(turned.p + frame.p, frame.r)))
@@ -73,7 +73,7 @@ def _sequence(elements: Elements, path: str, of: Mapping[str, Mapping[str, objec
 
 
 def _pose(change: Mapping[str, object]) -> Pose:
-    t, r = (np.array([change.get(k, 0.0) for k in part]) for part in (FRAME[:3], FRAME[3:]))
+    t, r = (np.array([change.get(k, 0.0) for k in part]) for part in (TASK[:3], TASK[3:]))
     return Pose.of(t, Rotation.from_rotvec(r).as_matrix())
 
 

@@ -12,12 +12,12 @@ import numpy as np
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.description.tree import joints
+from stiffmap.solve.labels import WRENCH
 from stiffmap.solve.machine import Machine
 
 KEY = "validity"
 """In `extra` of a machine file."""
 
-LOADS = ("fx", "fy", "fz", "mx", "my", "mz")
 SLACK = 0.05
 """Share of a range beyond its ends that still belongs to it."""
 
@@ -59,7 +59,7 @@ class Validity:
             turns = frozenset(n for n, kind in kinds(machine).items() if kind != "prismatic")
             drives = {str(k): _pair(v) for k, v in dict(e.get("drives", ())).items()}
             loads = {str(k): _pair(v) for k, v in dict(e.get("loads", ())).items()}
-            if not set(loads) <= set(LOADS):
+            if not set(loads) <= set(WRENCH):
                 raise ValueError
             error = e.get("error")
             return Validity(
@@ -75,7 +75,7 @@ class Validity:
         except (TypeError, ValueError, KeyError):
             raise StiffmapError(
                 f"{machine.name}: extra: {KEY}: expected poses, and ranges [low, high] under drives (by name), loads "
-                f"({', '.join(LOADS)}) and temperature; found {entry!r}"
+                f"({', '.join(WRENCH)}) and temperature; found {entry!r}"
             ) from None
 
     def kept_by(self, machine: Machine) -> Machine:
@@ -105,7 +105,7 @@ class Validity:
         out = np.zeros(len(coordinates), bool)
         for name, v in drive_coordinates(machine, coordinates).items():
             out |= _beyond(v, self.drives.get(name))
-        for i, name in enumerate(LOADS):
+        for i, name in enumerate(WRENCH):
             out |= _beyond(wrench[:, i], self.loads.get(name, (0.0, 0.0)))
         if self.temperature is not None and temperature is not None:
             out |= _beyond(temperature, self.temperature)

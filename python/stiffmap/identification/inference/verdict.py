@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import chdtrc, ndtri
 
-from stiffmap.experiment.experiment import Experiment, Floats, Integers
+from stiffmap.experiment.experiment import WRENCH, Experiment, Floats, Integers
 from stiffmap.identification.inference.amplitudes import OFF, Fit, declared_noise, noise_prior
 from stiffmap.identification.inference.chosen import Chosen
 from stiffmap.identification.inference.columns import Columns
@@ -227,7 +227,7 @@ def evenness(columns: Columns, rest: Fit, raw: Floats, block: Integers) -> tuple
 def partitions(e: Experiment, rows: Integers) -> Iterator[tuple[str, Integers]]:
     """Name and (N,) block of each reading, of every way to cut the experiment into parts."""
     over: list[tuple[str, Floats | None]] = [(f"{a}", e.position[:, k]) for k, a in enumerate("xyz")]
-    over += [(f"the load's {a}", e.wrench[:, k]) for k, a in enumerate(("fx", "fy", "fz", "mx", "my", "mz"))]
+    over += [(f"the load's {a}", e.wrench[:, k]) for k, a in enumerate(WRENCH)]
     if e.command is not None:
         over += [(f"drive {c.joint or c.name}", e.command[:, k]) for k, c in enumerate(e.command_of)]
     over += [

@@ -16,8 +16,8 @@ import numpy as np
 from stiffmap.common.arguments import checked
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.identification.numbers.certificate import INSTRUMENT, SCALE, Tolerances, frame_errors
-from stiffmap.model.description import Block, Body, Element, Joint, MachineDescription, Offset, Spring
-from stiffmap.model.with_errors import END, FRAME
+from stiffmap.model.description import TASK, Block, Body, Element, Joint, MachineDescription, Offset, Spring
+from stiffmap.model.with_errors import END
 
 GROUPS = (
     "zeros", "gains", "axis positions", "axis directions", "guide lean", "link lengths", "rod mismatch", "width", "tool",
@@ -126,11 +126,11 @@ def unknowns(
         out += found
         if len(bare.legs) > 1:
             place = given.position(run, t.position)
-            out += _frame(f"{leg.name}.{END}", leg.name, FRAME, place, t.direction, "axis positions")
+            out += _frame(f"{leg.name}.{END}", leg.name, TASK, place, t.direction, "axis positions")
     out += _of_sequence(bare.base, "base", "", given)[0]
     found, run = _of_sequence(bare.platform, "platform", "", given)
     out += found
-    out += _frame(f"platform.{END}", "", FRAME, given.position(run, t.tool), t.direction, "tool", "tool")
+    out += _frame(f"platform.{END}", "", TASK, given.position(run, t.tool), t.direction, "tool", "tool")
     if experiment.quantity == "position":
         out.append(
             Unknown("scale of the instrument", INSTRUMENT, "1", t.instrument, (((INSTRUMENT, SCALE), 1.0),))
@@ -189,14 +189,14 @@ def _single(what: str, name: str, leg: str, group: str, unit: str, u: float) -> 
 def _of_joint(e: Joint, name: str, leg: str, given: Declared, place: Floats) -> Iterator[Unknown]:
     """Frame errors that the joint's own motion does not take up; of a drive its zero and gain."""
     slides, t = e.kind == "prismatic", given.t
-    kept = list(FRAME)
+    kept = list(TASK)
     axes = [np.abs(np.array(a)) for a in e.axes]
     for axis in axes[:1]:
         along = int(np.argmax(axis))
         if axis[along] > ALONG:
-            kept.remove(FRAME[along + (0 if slides else 3)])
+            kept.remove(TASK[along + (0 if slides else 3)])
     if e.kind == "spherical":
-        kept = [k for k in kept if k in FRAME[:3]]
+        kept = [k for k in kept if k in TASK[:3]]
     turned = "guide lean" if slides else "axis directions"
     yield from _frame(name, leg, tuple(kept), place, t.direction, "axis positions", turned)
     if e.actuated:
@@ -221,12 +221,12 @@ def _frame(
 ) -> Iterator[Unknown]:
     """`place` (3,) are the standard uncertainties along x, y, z."""
     for a in axes:
-        turns = a in FRAME[3:]
+        turns = a in TASK[3:]
         yield Unknown(
             f"{'turn' if turns else 'shift'} of {name} {'about' if turns else 'along'} {a[-1]}",
             turned if turns else moved,
             "rad" if turns else "m",
-            direction if turns else float(place[FRAME.index(a)]),
+            direction if turns else float(place[TASK.index(a)]),
             (((name, a), 1.0),),
             leg,
         )

@@ -36,7 +36,7 @@ from stiffmap.machining.process.description import Process
 from stiffmap.machining.process.load import GivenProcess
 from stiffmap.solve.machine import Machine, as_machine
 from stiffmap.solve.options import keywords_of
-from stiffmap.workspace.maps.inputs import unit
+from stiffmap.workspace.maps.inputs import rising, unit
 from stiffmap.workspace.vibration.modes import tip_modes
 
 METHODS = ("semi-discretization", "zero order")
@@ -129,10 +129,11 @@ def stability_lobes(
     frequency = frequencies_of(modes.frequency)
     depth0, angle = limits(modes.receptance(frequency), p)
     least = least_depth(frequency, modes.receptance, p)
-    s = _axis(p.spindle * np.linspace(0.25, 1.5, diagram[0]) if speeds is None else speeds, "speeds", "rad/s")
+    usual = p.spindle * np.linspace(0.25, 1.5, diagram[0])
+    s = rising(usual if speeds is None else speeds, "speeds", "rising numbers above zero (rad/s)", above=0.0)
     top = HIGHEST * least if np.isfinite(least) else p.cut.axial
     usual = np.linspace(0, max(top, 1e-9), diagram[1] + 1)[1:]
-    d = _axis(usual if depths is None else depths, "depths", "m")
+    d = rising(usual if depths is None else depths, "depths", "rising numbers above zero (m)", above=0.0)
     zero = at_periods(frequency, depth0, angle, 2 * pi / (p.tool.teeth * s))
     own = np.array([p.spindle])
     ds = xr.Dataset(
@@ -210,19 +211,6 @@ def _modes(
     if len(found.square) != 1:
         raise StiffmapError(f"position: expected one pose for a diagram, got {len(found.square)}")
     return modes_of_machine(found).turned(axes), found.damping.said
-
-
-def _axis(given: ArrayLike, name: str, unit: str) -> Floats:
-    what = f"rising numbers above zero ({unit})"
-    out = np.atleast_1d(real_array(given, name, what))
-    if (
-        out.ndim != 1
-        or not out.size
-        or not np.isfinite(out).all()
-        or not (np.diff(out, prepend=0.0) > 0).all()
-    ):
-        raise StiffmapError(f"{name}: expected {what}")
-    return out
 
 
 def multipliers_at(

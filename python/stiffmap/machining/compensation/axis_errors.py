@@ -13,11 +13,12 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from stiffmap.common.broadcasting import Floats, real_array
+from stiffmap.common.broadcasting import Floats, one_of, real_array, refused
 from stiffmap.common.errors import StiffmapError
 from stiffmap.machining.compensation.commands import compensate
 from stiffmap.solve.machine import Machine, takes_machine
 from stiffmap.workspace.maps.files import read_dataset
+from stiffmap.workspace.maps.inputs import place, rising
 
 LETTERS = "XYZABC"
 
@@ -93,18 +94,16 @@ def axis_errors(
     wrench: (6,) N, N·m at the tool; gravity: (3,) m/s², None: the machine's. Between the positions the errors are
     solved as well, for `interpolation`. Raises StiffmapError where a position has no answer.
     """
-    i = _index(axis)
+    i = "xyz".index(one_of(axis, ("x", "y", "z"), "axis"))
     if axis not in machine.description.task:
         raise StiffmapError(f"axis: {machine.name} does not command {axis}")
     if position is None:
         low, high = machine.workspace
         position = np.linspace(low[i], high[i], max(points, 1))
-    nodes = real_array(position, "position")
-    if nodes.ndim != 1 or nodes.size < 2 or not (np.diff(nodes) > 0).all():
-        raise StiffmapError("points, position: expected two or more rising numbers (m)")
-    point = real_array(machine.description.home.p if through is None else through, "through")
-    if point.shape != (3,) or not np.isfinite(point).all():
-        raise StiffmapError("through: expected a position of three numbers (m)")
+    nodes = rising(position, "points, position", expected := "two or more rising numbers (m)")
+    if nodes.size < 2:
+        raise refused("points, position", expected, "one")
+    point = place(machine.description.home.p if through is None else through, "through")
     middle = (nodes[:-1] + nodes[1:]) / 2
     everywhere = np.r_[nodes, middle]
     line = np.tile(point, (everywhere.size, 1))
@@ -144,7 +143,7 @@ def axis_errors_of_map(
     case: load case of the map; None: its only one. Both directions of travel are the same. The interpolation error
     is estimated from second differences.
     """
-    i = _index(axis)
+    i = "xyz".index(one_of(axis, ("x", "y", "z"), "axis"))
     if not isinstance(ds, xr.Dataset):
         ds = read_dataset(ds)
     if "case" in ds.dims:
@@ -154,7 +153,7 @@ def axis_errors_of_map(
             raise StiffmapError(f"case: expected one of {', '.join(names)}{found}")
         ds = ds.sel(case=case or names[0])
     middle = [float(ds[a].values[ds[a].size // 2]) for a in "xyz"]
-    point = middle if through is None else [float(v) for v in np.asarray(through, dtype=float)]
+    point = middle if through is None else place(through, "through").tolist()
     others = {a: point[k] for k, a in enumerate("xyz") if k != i}
     line = ds.sel(others, method="nearest").sortby(axis)
     nodes = np.asarray(line[axis].values, dtype=float)
@@ -179,9 +178,3 @@ def axis_errors_of_map(
         machine=str(ds.attrs.get("machine", "")),
     )
     return made if zero is None else made.zeroed(zero)
-
-
-def _index(axis: str) -> int:
-    if axis not in ("x", "y", "z"):
-        raise StiffmapError(f"axis: expected x, y or z, got {axis!r}")
-    return "xyz".index(axis)

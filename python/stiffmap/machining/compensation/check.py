@@ -48,27 +48,18 @@ def check_compensation(machine: Machine, experiment: Experiment | str | PathLike
     Frames and zeros that the experiment calls unknown are fitted to both sizes. Raises StiffmapError for readings that
     cannot be used.
     """
-    e = Predictor(machine, as_experiment(experiment)).experiment
-    far = beyond(machine, e)
-    some = far is not None and far.any() and not far.all()
-    there = prediction_error(machine, e, far) if some else None
-    return CompensationCheck(prediction_error(machine, e), far, there, Validity.of_machine(machine))
-
-
-def prediction_error(
-    machine: Machine, experiment: Experiment, rows: Mask | None = None
-) -> tuple[Summary, Summary]:
-    """Sizes of the readings, and of what they differ by from the machine's prediction, m and rad; of `rows` (n,) alone.
-
-    Frames and zeros that the experiment calls unknown are fitted to each, by all rows. To first order the second is the
-    error at commands that cancel the prediction. Raises StiffmapError for readings that cannot be used.
-    """
-    predictor = Predictor(machine, experiment)
+    predictor = Predictor(machine, as_experiment(experiment))
     e, expected = predictor.experiment, predictor()
     refuse(e, expected)
     sigma = noise_of(e).sigma
     problem = LinearProblem.of(e, sigma, expected)
-    bare = (r - nuisance_part(problem, r) for r in (e.reading, e.reading - expected))
-    kept = np.ones(len(e), bool) if rows is None else rows
-    before, after = (summary(np.where(kept[:, None], r, np.nan), sigma, e.channels) for r in bare)
-    return before, after
+    # to first order the second is the error at commands that cancel the prediction
+    bare = [r - nuisance_part(problem, r) for r in (e.reading, e.reading - expected)]
+
+    def sizes(rows: Mask) -> Sizes:
+        before, after = (summary(np.where(rows[:, None], r, np.nan), sigma, e.channels) for r in bare)
+        return before, after
+
+    far = beyond(machine, e)
+    there = sizes(far) if far is not None and far.any() and not far.all() else None
+    return CompensationCheck(sizes(np.ones(len(e), bool)), far, there, Validity.of_machine(machine))

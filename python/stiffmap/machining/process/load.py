@@ -9,7 +9,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any, Literal, NoReturn
 
-from pydantic import Field
+from pydantic import Field, create_model
 
 from stiffmap.common.errors import FileError, StiffmapError, refuse_folder, suggestion
 from stiffmap.common.units import FREQUENCIES, feed_unit
@@ -56,6 +56,8 @@ UNITS = {
     **dict.fromkeys(("Ktc", "Krc", "Kac", "kc11", "rubbing", "specific_energy"), PRESSURE),
     **dict.fromkeys(("Kte", "Kre", "Kae"), EDGE),
 }
+ZERO = ("axial", "rubbing")
+"""Numbers of a law that are zero where the file does not say them."""
 MAIN = ("Ktc", "kc11", "specific_energy")
 """Numbers of a law that are above zero, and what they may be, N/m²: from foam to beyond any metal."""
 PRESSURES = (1e5, 1e11)
@@ -249,40 +251,15 @@ class ToolModel(FileModel):
     modulus: Written | None = None
 
 
-class EndMillModel(FileModel):
-    """Shear and edge coefficients."""
-
-    Ktc: ProcessQuantity
-    Krc: ProcessQuantity
-    Kac: ProcessQuantity
-    Kte: ProcessQuantity
-    Kre: ProcessQuantity
-    Kae: ProcessQuantity
+def _law_keys(law: type[Law]) -> type[FileModel]:
+    """A mapping with a key for each number of a law."""
+    zero = {n: ProcessQuantity(value=f"0 {UNITS.get(n, '')}") for n in ZERO}
+    keys: dict[str, Any] = {n: (ProcessQuantity, zero.get(n, ...)) for n in law.__dataclass_fields__}
+    return create_model(law.__name__, __base__=FileModel, **keys)
 
 
-class KienzleModel(FileModel):
-    """Chip pressure kc1.1 at a chip of 1 mm and its exponent."""
-
-    kc11: ProcessQuantity
-    mc: ProcessQuantity
-    radial: ProcessQuantity
-    axial: ProcessQuantity = ProcessQuantity(value=0.0)
-
-
-class TrimmingModel(FileModel):
-    """A coated tool."""
-
-    specific_energy: ProcessQuantity
-    rubbing: ProcessQuantity = ProcessQuantity(value="0 N/mm2")
-    radial: ProcessQuantity
-
-
-class ProcessLawModel(FileModel):
-    """One law."""
-
-    end_mill: EndMillModel | None = None
-    kienzle: KienzleModel | None = None
-    trimming: TrimmingModel | None = None
+_LAWS: dict[str, Any] = {n: (_law_keys(law) | None, None) for n, law in LAWS.items()}
+ProcessLawModel = create_model("ProcessLawModel", __base__=FileModel, **_LAWS)
 
 
 class CutModel(FileModel):
@@ -301,7 +278,7 @@ class ProcessFile(FileModel):
     title: str = ""
     source: str = ""
     tool: ToolModel
-    law: ProcessLawModel
+    law: ProcessLawModel  # type: ignore[valid-type]
     spindle: Written = Field(description="with its unit: 6000 rpm")
     feed: Written = Field(description="10 m/min, or 0.075 mm/tooth")
     cut: CutModel

@@ -11,18 +11,15 @@ import numpy as np
 
 from stiffmap.common.broadcasting import Floats, names_of, one_of, refused
 from stiffmap.common.errors import StiffmapError
-from stiffmap.model.description import AppliedEffect, MachineDescription
+from stiffmap.model.description import TASK, AppliedEffect, MachineDescription
 from stiffmap.model.effects import add_effect, apply_records, get
 from stiffmap.solve.compiled import CompiledMachine
+from stiffmap.solve.labels import WRENCH
 
 EffectRequest = tuple[str, Mapping[str, Any]]
 Request = EffectRequest | str
 
-INPUTS = {
-    "position": ("x", "y", "z"),
-    "rotation": ("rx", "ry", "rz"),
-    "wrench": ("fx", "fy", "fz", "mx", "my", "mz"),
-}
+INPUTS = {"position": TASK[:3], "rotation": TASK[3:], "wrench": WRENCH}
 DISPLACEMENT = ("displacement",)
 QUANTITIES = ("displacement", "stiffness", "compliance")
 

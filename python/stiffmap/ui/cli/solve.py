@@ -12,7 +12,7 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import length_text
 from stiffmap.common.outputs import write_rows
 from stiffmap.common.tables.named import PoseTable, read_pose_table
-from stiffmap.solve.labels import WRENCH
+from stiffmap.solve.labels import COMPONENTS, WRENCH
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.mobility import free_motions
 from stiffmap.solve.solution import Solution
@@ -27,7 +27,6 @@ from stiffmap.ui.cli.output import table as table_of
 
 SCALE = [1e3] * 3 + [1.0] * 3
 """m to mm, rad stays: a compliance then is in mm/N, rad/N, mm/(N mm), rad/(N mm)."""
-NAMES = ("dx", "dy", "dz", "rx", "ry", "rz")
 SHOWN = 20  # rows of a file that are printed
 
 
@@ -103,7 +102,7 @@ def _lines(m: Machine, s: Solution) -> Iterator[str | Table]:
             yield f"drive {name}: {effort:z.4f} {'N' if m.compiled.names.is_prismatic(name) else 'N·m'}"
     if np.isfinite(s.compliance).any():
         scaled = s.compliance * np.outer(SCALE, SCALE) / 1e3
-        rows = ([name, *(f"{v:11.3e}" for v in row)] for name, row in zip(NAMES, scaled, strict=True))
+        rows = ([name, *(f"{v:11.3e}" for v in row)] for name, row in zip(COMPONENTS, scaled, strict=True))
         title = "loaded compliance: mm and rad per N and N mm"
         yield table_of(title, ("", *WRENCH), rows, padding=0, pad_edge=False, collapse_padding=True)
 
@@ -120,7 +119,7 @@ def solve_table(m: Machine, file: Path, load: Floats, how: dict[str, Any], outpu
     words = [Status(int(v)).name for v in s.status]
     files: list[Path] = []
     if output is not None:
-        units = (f"{n} [{'mm' if n[0] == 'd' else 'rad'}]" for n in NAMES)
+        units = (f"{n} [{'mm' if n[0] == 'd' else 'rad'}]" for n in COMPONENTS)
         head = ["x [mm]", "y [mm]", "z [mm]", *units, "status"]
         in_mm = np.hstack([table.position / MM, s.displacement * np.r_[np.full(3, 1 / MM), np.ones(3)]])
         write_rows(output, head, ([*map(repr, row.tolist()), w] for row, w in zip(in_mm, words, strict=True)))

@@ -18,12 +18,12 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.ui.plot.forces import in_words
 from stiffmap.ui.plot.planes import Planes, draw_isolines, draw_tolerance, halo, hatch_failed, on_grid, planes
 from stiffmap.ui.plot.style import BLUE, COLOURS, MM, TOLERANCE, length_unit, panel, paper, wrench_text
+from stiffmap.workspace.maps.inputs import PLANES
 
 TITLES = {
     "worst_deflection": "worst direction of the force",
     "best_deflection": "best direction of the force",
 }
-FORCE_PLANES = ("xy", "xz", "yz")
 
 
 def map_figure(
@@ -53,7 +53,7 @@ def map_figure(
         case = str(ds.case.values)
         variable = variable or "deflection"
     if variable is None:
-        turned = [f"worst_deflection_{p}" for p in FORCE_PLANES if f"worst_deflection_{p}" in ds]
+        turned = [f"worst_deflection_{p}" for p in PLANES if f"worst_deflection_{p}" in ds]
         variable = turned[0] if turned else "deflection"
     values = pick(ds, variable, case)
     unit, factor = length_unit(limits[1] if limits else float(np.nanmax(values.values, initial=0.0)))
@@ -157,7 +157,7 @@ def component(ds: xr.Dataset, variable: str) -> xr.DataArray:
     """A deflection of the map, or of its displacement a component, the norm or that in a plane; StiffmapError."""
     if variable in ds and ds[variable].attrs.get("units") == "m":
         return ds[variable]
-    axes = {"|d|": "xyz", **{f"d{a}": a for a in "xyz"}, **{f"d_{p}": p for p in FORCE_PLANES}}.get(variable)
+    axes = {"|d|": "xyz", **{f"d{a}": a for a in "xyz"}, **{f"d_{p}": p for p in PLANES}}.get(variable)
     if axes is None or "displacement" not in ds:
         known = [str(n) for n, v in ds.data_vars.items() if v.attrs.get("units") == "m"]
         raise StiffmapError(
@@ -233,8 +233,7 @@ def draw_directions(ax: Axes, m: Drawn, index: int) -> None:
     ax.plot([], [], color="white", label="direction of the force", path_effects=halo(2.5, "#444444"))
 
 
-def _spread(count: int, most: int = 9) -> NDArray[np.intp]:
+def _spread(count: int) -> NDArray[np.intp]:
     """Indices of at most nine evenly spaced grid values, none at the border."""
-    if count <= most:
-        return np.arange(count)
+    most = min(count, 9)
     return np.unique(np.round((np.arange(most) + 0.5) * count / most - 0.5).astype(int))

@@ -18,6 +18,7 @@ from stiffmap.common.number_text import place_text
 from stiffmap.solve.internal_wrenches import InternalWrenches
 from stiffmap.solve.status import Status, status_of_one
 from stiffmap.ui.plot.style import BLACK, BLUE, MM, TOLERANCE, headline, length_unit, line_look, panel, paper
+from stiffmap.workspace.maps.inputs import PLANES
 
 
 def polar_figure(
@@ -145,7 +146,7 @@ def _panels(figure: Figure, many: Sequence[xr.Dataset], *needed: str, projection
 def in_words(variable: str) -> str:
     """What a deflection variable means."""
     plane = variable.rpartition("_")[2]
-    return f"deflection in the {plane} plane" if plane in ("xy", "xz", "yz") else "deflection"
+    return f"deflection in the {plane} plane" if plane in PLANES else "deflection"
 
 
 def force_text(ds: xr.Dataset) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterable
 from os import PathLike
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from stiffmap.common.fingerprints import digest
 from stiffmap.common.number_text import place_text
 from stiffmap.common.outputs import make_folder, write_rows, write_text
 from stiffmap.machining.milling.choices import Choices, part_lies
@@ -27,6 +27,7 @@ from stiffmap.ui.plot.milling import error_figure, machine_path_figure, outline_
 from stiffmap.ui.plot.style import save
 from stiffmap.ui.report.sheet import ReportSheet, write_sheet
 from stiffmap.workspace.maps.files import write_dataset
+from stiffmap.workspace.maps.loading import machine_digest
 
 
 def summary(found: Milled) -> dict[str, object]:
@@ -146,7 +147,12 @@ def write_report(found: Milled, folder: str | PathLike[str]) -> dict[str, str]:
     ):
         made[name] = save(figure, target / f"{name}.png").name
         pictures[caption] = figure
-    write_sheet(target / made["report"], _sheet(found), pictures, _digests(found))
+    digests = {
+        "machine": machine_digest(found.job.machine),
+        "process": digest(found.job.process),
+        "compensated program": digest(found.program.text),
+    }
+    write_sheet(target / made["report"], _sheet(found), pictures, digests)
     return made
 
 
@@ -161,14 +167,6 @@ def _drives(found: Milled) -> tuple[list[str], list[list[str]]]:
     assert job.angle is not None
     columns = np.hstack([1e3 * job.points.way[:, None], np.degrees(job.angle)[:, None], at * scale])
     return names, [[f"{v:.9g}" for v in row] for row in columns]
-
-
-def _digests(found: Milled) -> dict[str, str]:
-    return {
-        "machine": hashlib.sha256(repr(found.job.machine.description).encode()).hexdigest(),
-        "process": hashlib.sha256(repr(found.job.process).encode()).hexdigest(),
-        "compensated program": hashlib.sha256(found.program.text.encode()).hexdigest(),
-    }
 
 
 def _range(values: Iterable[float]) -> str:

@@ -35,13 +35,24 @@ def number_list(values: ArrayLike, name: str) -> Floats:
     return out
 
 
-def place(position: ArrayLike) -> Floats:
+def rising(values: ArrayLike, name: str, what: str, above: float = -np.inf) -> Floats:
+    """(n,) finite numbers above this one that rise, at least one; StiffmapError says `what` is expected."""
+    out = number_list(values, name)
+    fall = np.flatnonzero(~(np.diff(out, prepend=above) > 0))
+    if fall.size:
+        k = int(fall[0])
+        after = f" after {out[k - 1]:g}" if k else ""
+        raise StiffmapError(f"{name}: expected {what}; entry {k + 1} is {out[k]:g}{after}")
+    return out
+
+
+def place(position: ArrayLike, name: str = "position") -> Floats:
     """One finite TCP position (3,), m."""
-    out = trailing(position, (3,), "position", "a position (m)")
+    out = trailing(position, (3,), name, "a position (m)")
     if out.shape != (3,):
-        raise StiffmapError(f"position: expected one position of shape (3,), got shape {out.shape}")
+        raise StiffmapError(f"{name}: expected one position of shape (3,), got shape {out.shape}")
     if not np.isfinite(out).all():
-        raise StiffmapError(f"position: expected finite numbers, got {out.tolist()}")
+        raise StiffmapError(f"{name}: expected finite numbers, got {out.tolist()}")
     return out
 
 

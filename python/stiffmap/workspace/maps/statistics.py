@@ -12,13 +12,14 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from stiffmap.common.broadcasting import Floats, real_array
+from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.labels import meaning, status_attrs
 from stiffmap.solve.machine import Machine, as_machine
 from stiffmap.solve.options import keywords_of
 from stiffmap.solve.status import Status
 from stiffmap.workspace.maps.block import work_of
+from stiffmap.workspace.maps.inputs import number_list
 from stiffmap.workspace.maps.loading import track
 from stiffmap.workspace.maps.plan import MapPlan, Variable, map_plan
 from stiffmap.workspace.maps.summary import readings, values_of
@@ -61,8 +62,8 @@ def map_statistics(
     StiffmapError
         For bad input.
     """
-    wanted = np.atleast_1d(real_array(percentiles, "percentiles"))
-    if wanted.ndim != 1 or wanted.size == 0 or not ((wanted >= 0) & (wanted <= 100)).all():
+    wanted = number_list(percentiles, "percentiles")
+    if not ((wanted >= 0) & (wanted <= 100)).all():
         raise StiffmapError(f"percentiles: expected numbers from 0 to 100, got {wanted.tolist()}")
     plan = map_plan(as_machine(machine), **call)
     work = work_of(chunk, scheduler)

@@ -17,7 +17,7 @@ from stiffmap.common.tables.lines import complex_number
 from stiffmap.common.tables.named import WORD, Known, NamedTable, read_named
 from stiffmap.common.tables.workbook import TABLES
 from stiffmap.common.units import FREQUENCIES
-from stiffmap.workspace.vibration.response import Complex
+from stiffmap.workspace.vibration.response import Complex, frequency_axis
 from stiffmap.workspace.vibration.response_units import ResponseUnit, response_unit
 
 PREFIX = re.compile(r"((frf|tf|h[12]?(\(f\))?|\w+/\w+|dyn(amic|amische|\.)?)[_/])+(?=.)")
@@ -372,16 +372,8 @@ def _ends(s: DataSet) -> tuple[str, str]:
 
 
 def _check(one: MeasuredResponse) -> None:
-    f, c = one.frequency, one.coherence
-    where = f"response {one.name}" if one.name else "response"
-    if not np.isfinite(f).all() or f[0] < 0:
-        raise StiffmapError(f"{where}: expected finite frequencies (Hz) from 0 on")
-    fall = np.flatnonzero(np.diff(f) <= 0)
-    if fall.size:
-        k = int(fall[0])
-        raise StiffmapError(
-            f"{where}: expected rising frequencies; point {k + 2} has {f[k + 1]:g} Hz after {f[k]:g} Hz"
-        )
+    c, where = one.coherence, f"response {one.name}" if one.name else "response"
+    frequency_axis(one.frequency, where)
     bad = np.flatnonzero(np.isfinite(c) & ((c < 0) | (c > 1 + 1e-9)))
     if bad.size:
         k = int(bad[0])

@@ -9,12 +9,13 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
-from stiffmap.common.broadcasting import Floats, one_of, real_array, thread_count
-from stiffmap.common.errors import StiffmapError
+from stiffmap.common.broadcasting import Floats, one_of, thread_count
+from stiffmap.model.description import TASK
 from stiffmap.model.files.load import Source
 from stiffmap.solve.labels import WRENCH, batch_dims
 from stiffmap.solve.machine import Machine, as_machine
 from stiffmap.solve.options import keywords_of
+from stiffmap.workspace.maps.inputs import rising
 from stiffmap.workspace.vibration.modes import SYMMETRIC, TipModes, tip_modes
 
 Complex = NDArray[np.complex128]
@@ -103,7 +104,6 @@ def direct(m: TipModes, i: int, s: Complex) -> Complex:
 
 KINDS = {"receptance": 0, "mobility": 1, "accelerance": 2}
 """Displacement, velocity, acceleration by force: derivatives of a receptance by time."""
-MOTION = ("x", "y", "z", "rx", "ry", "rz")
 
 
 @keywords_of(tip_modes)
@@ -174,23 +174,12 @@ def frequency_response(
         attrs["symmetrised"] = "the symmetric part of the loaded stiffness was taken"
     dims = (*poses, "frequency", "response", "force")
     coords = {
-        "frequency": ("frequency", f, {"units": "Hz"}), "response": list(MOTION), "force": list(WRENCH),
+        "frequency": ("frequency", f, {"units": "Hz"}), "response": list(TASK), "force": list(WRENCH),
         "status": (poses, found.status.reshape(batch)),
     }  # fmt: skip
     return xr.DataArray(values.reshape(*batch, *values.shape[1:]), coords, dims, kind, attrs)
 
 
-def frequency_axis(frequencies: ArrayLike) -> Floats:
+def frequency_axis(frequencies: ArrayLike, name: str = "frequencies") -> Floats:
     """(frequencies,) Hz; StiffmapError unless finite, rising and not negative."""
-    f = np.atleast_1d(real_array(frequencies, "frequencies", "frequencies (Hz)"))
-    if f.ndim != 1 or not f.size:
-        raise StiffmapError(f"frequencies: expected a list of frequencies (Hz), got shape {f.shape}")
-    if not np.isfinite(f).all() or f[0] < 0:
-        raise StiffmapError("frequencies: expected finite frequencies (Hz) from 0 on")
-    fall = np.flatnonzero(np.diff(f) <= 0)
-    if fall.size:
-        k = int(fall[0])
-        raise StiffmapError(
-            f"frequencies: expected rising frequencies (Hz); entry {k + 2} is {f[k + 1]:g} after {f[k]:g}"
-        )
-    return f
+    return rising(frequencies, name, "rising frequencies (Hz) from 0 on", above=np.nextafter(0.0, -1.0))

@@ -12,7 +12,7 @@ from stiffmap.experiment import Experiment, Predictor, random_plan
 from stiffmap.identification.diagnosis.report.sentences import next_step, opening
 from stiffmap.identification.numbers import unknowns
 from stiffmap.identification.numbers.sensitivity import predicted
-from stiffmap.machining.compensation.check import prediction_error
+from stiffmap.machining.compensation.check import check_compensation
 from stiffmap.model.description import AppliedEffect
 from stiffmap.ui.cli.diagnose import write
 
@@ -79,13 +79,13 @@ def test_the_file_does_on_new_readings_what_the_headline_says(tmp_path: Path) ->
     file = sm.load_machine(tmp_path / "machine.yaml")
     assert not (tmp_path / "calibrated.yaml").exists()
     _, fresh = twin(5, LEAD, poses=200)
-    after = prediction_error(file, fresh)[1]
+    after = check_compensation(file, fresh).whole[1]
     assert after.rms == pytest.approx(d.after.rms, rel=0.15)
     # the effect alone, on the declared numbers, is not the machine
     bare = machine.with_effect(
         "lead_error", element="carriage", legs=["a"], slope=d.effects[0].parameters["slope"][0]
     )
-    assert prediction_error(bare, fresh)[1].rms > 3.0 * after.rms
+    assert check_compensation(bare, fresh).whole[1].rms > 3.0 * after.rms
 
 
 @pytest.mark.slow

@@ -20,7 +20,6 @@ from stiffmap.machining.compensation import (
     dh_list,
     write_dh,
 )
-from stiffmap.machining.compensation.check import prediction_error
 from stiffmap.ui.cli.app import main
 
 MACHINES = (
@@ -223,7 +222,7 @@ def test_what_compensation_leaves_of_held_out_readings(
     assert said["verdict"].startswith("worse")
     assert said["rms left by compensation, mm"] > 1.9 * said["rms as measured, mm"]
     assert not check_compensation(both, tmp_path / "held_out").worse
-    before, after = prediction_error(both, data)
+    before, after = check_compensation(both, data).whole
     assert (before.n, after.rms * 1e3) == (24, pytest.approx(expected, rel=1e-3))
 
 

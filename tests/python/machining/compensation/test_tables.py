@@ -136,3 +136,24 @@ def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
 def test_an_option_that_would_be_dropped_is_refused(words, message, capsys) -> None:
     assert main(["compensate", *words]) == 2
     assert message in capsys.readouterr().err
+
+
+def test_lists_that_must_rise_name_the_entry_that_does_not() -> None:
+    machine = sm.load_machine("travelling-column")
+    with pytest.raises(sm.StiffmapError, match=r"two or more rising numbers .* entry 3 is 0.8 after 0.9"):
+        axis_errors(machine, "z", [0.7, 0.9, 0.8])
+    with pytest.raises(sm.StiffmapError, match=r"two or more rising numbers .* got one"):
+        axis_errors(machine, "z", [0.7])
+    with pytest.raises(sm.StiffmapError, match="through: expected a position"):
+        axis_errors(machine, "z", through=[0.1, 0.2])
+    flat = sm.error_map(
+        machine, x=[0.0], y=[0.97], z=[0.7, 0.8, 0.9], wrench=[0, 0, -100, 0, 0, 0], plane=None
+    )
+    with pytest.raises(sm.StiffmapError, match="through: expected a position"):
+        axis_errors_of_map(flat, "z", through=[0.1, 0.2])
+    with pytest.raises(
+        sm.StiffmapError, match=r"speeds: expected rising numbers above zero .* entry 1 is -1"
+    ):
+        sm.stability_lobes([(80.0, 0.02, 5.0, "x")], "slot", speeds=[-1.0, 2.0])
+    with pytest.raises(sm.StiffmapError, match=r"depths: expected rising .* entry 2 is 0.001 after 0.002"):
+        sm.stability_lobes([(80.0, 0.02, 5.0, "x")], "slot", depths=[0.002, 0.001])

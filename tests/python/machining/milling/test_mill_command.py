@@ -15,6 +15,7 @@ from stiffmap.machining.milling import mill_job
 from stiffmap.machining.toolpath import load_path, outline, outline_text
 from stiffmap.ui.cli import main
 from stiffmap.ui.plot.milling import outline_figure
+from stiffmap.workspace.maps.loading import machine_digest
 
 ORTHOGLIDE = ["--process", "trimming", "--at", "50,50,0"]
 
@@ -50,6 +51,7 @@ def test_outline_to_report_and_program(tmp_path: Path, capsys: pytest.CaptureFix
     assert f"Along the path as simulated: feed 4.8 m/min, force {force[0]} to {force[1]} N." in page
     assert "At the process file&#39;s own feed (6 m/min), speed and cut the mean force would be" in page
     assert page.count("data:image/png") == 3
+    assert f"sha256 {machine_digest(sm.load_machine('orthoglide-revised'))}" in page  # as in its map
     assert "http" not in page.replace("http://www.w3.org", "")
     program = load_path(out / "compensated.ngc")
     assert len(program.cuts) > 10

@@ -84,10 +84,6 @@ class Polygon:
     """(...) radius reached in every direction of the plane; 0 where the drives cannot hold the pose."""
     outer: Floats
     """(...) radius reached in the best direction."""
-    outer_direction: Floats
-    """(...) its angle in the plane, rad."""
-    inner_direction: Floats
-    """(...) angle of the weakest direction, rad."""
     status: NDArray[np.uint8]
 
 
@@ -96,15 +92,13 @@ def section_polygon(
 ) -> Polygon:
     """Polygon of |rows v + bias| <= limits; rows (..., drives, 2), limits (drives,), bias (..., drives)."""
     n = rows.shape[-2]
-    half, room, inner, toward = _nearest_border(rows, limits, bias)
-    points = _crossings(half, room, 2 * n)
-    vertices, outer, best = _ordered(points)
+    half, room, inner = _nearest_border(rows, limits, bias)
+    vertices, outer = _ordered(_crossings(half, room, 2 * n))
     outer = np.where(np.isnan(vertices).all(axis=(-2, -1)) & (inner > 0.0), np.inf, outer)  # a strip
     bad = np.asarray(~np.isfinite(rows).all(axis=(-2, -1)))
     vertices = np.where(bad[..., None, None], np.nan, vertices)
-    weakest = np.arctan2(toward[..., 1], toward[..., 0])
-    inner, outer, best, weakest = (np.where(bad, np.nan, v) for v in (inner, outer, best, weakest))
-    return Polygon(vertices, inner, outer, best, weakest, status)
+    inner, outer = (np.where(bad, np.nan, v) for v in (inner, outer))
+    return Polygon(vertices, inner, outer, status)
 
 
 def inner_radius(rows: Floats, limits: Floats, bias: Floats | float = 0.0) -> Floats:
@@ -113,10 +107,8 @@ def inner_radius(rows: Floats, limits: Floats, bias: Floats | float = 0.0) -> Fl
     return np.where(np.isfinite(rows).all(axis=(-2, -1)), inner, np.nan)
 
 
-def _nearest_border(
-    rows: Floats, limits: Floats, bias: Floats | float
-) -> tuple[Floats, Floats, Floats, Floats]:
-    """Half-spaces half . v <= room, the distance of the nearest border and its normal."""
+def _nearest_border(rows: Floats, limits: Floats, bias: Floats | float) -> tuple[Floats, Floats, Floats]:
+    """Half-spaces half . v <= room, and the distance of the nearest border."""
     bias = np.broadcast_to(bias, rows.shape[:-1])
     half = np.concatenate([rows, -rows], axis=-2)
     room = np.concatenate([limits - bias, limits + bias], axis=-1)
@@ -124,9 +116,8 @@ def _nearest_border(
     norms = np.linalg.norm(half, axis=-1)
     with np.errstate(invalid="ignore", divide="ignore"):
         distance = np.where(norms > 1e-300, room / norms, np.where(room >= 0, np.inf, -np.inf))
-    weakest = np.argmin(np.where(np.isnan(distance), np.inf, distance), axis=-1)[..., None]
-    inner = np.maximum(np.take_along_axis(distance, weakest, -1)[..., 0], 0.0)
-    return half, room, inner, np.take_along_axis(half, weakest[..., None], -2)[..., 0, :]
+    nearest = np.where(np.isnan(distance), np.inf, distance).min(axis=-1)
+    return half, room, np.maximum(nearest, 0.0)
 
 
 def _crossings(half: Floats, room: Floats, count: int) -> Floats:
@@ -147,8 +138,8 @@ def _crossings(half: Floats, room: Floats, count: int) -> Floats:
     return np.stack(out, axis=-2)
 
 
-def _ordered(points: Floats) -> tuple[Floats, Floats, Floats]:
-    """Vertices by angle about their mean, the largest norm and its direction."""
+def _ordered(points: Floats) -> tuple[Floats, Floats]:
+    """Vertices by angle about their mean, and the largest norm."""
     some = np.asarray(np.isfinite(points).all(axis=-1))
     count = np.maximum(some.sum(axis=-1), 1)[..., None]
     centre = np.where(some[..., None], points, 0.0).sum(axis=-2) / count
@@ -159,11 +150,7 @@ def _ordered(points: Floats) -> tuple[Floats, Floats, Floats]:
     most = max(int(some.sum(axis=-1).max(initial=0)), 1)
     last = np.take_along_axis(ordered, (count - 1)[..., None], -2)
     ordered = np.where(np.isfinite(ordered), ordered, last)[..., :most, :]
-    size = np.where(some, np.linalg.norm(points, axis=-1), -np.inf)
-    best = np.argmax(size, axis=-1)[..., None]
-    far = np.take_along_axis(points, best[..., None], -2)[..., 0, :]
-    outer = np.take_along_axis(size, best, -1)[..., 0]
-    return ordered, np.where(np.isfinite(outer), outer, 0.0), np.arctan2(far[..., 1], far[..., 0])
+    return ordered, np.where(some, np.linalg.norm(points, axis=-1), 0.0).max(axis=-1)
 
 
 KINDS = ("least_norm", "stiffness")

@@ -57,8 +57,6 @@ class VelocityTransmission(OverPoses):
     """(...) largest speed in any direction, each drive within its limit: the farthest vertex."""
     condition: Floats
     """(...) sphere_max / sphere_min."""
-    dexterity: Floats
-    """(...) 1 / condition."""
     manipulability: Floats
     """(...) product of the singular values."""
     jacobian: Floats
@@ -95,7 +93,7 @@ def transmission_of(
     with np.errstate(invalid="ignore", divide="ignore"):
         return VelocityTransmission(
             sphere_min=low, sphere_max=high, cube_min=slowest, cube_max=farthest_vertex(driven),
-            condition=high / low, dexterity=low / high, manipulability=np.nanprod(s, axis=-1) + 0 * high,
+            condition=high / low, manipulability=np.nanprod(s, axis=-1) + 0 * high,
             jacobian=k.jacobian, length=size, limits=speeds, status=k.status, flags=k.flags,
         )  # fmt: skip
 
