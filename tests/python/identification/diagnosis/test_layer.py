@@ -57,6 +57,7 @@ def test_a_machine_whose_numbers_are_off_as_a_group_is_not_as_declared() -> None
     assert d.calibration is not None and d.calibration.wide and not d.calibration.beyond and not d.effects
     assert d.verdict == "unattributed" and not d.unexplained
     assert "by more than its numbers are uncertain" in opening(d) and "Nothing to mend" not in next_step(d)
+    assert "none of them alone can be named" in d.lines()[0]
     assert any("times as far off" in line for line in d.lines())
     assert sm.calibrate(machine, data).verdict == "adjusted beyond tolerance"
 

@@ -30,6 +30,7 @@ from stiffmap.identification.diagnosis.report.sentences import (
     LISTED,
     effect_text,
     next_step,
+    off_as_a_group,
     opening,
     separation_text,
 )
@@ -53,6 +54,7 @@ VERDICTS = {
     "effects+unattributed": "explained in part; real structure remains",
     "readings": "a mistake in the readings comes before any cause",
 }
+NUMBERS_OFF = "its numbers are further off than the file allows, and none of them alone can be named"
 
 
 @short_repr
@@ -133,8 +135,9 @@ class Diagnosis:
 
     def lines(self) -> list[str]:
         """Verdict, effects, before and after, noise, and what could not be seen; then the calibration, if any."""
+        numbers = self.verdict == "unattributed" and off_as_a_group(self)
         return [
-            f"verdict: {self.verdict} - {VERDICTS[self.verdict]}",
+            f"verdict: {self.verdict} - {NUMBERS_OFF if numbers else VERDICTS[self.verdict]}",
             *(f"readings: {_slip(s)}" for s in self.slips),
             "effects: " + ("; ".join(effect_text(e) for e in self.effects) or "none") + _others(self),
             *(f"number: {n}" for n in (self.calibration.beyond if self.calibration else ())[:LISTED]),
