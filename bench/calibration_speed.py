@@ -15,11 +15,11 @@ import time
 from dataclasses import replace
 
 import numpy as np
+from tests.python.experiment.virtual.joint_plans import plan_of_joints
 
 import stiffmap as sm
 from stiffmap.experiment import Experiment, Predictor
 from stiffmap.experiment.channels import AXES
-from stiffmap.experiment.virtual.plans import plan_of_joints
 from stiffmap.identification.numbers import unknowns
 from stiffmap.identification.numbers.sensitivity import predicted
 

@@ -44,29 +44,3 @@ def _push(machine: Machine, position: ArrayLike, force: Floats, options: Any) ->
         return -1.0, force, np.full(3, np.nan)
     d = s.displacement[:3]
     return float(np.linalg.norm(d)), force, s.compliance[:3, :3].T @ d
-
-
-def greatest(c: Floats) -> Floats:
-    """(...) greatest singular value of matrices (..., 3, 3), NaN where one is not finite."""
-    bad = np.asarray(~np.isfinite(c).all(axis=(-1, -2)))
-    square = np.swapaxes(c, -1, -2) @ c
-    scale = np.abs(square).max(axis=(-1, -2))
-    safe = np.where(bad | (scale == 0), 1.0, scale)
-    values = _largest_eigenvalue(np.where(bad[..., None, None], 0.0, square) / safe[..., None, None])
-    out = np.sqrt(np.maximum(values * np.where(scale == 0, 0.0, safe), 0.0))
-    return np.asarray(np.where(bad, np.nan, out))
-
-
-def _largest_eigenvalue(a: Floats) -> Floats:
-    """(...) of symmetric matrices (..., 3, 3), by the closed form with the cosine of a third of an angle."""
-    mean = np.trace(a, axis1=-2, axis2=-1) / 3
-    b = a - mean[..., None, None] * np.eye(3)
-    p = np.sqrt((b * b).sum(axis=(-1, -2)) / 6)
-    safe = np.where(p > 0, p, 1.0)
-    b = b / safe[..., None, None]
-    half_det = (
-        b[..., 0, 0] * (b[..., 1, 1] * b[..., 2, 2] - b[..., 1, 2] * b[..., 2, 1])
-        - b[..., 0, 1] * (b[..., 1, 0] * b[..., 2, 2] - b[..., 1, 2] * b[..., 2, 0])
-        + b[..., 0, 2] * (b[..., 1, 0] * b[..., 2, 1] - b[..., 1, 1] * b[..., 2, 0])
-    ) / 2
-    return np.asarray(mean + 2 * p * np.cos(np.arccos(np.clip(half_det, -1.0, 1.0)) / 3))

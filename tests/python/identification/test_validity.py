@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.python.experiment.virtual.joint_plans import plan_of_joints
 
 import stiffmap as sm
 from stiffmap.experiment import Experiment, Predictor, save_experiment
-from stiffmap.experiment.virtual.plans import plan_of_joints
 from stiffmap.identification.validity import beyond, covered
 from stiffmap.machining.compensation import compensate
 from stiffmap.solve.validity import KEY, Validity

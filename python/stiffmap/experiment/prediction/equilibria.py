@@ -78,7 +78,7 @@ def _with_kinds(machine: Machine, plan: Experiment, threads: int | None) -> tupl
     motion, count = motions(machine, bare, threads)
     out = np.full((len(plan), len(plan.channels)), np.nan)
     out[:, [plan.channels.index(c) for c in bare.channels]] = motion
-    here = Seen(bare, motion[:, :6], partial(positions_of, machine, bare))
+    here = Seen(bare, motion[:, :6], positions_of(machine, bare))
     kinds = [(i, kind) for i, c in enumerate(plan.channels) if (kind := kind_of(c))]
     for i, kind in kinds:
         if not kind.pair:
@@ -97,8 +97,8 @@ def _with_kinds(machine: Machine, plan: Experiment, threads: int | None) -> tupl
     ).rows(rows)
     there, more = motions(machine, second, threads)
     first = bare.rows(rows)
-    start = Seen(first, motion[rows, :6], partial(positions_of, machine, first))
-    end = Seen(second, there[:, :6], partial(positions_of, machine, second))
+    start = Seen(first, motion[rows, :6], here.position[rows])
+    end = Seen(second, there[:, :6], positions_of(machine, second))
     for i, kind in paired:
         out[rows, i] = kind.change(start, end)
     return out, count + more

@@ -113,7 +113,7 @@ def _seen(machine: Machine, plan: Experiment, name: str, column: Floats, more: F
     out[:, :6] = np.hstack([linear, twist[:, 3:]])
     for i, c in enumerate(plan.channels):
         if kind := kind_of(c):
-            out[:, i] = kind.change(Seen(plan, out[:, :6], lambda: plan.position + arm), None)
+            out[:, i] = kind.change(Seen(plan, out[:, :6], plan.position + arm), None)
         elif c.joint == name and c.side == "load":
             out[:, i] = more
     return out

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Hashable, Iterable, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from functools import partial
 
 import numpy as np
@@ -287,21 +287,15 @@ def _on_branch(term: AppliedEffect, branch: str) -> AppliedEffect:
     return replace(term, options=tuple({**dict(term.options), "branch": branch}.items()))
 
 
+UNSEEN = {
+    "name", "machine", "title", "record", "source", "ids", "repeat", "out_of_reach", "reading", "sigma", "zero_sigma", "certificate",
+    "asked", "seen", "seen_rotation", "absolute", "rotation_against", "command", "command_of", "other_command", "near", "near_names",
+}  # fmt: skip
+"""Fields of a located experiment that no prediction depends on, or only by what others have of them."""
+
+
 def fingerprint(predictor: Predictor) -> str:
     """Digest of the machine and of all of the plan that a prediction depends on."""
     e = predictor.experiment
-    parts = [
-        predictor.machine.description,
-        e.quantity,
-        e.branch,
-        e.setup,
-        e.point,
-        e.load_point,
-        e.gravity,
-        e.loop,
-    ]
-    parts += [e.reference_temperature, e.extra, e.points, e.load_points, e.unloaded]
-    parts += [e.frame, e.tool, e.instrument, e.target, e.surface, e.normal, e.joint_names]
-    arrays = [e.position, e.wrench, e.rotation, e.other, e.other_rotation, e.approach, e.order, e.temperature]
-    arrays += [e.joints, e.other_joints, e.gravity_of, e.hours]
-    return digest(parts, arrays, code())
+    plan = [getattr(e, f.name) for f in fields(e) if f.name not in UNSEEN]
+    return digest(predictor.machine.description, plan, code())

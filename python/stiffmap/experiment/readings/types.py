@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import cached_property
 
 from stiffmap.experiment.channels import Channel
 from stiffmap.experiment.experiment import Experiment, Floats
@@ -17,12 +16,8 @@ class Seen:
     plan: Experiment
     motion: Floats
     """(n, 6) m, rad: from where it is commanded to where it is, linear part first; NaN where the pose fails."""
-    place: Callable[[], Floats]
-
-    @cached_property
-    def position(self) -> Floats:
-        """(n, 3) m, where it is commanded."""
-        return self.place()
+    position: Floats
+    """(n, 3) m, where it is commanded."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,7 +23,7 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.channels import AXES, AXIS_CHANNELS, Channel
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.readings.library.distance_and_height import DISTANCE
-from stiffmap.solve.kinematics import forward_kinematics, inverse_kinematics
+from stiffmap.solve.kinematics import inverse_kinematics
 from stiffmap.solve.machine import Machine, as_machine, takes_machine
 from stiffmap.workspace.maps.inputs import magnitude
 
@@ -117,23 +117,6 @@ def numbered_anew(plan: Experiment) -> Experiment:
     """The plan with the names and the order of its rows from 1 on."""
     number = np.arange(1, len(plan.position) + 1)
     return replace(plan, ids=tuple(map(str, number)), order=number.astype(float))
-
-
-def plan_of_joints(
-    machine: Machine,
-    joints: Floats,
-    *,
-    axes: Sequence[str] = AXES[:3],
-    noise: float | None = None,
-    angle_noise: float = 1e-5,
-) -> Experiment:
-    """Positions without a load where the drives are commanded (n, drives), in the order of `machine.actuators`."""
-    at = forward_kinematics(machine, joints)
-    plan = plan_of_poses(
-        machine, "position", at.position, np.zeros((1, 6)), axes=axes, noise=noise, angle_noise=angle_noise
-    )
-    names = tuple(machine.actuators)
-    return replace(plan, rotation=at.rotation, rotation_against="base", joints=joints, joint_names=names)
 
 
 def _each(loads: Floats | Sequence[Floats], number: int) -> list[Floats]:

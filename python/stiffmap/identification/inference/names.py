@@ -12,12 +12,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.tasks import on_one_thread
-from stiffmap.experiment.experiment import Experiment, Floats, Mask
+from stiffmap.experiment.experiment import Floats, Mask
 from stiffmap.experiment.noise.level import Noise
 from stiffmap.experiment.noise.outliers import without_suspects
 from stiffmap.experiment.prediction.predict import Predictor
-from stiffmap.identification.candidates.sensitivity import CandidatePlan, plan_of
+from stiffmap.identification.candidates.sensitivity import CandidatePlan
 from stiffmap.identification.clock import Clock
 from stiffmap.identification.inference.amplitudes import Fit, evaluated, fitted
 from stiffmap.identification.inference.chosen import Chosen
@@ -40,7 +39,6 @@ from stiffmap.identification.numbers.certificate import Tolerances, certified
 from stiffmap.identification.numbers.unknowns import Unknown, unknowns
 from stiffmap.model import effects
 from stiffmap.model.description import AppliedEffect
-from stiffmap.solve.machine import Machine
 
 BEHIND = 30.0
 """Evidence, ln, by which a world may fall short of the best one for its effects to get further shapes; effort only."""
@@ -192,14 +190,6 @@ class Inferred:
     """All declared numbers that have an uncertainty."""
     columns: Columns
     search: Search
-
-
-@on_one_thread
-def inferred(machine: Machine, experiment: Experiment) -> tuple[Columns, Search]:
-    """The columns of an experiment, and the set of effects with the best evidence."""
-    predictor = Predictor(machine, experiment)
-    found = infer(predictor, plan_of(predictor))
-    return found.columns, found.search
 
 
 def infer(

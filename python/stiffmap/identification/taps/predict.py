@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from stiffmap.common.arguments import checked
@@ -20,6 +20,8 @@ OCTAVE = 0.35
 NEAR = 0.05
 """Difference of the logarithms of two frequencies within which small errors of the machine mix the directions of two modes: together
 they then count as one plane of directions, and frequency decides."""
+MODES = 16
+"""Of a pose, lowest first, among which those that were found are looked for."""
 REACH = 1.0
 """Difference of the logarithms of two frequencies within which a row looks for its mode."""
 LIKE = 0.7
@@ -52,16 +54,14 @@ class Predicted:
 
 @takes_machine
 @checked
-def predict_taps(
-    machine: Machine, taps: TapTest, *, gravity: ArrayLike | None = None, modes: int = 16
-) -> Predicted:
+def predict_taps(machine: Machine, taps: TapTest) -> Predicted:
     """Frequencies that the machine should show at the poses of a tap test.
 
     Modes are paired at each pose so that directions (MAC of the tool's motion) and frequencies agree best together, never by their
     order: modes that cross are kept apart. Raises StiffmapError for bad input.
     """
     once, back = taps.poses
-    found = tip_modes(machine, once, gravity=gravity, modes=modes)
+    found = tip_modes(machine, once, modes=MODES)
     f, ratio = np.full(len(taps), np.nan), np.full(len(taps), np.nan)
     mac, flexibility = np.full(len(taps), np.nan), np.full((len(taps), 3), np.nan)
     voted, merged = np.zeros(len(taps), np.bool_), np.zeros(len(taps))

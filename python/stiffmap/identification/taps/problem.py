@@ -113,11 +113,8 @@ class TapsProblem:
         if off is not None:
             d = shifted(d, self.numbers, off)
         for c, value in causes:
-            if c.kind.startswith("hammer"):
-                taps = held(taps, c, value)
-            else:
-                d = with_cause(d, c, value)
-        return Machine(d, like=self.machine), taps
+            taps = held(taps, c, value)
+        return Machine(with_causes(d, causes), like=self.machine), taps
 
     def residual(self, causes: Causes = (), off: Floats | None = None) -> Floats:
         """(n,) by noise."""
@@ -131,8 +128,14 @@ class TapsProblem:
         return out
 
 
-def with_cause(d: MachineDescription, c: Candidate, value: float) -> MachineDescription:
-    """The description with a cause in the machine (SI)."""
+def with_causes(d: MachineDescription, causes: Causes) -> MachineDescription:
+    """The description with those causes that lie in the machine."""
+    for c, value in causes:
+        d = d if c.kind in HAMMER else _with_cause(d, c, value)
+    return d
+
+
+def _with_cause(d: MachineDescription, c: Candidate, value: float) -> MachineDescription:
     if c.kind == "payload":
         return replace(d, platform=(*d.platform, Body("tapped_load", value)))
     if c.kind not in FIELDS:
@@ -148,7 +151,9 @@ def with_cause(d: MachineDescription, c: Candidate, value: float) -> MachineDesc
 
 
 def held(taps: TapTest, c: Candidate, value: float) -> TapTest:
-    """The tap test with a cause in how the hammer was held (SI)."""
+    """The tap test with a cause, where that is how the hammer was held (SI)."""
+    if c.kind not in HAMMER:
+        return taps
     way = value * np.eye(3)["xyz".index(c.element)]
     if c.kind == "hammer_direction":
         return replace(taps, hammer=taps.hammer @ Rotation.from_rotvec(way).as_matrix().T)
@@ -233,14 +238,3 @@ def _damper(problem: TapsProblem, full: str, e: Joint) -> list[Candidate]:
         return []
     size = TYPICAL / float(more)
     return [replace(one, parameters=(replace(one.parameters[0], scale=size, upper=1e3 * size),))]
-
-
-def corrected(machine: Machine, causes: Causes) -> Machine:
-    """The machine with the causes, an effect as an effect."""
-    for c, value in causes:
-        if c.kind in KINDS:
-            p = c.parameters[0].name
-            machine = machine.with_effect(c.kind, element=c.element, legs=list(c.legs) or None, **{p: value})
-        else:
-            machine = Machine(with_cause(machine.description, c, value), like=machine)
-    return machine

@@ -16,11 +16,10 @@ from stiffmap.model.link.checks import (
     identifiable_columns,
     on_one_line,
 )
-from stiffmap.model.link.estimate import Evidence
 from stiffmap.model.link.noise import Correlation, FieldNoise, analyse_correlation, estimate_noise
 from stiffmap.model.link.outliers import LEVEL, find_outliers
 from stiffmap.model.link.regression import regress
-from stiffmap.model.link.result import Link, build_link
+from stiffmap.model.link.result import Evidence, Link, build_link
 from stiffmap.model.link.rigidfit import RigidFit, fit_exact, fit_linear, parting_rotation, turn_back
 from stiffmap.model.link.transport import Bools, Floats, twist_transport
 

@@ -19,31 +19,6 @@ from stiffmap.model.link.solve import Material, Setup, has_ccx, mean_motion, sol
 from stiffmap.model.link.transport import Floats, Ints, standard_errors
 
 
-@dataclass(frozen=True)
-class CovarianceBudget:
-    """Covariance (36, 36) by source; each systematic source is one common scale on its matrix of shifts."""
-
-    parts: dict[str, Floats]
-
-    @property
-    def total(self) -> Floats:
-        """(36, 36) sum over the sources."""
-        return np.asarray(sum(self.parts.values()))
-
-    def standard_error(self, source: str | None = None) -> Floats:
-        """(6, 6) standard uncertainty of one source, or of all."""
-        return standard_errors(self.total if source is None else self.parts[source])
-
-    def table(self, compliance: Floats) -> str:
-        """Relative standard uncertainty of the diagonal entries, a line per source."""
-        size = np.diag(compliance)
-        lines = ["source    " + "".join(f"{f'k{i}{i}':>10}" for i in range(1, 7))]
-        for source in [*self.parts, None]:
-            relative = np.diag(self.standard_error(source)) / size
-            lines.append(f"{source or 'total':<10}" + "".join(f"{r:>10.1e}" for r in relative))
-        return "\n".join(lines)
-
-
 def shift_covariance(shifts: list[Floats]) -> Floats:
     """(36, 36) mean square of alternative estimates' deviations (6, 6) from the one that is kept.
 
@@ -65,7 +40,8 @@ class PartLink:
     """An identified part: the spring of the finest mesh, its uncertainty by source, and the fields."""
 
     link: Link
-    budget: CovarianceBudget
+    covariances: dict[str, Floats]
+    """(36, 36) by source; each systematic source is one common scale on its matrix of shifts."""
     refinement: Refinement | None
     mesh: SolidMesh
     nodes: Ints  # (n,) nodes of the loaded face in the mesh
@@ -74,6 +50,19 @@ class PartLink:
     solver: str
     material: Material
     setup: Setup
+
+    @property
+    def covariance(self) -> Floats:
+        """(36, 36) of all sources together."""
+        return np.asarray(sum(self.covariances.values()))
+
+    def table(self) -> str:
+        """Relative standard uncertainty of the diagonal entries, a line per source."""
+        lines = ["source    " + "".join(f"{f'k{i}{i}':>10}" for i in range(1, 7))]
+        for source, V in {**self.covariances, "total": self.covariance}.items():
+            relative = np.diag(standard_errors(V)) / np.diag(self.link.compliance)
+            lines.append(f"{source:<10}" + "".join(f"{r:>10.1e}" for r in relative))
+        return "\n".join(lines)
 
     def file(self, name: str) -> LinkFile:
         """The link file: compliance, total covariance, and where both come from."""
@@ -90,10 +79,10 @@ class PartLink:
                          "support": self.setup.support},
             "noise_m": self.link.sigma.tolist(),
             "degrees_of_freedom": self.link.dof.tolist(),
-            "standard_error": {k: self.budget.standard_error(k).tolist() for k in self.budget.parts},
+            "standard_error": {k: standard_errors(V).tolist() for k, V in self.covariances.items()},
         }  # fmt: skip
         C = self.link.compliance
-        return LinkFile((C + C.T) / 2, self.budget.total, self.link.reference, source, name)
+        return LinkFile((C + C.T) / 2, self.covariance, self.link.reference, source, name)
 
 
 def link_from_part(
@@ -155,9 +144,7 @@ def link_from_part(
         shifts = [another(mesh, s, solve_skfem) - link.compliance for s in others]
         # Head and support are two questions: their shares add.
         parts["boundary"] = np.sum([shift_covariance([s]) for s in shifts], axis=0)
-    return PartLink(
-        link, CovarianceBudget(parts), refinement, mesh, nodes, field, wrenches, chosen, material, setup
-    )
+    return PartLink(link, parts, refinement, mesh, nodes, field, wrenches, chosen, material, setup)
 
 
 def _identify(mesh: SolidMesh, nodes: Ints, field: Floats, setup: Setup, wrenches: Floats) -> Link:

@@ -1,11 +1,10 @@
-"""Text report of an identified link: the only place of the identification that knows millimetres."""
+"""Units in which a compliance is shown, and what the matrix itself says: definiteness, lengths of an equivalent bar."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.model.link.estimate import SpringEstimate
 from stiffmap.model.link.transport import Floats
 
 
@@ -26,86 +25,6 @@ def unit_name(i: int, j: int, length: str) -> str:
     if i < 3 and j < 3:
         return f"{length}/N"
     return f"rad/(N·{length})" if i >= 3 and j >= 3 else "1/N"
-
-
-def write_report(link: SpringEstimate, length: str) -> str:
-    """See :meth:`stiffmap.model.link.result.Link.report`."""
-    return "\n".join([*_table(link, length), *_field_lines(link), *_matrix_lines(link)])
-
-
-def _table(link: SpringEstimate, length: str) -> list[str]:
-    factor = unit_factor(length)
-    C, error = link.compliance * factor, link.standard_error * factor
-    zero = link.insignificant
-    diagonal = [(i, i) for i in range(6)]
-    pairs = diagonal + [
-        (i, j) for i in range(6) for j in range(6) if i != j and (i < j or not link.symmetric)
-    ]
-    lines = [f"{'entry':<6} {'value':>13} {'std. error':>11} {'rel.':>8}  unit"]
-    for i, j in pairs:
-        if zero[i, j] and i != j:
-            continue
-        with np.errstate(invalid="ignore", divide="ignore"):
-            relative = abs(error[i, j] / C[i, j])
-        mark = "  zero within the test" if zero[i, j] else ""
-        numbers = f"{C[i, j]:>13.5e} {error[i, j]:>11.1e} {relative:>8.1e}"
-        lines.append(f"k{i + 1}{j + 1:<4} {numbers}  {unit_name(i, j, length)}{mark}")
-    names = [f"k{i + 1}{j + 1}" for i, j in pairs if zero[i, j] and i != j]
-    k = float(np.nanmin(link.multiple))
-    lines.append(
-        f"zero within {k:.2f} standard errors (family-wise level {link.level:g} over {link.tests} entries): "
-        + (", ".join(names) or "none")
-        + ("; set to zero and re-estimated" if link.zeros_applied else "")
-    )
-    return lines
-
-
-def _field_lines(link: SpringEstimate) -> list[str]:
-    e, noise = link.evidence, link.evidence.noise
-    size = np.sqrt(np.mean(np.sum(e.field.displacements**2, axis=2), axis=1))
-    place = np.array2string(link.reference, precision=6)
-    lines = [f"rigid-body residual, {e.kept.shape[1]} nodes, reference {place} m:"]
-    share = np.divide(link.sigma, size, out=np.full_like(size, np.nan), where=size > 0)
-    for k in range(len(size)):
-        gone = int(link.outliers[k].sum())
-        loose = "; NOT rigid: are these nodes of the loaded end alone?" if share[k] > 0.1 else ""
-        lines.append(
-            f"  case {k + 1}: sigma {link.sigma[k]:.2e} m ({share[k]:.1e} of the displacement), "
-            f"{link.dof[k]} degrees of freedom, {gone} outliers{loose}"
-        )
-    kind = "pooled" if noise.pooled else "given" if not np.all(np.isfinite(noise.used_dof)) else "per case"
-    lines.append(f"noise: {kind} (homogeneity p = {noise.homogeneity:.2g})")
-    c = e.correlation
-    if c is None:
-        lines.append("independence of the noise: taken as given")
-    elif not c.correlated:
-        lines.append(f"independence of the noise: not rejected (p = {c.p_value:.2g})")
-    else:
-        lines.append(
-            f"independence of the noise: REJECTED (p = {c.p_value:.1g}); correlation length "
-            f"{1e3 * c.length:.3g} mm, {c.effective_nodes:.3g} effective nodes of {e.kept.shape[1]}, "
-            f"errors enlarged by {np.sqrt(c.inflation.mean()):.3g}; "
-            f"largest correlation between cases {c.repetition:.2f}"
-        )
-    return lines
-
-
-def _matrix_lines(link: SpringEstimate) -> list[str]:
-    missing = ~np.isfinite(link.compliance)
-    # 0.1 is more than warping of the face and the mesh make
-    wrong = link.asymmetry > 0.1 and link.symmetry_p_value < link.level
-    lines = [
-        f"asymmetry before symmetrisation: {link.asymmetry:.2e} of sqrt(kii kjj) "
-        f"(p = {link.symmetry_p_value:.2g})"
-        + ("; NOT an elastic body: compare order, units and reference of the wrenches" if wrong else ""),
-        *findings(link.compliance, link.covariance),
-    ]
-    if np.isfinite(link.case_p_value):
-        lines.append(f"agreement of the cases with one matrix: p = {link.case_p_value:.2g}")
-    if missing.any():
-        names = ", ".join(f"k{i + 1}{j + 1}" for i, j in np.argwhere(missing))
-        lines.append(f"not identified: {names}")
-    return lines
 
 
 def smallest_eigenvalue(compliance: Floats, covariance: Floats) -> tuple[float, float]:

@@ -18,7 +18,7 @@ from stiffmap.model.link.pipeline import PartLink, Solver, Support, link_from_pa
 from stiffmap.model.link.readers import FIELDS, read_field
 from stiffmap.model.link.result import Link
 from stiffmap.model.link.solve import Material, Setup
-from stiffmap.model.link.transport import Floats
+from stiffmap.model.link.transport import Floats, standard_errors
 from stiffmap.ui.cli.inputs import in_si
 from stiffmap.ui.cli.options import argument, flag, option, written
 from stiffmap.ui.cli.output import Answer
@@ -83,7 +83,7 @@ def command(
         from stiffmap.ui.plot.link import draw_link
 
         draw_link(link, picture, found)
-    told = [link.report(), *([] if found is None else _of_part(found, link))]
+    told = [link.report(), *([] if found is None else _of_part(found))]
     told += [f"wrote {path}" for path in (out, picture) if path is not None]
     problem = ""
     try:
@@ -133,10 +133,10 @@ def _reference(
     return face_area_centre(mesh.nodes, mesh.face(loaded))[1]
 
 
-def _of_part(part: PartLink, link: Link) -> Iterator[str]:
+def _of_part(part: PartLink) -> Iterator[str]:
     yield f"\n{part.solver}, {len(part.mesh.nodes)} nodes, {len(part.mesh.tets)} ten-node tetrahedra"
     yield "relative standard uncertainty of the diagonal, by source (fit: which nodes, by block bootstrap):"
-    yield part.budget.table(link.compliance)
+    yield part.table()
     if part.refinement is not None:
         yield f"observed order of the mesh error: {part.refinement.words}"
 
@@ -154,7 +154,7 @@ def as_data(link: Link, part: PartLink | None, file: LinkFile) -> dict[str, Any]
     }
     if part is not None:
         data["solver"] = part.solver
-        data["uncertainty"] = {k: part.budget.standard_error(k) for k in part.budget.parts}
+        data["uncertainty"] = {k: standard_errors(V) for k, V in part.covariances.items()}
         r = part.refinement
         data["order"] = None if r is None or r.why else r.order
         data["order_note"] = "one mesh" if r is None else r.why

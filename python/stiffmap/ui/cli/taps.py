@@ -8,7 +8,8 @@ import numpy as np
 
 from stiffmap.experiment import load_experiment
 from stiffmap.identification.taps import TapDiagnosis, TapTest, explain_taps, load_taps
-from stiffmap.identification.taps.problem import corrected
+from stiffmap.identification.taps.problem import HAMMER, with_causes
+from stiffmap.solve.machine import Machine
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import machine_with, percent, words
 from stiffmap.ui.cli.options import argument, option
@@ -60,15 +61,15 @@ def _row(r: dict[str, Any]) -> str:
     return text if (d := r["damping_after_percent"]) is None else f"{text}, after {d:.2f}"
 
 
-def _files(machine: Any, measured: TapTest, found: TapDiagnosis) -> Iterator[tuple[str, Any]]:
+def _files(machine: Machine, measured: TapTest, found: TapDiagnosis) -> Iterator[tuple[str, Any]]:
     from stiffmap.ui.plot.modes import response_figure
     from stiffmap.workspace.vibration import frequency_response
 
     f = np.geomspace(0.3 * measured.frequency.min(), 2 * measured.frequency.max(), 600)
     at = measured.position[0]
     many = {"before": frequency_response(machine, at, f)}
-    own = [(e.place, e.value) for e in found.named if not e.place.kind.startswith("hammer")]
+    own = [(e.place, e.value) for e in found.named if e.place.kind not in HAMMER]
     if own and found.machine is not None:
         many["after"] = frequency_response(found.machine, at, f)
-        yield "corrected.yaml", corrected(machine, own)
+        yield "corrected.yaml", Machine(with_causes(machine.description, own), like=machine)
     yield "response.png", response_figure(many)

@@ -15,7 +15,7 @@ from stiffmap.common.outputs import write_picture
 from stiffmap.model.link.pipeline import PartLink
 from stiffmap.model.link.report import unit_factor, unit_name
 from stiffmap.model.link.result import Link
-from stiffmap.model.link.transport import Floats, Ints
+from stiffmap.model.link.transport import Floats, Ints, standard_errors
 from stiffmap.ui.plot.style import BLUE, COLOURS, VERMILLION, new_figure, wrench_text
 
 GREY = "#999999"
@@ -34,7 +34,7 @@ def draw_link(link: Link, path: str | Path, part: PartLink | None = None) -> Non
         for k in range(cases):
             _draw_shape(rows[0].add_subplot(1, cases, k + 1, projection="3d"), part, triangles, k)
     _draw_residuals(rows[-2], link, cases)
-    error = link.standard_error if part is None else part.budget.standard_error()
+    error = link.standard_error if part is None else standard_errors(part.covariance)
     _draw_entries(rows[-1].add_subplot(), link, error)
     write_picture(path, figure, dpi=110)
 

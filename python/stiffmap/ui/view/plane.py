@@ -17,9 +17,9 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.common.number_text import length_unit
 from stiffmap.solve.compiled import Status
 from stiffmap.solve.solution import Solution
-from stiffmap.solve.worst_force import greatest
 from stiffmap.ui.plot.planes import levels
 from stiffmap.ui.plot.style import BLUE, COLOURS, ORANGE, PURPLE, VERMILLION
+from stiffmap.workspace.performance.motion.velocity import singular_values
 
 
 @dataclass(frozen=True)
@@ -50,13 +50,13 @@ def deflection(s: Solution, force: float, tolerance: float) -> Floats:
 
 def worst_deflection(s: Solution, force: float, tolerance: float) -> Floats:
     """(...) m: a further force of this size in its worst direction, to first order at the loaded pose."""
-    return np.asarray(force * greatest(s.compliance[..., :3, :3]))
+    return np.asarray(force * singular_values(s.compliance[..., :3, :3])[..., 0])
 
 
 def weakest_stiffness(s: Solution, force: float, tolerance: float) -> Floats:
     """(...) N/m of the softest direction."""
     with np.errstate(divide="ignore"):
-        return np.asarray(1.0 / greatest(s.compliance[..., :3, :3]))
+        return np.asarray(1.0 / singular_values(s.compliance[..., :3, :3])[..., 0])
 
 
 def margin(s: Solution, force: float, tolerance: float) -> Floats:

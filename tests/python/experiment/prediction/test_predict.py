@@ -16,7 +16,7 @@ from stiffmap.experiment.experiment import numbered
 from stiffmap.experiment.noise.checks import checks
 from stiffmap.experiment.noise.level import noise_of
 from stiffmap.experiment.noise.outliers import suspects, without_suspects
-from stiffmap.experiment.prediction.predict import readings, true_wrench
+from stiffmap.experiment.prediction.predict import fingerprint, readings, true_wrench
 from stiffmap.model.description import AppliedEffect
 
 
@@ -204,3 +204,21 @@ def test_names_folders_and_texts_serve_as_well(
     ):
         np.testing.assert_allclose(predict(m, e, terms), wanted, atol=1e-9)  # type: ignore[arg-type]
     assert random_plan("orthoglide-revised", poses=2).machine == machine.name
+
+
+@pytest.mark.parametrize(
+    ("change", "same"),
+    [
+        ({"name": "again", "reading": 1e-5, "notes": "cold"}, True),
+        ({"anchor": (0.0, 0.0, 1.0)}, False),
+        ({"registration": (("anchor 1", np.eye(3), np.ones(3)),)}, False),
+        ({"unloaded": "unknown"}, False),
+        ({"wrench": 2.0}, False),
+    ],
+)
+def test_a_fingerprint_is_of_all_that_a_prediction_depends_on(machine, plan, change, same) -> None:
+    own = {k: np.full(getattr(plan, k).shape, v) for k, v in change.items() if isinstance(v, float)}
+    own |= {k: v for k, v in change.items() if k != "notes" and not isinstance(v, float)}
+    record = (("notes", change["notes"]),) if "notes" in change else ()
+    other = replace(plan, **own, record=record)
+    assert (fingerprint(Predictor(machine, other)) == fingerprint(Predictor(machine, plan))) == same

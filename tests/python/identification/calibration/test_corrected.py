@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.python.experiment.virtual.joint_plans import plan_of_joints
 
 import stiffmap as sm
 from stiffmap.experiment import Experiment, Predictor
 from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.noise.whitening import LinearProblem, best_fit, unseen_nuisances
-from stiffmap.experiment.virtual.plans import plan_of_joints
 from stiffmap.identification.calibration import Calibration, calibrate
 from stiffmap.identification.calibration.result import in_display_units
 from stiffmap.identification.inference.travel import Profile, knots_of

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.python.experiment.virtual.joint_plans import plan_of_joints
 
 import stiffmap as sm
 from stiffmap.experiment import Experiment, Predictor, random_plan
 from stiffmap.experiment.experiment import Floats
-from stiffmap.experiment.virtual.plans import plan_of_joints
 from stiffmap.identification.calibration import Calibration, calibrate
 from stiffmap.identification.diagnosis import answer
 from stiffmap.identification.inference.corrected import Corrected, machine_of

@@ -12,12 +12,14 @@ import pytest
 from tests.python.identification.inference.synthetic import CHANNELS, READINGS, columns
 
 import stiffmap as sm
-from stiffmap.experiment import load_experiment, random_plan, simulate
+from stiffmap.experiment import Experiment, Predictor, load_experiment, random_plan, simulate
 from stiffmap.identification.candidates.candidates import Candidate
+from stiffmap.identification.candidates.sensitivity import plan_of
 from stiffmap.identification.inference.amplitudes import fitted
 from stiffmap.identification.inference.chosen import Chosen
+from stiffmap.identification.inference.columns import Columns
 from stiffmap.identification.inference.constants import ODDS
-from stiffmap.identification.inference.names import inferred, searched, terms, with_travel
+from stiffmap.identification.inference.names import Search, infer, searched, terms, with_travel
 from stiffmap.identification.inference.parts import Parts
 from stiffmap.identification.inference.places import Place, Shape
 from stiffmap.identification.inference.verdict import TOLERABLE, Beyond, effect_of, judged
@@ -157,6 +159,13 @@ def test_what_is_nothing_at_the_optimum_leaves_the_search_and_the_others_are_fit
     of = [dict(zip((o.part.name for o in x.best.chosen), x.gain, strict=True)) for x in (s, again)]
     assert of[0] == of[1]
     assert s.less(replace(gone, part=replace(gone.part, name="a number"))) is s
+
+
+def inferred(machine: sm.Machine, experiment: Experiment) -> tuple[Columns, Search]:
+    """The columns of an experiment, and the set of effects with the best evidence."""
+    predictor = Predictor(machine, experiment)
+    found = infer(predictor, plan_of(predictor))
+    return found.columns, found.search
 
 
 def judged_word(s: Any) -> str:

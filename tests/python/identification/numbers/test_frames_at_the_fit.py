@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from tests.python.experiment.virtual.joint_plans import plan_of_joints
 
 import stiffmap as sm
 from stiffmap.experiment import Experiment, Predictor, random_plan
 from stiffmap.experiment.channels import AXES
 from stiffmap.experiment.noise.whitening import LinearProblem
 from stiffmap.experiment.poses.handeye import Sighting, find_frames
-from stiffmap.experiment.virtual.plans import plan_of_joints
 from stiffmap.identification.calibration import calibrate
 from stiffmap.identification.inference.corrected import corrected
 from stiffmap.identification.inference.kernels import Covariance

@@ -27,6 +27,7 @@ from stiffmap.model.link.solve import (
     solve_ccx,
     solve_skfem,
 )
+from stiffmap.model.link.transport import standard_errors
 
 STEEL = Material(210e9, 0.3)
 WRENCHES = np.diag([100.0, 100.0, 100.0, 10.0, 10.0, 10.0])
@@ -175,17 +176,17 @@ def test_budget_lists_its_sources_and_the_file_carries_their_sum():
     part = link_from_part(
         bar.mesh, STEEL, SETUP._replace(reference=bar.reference()), WRENCHES, size=0.003, solver="skfem"
     )
-    assert set(part.budget.parts) == {"fit", "region", "mesh", "boundary"}
-    V = sum(part.budget.parts.values())
+    assert set(part.covariances) == {"fit", "region", "mesh", "boundary"}
+    V = sum(part.covariances.values())
     file = part.file("test")
     assert np.array_equal(file.covariance, V)
     assert np.linalg.eigvalsh(V).min() > -1e-12 * np.linalg.eigvalsh(V).max()
     assert file.provenance["solver"] == "scikit-fem"
-    assert "boundary" in part.budget.table(part.link.compliance)
+    assert "boundary" in part.table()
     beam = cantilever(rectangle(0.01, 0.02), 0.06, STEEL.young, STEEL.young / 2.6)
     off = np.abs(np.diag(part.link.compliance - beam))
     shear = np.array([0, 0.012, 0.05, 0, 0, 0]) * np.diag(beam)  # not in Euler-Bernoulli
-    assert np.all(off < 3 * np.diag(part.budget.standard_error()) + shear)
+    assert np.all(off < 3 * np.diag(standard_errors(part.covariance)) + shear)
 
 
 @pytest.mark.parametrize(
@@ -241,7 +242,7 @@ def test_the_fits_share_is_that_of_the_nodes():
         for s in (0.009, 0.008)
     ]
     a, b = (p.link.compliance[0, 0] for p in parts)
-    share = parts[0].budget.standard_error("fit")[0, 0]
+    share = standard_errors(parts[0].covariances["fit"])[0, 0]
     assert parts[0].link.evidence.correlation.correlated
     assert share < 0.3 * parts[0].link.standard_error[0, 0]
     assert abs(a - b) < 2 * share

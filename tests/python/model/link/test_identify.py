@@ -17,7 +17,6 @@ from tests.python.model.link.link_fields import (
 )
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.model.link import transport_compliance
 from stiffmap.model.link.identify import identify_link
 from stiffmap.model.link.report import bending_lengths
 from stiffmap.model.link.transport import twist_transport
@@ -124,15 +123,6 @@ def test_transport_agrees_with_identification_at_the_other_point():
     assert np.abs((there.compliance - C2) / size).max() < 1e-9
     error = np.sqrt(np.diag(V2))
     assert np.abs((there.covariance - V2) / np.outer(error, error)).max() < 1e-6
-
-
-def test_transport_with_rotation_turns_axes():
-    R = Rotation.from_rotvec([0.3, -0.2, 0.9]).as_matrix()
-    turned, _ = transport_compliance(C, np.eye(36), np.zeros(3), R)
-    wrench = np.arange(1.0, 7)
-    local = np.concatenate([R.T @ wrench[:3], R.T @ wrench[3:]])
-    twist = C @ wrench
-    assert turned @ local == pytest.approx(np.concatenate([R.T @ twist[:3], R.T @ twist[3:]]))
 
 
 def test_stiffness_error_agrees_with_sampling():

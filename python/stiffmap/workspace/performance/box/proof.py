@@ -18,6 +18,7 @@ from stiffmap.common.tasks import workers
 from stiffmap.workspace.performance.limits.limits import Bounds, factor_limits
 from stiffmap.workspace.performance.motion.closing import kernel_starts, revolute_drives
 from stiffmap.workspace.performance.motion.many_drives import corners
+from stiffmap.workspace.performance.motion.velocity import singular_values
 
 BOX = np.array(list(product((-1.0, 1.0), repeat=3)))  # (8, 3) corners of a cell, in half lengths
 
@@ -184,31 +185,25 @@ def _factors_over(
     ok = np.isfinite(w).all(axis=(1, 2)) & np.isfinite(slack)
     if low > 0:
         at = w[ok][:, None] + np.einsum("ck,nkab->ncab", BOX, step[ok])
-        values = _largest(at) if sphere else np.linalg.norm(at, axis=3).max(axis=2)
+        values = singular_values(at)[..., 0] if sphere else np.linalg.norm(at, axis=3).max(axis=2)
         add(below, ok, values, slack[ok], 1 / low)
     if not np.isfinite(high):
         return out
     ok = ok & (np.abs(np.linalg.det(np.where(ok[:, None, None], w, np.eye(d)))) > 1e-12)
     v = np.linalg.inv(w[ok])
     relative = v[:, None] @ step[ok]
-    size = _largest(v)
+    size = singular_values(v)[..., 0]
     # J = (1 + Z)^-1 V with Z = V (step + rest): its part of first order is exact, the others are bounded
-    z = _largest(np.einsum("ck,nkab->ncab", BOX, relative)).max(axis=1) + size * slack[ok]
+    z = singular_values(np.einsum("ck,nkab->ncab", BOX, relative))[..., 0].max(axis=1) + size * slack[ok]
     with np.errstate(divide="ignore", invalid="ignore"):
         rest = np.where(z < 1, (z**2 / (1 - z) + size * slack[ok]) * size, np.inf)
     at = v[:, None] - np.einsum("ck,nkab->ncab", BOX, relative @ v[:, None])
     if sphere:
-        values = _largest(at)
+        values = singular_values(at)[..., 0]
     else:
         values, rest = np.linalg.norm(at @ corners(d).T, axis=2).max(axis=2), rest * np.sqrt(d)
     add(above, ok, values, rest, high)
     return out
-
-
-def _largest(a: Floats) -> Floats:
-    """(...) largest singular value."""
-    gram = np.swapaxes(a, -1, -2) @ a
-    return np.asarray(np.sqrt(np.maximum(np.linalg.eigvalsh(gram)[..., -1], 0.0)))
 
 
 FIRST = 4  # cells along each edge at first

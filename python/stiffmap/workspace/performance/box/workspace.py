@@ -112,7 +112,7 @@ def workspace_volume(
             f"{machine.name}: the task has no position, so there is no workspace of positions"
         )
     cells = cells or CELLS[len(axes)]
-    low, high = _begun(machine, region, axes)
+    low, high = _begun(machine, axes) if region is None else read_region(region, axes)
     more = 0
     if region is None:
         drawn, _, low, high, more = _drawn(ask, low, high, axes, FIRST[len(axes)], rng, GROWN, 1 / 2)
@@ -136,10 +136,7 @@ def workspace_volume(
     )  # fmt: skip
 
 
-def _begun(machine: Machine, region: ArrayLike | None, axes: list[int]) -> tuple[Floats, Floats]:
-    if region is not None:
-        low, high = read_region(region, axes)
-        return low, high
+def _begun(machine: Machine, axes: list[int]) -> tuple[Floats, Floats]:
     low, high = machine.workspace
     centre, half = (low + high) / 2, (high - low) / 2
     moves = np.isin(np.arange(3), axes)
