@@ -28,7 +28,7 @@ from stiffmap.identification.diagnosis.report.separation import separation
 from stiffmap.identification.inference.amplitudes import Fit
 from stiffmap.identification.inference.chosen import Chosen, Term
 from stiffmap.identification.inference.columns import Columns
-from stiffmap.identification.inference.constants import RARE
+from stiffmap.identification.inference.constants import ODDS, RARE
 from stiffmap.identification.inference.corrected import Corrected, along_travel, corrected, instead
 from stiffmap.identification.inference.machines import (
     CALIBRATED,
@@ -71,7 +71,7 @@ def answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, cross
     # where nothing is named, the numbers alone are corrected
     which = CALIBRATED if made.which == CORRECTED and not effects else made.which
     others = list(_alternatives(found, v, best, clock)) if best and effects else []
-    several = bool(others or clock.left_out or any(n.or_numbers or n.equivalents[RIVALS:] for n in v.named))
+    several = bool(others or clock.left_out or any(n.numbers or n.equivalents[RIVALS:] for n in v.named))
     rest, numbers = _rest(columns, fit, v, each, gap), _numbers(found, v, models.get(CORRECTED))
     cut_short = clock.stopped and noise.lack_of_fit_before < RARE
     return Diagnosis(
@@ -95,7 +95,7 @@ def answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, cross
         limitations=[
             *_first(fit, v, bool((found.noise.declared >= found.noise.floor).any())),
             *notes,
-            *(_or_numbers(n) for n in v.named if n.or_numbers),
+            *(_or_numbers(n) for n in v.named if n.numbers or n.against_numbers < np.log(ODDS)),
             *limitations(e, found.noise, predictor.machine),
             *([] if late is None else [str(late)]),
         ],

@@ -52,11 +52,6 @@ class Named:
     against_numbers: float = np.inf
     """Its ln odds against declared numbers that are off in its stead."""
 
-    @property
-    def or_numbers(self) -> bool:
-        """Whether declared numbers would do in its stead, within their tolerances or out of them."""
-        return bool(self.numbers) or self.against_numbers < np.log(ODDS)
-
 
 @dataclass(frozen=True, eq=False)
 class Beyond:
@@ -93,7 +88,7 @@ class Verdict:
     def word(self) -> str:
         """``none``, ``effects``, ``ambiguous``, ``unattributed``."""
         if self.named:
-            return "ambiguous" if any(n.equivalents or n.or_numbers for n in self.named) else "effects"
+            return "ambiguous" if any(n.equivalents or n.numbers for n in self.named) else "effects"
         return "unattributed" if self.rest else "effects" if self.beyond else "none"
 
 
