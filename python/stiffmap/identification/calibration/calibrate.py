@@ -104,7 +104,7 @@ def _answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, star
     made = written(models, base, predictor, sigma, listed, seed, lambda: clock.over)
     rows, rank = table_of(columns, found.search.calibrated or fit, at)
     verdict = judged(columns, found.search)
-    wide = too_wide(fit, [b.unknown for b in verdict.beyond])
+    wide = too_wide(fit, verdict.out_of_tolerance)
     at_name = {r.name: r for r in rows}
     beyond = tuple(at_name[b.unknown.name] for b in verdict.beyond)
     held, rest = made.held_out, verdict.rest or verdict.time

@@ -218,7 +218,7 @@ def _noise(found: Inferred, made: Written, best: Corrected | None, scale: float)
     n, e = found.noise, found.columns.experiment
     frames = nuisance_columns(e, found.plan.base).shape[-1]
     values = 0 if best is None else sum(len(t.values) for t in best.terms)
-    heavy = bool(np.any(found.search.best.fit.weights != 1.0))
+    heavy = found.search.best.fit.heavy
 
     floor, repeats, declared, consistency = (
         {c.name: float(v) for c, v, read in zip(e.channels, each, e.axis_read, strict=True) if read}
@@ -248,9 +248,8 @@ def _rest(columns: Columns, fit: Fit, v: Verdict, each: dict[str, float], gap: F
     in_noise = gap / noise
     if not in_noise.any():
         return [Rest(what, share)]
-    share = share or min(
-        1.0, float(np.sum(in_noise**2) / np.sum(columns.residual**2))
-    )  # of what stays at the fit
+    if share == 0.0:  # no part of the model: what stays at the fit
+        share = min(1.0, float(np.sum(in_noise**2) / np.sum(columns.residual**2)))
     pose = e.groups
     number = int(pose.max()) + 1
     count = np.maximum(np.bincount(pose, minlength=number), 1)
@@ -266,7 +265,7 @@ def _rest(columns: Columns, fit: Fit, v: Verdict, each: dict[str, float], gap: F
 def _first(fit: Fit, v: Verdict, stated: bool) -> list[str]:
     """What must be known of the noise before anything else."""
     out = not_as_stated(v.noise, "is stated" if stated else "repeats or steps show")
-    if np.any(fit.weights != 1.0):
+    if fit.heavy:
         out.append("some readings lie far from the others and count less")
     if v.time:
         out.append(f"the noise of a reading carries over to the following ones ({v.time})")
@@ -288,8 +287,7 @@ def _numbers(found: Inferred, v: Verdict, best: Corrected | None) -> FoundNumber
         return None
     fit, known = found.search.best.fit, {u.name for u in best.given.sensitivity.unknowns}
     table = tuple(n for n in table_of(found.columns, fit, best)[0] if n.name in known)
-    off = {b.unknown.name for b in v.beyond}
-    wide = too_wide(fit, [*(b.unknown for b in v.beyond), *v.as_effects])
+    off, wide = {b.unknown.name for b in v.beyond}, too_wide(fit, v.out_of_tolerance)
     beyond = tuple(sorted((n for n in table if n.name in off), key=lambda n: -n.share))
     return FoundNumbers(tolerance_word(", ".join(n.name for n in beyond), wide), wide, beyond, table)
 

@@ -79,6 +79,11 @@ class Fit:
         """κ: noise over what is declared."""
         return float(np.exp(0.5 * self.t[0]))
 
+    @property
+    def heavy(self) -> bool:
+        """Whether the noise has heavy tails: some readings lie far from the others and count less."""
+        return bool(np.any(self.weights != 1.0))
+
     def amplitude(self, name: str) -> float:
         """Standard deviation of a part; 0 where it is not in the model."""
         return next(
@@ -172,7 +177,7 @@ def _standing_out(fit: Fit) -> tuple[float, Floats | None]:
 def refitted(fit: Fit, residual: Floats) -> Fit:
     """The same parts for another residual (m,): from the amplitudes of a fit, with heavy tails where it has them."""
     columns = replace(fit.columns, residual=residual)
-    found = _optimum(columns, fit.parts, fit.t, fit.weights, heavy=bool(np.any(fit.weights != 1.0)))
+    found = _optimum(columns, fit.parts, fit.t, fit.weights, heavy=fit.heavy)
     return replace(found, lighter=fit.lighter)
 
 

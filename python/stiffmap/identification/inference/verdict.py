@@ -85,6 +85,11 @@ class Verdict:
     """Numbers out of tolerance that are named as the effect that shows the same."""
 
     @property
+    def out_of_tolerance(self) -> tuple[Unknown, ...]:
+        """All numbers that no tolerance allows, also those that are named as effects."""
+        return *(b.unknown for b in self.beyond), *self.as_effects
+
+    @property
     def word(self) -> str:
         """``none``, ``effects``, ``ambiguous``, ``unattributed``."""
         if self.named:
@@ -121,8 +126,8 @@ def judged(columns: Columns, search: Search, gone: tuple[tuple[Chosen, str], ...
     as_effects = tuple(b.unknown for b in beyond if called[id(b)] is not None)
     beyond = tuple(b for b in beyond if called[id(b)] is None)
     rest, time, noise = left(model.fit)
-    slips = bool(np.any(model.fit.weights != 1.0))  # then those of one pose may be others
-    explained = {TOLERABLE, ONE_POSE} if slips else {TOLERABLE}
+    # readings of one pose alone may be slips where there are others
+    explained = {TOLERABLE, ONE_POSE} if model.fit.heavy else {TOLERABLE}
     unexplained = [c.part.name for c, why in refused if why not in explained]
     if rest in ("", NOISIER):  # part of which an effect without a name may be
         rest = next(iter(unexplained), rest) or (gone[-1][0].part.name if gone and not named else "")

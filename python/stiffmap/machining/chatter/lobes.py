@@ -129,8 +129,8 @@ def stability_lobes(
     frequency = frequencies_of(modes.frequency)
     depth0, angle = limits(modes.receptance(frequency), p)
     least = least_depth(frequency, modes.receptance, p)
-    usual = p.spindle * np.linspace(0.25, 1.5, diagram[0])
-    s = rising(usual if speeds is None else speeds, "speeds", "rising numbers above zero (rad/s)", above=0.0)
+    speeds = p.spindle * np.linspace(0.25, 1.5, diagram[0]) if speeds is None else speeds
+    s = rising(speeds, "speeds", "rising numbers above zero (rad/s)", above=0.0)
     top = HIGHEST * least if np.isfinite(least) else p.cut.axial
     usual = np.linspace(0, max(top, 1e-9), diagram[1] + 1)[1:]
     d = rising(usual if depths is None else depths, "depths", "rising numbers above zero (m)", above=0.0)

@@ -100,9 +100,10 @@ def axis_errors(
     if position is None:
         low, high = machine.workspace
         position = np.linspace(low[i], high[i], max(points, 1))
-    nodes = rising(position, "points, position", expected := "two or more rising numbers (m)")
+    name, expected = "points, position", "two or more rising numbers (m)"
+    nodes = rising(position, name, expected)
     if nodes.size < 2:
-        raise refused("points, position", expected, "one")
+        raise refused(name, expected, "one")
     point = place(machine.description.home.p if through is None else through, "through")
     middle = (nodes[:-1] + nodes[1:]) / 2
     everywhere = np.r_[nodes, middle]
