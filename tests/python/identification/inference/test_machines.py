@@ -253,3 +253,10 @@ def test_what_a_machine_leaves_is_compared_with_noise_as_it_is(
     p = machines.lack_of_fit(times * noise, heavy, 3, 1000)
     assert (p < RARE) is lacks and (lacks or p < 0.999)
     assert not heavy or machines.lack_of_fit(noise, False, 3, 1000) < RARE
+
+
+def test_bounded_squares_of_heavy_tails_have_the_mean_of_squares_of_a_gaussian() -> None:
+    rng = np.random.default_rng(5)
+    many = 100_000
+    for heavy, noise in ((True, rng.standard_t(machines.DEGREES, many)), (False, rng.normal(size=many))):
+        assert RARE < machines.lack_of_fit(noise, heavy, 0, many) < 1.0 - RARE

@@ -157,3 +157,5 @@ def test_lists_that_must_rise_name_the_entry_that_does_not() -> None:
         sm.stability_lobes([(80.0, 0.02, 5.0, "x")], "slot", speeds=[-1.0, 2.0])
     with pytest.raises(sm.StiffmapError, match=r"depths: expected rising .* entry 2 is 0.001 after 0.002"):
         sm.stability_lobes([(80.0, 0.02, 5.0, "x")], "slot", depths=[0.002, 0.001])
+    with pytest.raises(sm.StiffmapError, match=r"depths: expected rising .* entry 2 is 0.002 after 0.002"):
+        sm.stability_lobes([(80.0, 0.02, 5.0, "x")], "slot", depths=[0.002, 0.002])
