@@ -18,7 +18,6 @@ from stiffmap.solve.mobility import free_motions
 from stiffmap.solve.solution import Solution
 from stiffmap.solve.status import Flag, Status
 from stiffmap.solve.unreachable import why_unreachable
-from stiffmap.solve.worst_force import worst_force
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import MM, force_given, machine_at, numbers, position_words
 from stiffmap.ui.cli.options import option, written
@@ -71,7 +70,7 @@ def command(
     if output is not None:
         raise StiffmapError("--output: only with a file of poses (--at poses.csv)")
     size, vector = force_given(force)
-    acting = worst_force(m, place, size, **how) if vector is None else vector
+    acting = _furthest(m, place, size, how) if vector is None else vector
     load = np.r_[acting, MM * numbers(moment, "moment", 3)]
     s = m.solve(place, load, **how)
     why = None if int(s.status) == Status.CONVERGED else MEANINGS[Status(int(s.status)).name]
@@ -86,6 +85,14 @@ def command(
         told.append(f"free: the platform can {'; '.join(ways)}")
     found = {"machine": m.name, "point": point, "position": place, "wrench": load} | s.as_plain()
     return Answer(found | {"reason": why}, told, finding=int(s.status) != Status.CONVERGED)
+
+
+def _furthest(m: Machine, place: Floats, size: float, how: dict[str, Any]) -> Floats:
+    """Force (3,) N of that size; along x where no direction has an answer."""
+    from stiffmap.workspace.performance import worst_deflection  # what maps need takes most of a second
+
+    unit = worst_deflection(m, place, force=size, plane=None, **how).direction
+    return size * (unit if np.isfinite(unit).all() else np.eye(3)[0])
 
 
 def _lines(m: Machine, s: Solution) -> Iterator[str | Table]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from itertools import product
+from typing import Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,6 +13,7 @@ from stiffmap.common.broadcasting import Floats, trailing, whole_number
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.short import short_repr
 from stiffmap.solve.machine import Machine, takes_machine
+from stiffmap.solve.options import LoadingKeywords, spelled_out
 from stiffmap.solve.solution import Solution
 from stiffmap.solve.status import Status
 from stiffmap.workspace.maps.inputs import box_nodes, magnitude, plane_axes, read_box
@@ -46,6 +48,7 @@ class WorstDeflection:
 
 
 @takes_machine
+@spelled_out(LoadingKeywords)
 def worst_deflection(
     machine: Machine,
     position: ArrayLike | None = None,
@@ -58,9 +61,7 @@ def worst_deflection(
     refine: bool = True,
     turns: int = TURNS,
     linear: bool = False,
-    rotation: ArrayLike | None = None,
-    gravity: ArrayLike | None = None,
-    threads: int | None = None,
+    **given: Unpack[LoadingKeywords],
 ) -> WorstDeflection:
     """Largest deflection of the TCP under a force that may point anywhere in a plane or in space.
 
@@ -93,8 +94,7 @@ def worst_deflection(
     force = magnitude(force, "force", "N")
     whole_number(turns, "turns", 0)
     axes = [0, 1, 2] if plane is None else list(plane_axes(plane))
-    loading = Loading(machine, rotation=rotation, gravity=gravity, threads=threads)
-    ask = _Ask(loading, force, plane, axes, direction, linear, turns)
+    ask = _Ask(Loading(machine, **given), force, plane, axes, direction, linear, turns)
     if position is not None:
         if box is not None:
             raise StiffmapError("worst_deflection: expected position or box, got both")
