@@ -21,9 +21,11 @@ import numpy as np
 import stiffmap as sm
 from stiffmap.experiment import Experiment
 from stiffmap.experiment.files.load import load_experiment
+from stiffmap.experiment.prediction.predict import Predictor
+from stiffmap.identification.candidates.sensitivity import plan_of
 from stiffmap.identification.inference import columns as of_columns
 from stiffmap.identification.inference.chosen import Chosen
-from stiffmap.identification.inference.names import inferred
+from stiffmap.identification.inference.names import infer
 from stiffmap.identification.inference.places import Place
 from stiffmap.identification.inference.verdict import judged
 
@@ -188,7 +190,9 @@ SETS: dict[str, Callable[[Path, Path, int], Iterator[Case]]] = {
 def said(machine: sm.Machine, experiment: Experiment) -> Iterator[str]:
     """Lines of one answer."""
     begun = time.perf_counter()
-    columns, search = inferred(machine, experiment)
+    predictor = Predictor(machine, experiment)
+    found = infer(predictor, plan_of(predictor))
+    columns, search = found.columns, found.search
     v = judged(columns, search)
     took = time.perf_counter() - begun
     model = search.best

@@ -11,6 +11,7 @@ import sys
 from collections.abc import Iterator
 from functools import cache
 from graphlib import CycleError, TopologicalSorter
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -184,6 +185,18 @@ def loaders(path: Path) -> set[str]:
 
 def test_modules_are_loaded_by_name_in_few_places() -> None:
     assert {name for name, path in MODULES.items() if loaders(path)} == BY_NAME
+
+
+@pytest.mark.parametrize("folder", ["bench", "docs", "examples"])
+def test_scripts_import_names_that_there_are(folder: str) -> None:
+    absent = []
+    for path in sorted((PACKAGE.parents[1] / folder).rglob("*.py")):
+        for node in statements(ast.parse(path.read_text(encoding="utf-8")).body):
+            if isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "stiffmap":
+                module = import_module(node.module)
+                names = [a.name for a in node.names if f"{node.module}.{a.name}" not in MODULES]
+                absent += [f"{path.name}: {node.module}.{n}" for n in names if not hasattr(module, n)]
+    assert not absent
 
 
 def test_no_module_of_ours_is_imported_by_its_name_as_text() -> None:
