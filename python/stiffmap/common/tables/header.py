@@ -302,7 +302,7 @@ DEFLECTION = (
 OF_SOME = re.compile(f"(?i){DEFLECTION}|{FORCE}|{MOMENT}")
 """In a title whose unit is not that of all columns."""
 COMMANDED = "target|cmd|nom|nominal|command|commanded|ref|desired|r?soll?"
-MEASURED = "act|actual|meas|measured|achieved|attained|r?ist|gemessen"
+MEASURED = "act|actual|meas|measured|achieved|attained|r?ist|gemessen|mess"
 PATTERNS: tuple[tuple[str, str], ...] = (
     ("id", r"#|id|nr\.?|no\.?|lfd\.? ?nr\.?|number|nummer|row|zeile|punkt|messpunkt|point|messpunkt nr\.?|point no\.?|punto"),
     ("temperature", r"t|temp|temperature|temperatur"),
