@@ -86,10 +86,10 @@ def as_readings(m: Meant, instrument: Instrument) -> set[str]:
     chosen: dict[str, list[str]] = {}
     units: dict[str, str] = {}
     for meaning, pattern in instrument.columns.items():
-        index, other = m.sheet.find(pattern), instrument.measured.get(f"d{meaning}")
-        bare = None if index is not None or other is None else m.sheet.find(meaning)
-        if bare is not None and m.sheet.find(str(other), (bare,)) is not None:
-            index = bare  # X next to X meas is what was commanded
+        index = m.sheet.find(pattern)
+        if index is None and (other := instrument.measured.get(f"d{meaning}")):  # X next to X meas
+            bare = m.sheet.find(meaning)
+            index = bare if m.sheet.find(other, (bare,)) is not None else None
         if index is not None:
             chosen[meaning] = [m.sheet.header[index]]
             if meaning in instrument.units and not m.sheet.unit(index):
@@ -102,16 +102,15 @@ def as_readings(m: Meant, instrument: Instrument) -> set[str]:
             units[c.meaning] = unit
     at: dict[str, tuple[int, int]] = {}
     for reading, pattern in ({} if seen else instrument.measured).items():
-        a = reading[-1]
-        given = (chosen | m.chosen).get(a)
-        command = None if given is None else m.index(given[0])
-        own = m.sheet.find(pattern, () if command is None else (command,))
+        given = (chosen | m.chosen).get(a := reading[-1])
+        command = m.index(given[0]) if given else None
+        own = m.sheet.find(pattern, (command,))
         if own is None or (command is None and any(c.meaning == reading for c in said)):
             continue
         if command is None:
             raise StiffmapError(
-                f"{m.sheet.file}: expected {a} as commanded and as measured side by side; found '{m.sheet.header[own]}' alone: "
-                f"say --map {a}='HEADER' of the commanded one, or --map p{a}='HEADER' of one that was seen in a frame of its own"
+                f"{m.sheet.file}: expected {a} as commanded and as measured; found '{m.sheet.header[own]}' alone: say --map {a}='HEADER' "
+                f"of the commanded one, or --map p{a}='HEADER' of one that was seen in a frame of its own"
             )
         at[reading] = own, command
     if at:
