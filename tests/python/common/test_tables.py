@@ -267,6 +267,35 @@ def test_responses_of_complex_numbers(text: str, tmp_path: Path) -> None:
         read_responses(tmp_path / "t.csv")
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "Timestamp;x;y;z;Remark\n;mm;mm;mm;\n3 May 10:00;1,5;0;0;first\n3 May 10:01;2;0;0;\n",
+        "x [mm],y [mm],z [mm],Comment\n1.5,0,0,\n2,0,0,again\n",
+    ],
+)
+def test_remarks_next_to_numbers_are_left_out(text: str, tmp_path: Path) -> None:
+    (tmp_path / "p.csv").write_text(text, encoding="utf-8")
+    assert read_pose_table(tmp_path / "p.csv").position[:, 0].tolist() == [0.0015, 0.002]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (
+            "x,y,z\nmm,mm,furlong\n1,2,3\n4,5,6\n",
+            r"z \[furlong\]: expected a unit such as in z \[mm\], found furlong",
+        ),
+        ("x [mm],y [mm],z [mm],speeed\n1,2,3,fast\n4,5,6,7\n", "unknown column 'speeed'"),
+        ("x [mm],y [mm],z [mm],feeed\n1,2,3,fast\n4,5,6,slow\n", "unknown column 'feeed'"),
+    ],
+)
+def test_units_and_names_that_nobody_knows_are_named(text: str, words: str, tmp_path: Path) -> None:
+    (tmp_path / "p.csv").write_text(text, encoding="utf-8")
+    with pytest.raises(FileError, match=words):
+        read_pose_table(tmp_path / "p.csv")
+
+
 def test_numbers_of_columns_in_brackets_are_no_readings() -> None:
     plain = Spelling(False)
     assert [is_finite(c, plain) for c in ("0.33 + 0.42", "2*0.15", "-π/2")] == [True] * 3

@@ -157,6 +157,7 @@ def stated_unit(above: Sequence[str], quantity: str) -> str:
 
 UNIT_LABEL = re.compile(r"(?i)[\w -]*(unit|einheit|unité|unidad)[\w ]*")
 """Before the units of all columns, as in ``Y_Unit_Label``."""
+NO_UNIT = ("", "-", "–", "—", "#", "1")  # in the place of a unit
 
 
 def _plain(cell: str) -> str:
@@ -186,8 +187,7 @@ def _is_unit(text: str) -> bool:
 
 def _units(cells: Sequence[str]) -> bool:
     """Whether a line holds nothing but units."""
-    cells = [_bare(c) for c in cells if not UNIT_LABEL.fullmatch(c)]
-    filled = [c for c in cells if c not in ("", "-", "–", "—", "#", "1")]
+    filled = [b for c in cells if (b := _bare(c)) not in NO_UNIT and not UNIT_LABEL.fullmatch(c)]
     named = [c for c in filled if _is_unit(c)]
     return bool(named) and len(named) >= 0.6 * len(filled)
 
@@ -199,7 +199,8 @@ def with_unit(name: str, unit: str) -> str:
 
 def _with_own_unit(name: str, unit: str) -> str:
     bare = _bare(unit)
-    return name if not _is_unit(bare) or split_unit(name)[1] else with_unit(name, bare)
+    none = bare in NO_UNIT or UNIT_LABEL.fullmatch(unit) or split_unit(name)[1]
+    return name if none or not (name or _is_unit(bare)) else with_unit(name, bare)
 
 
 def _needs_group(names: Sequence[str], group: Sequence[str], first: Sequence[str]) -> bool:
@@ -302,7 +303,7 @@ DEFLECTION = (
 OF_SOME = re.compile(f"(?i){DEFLECTION}|{FORCE}|{MOMENT}")
 """In a title whose unit is not that of all columns."""
 COMMANDED = "target|cmd|nom|nominal|command|commanded|ref|desired|r?soll?"
-MEASURED = "act|actual|meas|measured|achieved|attained|r?ist|gemessen"
+MEASURED = "act|actual|meas|measured|achieved|attained|r?ist|gemessen|mess"
 PATTERNS: tuple[tuple[str, str], ...] = (
     ("id", r"#|id|nr\.?|no\.?|lfd\.? ?nr\.?|number|nummer|row|zeile|punkt|messpunkt|point|messpunkt nr\.?|point no\.?|punto"),
     ("temperature", r"t|temp|temperature|temperatur"),

@@ -1,7 +1,7 @@
 """Tables whose columns have known names, each with its unit, for all commands that take points, forces or frequencies; tables of poses
 among them, one convention for all commands.
 
-``x [mm]``, ``x (mm)``, ``x in mm`` or ``x_mm``; order and case are free, a column of names or numbers of rows is left out, and all that
+``x [mm]``, ``x (mm)``, ``x in mm`` or ``x_mm``; order and case are free, a column of remarks, of names or of numbers of rows is left out, and all that
 `read_sheet` understands is read: groups, units in a line of their own or in the cells, lines above the header. Of poses x, y, z are the
 commanded TCP, rx, ry, rz its rotation vector from home, fx … mz the wrench on the tool, t the time, feed the speed along the path;
 docs/machine_files.md lists the columns.
@@ -19,10 +19,11 @@ from typing import Any, NoReturn
 import numpy as np
 
 from stiffmap.common.broadcasting import Floats
-from stiffmap.common.errors import FileError, StiffmapError
+from stiffmap.common.errors import FileError, StiffmapError, suggestion
 from stiffmap.common.number_text import read_value
+from stiffmap.common.tables.cells import Cells
 from stiffmap.common.tables.header import meaning_of, split_unit
-from stiffmap.common.tables.lines import Spelling, finite_number, number
+from stiffmap.common.tables.lines import Spelling, finite_number, is_finite, number
 from stiffmap.common.tables.sheet import Layout, read_sheet
 from stiffmap.common.tables.table import Table
 from stiffmap.common.units import FREQUENCIES, QUANTITIES, SHORT_TIMES, feed_unit, unit_of
@@ -105,9 +106,11 @@ def named(sheet: Table, known: Known) -> NamedTable:
     out = NamedTable(sheet.file, list(sheet.lines), sheet.top, {}, {}, {}, {})
     for i, head in enumerate(sheet.header):
         index = COUNTER.fullmatch(sheet.names[i]) and sheet.is_numeric(i) and np.diff(sheet.numbers(i)) == 1
-        if not known.has(head) and (meaning_of(head) == "id" or np.all(index)):
+        if not known.has(head) and (meaning_of(sheet.names[i]) == "id" or np.all(index)):
             continue
-        name, unit, size = _meaning(head, known, out)
+        name, unit, size = _meaning(head, known, out, sheet.with_points(i))
+        if not name:
+            continue
         if name in out.header:
             out.fail(f"a column is given twice, as '{out.header[name]}' and '{head}'")
         out.header[name], out.units[name], out.size[name] = head, unit, size
@@ -136,8 +139,8 @@ def _joined(name: str) -> str:
     return re.sub(r"\s+", "_", name.lower())
 
 
-def _meaning(head: str, known: Known, table: NamedTable) -> tuple[str, str, float]:
-    """Name of a column, its unit as written, and the SI size of that."""
+def _meaning(head: str, known: Known, table: NamedTable, cells: Cells) -> tuple[str, str, float]:
+    """Name of a column, nothing where no cell is a number, its unit as written, and the SI size of that."""
     text, unit = split_unit(head)
     name = _joined(text)
     if not known.has(text) and not re.search(r"[])]\s*$", head):  # x_per_tooth_mm, real_m/N
@@ -151,6 +154,9 @@ def _meaning(head: str, known: Known, table: NamedTable) -> tuple[str, str, floa
     if name not in known.units and meaning_of(text) in known.units:
         name = meaning_of(text)
     usual = known.usual.get(name, name)
+    unlike = name not in known.units and not suggestion(name, known.units)
+    if unlike and not any(is_finite(c, Spelling()) for c in cells):
+        return "", "", 1.0
     if name not in known.units:
         shown = ", ".join(known.usual.get(n, n) for n in known.units)
         table.fail(f"unknown column '{head}'; known: {shown}, each with its unit, as in x [mm] or x_mm")

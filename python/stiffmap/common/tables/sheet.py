@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from itertools import chain, islice, zip_longest
+from itertools import chain, islice, takewhile, zip_longest
 from pathlib import Path
 
 import numpy as np
@@ -129,10 +129,8 @@ def read_sheet(path: Path, sheet: str | None = None, layout: Layout = PLAIN) -> 
     width = len(names)
     said = [*header, *(c.strip() for _, cells in above for c in cells)]
     aside = [f"row {n}, of numbers above the header" for n, _ in begun[:-1] if not layout.strict]
-    clear = (
-        b if _all_readings(b) else _data(b, first, header, said, spelling, aside, layout, str(path))
-        for b in blocks(chain([first], kept(rows, None if layout.strict else aside)))
-    )
+    every = blocks(chain([first], kept(rows, None if layout.strict else aside)))
+    clear = (_data(b, first, header, said, spelling, aside, layout, str(path)) for b in every)
     data = even(chain.from_iterable(clear), width, str(path), separator, None if layout.strict else aside)
     cells_of, lines_ = packed(data, width)
     columns = list(cells_of)
@@ -303,6 +301,14 @@ def _all_readings(rows: Sequence[Line]) -> bool:
     )
 
 
+def _labels(rows: Sequence[Line], comma: bool) -> set[int]:
+    """First lines that begin with a word, where all others begin with a number: channels or sensors below the names of columns."""
+    begins = [(n, "".join(cells[:1]).strip()) for n, cells in rows]
+    lines = {n for n, _ in takewhile(lambda b: not (re.search(r"\d", b[1]) or is_nothing(b[1])), begins)}
+    numbers = [is_finite(c, Spelling(comma)) for n, c in begins if n not in lines]
+    return lines if numbers and all(numbers) else set()
+
+
 def _plain_numbers(cells: Sequence[str]) -> bool:
     text = "".join(cells)
     if "_" in text or not text.isascii():
@@ -313,7 +319,7 @@ def _plain_numbers(cells: Sequence[str]) -> bool:
 
 
 def _data(
-    rows: Iterable[Line],
+    rows: Sequence[Line],
     begun: Line,
     header: Sequence[str],
     names: Sequence[str],
@@ -326,11 +332,16 @@ def _data(
 
     `names`: all that stands above the rows.
     """
+    knows = [layout.known(split_unit(h)[0]) for h in header]
+    labels = _labels(rows, spelling.comma) if rows[0] == begun and any(knows) and not knows[0] else set[int]()
+    if _all_readings(rows) and not labels:
+        yield from rows
+        return
     means = MEAN.fullmatch(begun[1][-1].strip())
     for n, cells in rows:
         first = next(c.strip() for c in cells if c.strip())
         last = cells[-1].strip()
-        if STATISTICS.fullmatch(first) and number(first, spelling) is None:
+        if n in labels or (STATISTICS.fullmatch(first) and number(first, spelling) is None):
             aside.append(f"row {n}, '{first}', is no reading")
         elif MEAN.fullmatch(last) and not means and len(cells) == len(header):
             aside.append(f"row {n}, '{last}', is no reading")

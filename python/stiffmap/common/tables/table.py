@@ -61,7 +61,7 @@ class Table:
         """The unit that stands in a column's header, or nothing."""
         return split_unit(self.header[column])[1]
 
-    def find(self, pattern: str, besides: Collection[int] = ()) -> int | None:
+    def find(self, pattern: str, besides: Collection[int | None] = ()) -> int | None:
         """The first column, `besides` some, whose name, without its unit, is all of a regular expression in any case."""
         at = (i for i, n in enumerate(self.names) if re.fullmatch(pattern, n, re.IGNORECASE))
         return next((i for i in at if i not in besides), None)

@@ -13,6 +13,7 @@ import numpy as np
 from stiffmap.common.broadcasting import given_path
 from stiffmap.common.errors import FileError, MissingColumnError
 from stiffmap.common.tables.table import Table
+from stiffmap.common.tables.workbook import TABLES
 from stiffmap.common.units import name_and_unit
 from stiffmap.common.yaml_text import read as read_yaml
 from stiffmap.experiment.channels import AXES, AXIS_CHANNELS, Channel
@@ -42,10 +43,9 @@ def load_experiment(path: str | PathLike[str]) -> Experiment:
     """
     place = given_path(path, "path", "an experiment's folder or its YAML file")
     file = place / "experiment.yaml" if place.is_dir() else place
-    if not file.is_file():
-        raise FileError(
-            "there is no such experiment (expected a folder with experiment.yaml)", file=str(place)
-        )
+    if not file.is_file() or file.suffix.lower() in (*TABLES, ".txt"):
+        way = "expected a folder with experiment.yaml; stiffmap experiment new makes one of a table"
+        raise FileError(f"there is no such experiment ({way})", file=str(place))
     document = read_yaml(file)
     expected = "an experiment file is a mapping with machine, quantity and units"
     model = validated(file_model(), document, str(file), expected)

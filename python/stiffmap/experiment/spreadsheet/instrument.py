@@ -87,6 +87,9 @@ def as_readings(m: Meant, instrument: Instrument) -> set[str]:
     units: dict[str, str] = {}
     for meaning, pattern in instrument.columns.items():
         index = m.sheet.find(pattern)
+        if index is None and (other := instrument.measured.get(f"d{meaning}")):  # X next to X meas
+            bare = m.sheet.find(meaning)
+            index = bare if m.sheet.find(other, (bare,)) is not None else None
         if index is not None:
             chosen[meaning] = [m.sheet.header[index]]
             if meaning in instrument.units and not m.sheet.unit(index):
@@ -99,14 +102,17 @@ def as_readings(m: Meant, instrument: Instrument) -> set[str]:
             units[c.meaning] = unit
     at: dict[str, tuple[int, int]] = {}
     for reading, pattern in ({} if seen else instrument.measured).items():
-        own = m.sheet.find(pattern)
-        if own is None:
+        given = (chosen | m.chosen).get(a := reading[-1])
+        command = m.index(given[0]) if given else None
+        own = m.sheet.find(pattern, (command,))
+        if own is None or (command is None and any(c.meaning == reading for c in said)):
             continue
-        if reading[-1] not in chosen:
+        if command is None:
             raise StiffmapError(
-                f"{m.sheet.file}: '{m.sheet.header[own]}' was measured; no column is its commanded {reading[-1]}"
+                f"{m.sheet.file}: expected {a} as commanded and as measured; found '{m.sheet.header[own]}' alone: say --map {a}='HEADER' "
+                f"of the commanded one, or --map p{a}='HEADER' of one that was seen in a frame of its own"
             )
-        at[reading] = own, m.sheet.header.index(chosen[reading[-1]][0])
+        at[reading] = own, command
     if at:
         read = np.column_stack([_si(m, own, r, instrument) for r, (own, _) in at.items()])
         asked = np.column_stack([_si(m, command, r[-1], instrument) for r, (_, command) in at.items()])

@@ -80,7 +80,7 @@ def _parsed(text: bytes, wrong: Wrong) -> xml.Element:
     try:
         parser.Parse(tolerated(text), True)
     except (expat.ExpatError, LookupError, ValueError) as error:  # the latter two: no such encoding
-        raise wrong(f"not XML: {error}") from None
+        raise wrong(f"not XML: {error}; expected a URDF (xacro puts a calibration into it)") from None
     return tree.close()
 
 

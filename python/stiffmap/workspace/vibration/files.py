@@ -146,21 +146,22 @@ def _in_form(t: NamedTable, form: tuple[str, str], frequency: Floats) -> Complex
         t.check(form[0], lambda _: values != 0, "a force by a motion above zero")
         values = 1 / values
     out = _receptance(frequency, values, kind)
-    if np.isfinite(out).any():  # over a peak by 90 to 180 deg: 2 to 3 rad, or 57 times as much
-        top = np.nanargmax(np.abs(out))
-        low = np.flatnonzero(np.abs(out) < abs(out[top]) / np.sqrt(2))
-        ends = [*low[low < top][-1:], *low[low > top][:1]]
-        over = slice(*ends) if len(ends) == 2 else slice(None)
-        turn, degrees = np.ptp(b[over]), t.units.get("phase") != "rad"
-        if polar and (len(ends) == 2 and turn < 0.1 if degrees else bool(ends) and turn > 20):
+    if polar:  # over a peak by 90 to 180 deg: 2 to 3 rad, or 57 times as much
+        ends = _about_peak(out)
+        turn, degrees = np.ptp(b[slice(*ends) if len(ends) == 2 else slice(None)]), t.units["phase"] != "rad"
+        if len(ends) == 2 and turn < 0.1 if degrees else bool(ends) and turn > 20:
             found, other = f"{turn / t.size['phase']:.3g}", "rad" if degrees else "deg"
             t.fail(
                 f"expected a turn by 90 to 180 deg over the peak, found {found}: is it in {other}?", "phase"
             )
-        rise = np.diff(np.unwrap(np.angle(out[over])))
-        if len(ends) == 2 and len(rise) > 2 and (rise > 0).all() and rise.sum() > 1:
-            t.fail("expected a phase that falls over the peak, found one that rises: turn its sign", form[1])
     return out
+
+
+def _about_peak(receptance: Complex) -> list[int]:
+    """The nearest frequencies below and above the largest size at which it has half the power, as far as there are any."""
+    top = np.argmax(np.nan_to_num(size := np.abs(receptance)))
+    low = np.flatnonzero(size < size[top] / np.sqrt(2))
+    return [*low[low < top][-1:], *low[low > top][:1]]
 
 
 def _kind(unit: ResponseUnit) -> tuple[int | None, int]:
@@ -378,6 +379,11 @@ def _check(one: MeasuredResponse) -> None:
     if bad.size:
         k = int(bad[0])
         raise StiffmapError(f"{where}: expected a coherence from 0 to 1; point {k + 1} has {c[k]:g}")
+    ends = _about_peak(one.receptance)
+    rise = np.diff(np.unwrap(np.angle(one.receptance[slice(*ends)]))) if len(ends) == 2 else np.empty(0)
+    if len(rise) > 2 and (rise > 0).all() and rise.sum() > 1:
+        what = "expected a phase that falls over the peak, found one that rises: turn its sign"
+        raise StiffmapError(f"{where}: {what}")
     known = c[np.isfinite(c)]
     if known.size > 2 and (known >= 1).all():
         raise StiffmapError(

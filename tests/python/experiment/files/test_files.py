@@ -70,6 +70,14 @@ def test_no_folder(tmp_path: Path) -> None:
         sm.load_experiment(tmp_path / "nowhere")
 
 
+def test_a_table_is_no_folder(tmp_path: Path) -> None:
+    (tmp_path / "readings.xlsx").write_bytes(b"PK\xff")
+    with pytest.raises(
+        sm.StiffmapError, match=r"readings.xlsx: .*stiffmap experiment new makes one of a table"
+    ):
+        sm.load_experiment(tmp_path / "readings.xlsx")
+
+
 def test_a_virtual_experiment_survives_its_file(tmp_path: Path) -> None:
     machine = sm.load_machine("orthoglide-revised")
     twin = simulate(machine, random_plan(machine, "deflection", poses=3, loads=2), seed=3)

@@ -56,6 +56,22 @@ def test_a_tracker_lists_points(tmp_path: Path) -> None:
     assert e.ids == ("A1", "A2")
 
 
+@pytest.mark.parametrize(
+    "header", ["X;Y;Z;X meas;Y meas;Z meas", "X soll;Y soll;Z soll;X Mess;Y Mess;Z Mess"]
+)
+def test_plain_axes_next_to_measured_ones_are_commanded(header: str, tmp_path: Path) -> None:
+    text = f"{header}\n0;400;0;0,012;399,980;0,004\n50;420;0;50,031;419,991;-0,002\n"
+    e = made(tmp_path, "tracker", text, "--noise", "dx=0.01", "--noise", "dy=0.01", "--noise", "dz=0.01")
+    np.testing.assert_allclose(e.position, [[0, 0.4, 0], [0.05, 0.42, 0]])
+    np.testing.assert_allclose(e.reading[:, :2], [[0.012e-3, -0.020e-3], [0.031e-3, -0.009e-3]], atol=1e-12)
+
+
+def test_places_without_a_command_are_asked_for(tmp_path: Path) -> None:
+    (tmp_path / "file.csv").write_text("X,Y,Z,Xm,Ym,Zm\n0,400,0,0,400,0\n0,420,0,0,420,0\n", encoding="utf-8")
+    with pytest.raises(StiffmapError, match=r"found 'X' alone: say --map x='HEADER' .*--map px='HEADER'"):
+        sm.experiment_from_table("hexapod", tmp_path / "file.csv", tmp_path / "out", instrument="tracker")
+
+
 def test_titles_in_the_middle_of_what_they_mean(tmp_path: Path) -> None:
     text = (
         "Name,,Nominal,,,Actual,,,Deviation,\n,X,Y,Z,X,Y,Z,X,Y,Z\n,mm,mm,mm,mm,mm,mm,mm,mm,mm\n"

@@ -541,6 +541,25 @@ def test_a_vector_behind_a_path_is_no_position(tmp_path: Path) -> None:
         made(tmp_path, text)
 
 
+@pytest.mark.parametrize("labels", ["Kanal;1;2;3;4;5\n", "SN;30123;30124;30125;30126;30127\n"])
+def test_numbers_of_channels_below_the_names_are_no_readings(labels: str, tmp_path: Path) -> None:
+    rows = "".join(f"{0.02 * i:.2f};{row}\n" for i, row in enumerate(ROWS.splitlines()))
+    found = made(tmp_path, f"Zeit [s];{HEAD}{labels}{rows}")
+    truth(found.experiment)
+    assert f"row 2, '{labels.partition(';')[0]}', is no reading" in str(found.remarks)
+
+
+def test_a_remark_ahead_of_a_row_keeps_it(tmp_path: Path) -> None:
+    first, second = ROWS.splitlines()
+    truth(made(tmp_path, f"Bemerkung;{HEAD};{first}\nok;{second}\n").experiment)
+
+
+@pytest.mark.parametrize("units", ["mm;mm;mm;N;counts", "mm;mm;mm;N;[div]"])
+def test_an_unknown_unit_in_a_line_of_units_is_named(units: str, tmp_path: Path) -> None:
+    with pytest.raises(StiffmapError, match=r"column 'dz' \(dz\): the unit '(counts|div)' is not known"):
+        made(tmp_path, f"x;y;z;fz;dz\n{units}\n{ROWS}")
+
+
 @pytest.mark.parametrize("above", ["Version;2.1", "Sample rate;1000.0;Hz", "Scale factor [-];1.0;;;"])
 def test_a_number_above_the_table_does_not_tell_its_decimal_sign(above: str, tmp_path: Path) -> None:
     truth(made(tmp_path, f"{above}\n{HEAD}0,0;0,0;0;-100;-41,0\n50,0;0;0;-200;-83,0\n").experiment)

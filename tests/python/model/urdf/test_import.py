@@ -210,6 +210,7 @@ NO_URDF = {
     "this is a web page": "<!DOCTYPE html>\n<HTML><head><br></head></HTML>",
     "fetch that with: git lfs pull": "version https://git-lfs.github.com/spec/v1\noid sha256:0\n",
     "not XML: no element found: line 1": "",
+    "expected a URDF (xacro puts a calibration into it)": "kinematics:\n  shoulder: {x: 0, y: 0, z: 0.1}\n",
 }
 
 

@@ -441,6 +441,15 @@ def test_a_phase_that_rises_over_the_peak_is_refused(size, power, head, tmp_path
         read_responses(tmp_path / "f.csv")
 
 
+def test_a_phase_that_rises_in_a_universal_file_is_refused(tmp_path):
+    values = 1e-7 / (1 - (F / F.mean()) ** 2 + 0.2j * F / F.mean())
+    _function(tmp_path, values)
+    assert len(read_responses(tmp_path / "one.uff")) == 1
+    _function(tmp_path, values.conj())
+    with pytest.raises(StiffmapError, match="response tap: expected a phase that falls over the peak"):
+        read_responses(tmp_path / "one.uff")
+
+
 @pytest.mark.parametrize("axis", ["X [Hz]", "x_Hz", "Linear [Hz]", "Linear Hz"])
 def test_what_is_in_hertz_is_the_frequency(axis, tmp_path):
     (tmp_path / "r.csv").write_text(f"{axis},Real [m/N],Imag [m/N]\n10,1e-6,0\n20,2e-6,-1e-6\n")
