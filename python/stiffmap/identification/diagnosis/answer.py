@@ -108,7 +108,7 @@ def answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, cross
         set_aside=listed,
         gap=gap,
         calibration=numbers,
-        refused=[f"{c.place.candidate}: {why}" for c, why in (*v.refused, *v.gone)],
+        refused=[*dict.fromkeys(f"{c.place.candidate}: {why}" for c, why in (*v.refused, *v.gone))],
         which=which,
         stopped=clock.stopped or bool(clock.left_out),
         not_tried=list(clock.left_out),

@@ -49,7 +49,7 @@ APART = ("verdict", "held_out", "shares", "machine", "declared", "experiment", "
 VERDICTS = {
     "none": "no effect above the limits of this experiment",
     "effects": "the declared machine lacks what is named below",
-    "ambiguous": "explained, but not by one explanation alone",
+    "ambiguous": "more than one explanation fits the readings",
     "unattributed": "not as declared, and no known effect explains how",
     "effects+unattributed": "explained in part; real structure remains",
     "readings": "a mistake in the readings comes before any cause",
