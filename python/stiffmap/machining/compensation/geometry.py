@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.outputs import write_text, writing
+from stiffmap.machining.toolpath.gcode.words import decimal
 from stiffmap.model.description import Element, Joint, MachineDescription, Offset, Pose, Spring
 from stiffmap.model.description.tree import edit_all
 from stiffmap.model.urdf.chains import plain_name
@@ -26,6 +27,8 @@ PARALLEL = 0.05
 axes that are almost parallel runs away without end (S. A. Hayati, "Robot arm geometric link parameter
 estimation", CDC 1983)."""
 Frame = tuple[Floats, Floats]
+DIGITS = 9
+"""Decimals of mm and deg in a table of Denavit and Hartenberg, and of rotations."""
 
 
 @dataclass(frozen=True)
@@ -134,13 +137,12 @@ def write_dh(machine: Machine, path: str | PathLike[str]) -> list[str]:
     (p, r), rows, (q, s) = dh_list(corrected)
     lines = ["joint,theta_deg,d_mm,a_mm,alpha_deg,beta_deg"]
     for row in rows:
-        beta = "" if row.beta is None else f"{np.degrees(row.beta):.9g}"
-        lines.append(
-            f"{row.joint},{np.degrees(row.theta):.9g},{1e3 * row.d:.9g},{1e3 * row.a:.9g},{np.degrees(row.alpha):.9g},{beta}"
-        )
+        cells = [np.degrees(row.theta), 1e3 * row.d, 1e3 * row.a, np.degrees(row.alpha)]
+        cells += [] if row.beta is None else [np.degrees(row.beta)]
+        lines.append(",".join([row.joint, *(decimal(v, DIGITS) for v in cells), *[""] * (5 - len(cells))]))
     for name, shift, turn in (("base", p, r), ("tool", q, s)):
-        cells = ",".join(f"{v:.9g}" for v in (*(1e3 * shift), *turn.ravel()))
-        lines.append(f"# {name}: x y z in mm, rotation by rows,{cells}")
+        values = ",".join(decimal(v, DIGITS) for v in (*(1e3 * shift), *turn.ravel()))
+        lines.append(f"# {name}: x y z in mm, rotation by rows,{values}")
     write_text(Path(path), "\n".join(lines) + "\n")
     return left
 

@@ -191,7 +191,9 @@ def test_the_command_line_writes_commands(tmp_path: Path, capsys: pytest.Capture
     table = axis_errors(machine, "x", points=5, zero=0.0)
     assert len(table.position) == 5
     assert np.interp(0.0, table.position, table.positioning[0]) == pytest.approx(0, abs=1e-12)
-    assert write_dh("ur10", tmp_path / "dh.csv") and "shoulder" in (tmp_path / "dh.csv").read_text()
+    assert write_dh("ur10", tmp_path / "dh.csv")
+    assert "\nshoulder,180,0,612,0,0\n" in (tmp_path / "dh.csv").read_text()  # no dust of round-off
+    assert main(["import", str(tmp_path / "dh.csv"), "-o", str(tmp_path / "arm.yaml")]) == 0
     assert main(["compensate", "linear-delta", "--dh", str(tmp_path / "a.csv")]) == 2
     assert "serial arm" in capsys.readouterr().err
     assert main(["compensate", "linear-delta", "--check", str(tmp_path / "nothing")]) == 2
