@@ -3,8 +3,7 @@ among them, one convention for all commands.
 
 ``x [mm]``, ``x (mm)``, ``x in mm`` or ``x_mm``; order and case are free, a column of remarks, of names or of numbers of rows is left out, and all that
 `read_sheet` understands is read: groups, units in a line of their own or in the cells, lines above the header. Of poses x, y, z are the
-commanded TCP, rx, ry, rz its rotation vector from home, A, B, C, W, P, R or qw … qz its orientation against the base, fx … mz the wrench on the tool, t the time, feed the speed along the path;
-docs/machine_files.md lists the columns.
+commanded TCP, rx, ry, rz its rotation vector from home, A, B, C, W, P, R or qw … qz its orientation against the base, fx … mz the wrench on the tool, t the time, feed the speed along the path.
 """
 
 from __future__ import annotations
