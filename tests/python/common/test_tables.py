@@ -272,6 +272,7 @@ def test_responses_of_complex_numbers(text: str, tmp_path: Path) -> None:
     [
         "Timestamp;x;y;z;Remark\n;mm;mm;mm;\n3 May 10:00;1,5;0;0;first\n3 May 10:01;2;0;0;\n",
         "x [mm],y [mm],z [mm],Comment\n1.5,0,0,\n2,0,0,again\n",
+        "Pose,x [mm],y [mm],z [mm],Serial No\n3,1.5,0,0,4711\n3,2,0,0,4711\n",
     ],
 )
 def test_remarks_next_to_numbers_are_left_out(text: str, tmp_path: Path) -> None:
@@ -291,6 +292,44 @@ def test_remarks_next_to_numbers_are_left_out(text: str, tmp_path: Path) -> None
     ],
 )
 def test_units_and_names_that_nobody_knows_are_named(text: str, words: str, tmp_path: Path) -> None:
+    (tmp_path / "p.csv").write_text(text, encoding="utf-8")
+    with pytest.raises(FileError, match=words):
+        read_pose_table(tmp_path / "p.csv")
+
+
+@pytest.mark.parametrize(
+    ("names", "cells", "rows"),
+    [  # what turns about which axis is by hand: the columns are where the tool's x, y, z point
+        ("A,B,C", "90,0,90", [[0, 0, 1], [1, 0, 0], [0, 1, 0]]),
+        ("W [deg],P [deg],R [deg]", "90,0,90", [[0, 0, 1], [1, 0, 0], [0, 1, 0]]),
+        (
+            "roll [rad],pitch [rad],yaw [rad]",
+            f"{np.pi / 2},{np.pi / 2},0",
+            [[0, 1, 0], [0, 0, -1], [-1, 0, 0]],
+        ),
+        ("A [deg],B [deg],C [deg]", "90,90,0", [[0, -1, 0], [0, 0, 1], [-1, 0, 0]]),
+        ("qx,qy,qz,qw", "0,0,0.70710678,0.70710678", [[0, -1, 0], [1, 0, 0], [0, 0, 1]]),
+        ("q1,q2,q3,q4", "0.70710678,0.70710678,0,0", [[1, 0, 0], [0, 0, -1], [0, 1, 0]]),
+    ],
+)
+def test_orientations_of_controllers_are_against_the_base(
+    names: str, cells: str, rows: list[list[int]], tmp_path: Path
+) -> None:
+    (tmp_path / "p.csv").write_text(f"x [mm],y [mm],z [mm],{names}\n1,2,3,{cells}\n", encoding="utf-8")
+    table = read_pose_table(tmp_path / "p.csv")
+    turned = table.rotation(np.diag([1.0, -1.0, -1.0]))
+    assert turned is not None and table.position.tolist() == [[0.001, 0.002, 0.003]]
+    np.testing.assert_allclose(turned[0], rows, atol=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("x [mm],y [mm],z [mm],A,B,C,rz [deg]\n1,2,3,0,0,0,5\n", "line 1: A: orientations are given twice"),
+        ("x [mm],y [mm],z [mm],qw,qx,qy,qz\n1,2,3,1,0,0,0\n1,2,3,,,,\n", "line 3: qw …: found an empty cell"),
+    ],
+)
+def test_an_orientation_is_given_once_in_every_row(text: str, words: str, tmp_path: Path) -> None:
     (tmp_path / "p.csv").write_text(text, encoding="utf-8")
     with pytest.raises(FileError, match=words):
         read_pose_table(tmp_path / "p.csv")

@@ -3,15 +3,14 @@ among them, one convention for all commands.
 
 ``x [mm]``, ``x (mm)``, ``x in mm`` or ``x_mm``; order and case are free, a column of remarks, of names or of numbers of rows is left out, and all that
 `read_sheet` understands is read: groups, units in a line of their own or in the cells, lines above the header. Of poses x, y, z are the
-commanded TCP, rx, ry, rz its rotation vector from home, fx … mz the wrench on the tool, t the time, feed the speed along the path;
-docs/machine_files.md lists the columns.
+commanded TCP, rx, ry, rz its rotation vector from home, A, B, C, W, P, R or qw … qz its orientation against the base, fx … mz the wrench on the tool, t the time, feed the speed along the path.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn
@@ -31,8 +30,8 @@ from stiffmap.common.units import FREQUENCIES, QUANTITIES, SHORT_TIMES, feed_uni
 SPELLED = {"s": SHORT_TIMES, "percent": {"%": 1.0, "-": 100.0, "1": 100.0}}
 """SI unit -> others that tables of such columns have."""
 PER = re.compile(r"_(?:per_)?(min|s|tooth|rev)$")
-COUNTER = re.compile(r"(?i)column \d+|unnamed: ?\d+|index|idx|line|sample|frame|record")
-"""Names of columns that may number the rows; programs leave out the name, or write ``Unnamed: 0``."""
+COUNTER = re.compile(r"(?i)column \d+|unnamed: ?\d+|index|idx|line|sample|frame|record|pose|serial( no)?")
+"""Names of columns that may number the rows, or groups of them; programs leave out the name, or write ``Unnamed: 0``."""
 WORD = "word"
 """In place of a unit: the column holds text."""
 
@@ -101,12 +100,12 @@ def read_named(path: Path, known: Known, sheet: str | None = None) -> NamedTable
     return named(read_sheet(path, sheet, Layout(known.has, strict=True, names=names)), known)
 
 
-def named(sheet: Table, known: Known) -> NamedTable:
-    """Columns of a sheet by their known names; raises FileError."""
+def named(sheet: Table, known: Known, besides: Collection[int] = ()) -> NamedTable:
+    """Columns of a sheet, but some, by their known names; raises FileError."""
     out = NamedTable(sheet.file, list(sheet.lines), sheet.top, {}, {}, {}, {})
-    for i, head in enumerate(sheet.header):
-        index = COUNTER.fullmatch(sheet.names[i]) and sheet.is_numeric(i) and np.diff(sheet.numbers(i)) == 1
-        if not known.has(head) and (meaning_of(sheet.names[i]) == "id" or np.all(index)):
+    for i, (head, text) in enumerate(zip(sheet.header, sheet.names, strict=True)):
+        counts = COUNTER.fullmatch(text) and sheet.is_numeric(i) and {*np.diff(sheet.numbers(i))} <= {0, 1}
+        if i in besides or (not known.has(head) and (meaning_of(text) == "id" or counts)):
             continue
         name, unit, size = _meaning(head, known, out, sheet.with_points(i))
         if not name:
@@ -221,9 +220,9 @@ class PoseTable(NamedTable):
         return not LOADS.keys().isdisjoint(self.values)
 
     def rotation(self, home: Floats) -> Floats | None:
-        """(n, 3, 3) commanded orientations, turned from `home` about base axes; None: as at home."""
+        """(n, 3, 3) commanded orientations: those of a controller, or turned from `home` about base axes; None: as at home."""
         if not {"rx", "ry", "rz"} & set(self.values):
-            return None
+            return self.values.get("orientation")
         from scipy.spatial.transform import Rotation
 
         turns: Floats = Rotation.from_rotvec(self.block(("rx", "ry", "rz"))).as_matrix()
@@ -236,7 +235,14 @@ def read_pose_table(place: Path, *, at_home: Floats | None = None) -> PoseTable:
     `at_home` (3,) m stands in for x, y or z that have no column, along which a planar machine is not commanded; None: all three
     are wanted. Raises FileError naming file, line, column, what was expected and what was found.
     """
-    table = PoseTable(**vars(read_named(place, KNOWN)))
+    sheet = read_sheet(place, None, Layout(KNOWN.has, strict=True, names=", ".join(KNOWN.usual.values())))
+    columns, turns, words = orientation_of(sheet)
+    table = PoseTable(**vars(named(sheet, KNOWN, [] if turns == "rotvec" else columns)))
+    if columns and turns != "rotvec":
+        if {"rx", "ry", "rz"} & set(table.values):
+            table.fail("orientations are given twice", sheet.header[columns[0]])
+        table.header["orientation"] = f"{', '.join(sheet.header[i] for i in columns)}: {words}"
+        table.values["orientation"] = _against_base(sheet, columns, turns)
     missing = [c for c in "xyz" if c not in table.values]
     if missing and (at_home is None or len(missing) == 3):
         table.fail(
@@ -247,3 +253,55 @@ def read_pose_table(place: Path, *, at_home: Floats | None = None) -> PoseTable:
         assert at_home is not None  # refused before
         table.values[c] = np.full(len(table.lines), at_home["xyz".index(c)])
     return table
+
+
+ANGLE = r"(tcp|pos|ist|soll|nominal|cmd|orientation|ori|rot)?[ _.-]?{}"
+TURNS = (
+    ("a b c", "ZYX", "turns about z, the new y, the new x (KUKA's A, B, C; degrees where no unit is given)"),
+    ("w p r", "xyz", "turns about the fixed x, y, z (Fanuc's W, P, R; degrees where no unit is given)"),
+    ("roll pitch yaw", "xyz", "turns about the fixed x, y, z (degrees where no unit is given)"),
+    ("(rx|target_tcp_pose_3) (ry|target_tcp_pose_4) (rz|target_tcp_pose_5)", "rotvec", "a rotation vector (UR's RX, RY, RZ)"),
+)  # fmt: skip
+"""Names of three angles, how they turn, and that in words."""
+WXYZ = tuple(rf"(.*[./ ])?(q|quat(ernion)?|rot(ation)?|orientation)[ _./]?{a}" for a in "wxyz")
+ROUNDED = 0.01
+"""By how much digits of a table may change the length of a quaternion."""
+
+
+def orientation_of(sheet: Table, taken: Collection[int] = ()) -> tuple[list[int], str, str]:
+    """Columns of an orientation, none of them `taken`, how its angles turn (empty: a quaternion, w first), and that in words."""
+    forms = [(quaternion(sheet), "", "quaternions, w first")]
+    forms += [(_angles(sheet, names), turns, words) for names, turns, words in TURNS]
+    return next((f for f in forms if f[0] and not {*taken} & {*f[0]}), ([], "", ""))
+
+
+def _against_base(sheet: Table, columns: Sequence[int], turns: str) -> Floats:
+    from scipy.spatial.transform import Rotation
+
+    values = np.stack([sheet.numbers(i) for i in columns], axis=1)
+    sheet.check(~np.isnan(values).any(axis=1), lambda _: f"{sheet.header[columns[0]]} …: found an empty cell")
+    if not turns:
+        return np.asarray(Rotation.from_quat(values[:, [1, 2, 3, 0]]).as_matrix())
+    sizes = [size_in(sheet.unit(i) or "deg", "rad") for i in columns]
+    return np.asarray(Rotation.from_euler(turns, sizes * values).as_matrix())
+
+
+def quaternion(sheet: Table) -> list[int]:
+    """Columns w x y z of quaternions, by their names (Motive: Rotation W, ROS: pose.orientation.w) and length of one, or none."""
+    # q1 is a joint next to Q0 to Q3
+    numbered = ([f"(?-i:{q}{k + i})" for i in range(4)] for k in (1, 0) for q in "qQ")
+    for names in (WXYZ, *numbered, ("q0", *WXYZ[1:])):
+        at = [i for i in map(sheet.find, names) if i is not None and sheet.is_numeric(i)]
+        if len(at) == 4:
+            size = np.linalg.norm([sheet.numbers(i) for i in at], axis=0)
+            if np.nanmax(np.abs(size - 1.0), initial=0.0) < ROUNDED and not np.isnan(size).all():
+                return at
+    return []
+
+
+def _angles(sheet: Table, names: str) -> list[int]:
+    """Three columns of angles, or none."""
+    at = [sheet.find(ANGLE.format(name)) for name in names.split()]
+    columns = [i for i in at if i is not None and sheet.is_numeric(i)]
+    gauges = any((u := sheet.unit(i)) and unit_of(u, "angle") is None for i in columns)
+    return [] if gauges or len(columns) < 3 else columns

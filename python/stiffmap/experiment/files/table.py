@@ -12,6 +12,7 @@ from stiffmap.common.errors import FileError
 from stiffmap.common.tables.cells import filled, packed
 from stiffmap.common.tables.header import refuse_twice, split_unit
 from stiffmap.common.tables.lines import decimal_comma, even, lines_of
+from stiffmap.common.tables.sheet import STATISTICS
 from stiffmap.common.tables.table import Table
 from stiffmap.common.units import known, name_and_unit, size_of, unit_of
 from stiffmap.experiment.files.fields import base_of, quantity_of
@@ -35,12 +36,16 @@ def read_table(path: Path, expected: int | None = None) -> Table:
     header = tuple(c.strip() for c in next(data, (1, []))[1])
     if not header:
         raise FileError("the file is empty", file=str(path))
+    if "id" not in header and header[0] in ("", "row", "Unnamed: 0"):  # of R and pandas
+        header = ("id", *header[1:])
     refuse_twice(header, str(path), 1)
     columns, lines = packed(even(data, len(header), str(path), separator), len(header))
     cells = (c for _, c in islice(rows(), 1, None))
     comma = separator not in ("", ",") and decimal_comma(cells, separator)
     if not lines:
         raise FileError("expected a header line and at least one row", file=str(path))
+    if STATISTICS.fullmatch(last := columns[0].last) and not STATISTICS.fullmatch(next(iter(columns[0]))):
+        raise FileError(f"expected rows of readings alone; found '{last}'", file=str(path), line=lines[-1])
     if expected is not None:
         _whole(path, expected, len(lines))
     return Table(str(path), header, columns, lines, 1, comma)

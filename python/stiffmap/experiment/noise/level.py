@@ -159,7 +159,7 @@ def no_difference(experiment: Experiment) -> str:
         return ""
     if same.any() or own_frame(read, at) is not None:
         names = ", ".join(c.name for c, s in zip(e.channels, same, strict=False) if s or not same.any())
-        return f"{names} change as the commanded places do: places that were seen are no differences; --instrument tracker takes what was commanded off"
+        return f"{names} change as the commanded places do: places that were seen are no differences; --map px=HEADER (py, pz) takes them as they were seen, and --instrument tracker, where --map does not call them differences, takes what was commanded off"
     size = float(np.median(np.abs(read[np.isfinite(read)]))) if np.isfinite(read).any() else 0.0
     if e.quantity != "position" or size <= ERROR:
         return ""

@@ -11,12 +11,12 @@ import numpy as np
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.tables.cells import Cells
 from stiffmap.common.tables.header import with_unit
+from stiffmap.common.tables.named import quaternion
 from stiffmap.common.units import Unit, unit_of
 from stiffmap.experiment.channels import AXES
 from stiffmap.experiment.files.fields import SEEN
 from stiffmap.experiment.spreadsheet.answers import Meant
 from stiffmap.experiment.spreadsheet.guess import READINGS, Column, guess
-from stiffmap.experiment.spreadsheet.together import quaternion
 from stiffmap.solve.machine import Machine
 
 BEFORE = r"(?:.*[/.\[]|rob_?\d+ |(?:(?:ist|soll|act(?:ual)?|cmd)[ _-]?)?(?:pos(?:ition)?|angle|winkel)[ _])?"

@@ -10,6 +10,7 @@ import numpy as np
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.short import first_of
 from stiffmap.common.tables.header import split_unit
+from stiffmap.common.tables.named import orientation_of
 from stiffmap.common.tables.table import Table, column_letter
 from stiffmap.common.units import Unit, unit_of
 from stiffmap.experiment.channels import AXES
@@ -44,21 +45,6 @@ MOST_METRES = 20.0
 """Of a wire or bar; larger numbers are mm."""
 NAMED = 5
 """Rows that a sentence names."""
-ANGLE = r"(tcp|pos|ist|soll|nominal|cmd|orientation|ori|rot)?[ _.-]?{}"
-TURNS = (
-    ("a b c", "ZYX", "turns about z, the new y, the new x (KUKA's A, B, C; degrees where no unit is given)"),
-    ("w p r", "xyz", "turns about the fixed x, y, z (Fanuc's W, P, R; degrees where no unit is given)"),
-    ("roll pitch yaw", "xyz", "turns about the fixed x, y, z (degrees where no unit is given)"),
-    (
-        "(rx|target_tcp_pose_3) (ry|target_tcp_pose_4) (rz|target_tcp_pose_5)",
-        "rotvec",
-        "a rotation vector (UR's RX, RY, RZ)",
-    ),
-)
-"""Names of three angles, how they turn, and that in words."""
-WXYZ = tuple(rf"(.*[./ ])?(q|quat(ernion)?|rot(ation)?|orientation)[ _./]?{a}" for a in "wxyz")
-ROUNDED = 0.01
-"""By how much digits of a table may change the length of a quaternion."""
 
 
 def together(m: Meant, deflection: bool) -> None:
@@ -221,25 +207,10 @@ def _hung(m: Meant) -> None:
             return
 
 
-def quaternion(sheet: Table) -> list[int]:
-    """Columns w x y z of quaternions, by their names (Motive: Rotation W, ROS: pose.orientation.w) and length of one, or none."""
-    # q1 is a joint next to Q0 to Q3
-    numbered = ([f"(?-i:{q}{k + i})" for i in range(4)] for k in (1, 0) for q in "qQ")
-    for names in (WXYZ, *numbered, ("q0", *WXYZ[1:])):
-        at = [i for i in map(sheet.find, names) if i is not None and sheet.is_numeric(i)]
-        if len(at) == 4:
-            size = np.linalg.norm([sheet.numbers(i) for i in at], axis=0)
-            if np.nanmax(np.abs(size - 1.0), initial=0.0) < ROUNDED and not np.isnan(size).all():
-                return at
-    return []
-
-
 def _turns(m: Meant, taken: set[int]) -> None:
     """An orientation that stands with X Y Z."""
     meanings = {c.meaning: c.index for c in m.guessed}
-    forms = [(quaternion(m.sheet), "", "quaternions, w first")]
-    forms += [(_angles(m.sheet, names), turns, words) for names, turns, words in TURNS]
-    columns, turns, words = next((f for f in forms if f[0] and not taken & {*f[0]}), ([], "", ""))
+    columns, turns, words = orientation_of(m.sheet, taken)
     behind = min(columns, default=0) == meanings.get("z", -1) + 1
     seen = set(SEEN) <= set(meanings) and not (behind and set(POSE) <= set(meanings))
     position = SEEN if seen else POSE
@@ -274,14 +245,6 @@ def _turns(m: Meant, taken: set[int]) -> None:
     else:
         m.head["orientation"] = {"against": "base"} | ({"euler": turns} if of_pose is EULER else {})
     m.said.append(f"{shown} are the orientation: {words}")
-
-
-def _angles(sheet: Table, names: str) -> list[int]:
-    """Three columns of angles, or none."""
-    at = [sheet.find(ANGLE.format(name)) for name in names.split()]
-    columns = [i for i in at if i is not None and sheet.is_numeric(i)]
-    gauges = any((u := sheet.unit(i)) and unit_of(u, "angle") is None for i in columns)
-    return [] if gauges or len(columns) < 3 else columns
 
 
 def _targets(m: Meant, taken: set[int]) -> None:

@@ -27,9 +27,10 @@ UNITS = {
 }  # fmt: skip
 USUAL = {n: f"{n}_{ {'m': 'mm'}.get(u, u) }" for n, u in UNITS.items() if u not in ("", WORD)}
 ALIASES = {
-    **dict.fromkeys(("f", "fn", "f_n", "freq", "natural_frequency", "eigenfrequency", "frequenz", "eigenfrequenz"), "frequency"),
-    **dict.fromkeys(("zeta", "ζ", "damping_ratio", "dämpfung", "dämpfungsgrad", "lehr"), "damping"),
+    **dict.fromkeys(("f", "fn", "f_n", "freq", "natural_frequency", "eigenfrequency", "frequenz", "eigenfrequenz", "omega", "ω"), "frequency"),
+    **dict.fromkeys(("zeta", "ζ", "damp", "damping_ratio", "dämpfung", "dämpfungsgrad", "lehr"), "damping"),
     **dict.fromkeys(("mode_no", "mode_no.", "mode_number", "mode_nr"), "mode"),
+    **{f"{shape}_{a}": f"dir_{a}" for a in "xyz" for shape in ("mode_shape", "shape", "phi", "direction")},
 }  # fmt: skip
 KNOWN = Known(UNITS, USUAL, ALIASES, blank=True)
 SHARE = 0.01

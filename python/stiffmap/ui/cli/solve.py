@@ -45,8 +45,8 @@ def command(
 
     A force that is given by its size alone acts in the direction in space that pushes the tool furthest.
 
-    A file of poses has columns such as x [mm], y [mm], z [mm], rx [deg] …, fx [N] …, mx [N*m] …, one pose a row; --force acts
-    where it has no load.
+    A file of poses has columns such as x [mm], y [mm], z [mm], rx [deg] … from home (or a robot's A, B, C; W, P, R; qw …
+    against its base), fx [N] …, mx [N*m] …, one pose a row; --force acts where it has no load.
 
     Exit codes: 0 converged, 1 any other status, 2 bad input.
 
@@ -120,7 +120,7 @@ def solve_table(m: Machine, file: Path, load: Floats, how: dict[str, Any], outpu
     table = read_pose_table(file, at_home=None if commanded else m.description.home.p)
     turned = table.rotation(m.description.home.r)
     if turned is not None and how["rotation"] is not None:
-        raise StiffmapError(f"--rotation: {file} has orientations of its own (rx, ry, rz)")
+        raise StiffmapError(f"--rotation: {file} has orientations of its own")
     wrench = table.wrench if table.loaded else np.broadcast_to(load, (len(table), 6))
     s = m.solve(table.position, wrench, **{**how, "rotation": how["rotation"] if turned is None else turned})
     words = [Status(int(v)).name for v in s.status]
@@ -149,6 +149,8 @@ def _rows(table: PoseTable, s: Solution, words: list[str]) -> Iterator[str | Tab
         word = "" if words[i] == "CONVERGED" else words[i].lower()
         out.add_row(*where, *(["-"] * 4 if not np.isfinite(sizes[i]) else moved), word)
     yield out
+    if "orientation" in table.header:
+        yield f"orientation against the base: {table.header['orientation']}"
     if len(table) > SHOWN:
         yield f"{len(table) - SHOWN} more rows (-o answers.csv writes all)"
     if np.isfinite(sizes).any():

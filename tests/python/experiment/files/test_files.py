@@ -53,6 +53,7 @@ def test_decimal_commas_are_those_of_numbers_alone(tmp_path: Path) -> None:
         (HEAD, ROWS.replace("-100,0,0", "nan,0,0"), ["data.csv, line 3", "'fx'", "finite"]),
         (HEAD, ROWS.replace(",dx\n", ",rx\n"), ["'angle' is not declared"]),
         (HEAD, ROWS.replace("3,10,0,0,100,0,0,\n", "3,10,0\n"), ["line 4", "expected 8 values"]),
+        (HEAD, f"{ROWS}mean,0,0,0,0,0,0,0\n", ["data.csv, line 5", "readings alone", "'mean'"]),
         (HEAD.replace("deflection", "distance"), ROWS, ["quantity"]),
         (HEAD, "id,x,y,z,dx\n1,0,0,0,0.1\n", ["needs a load", "a position none"]),
         (HEAD + "colour: red\n", ROWS, ["unknown key 'colour'"]),
@@ -63,6 +64,12 @@ def test_bad_input_is_one_clear_error(tmp_path: Path, head: str, rows: str, word
         sm.load_experiment(write(tmp_path, head, rows))
     for word in words:
         assert word in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["", "row", "Unnamed: 0"])
+def test_names_of_rows_are_those_that_programs_write(name: str, tmp_path: Path) -> None:
+    e = sm.load_experiment(write(tmp_path, rows=ROWS.replace("id,", f"{name},", 1)))
+    assert e.ids == ("1", "2", "3") and e.reading[0, 0] == pytest.approx(5e-5, rel=1e-12)
 
 
 def test_no_folder(tmp_path: Path) -> None:

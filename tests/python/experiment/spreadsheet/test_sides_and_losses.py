@@ -246,3 +246,12 @@ def test_a_command_of_nines_is_no_lost_target(tmp_path: Path) -> None:
     assert len(found.experiment) == COUNT
     np.testing.assert_allclose(found.experiment.position[4], 9.999)
     assert not any("not seen" in r for r in found.remarks)
+
+
+def test_places_that_are_called_differences_keep_their_rows(tmp_path: Path) -> None:
+    """Some of them are as large as their commands, as where a target was not seen."""
+    seen = GRID + ERRORS
+    mapped = {"dx": "Xm", "dy": "Ym", "dz": "Zm"}
+    found = made(tmp_path, "X;Y;Z;Xm;Ym;Zm", GRID, seen, columns=mapped, units={"length": "mm"})
+    np.testing.assert_allclose(read(found), seen, atol=1e-6)
+    assert "--map px=" in found.warnings[0]

@@ -292,12 +292,19 @@ def test_changes_between_predicted_sizes_are_those_of_the_machine(arm, factor):
         ("Mode No.,x [mm],y [mm],z [mm],fn [kHz],zeta [-]", "1,10,0,0,.05,.02"),
         ("x [mm];y [mm];z [mm];Eigenfrequenz [Hz];Dämpfung [%]", "10;0;0;50;2"),
         ("x [mm],y [mm],z [mm],natural frequency [Hz],damping ratio [1]", "10,0,0,50,0.02"),
+        ("Serial No,x [mm],y [mm],z [mm],omega [rad/s],Damp (%)", f"4711,10,0,0,{100 * np.pi},2"),
+        (
+            "x [mm],y [mm],z [mm],f [Hz],Damp [%],Mode Shape X,Mode Shape Y,Mode Shape Z",
+            "10,0,0,50,2,0,0,2",
+        ),
     ],
 )
 def test_modes_as_modal_programs_list_them(head, row, tmp_path):
     (tmp_path / "t.csv").write_text(f"{head}\n{row}\n", encoding="utf-8")
     taps = load_taps(tmp_path / "t.csv")
-    np.testing.assert_allclose([*taps.frequency, *taps.ratio, *taps.position[0]], [50, 0.02, 0.01, 0, 0])
+    found = [taps.frequency[0], taps.ratio[0], *taps.position[0], *np.nan_to_num(taps.direction[0], nan=7)]
+    way = [0, 0, 1] if "Shape" in head else [7, 7, 7]
+    np.testing.assert_allclose(found, [50, 0.02, 0.01, 0, 0, *way])
 
 
 def test_one_mode_of_a_bare_structure_may_be_damped_by_less_than_a_thousandth(tmp_path):

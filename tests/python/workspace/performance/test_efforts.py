@@ -91,10 +91,11 @@ def test_bad_motion_files_name_the_key(tmp_path, old, new, words):
         ("x [mm]", "x [kg]", "line 1: .*: expected a unit such as"),
         ("x [mm]", "w [mm]", r"unknown column 'w .*known: x \[mm\]"),
         ("y [cm]", "x [cm]", "twice"),
-        ("0.2,10", "0.05,10", r"line 4: times must increase; 0.05 s follows 0.1 s"),
+        ("0.2,10", "0.05,10", r"line 4: t .*: times must increase; 0.05 s follows 0.1 s"),
         ("0.2,10", "0.2,ten", r"line 4: x .*: expected a number, found 'ten'"),
         ("0.2,10", "0.2,nan", "finite"),
         ("z [m]", "fz [N]", "no column z"),
+        (ROWS, "x [mm],y [mm],z [mm],A,B,C\n0,0,0,0,0,0\n1,0,0,0,0,0\n", "line 1: expected no orientations"),
     ],
 )
 def test_bad_tables_name_the_line(tmp_path, old, new, words):

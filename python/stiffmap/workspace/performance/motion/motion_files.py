@@ -167,6 +167,8 @@ def _described(document: Document, file: str) -> Motion:
 
 def _table(place: FilePath) -> Motion:
     table = read_pose_table(place)
+    if "orientation" in table.values:
+        table.fail("expected no orientations: the tool of a motion is turned as at home")
     for name in ("mx", "my", "mz", "rx", "ry", "rz"):
         table.check(name, lambda v: v == 0, "0: a motion has no moment, its tool is turned as at home")
     file, p, f = table.file, table.position, table.wrench[:, :3]
@@ -174,9 +176,7 @@ def _table(place: FilePath) -> Motion:
     if "t" not in table.values:
         if len(p) < 2:
             raise FileError(f"expected two or more rows, found {len(p)}", file=file)
-        if feed is not None and not (feed > 0).all():
-            line = table.lines[int(np.argmax(~(feed > 0)))]
-            raise FileError("expected a feed above zero", file=file, line=line, key="feed")
+        table.check("feed", lambda v: v > 0, "a feed above zero")
         try:
             path = through(p)
         except StiffmapError as error:
@@ -186,21 +186,17 @@ def _table(place: FilePath) -> Motion:
         if feed is None:
             return Motion(place.stem, path, None, None, np.inf, force)
         if np.ptp(feed) > 1e-9 * feed[0]:
-            raise FileError(
-                "expected one feed for the whole path (or times, a column t [s])", file=file, key="feed"
-            )
+            table.fail("expected one feed for the whole path (or times, a column t [s])", "feed")
         return Motion(place.stem, path, None, None, np.inf, force, feed=float(feed[0]))
     t = table.values["t"]
     if feed is not None:
-        raise FileError("give times or a feed, not both", file=file, line=1)
+        table.fail("give times or a feed, not both")
     if len(t) < LEAST_ROWS:
         raise FileError(f"a motion over time needs {LEAST_ROWS} or more rows, found {len(t)}", file=file)
     back = np.flatnonzero(np.diff(t) <= 0)
     if len(back):
         i = int(back[0])
-        raise FileError(
-            f"times must increase; {t[i + 1]:g} s follows {t[i]:g} s", file=file, line=table.lines[i + 1]
-        )
+        table.fail(f"times must increase; {t[i + 1]:g} s follows {t[i]:g} s", "t", i + 1)
     spline = make_interp_spline(t, p, k=5)
     motion = Trajectory(t, p, spline(t, 1), spline(t, 2), f)
     return Motion(place.stem, None, motion, None, np.inf, np.zeros(3))
