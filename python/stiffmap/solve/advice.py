@@ -161,6 +161,12 @@ def _reach(machine: Machine) -> list[str]:
     if d.workspace is None:
         return out
     low, high = machine.workspace
+    outside = np.maximum(low - d.home.p, d.home.p - high).max()
+    if outside > (size := float((high - low).max())):
+        out.append(
+            f"home lies {1e3 * outside:.4g} mm outside of the workspace, whose longest side is {1e3 * size:.4g} mm: are both in "
+            f"{d.units.length}?"
+        )
     grid = [np.linspace(low[i], high[i], 3) if i in moved else [d.home.p[i]] for i in range(3)]
     at = np.array(list(product(*grid)))
     status = machine.solve(at, np.zeros(6)).status

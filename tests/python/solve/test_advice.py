@@ -65,6 +65,12 @@ CASES = {
         "the beam of 'bar' is 5000 long, the offset before it spans 500",
     ),
     "box": (STARTER, "y: [320, 430]", "y: [320, 630]", "3 of 9 positions of the workspace cannot be reached"),
+    "box in m": (
+        STARTER,
+        "y: [320, 430]",
+        "y: [0.32, 0.43]",
+        "home lies",
+    ),
     "limit": (
         STARTER,
         "range: [-200, 200]",

@@ -216,7 +216,7 @@ def follow(
     """
     found: list[tuple[int, Estimate]] = []
     data: Experiment | None = None
-    machine = as_machine(machine)
+    machine, until = as_machine(machine), magnitude(until, "until", "of a typical size")
     now = tuple(effects_of(machine, terms, "terms"))
     while data is None or len(data) < most:
         chosen = plan(machine, now, rows=batch, done=data, seed=seed + len(found), **options)  # type: ignore[arg-type]

@@ -191,6 +191,11 @@ BAD = [
     (("polar", NAME, "--at", "0,0"), "--at: expected 3 numbers"),
     (("polar", NAME, "--plane", "ab"), "plane: expected one of"),
     (("sweep", NAME, "--direction", "0,0,0"), "direction: expected one vector"),
+    (("sweep", NAME, "--tolerance", "nan"), "--tolerance: expected a number above zero, got nan"),
+    (
+        ("plan", NAME, "--identify", "length bar error=1mm", "--until", "-0.1"),
+        "until: expected a positive number",
+    ),
     (("sweep", NAME, "--points", "0"), "forces: expected at least one number"),
     (("solve", NAME, "--force", "a,b,c"), "--force: expected numbers"),
     (("solve", NAME, "--at", "nan,0,0"), "--at: expected finite numbers"),
