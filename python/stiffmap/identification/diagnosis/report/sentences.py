@@ -199,7 +199,7 @@ def next_step(d: Any) -> str:
             "where the load acts first, and read again there."
         )
     if d.verdict == "ambiguous" and not d.alternatives:
-        return "Inspect this place, and read more poses or other loads: numbers within tolerance explain these nearly as well."
+        return "Inspect this place, and read more poses or other loads: declared numbers that are off explain these nearly as well."
     if d.verdict == "ambiguous" and d.separations:
         best = min(d.separations, key=lambda s: s.readings or float("inf"))
         if best.readings and best.readings <= d.before.n:  # no more than all that was read
