@@ -45,7 +45,7 @@ def _alone(context: typer.Context, path: Path | None) -> Path | None:
 
 def _tolerated(value: float) -> float:
     if not 0.0 < value < math.inf:
-        raise StiffmapError(f"--tolerance: expected a number above zero, got {value:g}")
+        raise StiffmapError(f"--tolerance: expected a positive number (mm), got {value:g}")
     return value
 
 

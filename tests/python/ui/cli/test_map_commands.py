@@ -191,7 +191,7 @@ BAD = [
     (("polar", NAME, "--at", "0,0"), "--at: expected 3 numbers"),
     (("polar", NAME, "--plane", "ab"), "plane: expected one of"),
     (("sweep", NAME, "--direction", "0,0,0"), "direction: expected one vector"),
-    (("sweep", NAME, "--tolerance", "nan"), "--tolerance: expected a number above zero, got nan"),
+    (("sweep", NAME, "--tolerance", "nan"), "--tolerance: expected a positive number (mm), got nan"),
     (
         ("plan", NAME, "--identify", "length bar error=1mm", "--until", "-0.1"),
         "until: expected a positive number",
