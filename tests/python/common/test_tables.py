@@ -289,9 +289,11 @@ def test_remarks_next_to_numbers_are_left_out(text: str, tmp_path: Path) -> None
         ),
         ("x [mm],y [mm],z [mm],speeed\n1,2,3,fast\n4,5,6,7\n", "unknown column 'speeed'"),
         ("x [mm],y [mm],z [mm],feeed\n1,2,3,fast\n4,5,6,slow\n", "unknown column 'feeed'"),
+        ("x [mm],y [mm],z [mm],A,B,C,rz [deg]\n1,2,3,0,0,0,5\n", "line 1: A: orientations are given twice"),
+        ("x [mm],y [mm],z [mm],qw,qx,qy,qz\n1,2,3,1,0,0,0\n1,2,3,,,,\n", "line 3: qw …: found an empty cell"),
     ],
 )
-def test_units_and_names_that_nobody_knows_are_named(text: str, words: str, tmp_path: Path) -> None:
+def test_columns_that_cannot_be_read_are_named(text: str, words: str, tmp_path: Path) -> None:
     (tmp_path / "p.csv").write_text(text, encoding="utf-8")
     with pytest.raises(FileError, match=words):
         read_pose_table(tmp_path / "p.csv")
@@ -320,19 +322,6 @@ def test_orientations_of_controllers_are_against_the_base(
     turned = table.rotation(np.diag([1.0, -1.0, -1.0]))
     assert turned is not None and table.position.tolist() == [[0.001, 0.002, 0.003]]
     np.testing.assert_allclose(turned[0], rows, atol=1e-7)
-
-
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("x [mm],y [mm],z [mm],A,B,C,rz [deg]\n1,2,3,0,0,0,5\n", "line 1: A: orientations are given twice"),
-        ("x [mm],y [mm],z [mm],qw,qx,qy,qz\n1,2,3,1,0,0,0\n1,2,3,,,,\n", "line 3: qw …: found an empty cell"),
-    ],
-)
-def test_an_orientation_is_given_once_in_every_row(text: str, words: str, tmp_path: Path) -> None:
-    (tmp_path / "p.csv").write_text(text, encoding="utf-8")
-    with pytest.raises(FileError, match=words):
-        read_pose_table(tmp_path / "p.csv")
 
 
 def test_numbers_of_columns_in_brackets_are_no_readings() -> None:

@@ -69,7 +69,7 @@ CASES = {
         STARTER,
         "y: [320, 430]",
         "y: [0.32, 0.43]",
-        "home lies",
+        "399.6 mm outside of the workspace, whose longest side is 200 mm: are both in mm?",
     ),
     "limit": (
         STARTER,

@@ -1,9 +1,10 @@
 """Tables whose columns have known names, each with its unit, for all commands that take points, forces or frequencies; tables of poses
 among them, one convention for all commands.
 
-``x [mm]``, ``x (mm)``, ``x in mm`` or ``x_mm``; order and case are free, a column of remarks, of names or of numbers of rows is left out, and all that
-`read_sheet` understands is read: groups, units in a line of their own or in the cells, lines above the header. Of poses x, y, z are the
-commanded TCP, rx, ry, rz its rotation vector from home, A, B, C, W, P, R or qw … qz its orientation against the base, fx … mz the wrench on the tool, t the time, feed the speed along the path.
+``x [mm]``, ``x (mm)``, ``x in mm`` or ``x_mm``; order and case are free, a column of remarks, of names or of numbers of rows is left
+out, and all that `read_sheet` understands is read: groups, units in a line of their own or in the cells, lines above the header. Of
+poses x, y, z are the commanded TCP, rx, ry, rz its rotation vector from home, A, B, C, W, P, R or qw … qz its orientation against the
+base, fx … mz the wrench on the tool, t the time, feed the speed along the path.
 """
 
 from __future__ import annotations
@@ -20,9 +21,9 @@ import numpy as np
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError, StiffmapError, suggestion
 from stiffmap.common.number_text import read_value
-from stiffmap.common.tables.cells import Cells
 from stiffmap.common.tables.header import meaning_of, split_unit
 from stiffmap.common.tables.lines import Spelling, finite_number, is_finite, number
+from stiffmap.common.tables.orientation import orientation_of
 from stiffmap.common.tables.sheet import Layout, read_sheet
 from stiffmap.common.tables.table import Table
 from stiffmap.common.units import FREQUENCIES, QUANTITIES, SHORT_TIMES, feed_unit, unit_of
@@ -96,18 +97,21 @@ class NamedTable:
 
 def read_named(path: Path, known: Known, sheet: str | None = None) -> NamedTable:
     """A text or a workbook. Raises FileError naming file, line and column, what was expected and what was found."""
+    return named(_sheet(path, known, sheet), known)
+
+
+def _sheet(path: Path, known: Known, sheet: str | None = None) -> Table:
     names = ", ".join(known.usual.get(n, n) for n in known.units)
-    return named(read_sheet(path, sheet, Layout(known.has, strict=True, names=names)), known)
+    return read_sheet(path, sheet, Layout(known.has, strict=True, names=names))
 
 
 def named(sheet: Table, known: Known, besides: Collection[int] = ()) -> NamedTable:
     """Columns of a sheet, but some, by their known names; raises FileError."""
     out = NamedTable(sheet.file, list(sheet.lines), sheet.top, {}, {}, {}, {})
     for i, (head, text) in enumerate(zip(sheet.header, sheet.names, strict=True)):
-        counts = COUNTER.fullmatch(text) and sheet.is_numeric(i) and {*np.diff(sheet.numbers(i))} <= {0, 1}
-        if i in besides or (not known.has(head) and (meaning_of(text) == "id" or counts)):
+        if i in besides or (not known.has(head) and (meaning_of(text) == "id" or _counts(sheet, i))):
             continue
-        name, unit, size = _meaning(head, known, out, sheet.with_points(i))
+        name, unit, size = _meaning(sheet, i, known, out)
         if not name:
             continue
         if name in out.header:
@@ -118,6 +122,13 @@ def named(sheet: Table, known: Known, besides: Collection[int] = ()) -> NamedTab
             list(sheet.columns[i]) if words else size * _numbers(sheet, i, name, out, known.blank)
         )
     return out
+
+
+def _counts(sheet: Table, column: int) -> bool:
+    """Whether a column numbers the rows, or groups of them."""
+    if not COUNTER.fullmatch(sheet.names[column]) or not sheet.is_numeric(column):
+        return False
+    return bool(np.isin(np.diff(sheet.numbers(column)), (0.0, 1.0)).all())
 
 
 def _numbers(sheet: Table, column: int, name: str, table: NamedTable, blank: bool) -> Floats:
@@ -138,8 +149,9 @@ def _joined(name: str) -> str:
     return re.sub(r"\s+", "_", name.lower())
 
 
-def _meaning(head: str, known: Known, table: NamedTable, cells: Cells) -> tuple[str, str, float]:
+def _meaning(sheet: Table, column: int, known: Known, table: NamedTable) -> tuple[str, str, float]:
     """Name of a column, nothing where no cell is a number, its unit as written, and the SI size of that."""
+    head = sheet.header[column]
     text, unit = split_unit(head)
     name = _joined(text)
     if not known.has(text) and not re.search(r"[])]\s*$", head):  # x_per_tooth_mm, real_m/N
@@ -153,10 +165,12 @@ def _meaning(head: str, known: Known, table: NamedTable, cells: Cells) -> tuple[
     if name not in known.units and meaning_of(text) in known.units:
         name = meaning_of(text)
     usual = known.usual.get(name, name)
-    unlike = name not in known.units and not suggestion(name, known.units)
-    if unlike and not any(is_finite(c, Spelling()) for c in cells):
-        return "", "", 1.0
     if name not in known.units:
+        spelling = Spelling(sheet.decimal_comma)
+        if not suggestion(name, known.units) and not any(
+            is_finite(c, spelling) for c in sheet.columns[column]
+        ):
+            return "", "", 1.0
         shown = ", ".join(known.usual.get(n, n) for n in known.units)
         table.fail(f"unknown column '{head}'; known: {shown}, each with its unit, as in x [mm] or x_mm")
     si = known.units[name]
@@ -201,8 +215,14 @@ USUAL = {"m": "mm", "m/s": "mm/min", "rad": "deg"}
 KNOWN = Known(COLUMNS, {n: f"{n} [{USUAL.get(si, si)}]" for n, si in COLUMNS.items()}, {"time": "t"})
 
 
+@dataclass(eq=False)
 class PoseTable(NamedTable):
     """Columns (n,) in SI by name, and the line of each row in the file."""
+
+    orientation: Floats | None = None
+    """(n, 3, 3) against the base, as a controller has it; None where the table has no such columns."""
+    turns: str = ""
+    """Its columns and how they turn, in words."""
 
     @property
     def position(self) -> Floats:
@@ -222,7 +242,7 @@ class PoseTable(NamedTable):
     def rotation(self, home: Floats) -> Floats | None:
         """(n, 3, 3) commanded orientations: those of a controller, or turned from `home` about base axes; None: as at home."""
         if not {"rx", "ry", "rz"} & set(self.values):
-            return self.values.get("orientation")
+            return self.orientation
         from scipy.spatial.transform import Rotation
 
         turns: Floats = Rotation.from_rotvec(self.block(("rx", "ry", "rz"))).as_matrix()
@@ -235,14 +255,15 @@ def read_pose_table(place: Path, *, at_home: Floats | None = None) -> PoseTable:
     `at_home` (3,) m stands in for x, y or z that have no column, along which a planar machine is not commanded; None: all three
     are wanted. Raises FileError naming file, line, column, what was expected and what was found.
     """
-    sheet = read_sheet(place, None, Layout(KNOWN.has, strict=True, names=", ".join(KNOWN.usual.values())))
-    columns, turns, words = orientation_of(sheet)
-    table = PoseTable(**vars(named(sheet, KNOWN, [] if turns == "rotvec" else columns)))
-    if columns and turns != "rotvec":
+    sheet = _sheet(place, KNOWN)
+    found = orientation_of(sheet)
+    columns = () if found.is_vector else found.columns  # rx, ry, rz are from home
+    table = PoseTable(**vars(named(sheet, KNOWN, columns)))
+    if columns:
         if {"rx", "ry", "rz"} & set(table.values):
             table.fail("orientations are given twice", sheet.header[columns[0]])
-        table.header["orientation"] = f"{', '.join(sheet.header[i] for i in columns)}: {words}"
-        table.values["orientation"] = _against_base(sheet, columns, turns)
+        table.turns = f"{', '.join(sheet.header[i] for i in columns)}: {found.words}"
+        table.orientation = found.matrices(sheet)
     missing = [c for c in "xyz" if c not in table.values]
     if missing and (at_home is None or len(missing) == 3):
         table.fail(
@@ -253,55 +274,3 @@ def read_pose_table(place: Path, *, at_home: Floats | None = None) -> PoseTable:
         assert at_home is not None  # refused before
         table.values[c] = np.full(len(table.lines), at_home["xyz".index(c)])
     return table
-
-
-ANGLE = r"(tcp|pos|ist|soll|nominal|cmd|orientation|ori|rot)?[ _.-]?{}"
-TURNS = (
-    ("a b c", "ZYX", "turns about z, the new y, the new x (KUKA's A, B, C; degrees where no unit is given)"),
-    ("w p r", "xyz", "turns about the fixed x, y, z (Fanuc's W, P, R; degrees where no unit is given)"),
-    ("roll pitch yaw", "xyz", "turns about the fixed x, y, z (degrees where no unit is given)"),
-    ("(rx|target_tcp_pose_3) (ry|target_tcp_pose_4) (rz|target_tcp_pose_5)", "rotvec", "a rotation vector (UR's RX, RY, RZ)"),
-)  # fmt: skip
-"""Names of three angles, how they turn, and that in words."""
-WXYZ = tuple(rf"(.*[./ ])?(q|quat(ernion)?|rot(ation)?|orientation)[ _./]?{a}" for a in "wxyz")
-ROUNDED = 0.01
-"""By how much digits of a table may change the length of a quaternion."""
-
-
-def orientation_of(sheet: Table, taken: Collection[int] = ()) -> tuple[list[int], str, str]:
-    """Columns of an orientation, none of them `taken`, how its angles turn (empty: a quaternion, w first), and that in words."""
-    forms = [(quaternion(sheet), "", "quaternions, w first")]
-    forms += [(_angles(sheet, names), turns, words) for names, turns, words in TURNS]
-    return next((f for f in forms if f[0] and not {*taken} & {*f[0]}), ([], "", ""))
-
-
-def _against_base(sheet: Table, columns: Sequence[int], turns: str) -> Floats:
-    from scipy.spatial.transform import Rotation
-
-    values = np.stack([sheet.numbers(i) for i in columns], axis=1)
-    sheet.check(~np.isnan(values).any(axis=1), lambda _: f"{sheet.header[columns[0]]} …: found an empty cell")
-    if not turns:
-        return np.asarray(Rotation.from_quat(values[:, [1, 2, 3, 0]]).as_matrix())
-    sizes = [size_in(sheet.unit(i) or "deg", "rad") for i in columns]
-    return np.asarray(Rotation.from_euler(turns, sizes * values).as_matrix())
-
-
-def quaternion(sheet: Table) -> list[int]:
-    """Columns w x y z of quaternions, by their names (Motive: Rotation W, ROS: pose.orientation.w) and length of one, or none."""
-    # q1 is a joint next to Q0 to Q3
-    numbered = ([f"(?-i:{q}{k + i})" for i in range(4)] for k in (1, 0) for q in "qQ")
-    for names in (WXYZ, *numbered, ("q0", *WXYZ[1:])):
-        at = [i for i in map(sheet.find, names) if i is not None and sheet.is_numeric(i)]
-        if len(at) == 4:
-            size = np.linalg.norm([sheet.numbers(i) for i in at], axis=0)
-            if np.nanmax(np.abs(size - 1.0), initial=0.0) < ROUNDED and not np.isnan(size).all():
-                return at
-    return []
-
-
-def _angles(sheet: Table, names: str) -> list[int]:
-    """Three columns of angles, or none."""
-    at = [sheet.find(ANGLE.format(name)) for name in names.split()]
-    columns = [i for i in at if i is not None and sheet.is_numeric(i)]
-    gauges = any((u := sheet.unit(i)) and unit_of(u, "angle") is None for i in columns)
-    return [] if gauges or len(columns) < 3 else columns

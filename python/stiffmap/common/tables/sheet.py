@@ -301,8 +301,12 @@ def _all_readings(rows: Sequence[Line]) -> bool:
     )
 
 
-def _labels(rows: Sequence[Line], comma: bool) -> set[int]:
-    """First lines that begin with a word, where all others begin with a number: channels or sensors below the names of columns."""
+def _labels(rows: Sequence[Line], header: Sequence[str], layout: Layout, comma: bool) -> set[int]:
+    """First lines that begin with a word, where all others begin with a number: channels or sensors below the names of columns,
+    of which some are known, but not the first."""
+    knows = [layout.known(split_unit(h)[0]) for h in header]
+    if knows[0] or not any(knows):
+        return set()
     begins = [(n, "".join(cells[:1]).strip()) for n, cells in rows]
     lines = {n for n, _ in takewhile(lambda b: not (re.search(r"\d", b[1]) or is_nothing(b[1])), begins)}
     numbers = [is_finite(c, Spelling(comma)) for n, c in begins if n not in lines]
@@ -332,9 +336,8 @@ def _data(
 
     `names`: all that stands above the rows.
     """
-    knows = [layout.known(split_unit(h)[0]) for h in header]
-    labels = _labels(rows, spelling.comma) if rows[0] == begun and any(knows) and not knows[0] else set[int]()
-    if _all_readings(rows) and not labels:
+    labels = _labels(rows, header, layout, spelling.comma) if rows[0] is begun else set[int]()
+    if not labels and _all_readings(rows):
         yield from rows
         return
     means = MEAN.fullmatch(begun[1][-1].strip())

@@ -44,7 +44,9 @@ def read_table(path: Path, expected: int | None = None) -> Table:
     comma = separator not in ("", ",") and decimal_comma(cells, separator)
     if not lines:
         raise FileError("expected a header line and at least one row", file=str(path))
-    if STATISTICS.fullmatch(last := columns[0].last) and not STATISTICS.fullmatch(next(iter(columns[0]))):
+    first, last = next(iter(columns[0])), columns[0].last
+    letters = first.isalpha() and len(first) == len(last)  # rows a, b, c to n
+    if STATISTICS.fullmatch(last) and not (letters or STATISTICS.fullmatch(first)):
         raise FileError(f"expected rows of readings alone; found '{last}'", file=str(path), line=lines[-1])
     if expected is not None:
         _whole(path, expected, len(lines))

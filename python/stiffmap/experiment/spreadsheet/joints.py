@@ -11,7 +11,7 @@ import numpy as np
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.tables.cells import Cells
 from stiffmap.common.tables.header import with_unit
-from stiffmap.common.tables.named import quaternion
+from stiffmap.common.tables.orientation import quaternion
 from stiffmap.common.units import Unit, unit_of
 from stiffmap.experiment.channels import AXES
 from stiffmap.experiment.files.fields import SEEN

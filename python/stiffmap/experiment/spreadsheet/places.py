@@ -41,6 +41,8 @@ SELDOM = 0.5
 """Share of rows that have places of their own, at most, where a ball stood in sockets."""
 ALIKE = 1e-3
 """Share of a distance by which rounded numbers differ."""
+SMALL = 0.1
+"""Differences below this share of the largest in at least this share of the rows: without them all are places."""
 STILL = 0.01
 """Share of its range within which a command is the same one."""
 
@@ -156,7 +158,7 @@ def without_lost(m: Meant, columns: Mapping[str, str], measured: Mapping[str, st
                 if whole:
                     _emptied(m, made, lost & as_made(np.abs(seen - asked)), "made of it")
                 _emptied(m, places, lost, what)
-    if whole and np.nanquantile(sizes.max(axis=1), 0.1) < np.nanmax(sizes) / 10:
+    if whole and np.nanquantile(sizes.max(axis=1), SMALL) < SMALL * np.nanmax(sizes):
         _emptied(m, made, as_made(np.abs(asked)), "as large as the commands, whose places were then 0")
 
 

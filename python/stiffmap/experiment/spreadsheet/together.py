@@ -10,7 +10,7 @@ import numpy as np
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.short import first_of
 from stiffmap.common.tables.header import split_unit
-from stiffmap.common.tables.named import orientation_of
+from stiffmap.common.tables.orientation import orientation_of
 from stiffmap.common.tables.table import Table, column_letter
 from stiffmap.common.units import Unit, unit_of
 from stiffmap.experiment.channels import AXES

@@ -137,12 +137,12 @@ def write_dh(machine: Machine, path: str | PathLike[str]) -> list[str]:
     (p, r), rows, (q, s) = dh_list(corrected)
     lines = ["joint,theta_deg,d_mm,a_mm,alpha_deg,beta_deg"]
     for row in rows:
-        cells = [np.degrees(row.theta), 1e3 * row.d, 1e3 * row.a, np.degrees(row.alpha)]
-        cells += [] if row.beta is None else [np.degrees(row.beta)]
-        lines.append(",".join([row.joint, *(decimal(v, DIGITS) for v in cells), *[""] * (5 - len(cells))]))
+        numbers = np.degrees(row.theta), 1e3 * row.d, 1e3 * row.a, np.degrees(row.alpha)
+        beta = "" if row.beta is None else decimal(np.degrees(row.beta), DIGITS)
+        lines.append(",".join([row.joint, *(decimal(v, DIGITS) for v in numbers), beta]))
     for name, shift, turn in (("base", p, r), ("tool", q, s)):
-        values = ",".join(decimal(v, DIGITS) for v in (*(1e3 * shift), *turn.ravel()))
-        lines.append(f"# {name}: x y z in mm, rotation by rows,{values}")
+        cells = ",".join(decimal(v, DIGITS) for v in (*(1e3 * shift), *turn.ravel()))
+        lines.append(f"# {name}: x y z in mm, rotation by rows,{cells}")
     write_text(Path(path), "\n".join(lines) + "\n")
     return left
 

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs.keeping import check_replaceable, reserved
 
 
@@ -41,12 +39,6 @@ def _alone(context: typer.Context, path: Path | None) -> Path | None:
         if path.is_file() and "overwrite" not in {p.name for p in context.command.params}:
             check_replaceable(path)  # before anything is computed
     return path
-
-
-def _tolerated(value: float) -> float:
-    if not 0.0 < value < math.inf:
-        raise StiffmapError(f"--tolerance: expected a positive number (mm), got {value:g}")
-    return value
 
 
 Machine = Annotated[str, typer.Argument(help="Shipped name (stiffmap machines) or machine file.")]
@@ -97,7 +89,7 @@ DhConvention = Annotated[
 ]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Overwrite what is there already.")]
 Threads = Annotated[int | None, typer.Option(help="Threads; default: all cores.")]
-Tolerance = Annotated[float, typer.Option(help="Tolerated deflection, mm.", callback=_tolerated)]
+Tolerance = Annotated[float, typer.Option(help="Tolerated deflection, mm.")]
 Plane = Annotated[str, typer.Option(help="Plane in which the force turns: xy, xz or yz.")]
 Folder = Annotated[Path | None, written("Folder for files and pictures.", ...)]
 Rotation = Annotated[

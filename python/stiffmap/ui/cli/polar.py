@@ -13,6 +13,7 @@ from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import MM, force_given, gravity, machine_with, position
 from stiffmap.ui.cli.options import option
 from stiffmap.ui.cli.output import Answer, failed, failed_in_words, table, write_files
+from stiffmap.workspace.maps.inputs import magnitude
 
 
 def command(
@@ -41,12 +42,13 @@ def command(
       [cyan]stiffmap polar orthoglide-revised --at 0,0,0 --at 300,300,300 --force 500[/cyan]
       [cyan]stiffmap polar tripteron --at 300,400,500 --plane xz --json[/cyan]
     """
+    tolerance = MM * magnitude(tolerance, "--tolerance", "mm")
     m = machine_with(machine, effect)
     places = [position(text, m) for text in at] if at else [position(None, m)]
     size, vector = force_given(force)
     how: dict[str, Any] = {"gravity": gravity(gravity_), "method": method}
     many = [stiffmap.polar(m, p, size, plane, directions=directions, **how) for p in places]
-    files = write_files(output, _files(many, plane, MM * tolerance))
+    files = write_files(output, _files(many, plane, tolerance))
     moved = [] if vector is None else [m.solve(p, [*vector, 0, 0, 0], **how).displacement for p in places]
     lost = failed(np.concatenate([d.status.values.ravel() for d in many]))
     told = [_under(p, vector, d) for p, d in zip(places, moved, strict=False)]

@@ -149,8 +149,8 @@ def _rows(table: PoseTable, s: Solution, words: list[str]) -> Iterator[str | Tab
         word = "" if words[i] == "CONVERGED" else words[i].lower()
         out.add_row(*where, *(["-"] * 4 if not np.isfinite(sizes[i]) else moved), word)
     yield out
-    if "orientation" in table.header:
-        yield f"orientation against the base: {table.header['orientation']}"
+    if table.turns:
+        yield f"orientation against the base: {table.turns}"
     if len(table) > SHOWN:
         yield f"{len(table) - SHOWN} more rows (-o answers.csv writes all)"
     if np.isfinite(sizes).any():

@@ -16,6 +16,7 @@ from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import MM, machine_at, numbers, refuse_unused
 from stiffmap.ui.cli.options import option
 from stiffmap.ui.cli.output import Answer, table, write_files
+from stiffmap.workspace.maps.inputs import magnitude
 
 
 def command(
@@ -52,6 +53,7 @@ def command(
       [cyan]stiffmap sweep linear-delta --direction 0,0,-1 --control displacement --limit 20 -o out[/cyan]
     """
     refuse_unused(context, {"with limit": "from_ to tolerance method"})
+    tolerance = MM * magnitude(tolerance, "--tolerance", "mm")
     m, place, posed = machine_at(machine, effect, at, acting=gravity_)
     path = limit is not None or control != "force" or bool(cross)
     how: dict[str, Any] = {"forces": np.linspace(from_, to, max(points, 0)), "method": method}
@@ -59,7 +61,7 @@ def command(
         reach = limit if limit is None or control == "force" else MM * limit
         how = {"control": control, "limit": reach, "steps": points, "cross": cross}
     ds = stiffmap.sweep(m, place, numbers(direction, "direction", 3), **posed, **how)
-    files = write_files(output, _path_files(m, ds) if path else _files(ds, MM * tolerance))
+    files = write_files(output, _path_files(m, ds) if path else _files(ds, tolerance))
     counted = ds.assign(unstable_modes=ds.unstable_modes.astype(int)) if path else ds
     data = {"machine": m.name} | ({n: ds.attrs[n] for n in ("end", "crossing_end")} if path else {})
     data |= {n: counted[n].values for n in (OF_PATH if path else OF_FORCES)}

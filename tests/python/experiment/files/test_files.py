@@ -72,6 +72,11 @@ def test_names_of_rows_are_those_that_programs_write(name: str, tmp_path: Path) 
     assert e.ids == ("1", "2", "3") and e.reading[0, 0] == pytest.approx(5e-5, rel=1e-12)
 
 
+def test_letters_name_rows(tmp_path: Path) -> None:
+    rows = ROWS.replace("\n1,", "\nl,").replace("\n2,", "\nm,").replace("\n3,", "\nn,")
+    assert sm.load_experiment(write(tmp_path, rows=rows)).ids == ("l", "m", "n")
+
+
 def test_no_folder(tmp_path: Path) -> None:
     with pytest.raises(sm.StiffmapError, match="no such experiment"):
         sm.load_experiment(tmp_path / "nowhere")

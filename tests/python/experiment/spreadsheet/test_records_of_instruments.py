@@ -549,6 +549,11 @@ def test_numbers_of_channels_below_the_names_are_no_readings(labels: str, tmp_pa
     assert f"row 2, '{labels.partition(';')[0]}', is no reading" in str(found.remarks)
 
 
+def test_a_row_with_a_name_stays_where_others_have_numbers(tmp_path: Path) -> None:
+    first, second = ROWS.splitlines()
+    truth(made(tmp_path, f"id;{HEAD}home;{first}\n2;{second}\n").experiment)
+
+
 def test_a_remark_ahead_of_a_row_keeps_it(tmp_path: Path) -> None:
     first, second = ROWS.splitlines()
     truth(made(tmp_path, f"Bemerkung;{HEAD};{first}\nok;{second}\n").experiment)
