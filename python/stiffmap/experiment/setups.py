@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from stiffmap.experiment.experiment import Experiment, Floats, Integers
 
@@ -38,6 +41,14 @@ def target_positions(experiment: Experiment) -> Floats:
             here = seen & (number == k)
             out[here] += experiment.rotation[here] @ shift
     return out
+
+
+def standing(e: Experiment, shown: Floats) -> Experiment:
+    """The rows with the tool's poses where a machine that shows `shown` (n, c) m, rad stands."""
+    turn = Rotation.from_rotvec(np.nan_to_num(shown[:, 3:6])).as_matrix()
+    out = replace(e, rotation=None if e.rotation is None else turn @ e.rotation)
+    levers = target_positions(out) - out.position
+    return replace(out, position=target_positions(e) + np.nan_to_num(shown[:, :3]) - levers)
 
 
 def _labelled(e: Experiment, *words: tuple[str, ...]) -> tuple[Integers, list[str]]:

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.readings import ReadingKind, kind_of
-from stiffmap.experiment.setups import members, setups_of, target_positions, targets_of
+from stiffmap.experiment.setups import members, setups_of, standing, target_positions, targets_of
 
 Kinds = Sequence[tuple[int, ReadingKind, Experiment]]
 """Channel, what it is, and the experiment where the machine stands."""
@@ -102,10 +102,7 @@ def _standing(e: Experiment, base: Floats, kind: ReadingKind, i: int) -> Experim
     what was found at the commands."""
     if e.quantity != "position" or kind.pair:
         return e
-    turn = Rotation.from_rotvec(np.nan_to_num(base[:, 3:6])).as_matrix()
-    out = replace(e, rotation=None if e.rotation is None else turn @ e.rotation)
-    levers = target_positions(out) - out.position
-    out = replace(out, position=target_positions(e) + np.nan_to_num(base[:, :3]) - levers)
+    out = standing(e, base)
     if not (kind.found and kind.commanded and e.registration):
         return out
     with suppress(StiffmapError):  # too few rows

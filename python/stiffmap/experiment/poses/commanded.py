@@ -100,14 +100,15 @@ def rows_in_words(experiment: Experiment, failed: Mask, why: str, cause: str = O
     return f"{why} {at.size} row{'s' if at.size > 1 else ''} (id {rows}): {cause}"
 
 
-def resolved(machine: Machine, e: Experiment) -> tuple[Machine, Experiment]:
-    """The experiment (`located` before) with every absolute reading against its command.
+def resolved(machine: Machine, e: Experiment, stands: Experiment | None = None) -> tuple[Machine, Experiment]:
+    """The experiment (`located` before) with every absolute reading against its command; `stands`: the same rows where the machine stands
+    when it was commanded there, if that is known, since frames are those of places and no straight line leads to them.
 
     Where a target's place on the tool is unknown and its orientation is not seen, the machine gets a named
     point there, so that the target moves as its place on the tool does.
     """
     if e.seen is not None or e.seen_rotation is not None:
-        machine, e = _sighted(machine, e)
+        machine, e = _sighted(machine, e, stands or e)
     reading = e.reading.copy()
     for kind in kinds():
         if not (kind.commanded and kind.name in e.absolute):
@@ -123,7 +124,7 @@ def resolved(machine: Machine, e: Experiment) -> tuple[Machine, Experiment]:
     return machine, replace(e, reading=reading, absolute={})
 
 
-def _sighted(machine: Machine, e: Experiment) -> tuple[Machine, Experiment]:
+def _sighted(machine: Machine, e: Experiment, stands: Experiment) -> tuple[Machine, Experiment]:
     n, home = len(e), machine.description.home.r
     (setup, setups), (target, targets) = setups_of(e), targets_of(e)
     sighting = Sighting(
@@ -140,7 +141,8 @@ def _sighted(machine: Machine, e: Experiment) -> tuple[Machine, Experiment]:
         frames = unmoved(sighting)
     else:
         _enough(e, sighting)
-        frames = find_frames(sighting)
+        turned = sighting.r if stands.rotation is None else stands.rotation
+        frames = find_frames(replace(sighting, p=stands.position, r=turned))
     shift, turn = as_commanded(sighting, frames)
     reading = e.reading.copy()
     if e.seen is not None:

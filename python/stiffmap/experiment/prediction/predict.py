@@ -21,6 +21,7 @@ from stiffmap.experiment.prediction.equilibria import motions
 from stiffmap.experiment.prediction.history import Drives, Terms, at_records, history_motion, records_of
 from stiffmap.experiment.prediction.joints import check_joints
 from stiffmap.experiment.prediction.nearby import Near, Nearby
+from stiffmap.experiment.setups import standing
 from stiffmap.model import effects
 from stiffmap.model.description import AppliedEffect, MachineDescription
 from stiffmap.model.effects import apply_records
@@ -28,6 +29,8 @@ from stiffmap.solve.machine import Machine
 
 MACHINES, OTHERS = 4, 32
 """Machines with terms, and predictors of other machines and of some rows, that are kept."""
+FAR = 1e-3
+"""m, rad: a machine that shows more of itself than that does not stand where it is commanded, and its frames are found where it stands."""
 SAMPLE, SLOW = 100, 0.02
 """Poses that are asked whether the fast path closes them, and the share of others from which on it pays to keep where the joints stand."""
 
@@ -42,22 +45,45 @@ class Predictor:
     Raises StiffmapError for an unknown point, joint or effect, and for what is no machine or experiment.
     """
 
+    machine: Machine
+    experiment: Experiment
+
     def __init__(self, machine: Machine, experiment: Experiment, *, threads: int | None = None) -> None:
         instance_of(machine, Machine, "machine", "a Machine")
         instance_of(experiment, Experiment, "experiment", "an Experiment")
         check_points(machine, experiment)
         check_joints(machine, experiment)
         self.threads = threads
-        self.machine, self.experiment = resolved(machine, located(machine, experiment))
-        self._own = _left_open(self.machine, self.experiment)
         self.solved = 0
+        self._given = machine, located(machine, experiment)
+        self._register()
+        self._set_aside()
+        if self.is_sighted and np.nanmax(np.abs(shown := self()), initial=0.0) > FAR:
+            self._register(shown)
+        self._close_from_here()
+
+    @property
+    def is_sighted(self) -> bool:
+        """Whether frames of instruments or places of targets were found by the readings."""
+        return self._given[1].seen is not None and self.experiment.frame != "known"
+
+    def registered(self, shown: Floats) -> Predictor:
+        """The same with the frames and targets of best fit where a machine stands that shows `shown` (n, c) m, rad."""
+        out = copy.copy(self)
+        out._register(shown)
+        out._close_from_here()
+        return out
+
+    def _register(self, shown: Floats | None = None) -> None:
+        """Begins with frames and targets where the machine is commanded, or stands."""
+        stands = None if shown is None else standing(self.experiment, shown)
+        self.machine, self.experiment = resolved(*self._given, stands)
+        self._own = _left_open(self.machine, self.experiment)
         self._memory: Kept[tuple[Terms, Terms], Floats] = Kept()
         self._changes: Kept[tuple[Terms, Terms], Floats] = Kept()
         self._machines: Kept[Hashable, Machine] = Kept(MACHINES)
         self._others: Kept[Hashable, Predictor] = Kept(OTHERS)
         self._drives: dict[tuple[Terms, Terms], Drives] = {}
-        self._set_aside()
-        self._close_from_here()
 
     @checked
     def __call__(self, terms: Sequence[AppliedEffect] = ()) -> Floats:
@@ -159,7 +185,10 @@ class Predictor:
         failed = np.asarray((e.read & ~np.isfinite(self())).any(axis=1))
         if failed.any():
             self._memory.clear()
-            self.experiment = without(e, failed, "the machine has no equilibrium at", self._cause(failed))
+            machine, given = self._given
+            why, cause = "the machine has no equilibrium at", self._cause(failed)
+            self.experiment = without(e, failed, why, cause)
+            self._given = machine, without(given, failed, why, cause)
 
     def _cause(self, failed: Mask) -> str:
         """Of rows without an equilibrium: the load, where the machine gets there without it."""

@@ -24,13 +24,21 @@ from stiffmap.identification.inference.amplitudes import Fit
 from stiffmap.identification.inference.columns import Columns
 from stiffmap.identification.inference.constants import ODDS
 from stiffmap.identification.inference.corrected import Corrected, corrected
-from stiffmap.identification.inference.machines import CALIBRATED, stands_out, vouched, written
+from stiffmap.identification.inference.machines import (
+    CALIBRATED,
+    DECLARED,
+    plain_calibration,
+    stands_out,
+    vouched,
+    written,
+)
 from stiffmap.identification.inference.names import Inferred, infer
 from stiffmap.identification.inference.readings import readings
 from stiffmap.identification.inference.shares import of_numbers, shares, tolerance_word, too_wide
 from stiffmap.identification.inference.verdict import judged
 from stiffmap.identification.inference.world import EXACT
 from stiffmap.identification.numbers import GROUPS, Tolerances
+from stiffmap.identification.numbers.registration import registered
 from stiffmap.identification.validity import covered
 from stiffmap.solve.machine import Machine, as_machine
 
@@ -85,6 +93,7 @@ def calibrate(
     with clock.on_interrupt():
         predictor = Predictor(declared, data, threads=threads)
         refuse(predictor.experiment, predictor())
+        predictor = registered(predictor, tolerances, exclude)
         without_effects = CandidatePlan(predictor(), (), ())
         found = infer(predictor, without_effects, tolerances, exclude, clock, seed, travel=True)
         return _answer(predictor, found, clock, seed, start)
@@ -101,7 +110,9 @@ def _answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, star
     models = {CALIBRATED: at} if at else {}
     listed = stands_out(columns, best.fit, found.suspects, models.values())
     clock.say("readings that no fit saw")
-    made = written(models, base, predictor, sigma, listed, seed, lambda: clock.over)
+    every = ({} if exact else plain_calibration(predictor, found)) | models
+    made = written(every, base, predictor, sigma, listed, seed, lambda: clock.over)
+    listed, at = made.listed, every.get(made.which, at)
     rows, rank = table_of(columns, found.search.calibrated or fit, at)
     verdict = judged(columns, found.search)
     wide = too_wide(fit, verdict.out_of_tolerance)
@@ -121,7 +132,7 @@ def _answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, star
         rank=rank,
         beyond=beyond,
         wide=wide,
-        which=made.which,
+        which=DECLARED if made.which == DECLARED else CALIBRATED,
         before=made.sizes[0],
         after=made.sizes[1],
         held_out=held,
@@ -130,7 +141,7 @@ def _answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, star
         scale=best.fit.noise,
         shares=shares(columns, best.fit),
         rest=rest,
-        profiles=at.profiles if at and made.which == CALIBRATED else (),
+        profiles=at.profiles if at and made.which != DECLARED else (),
         outliers=tuple(e.ids[i] for i in np.flatnonzero(listed)),
         swapped=tuple((e.ids[i], e.ids[j]) for i, j in swapped(e, made.left[1], sigma, listed)),
         failed=given.sensitivity.failed,

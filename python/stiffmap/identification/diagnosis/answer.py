@@ -33,8 +33,10 @@ from stiffmap.identification.inference.corrected import Corrected, along_travel,
 from stiffmap.identification.inference.machines import (
     CALIBRATED,
     CORRECTED,
+    DECLARED,
     Written,
     lack_of_fit,
+    plain_calibration,
     stands_out,
     vouched,
     written,
@@ -61,7 +63,8 @@ def answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, cross
         models[CORRECTED] = along_travel(best, _given(predictor, found, v, more))
     listed = stands_out(columns, fit, found.suspects, models.values())
     clock.say("readings that no fit saw")
-    made = written(models, base, predictor, sigma, listed, seed, lambda: clock.over or not cross_validate)
+    every = (plain_calibration(predictor, found) if models else {}) | models
+    made = written(every, base, predictor, sigma, listed, seed, lambda: clock.over or not cross_validate)
     held, late = made.held_out, made.over_time
     noise = _noise(found, made, best, v.noise)
     each, gap = shares(columns, fit), gap_of(columns, fit)
@@ -69,7 +72,7 @@ def answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, cross
         v, gap = replace(v, rest=v.gone[-1][0].part.name if v.gone else UNFITTED), made.left[1]
     effects = _effects(v, best, each, fit)
     # where nothing is named, the numbers alone are corrected
-    which = CALIBRATED if made.which == CORRECTED and not effects else made.which
+    which = made.which if made.which == DECLARED or (effects and made.which == CORRECTED) else CALIBRATED
     others = list(_alternatives(found, v, best, clock)) if best and effects else []
     several = bool(others or clock.left_out or any(n.numbers or n.equivalents[RIVALS:] for n in v.named))
     rest, numbers = _rest(columns, fit, v, each, gap), _numbers(found, v, models.get(CORRECTED))

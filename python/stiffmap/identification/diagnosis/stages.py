@@ -24,6 +24,7 @@ from stiffmap.identification.diagnosis.slips.factors import named_within
 from stiffmap.identification.diagnosis.slips.find import find_slip
 from stiffmap.identification.inference.names import infer
 from stiffmap.identification.numbers import GROUPS, Tolerances
+from stiffmap.identification.numbers.registration import registered
 from stiffmap.model.effects import get
 from stiffmap.solve.machine import Machine, as_machine
 
@@ -85,6 +86,7 @@ def diagnose(
     with clock.on_interrupt():
         predictor = Predictor(declared, data, threads=threads)
         refuse(predictor.experiment, predictor())
+        predictor = registered(predictor, tolerances, exclude)
         times = [time.perf_counter()]
         slips: list[Slip] = []
         plan = plan_of(predictor, clock)
@@ -99,6 +101,7 @@ def diagnose(
                 break
             predictor = Predictor(declared, undone, threads=threads)
             refuse(predictor.experiment, predictor())
+            predictor = registered(predictor, tolerances, exclude)
             plan = plan_of(predictor, clock)
         times.append(time.perf_counter())
         inferred = infer(predictor, plan, tolerances, exclude, clock, seed)

@@ -19,7 +19,9 @@ from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.identification.inference.amplitudes import Fit
 from stiffmap.identification.inference.columns import MOST_READINGS, Columns, drawn
 from stiffmap.identification.inference.constants import DEGREES, STANDS_OUT
-from stiffmap.identification.inference.corrected import Corrected, columns_of, machine_of, without
+from stiffmap.identification.inference.corrected import Corrected, columns_of, corrected, machine_of, without
+from stiffmap.identification.inference.names import Inferred, of_noise_alone
+from stiffmap.identification.inference.readings import readings
 from stiffmap.identification.validity import covered
 from stiffmap.solve.machine import Machine
 
@@ -29,7 +31,7 @@ WORD = 10
 """Poses that the model's own word counts for in a promise."""
 FOLDS = 10
 """Groups of poses of which the promise is the mean."""
-DECLARED, CALIBRATED, CORRECTED = "declared", "calibrated", "corrected"
+DECLARED, PLAIN, CALIBRATED, CORRECTED = "declared", "calibrated, noise alone", "calibrated", "corrected"
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +69,18 @@ class Written:
     """What this machine leaves over time; None where no times were recorded."""
 
 
+def plain_calibration(predictor: Predictor, found: Inferred) -> dict[str, Corrected]:
+    """The numbers that set-ups share, under noise and nothing else, by its name; nothing where there are none. What nobody can name goes
+    on from pose to pose; no machine file has it, and numbers that are fitted next to it may be worse alone."""
+    fit = of_noise_alone(found.columns)
+    if fit is None:
+        return {}
+    of_setups = [u for u in found.columns.unknowns if u.setup]
+    own = found.uncertain, found.columns, fit, found.noise.sigma, found.suspects
+    given = readings(predictor, *own, exact=of_setups)
+    return {PLAIN: corrected(given, ())} if len(given.spread) else {}
+
+
 def written(
     models: dict[str, Corrected],
     declared: Floats,
@@ -79,7 +93,7 @@ def written(
     """The last of some machines, by name, unless another of them or the declared one is clearly better; `declared` (n, c) is what that
     one shows, `sigma` (n, c) the standard deviation of each reading, m or rad, `listed` (n,) rows that stand alone."""
     e = predictor.experiment
-    which, held = _chosen(models, declared, predictor, sigma, listed, seed, over)
+    which, held, listed = _chosen(models, declared, predictor, sigma, listed, seed, over)
     machine, prediction, promise = predictor.machine, declared, None
     if which != DECLARED:
         best = models[which]
@@ -101,14 +115,14 @@ def _chosen(
     listed: Mask,
     seed: int,
     over: Callable[[], bool],
-) -> tuple[str, HeldOut | None]:
-    """Which machine is handed over, each fold of readings predicted from all others."""
+) -> tuple[str, HeldOut | None, Mask]:
+    """Which machine is handed over, each fold of readings predicted from all others; (n,) rows that stand alone there."""
     e = predictor.experiment
     label, by = folds(e, seed)
     number = int(label.max()) + 1
     last = list(models)[-1] if models else DECLARED
     if number < 2 or over():
-        return last, None
+        return last, None, listed
     left = {name: np.full_like(e.reading, np.nan) for name in (DECLARED, *models)}
     for k in range(number):
         test = label == k
@@ -117,10 +131,14 @@ def _chosen(
         for name, whole in models.items():
             part = without(whole, ~test)
             shown = part.prediction + own_zeros(part, own)
-            left[name][own] = left_unseen(e, sigma, shown, seen, own)[own]
+            left[name][own] = left_unseen(e, whole.given.weighted_sigma, shown, seen, own)[own]
     best = _best(left, last, sigma, e.groups)
-    before, after = (summary(left[name], sigma, e.channels) for name in (DECLARED, best))
-    return best, HeldOut(before, after, number, by)
+    if best == PLAIN:
+        listed = listed | set_aside(models[best])
+    before, after = (
+        summary(np.where(listed[:, None], np.nan, left[name]), sigma, e.channels) for name in (DECLARED, best)
+    )
+    return best, HeldOut(before, after, number, by), listed
 
 
 def own_zeros(found: Corrected, own: Mask) -> Floats:
@@ -143,11 +161,15 @@ def own_zeros(found: Corrected, own: Mask) -> Floats:
 
 
 def _best(left: dict[str, Floats], wanted: str, sigma: Floats, pose: Integers) -> str:
-    """The machine that is wanted, unless another leaves less of the poses by more than one standard error of the difference."""
-    each = {}
-    for name, r in left.items():
-        squares = np.nansum((r / sigma) ** 2, axis=1)
-        each[name] = np.bincount(pose, np.where(np.isfinite(squares), squares, np.inf))
+    """The machine that is wanted, unless another predicts the poses better by more than one standard error of the difference, under the
+    heavy tails of readings and the noise of the machine that leaves least."""
+    read = np.isfinite(left[DECLARED])
+    size = {name: np.abs(np.nan_to_num(r / sigma, nan=np.inf)) for name, r in left.items()}
+    noise = 1.4826 * min(float(np.median(r[read])) for r in size.values())
+    each = {
+        name: np.bincount(pose, np.where(read, np.log1p((r / noise) ** 2 / DEGREES), 0.0).sum(axis=1))
+        for name, r in size.items()
+    }
     best = min(each, key=lambda name: float(each[name].sum()))
     worse = each[wanted] - each[best]
     if not np.isfinite(worse).all():
@@ -237,4 +259,12 @@ def stands_out(columns: Columns, fit: Fit, suspects: Mask, models: Iterable[Corr
         out[rows[~seen[rows]]] = False
         seen[rows] = True
         out[rows[w < SET_ASIDE]] = True
+    return out
+
+
+def set_aside(found: Corrected) -> Mask:
+    """(n,) rows with a reading that a machine gives next to no weight."""
+    given = found.given
+    out = np.zeros(len(given.predictor.experiment), dtype=bool)
+    out[given.rows[given.weights < SET_ASIDE]] = True
     return out

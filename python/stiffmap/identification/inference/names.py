@@ -149,6 +149,14 @@ def with_travel(fit: Fit, *, anew: bool) -> Fit:
     return max([fit, *found], key=lambda f: f.score)
 
 
+def of_noise_alone(columns: Columns) -> Fit | None:
+    """The best fit of the numbers that set-ups share, with noise and nothing else; None where there are none."""
+    parts = Parts(columns)
+    shared = [p for p in parts.numbers if not columns.unknowns[columns.groups[p.name][0]].setup]
+    found = [fitted(columns, some) for some in (parts.together[:1], shared) if some]
+    return max(found, key=lambda f: f.score, default=None)
+
+
 def put_instead(fit: Fit, c: Chosen, place: Place) -> Chosen:
     """Another place in the stead of an effect of a fit, nothing else fitted anew."""
     anchor = fit.without([c.part.name])

@@ -61,6 +61,13 @@ class Readings:
         parts = [d.columns(self.rows, self.channel) @ r / own for d, r in self.drives]
         return self.rest.white(np.hstack([np.zeros((len(own), 0)), *parts]))
 
+    @property
+    def weighted_sigma(self) -> Floats:
+        """(n, c) m, rad: standard deviations as heavy tails weigh the readings."""
+        out = self.sigma.copy()
+        out[self.rows, self.channel] /= np.sqrt(self.weights)
+        return out
+
     @cached_property
     def columns(self) -> Floats:
         """(N, p) change of the readings per prior standard deviation of each number, whitened."""
