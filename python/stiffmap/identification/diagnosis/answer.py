@@ -65,7 +65,7 @@ def answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, cross
     clock.say("readings that no fit saw")
     every = (plain_calibration(predictor, found) if models else {}) | models
     made = written(every, base, predictor, sigma, listed, seed, lambda: clock.over or not cross_validate)
-    held, late = made.held_out, made.over_time
+    held, late, listed = made.held_out, made.over_time, made.listed
     noise = _noise(found, made, best, v.noise)
     each, gap = shares(columns, fit), gap_of(columns, fit)
     if not (v.rest or v.time) and noise.lack_of_fit_after < RARE:
@@ -93,7 +93,7 @@ def answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, cross
         unobservable=_unobservable(found),
         outliers=[e.ids[i] for i in np.flatnonzero(listed)],
         checks_before=checks(e, e.reading, sigma, ~listed),
-        checks_after=checks(e, e.reading - made.prediction, sigma, ~listed),
+        checks_after=checks(e, made.difference, sigma, ~listed),
         unexplained=rest,
         limitations=[
             *_first(fit, v, bool((found.noise.declared >= found.noise.floor).any())),

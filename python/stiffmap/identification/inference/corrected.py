@@ -19,7 +19,7 @@ from itertools import compress
 import numpy as np
 
 from stiffmap.common.errors import StiffmapError
-from stiffmap.experiment.experiment import Floats, Mask
+from stiffmap.experiment.experiment import Experiment, Floats, Mask
 from stiffmap.experiment.noise.outliers import GROSS, MANY
 from stiffmap.identification.inference.chosen import WIDE, Term
 from stiffmap.identification.inference.constants import DEGREES, STANDS_OUT
@@ -79,6 +79,11 @@ class Corrected:
         return None
 
     @property
+    def experiment(self) -> Experiment:
+        """The readings, with frames and tools near where they fit best."""
+        return self.given.predictor.experiment
+
+    @property
     def others(self) -> Floats:
         """(p + K,) what is fitted besides the terms: numbers in standard deviations of the search, and errors along the travel."""
         return np.append(self.numbers / self.given.spread, self.travel)
@@ -125,6 +130,9 @@ def corrected(given: Readings, terms: Sequence[Term], fixed: Sequence[AppliedEff
             break
         weights = (DEGREES + 1.0) / (DEGREES + (noise / given.kappa) ** 2)
         given = given.weighed(np.minimum(weights, 1.0))
+        found = _optimum(given, found.terms, found.others, fixed=fixed)
+    if given.predictor.is_sighted:  # frames and tools turn with the machine
+        given = replace(found.given, predictor=given.predictor.registered(found.prediction))
         found = _optimum(given, found.terms, found.others, fixed=fixed)
     return _determined(found)
 

@@ -58,8 +58,8 @@ class Written:
     """By how much a reading of another pose will differ, m or rad, and its standard uncertainty; None of the declared machine."""
     listed: Mask
     """(n,) rows that stand alone: no measure of a prediction."""
-    prediction: Floats
-    """(n, c) m, rad."""
+    difference: Floats
+    """(n, c) m, rad: readings less its prediction, with frames and tools near where they fit best."""
     left: tuple[Floats, Floats]
     """(n, c) m, rad: readings less the predictions of the declared machine and of this one, less the frames, tools and zeros that
     fit all other rows best where that machine stands."""
@@ -94,17 +94,19 @@ def written(
     one shows, `sigma` (n, c) the standard deviation of each reading, m or rad, `listed` (n,) rows that stand alone."""
     e = predictor.experiment
     which, held, listed = _chosen(models, declared, predictor, sigma, listed, seed, over)
-    machine, prediction, promise = predictor.machine, declared, None
+    machine, there, prediction, promise = predictor.machine, e, declared, None
     if which != DECLARED:
         best = models[which]
-        machine, prediction, promise = machine_of(best), best.prediction, promised(best)
+        machine, there, prediction = machine_of(best), best.experiment, best.prediction
+        promise = promised(best)
         if held is not None and held.by == "poses":
             promise = borne_out(promise, held.after.size[0], len(np.unique(e.groups)))
-    problems = [LinearProblem.of(e, sigma, p, ~listed) for p in (declared, prediction)]
-    before, after = (e.reading - p.base - nuisance_part(p, e.reading - p.base) for p in problems)
+    problems = [LinearProblem.of(of, sigma, p, ~listed) for of, p in ((e, declared), (there, prediction))]
+    difference = e.reading - declared, there.reading - prediction
+    before, after = (r - nuisance_part(p, r) for p, r in zip(problems, difference, strict=True))
     first, last = (summary(np.where(listed[:, None], np.nan, r), sigma, e.channels) for r in (before, after))
     late = over_time(problems[1], problems[1].residual(prediction))
-    return Written(which, machine, held, promise, listed, prediction, (before, after), (first, last), late)
+    return Written(which, machine, held, promise, listed, difference[1], (before, after), (first, last), late)
 
 
 def _chosen(
@@ -131,7 +133,8 @@ def _chosen(
         for name, whole in models.items():
             part = without(whole, ~test)
             shown = part.prediction + own_zeros(part, own)
-            left[name][own] = left_unseen(e, whole.given.weighted_sigma, shown, seen, own)[own]
+            unseen = left_unseen(whole.experiment, whole.given.weighted_sigma, shown, seen, own)
+            left[name][own] = unseen[own]
     best = _best(left, last, sigma, e.groups)
     if best == PLAIN:
         listed = listed | set_aside(models[best])

@@ -12,7 +12,9 @@ from scipy.spatial.transform import Rotation
 import stiffmap as sm
 from stiffmap.experiment import Predictor, load_experiment, random_plan, residual
 from stiffmap.experiment.poses.commanded import resolved
+from stiffmap.identification.numbers import Tolerances
 from stiffmap.model.description import AppliedEffect
+from stiffmap.model.effects import apply_records
 from stiffmap.ui.cli.app import main
 
 COUNT = 40
@@ -106,6 +108,26 @@ def test_two_setups_have_a_frame_each_and_share_a_target(arm: sm.Machine, tmp_pa
     ]
     np.testing.assert_allclose(found.experiment.reading[:, :3], 0.0, atol=1e-8)
     assert "platform.seen_target_1" in found.machine.points
+
+
+@pytest.mark.parametrize("turned", [True, False])
+def test_frames_are_those_of_where_the_machine_stands(arm: sm.Machine, tmp_path: Path, turned: bool) -> None:
+    """Drives off by 1 to 3 degrees: frames of best fit at the commands are turned so far that no straight line leads back."""
+    q, error = commands(), np.array([0.0, -0.04, 0.05, -0.03, 0.02, 0.0])
+    p, m = sighted(arm, q + error, 9)
+    columns = {f"p{a}": p[:, i] for i, a in enumerate("xyz")}
+    if turned:
+        columns |= {f"pr{a}": Rotation.from_matrix(m).as_rotvec()[:, i] for i, a in enumerate("xyz")}
+    tool = "unknown" if turned else "offset_unknown"
+    e = load_experiment(write(tmp_path, arm, q, columns, f"{HEAD}frame: unknown\ntool: {tool}\n"))
+    drives = zip(("base", "shoulder", "elbow", "wrist_1", "wrist_2"), error, strict=False)
+    zeros = tuple(AppliedEffect("zero_offset", name, ("arm",), (("error", by),)) for name, by in drives)
+    true = sm.Machine(apply_records(arm.description, zeros))
+    assert residual(true, e).summary.rms < 1e-8
+    found = {name: shift for name, _, shift in Predictor(true, e).experiment.registration}
+    np.testing.assert_allclose(found["target 1"], [0.03, -0.05, 0.12], atol=1e-8)
+    c = sm.calibrate(arm, e, tolerances=Tolerances(turning_zero=0.03))
+    assert c.after.rms < 4e-6 and residual(c.machine, e).summary.rms < 4e-6
 
 
 def test_an_elbow_off_its_zero_is_seen_through_unknown_frames(arm: sm.Machine, tmp_path: Path) -> None:
