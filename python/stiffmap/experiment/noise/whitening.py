@@ -17,7 +17,8 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.experiment import Experiment, Floats, Integers, Mask
 from stiffmap.experiment.noise.nuisance import nuisance_columns
 
-FOLDS = 5
+FOLDS, MANY_RUNS = 5, 4
+"""Groups of poses, and set-ups from which on these are left out whole: a machine is judged by what nearly all readings give."""
 DEGREES = 1.0
 """Of freedom: readings far off have no weight at all."""
 ROUNDS, SETTLED = 50, 1e-3
@@ -176,8 +177,8 @@ def fitted(columns: Floats, values: Floats, rounds: int = ROUNDS) -> tuple[Float
 
 
 def folds(experiment: Experiment, seed: int) -> tuple[Integers, str]:
-    """(n,) fold of every row: whole set-ups where there are several, else whole poses."""
-    if experiment.runs.max() > 0:
+    """(n,) fold of every row: whole set-ups where there are `MANY_RUNS` or more, else whole poses."""
+    if experiment.runs.max() + 1 >= MANY_RUNS:
         return experiment.runs, "set-ups"
     number = int(experiment.groups.max()) + 1
     label = random_numbers(seed).permutation(number) % min(FOLDS, number)
