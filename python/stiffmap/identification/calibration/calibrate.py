@@ -110,9 +110,10 @@ def _answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, star
     models = {CALIBRATED: at} if at else {}
     listed = stands_out(columns, best.fit, found.suspects, models.values())
     clock.say("readings that no fit saw")
-    every = ({} if exact else plain_calibration(predictor, found)) | models
-    made = written(every, base, predictor, sigma, listed, seed, lambda: clock.over)
-    listed, at = made.listed, every.get(made.which, at)
+    if not exact and not clock.over:
+        models = plain_calibration(predictor, found) | models
+    made = written(models, base, predictor, sigma, listed, seed, lambda: clock.over)
+    listed, at = made.listed, models.get(made.which, at)
     rows, rank = table_of(columns, found.search.calibrated or fit, at)
     verdict = judged(columns, found.search)
     wide = too_wide(fit, verdict.out_of_tolerance)

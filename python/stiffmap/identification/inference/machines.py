@@ -165,10 +165,12 @@ def own_zeros(found: Corrected, own: Mask) -> Floats:
 
 def _best(left: dict[str, Floats], wanted: str, sigma: Floats, pose: Integers) -> str:
     """The machine that is wanted, unless another predicts the poses better by more than one standard error of the difference, under the
-    heavy tails of readings and the noise of the machine that leaves least."""
+    heavy tails of readings at the noise of the machine that leaves least."""
     read = np.isfinite(left[DECLARED])
+    if not read.any():
+        return wanted
     size = {name: np.abs(np.nan_to_num(r / sigma, nan=np.inf)) for name, r in left.items()}
-    noise = 1.4826 * min(float(np.median(r[read])) for r in size.values())
+    noise = max(1.0, 1.4826 * min(float(np.median(r[read])) for r in size.values()))
     each = {
         name: np.bincount(pose, np.where(read, np.log1p((r / noise) ** 2 / DEGREES), 0.0).sum(axis=1))
         for name, r in size.items()
