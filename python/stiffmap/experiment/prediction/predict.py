@@ -58,7 +58,7 @@ class Predictor:
         self._given = machine, located(machine, experiment)
         self._register()
         self._set_aside()
-        if self.is_sighted and np.nanmax(np.abs(shown := self()), initial=0.0) > FAR:
+        if self.is_sighted and _far(shown := self()):
             self._register(shown)
         self._close_from_here()
 
@@ -68,7 +68,10 @@ class Predictor:
         return self._given[1].seen is not None and self.experiment.frame != "known"
 
     def registered(self, shown: Floats) -> Predictor:
-        """The same with the frames and targets of best fit where a machine stands that shows `shown` (n, c) m, rad."""
+        """The same with the frames and targets of best fit where a machine stands that shows `shown` (n, c) m, rad; itself where none were
+        found, or it stands as commanded."""
+        if not self.is_sighted or not _far(shown):
+            return self
         out = copy.copy(self)
         out._register(shown)
         out._close_from_here()
@@ -79,8 +82,12 @@ class Predictor:
         stands = None if shown is None else standing(self.experiment, shown)
         self.machine, self.experiment = resolved(*self._given, stands)
         self._own = _left_open(self.machine, self.experiment)
-        self._memory: Kept[tuple[Terms, Terms], Floats] = Kept()
-        self._changes: Kept[tuple[Terms, Terms], Floats] = Kept()
+        self._forget(MOST_BYTES)
+
+    def _forget(self, room: int) -> None:
+        """Has solved nothing; `room` for what it will remember, bytes."""
+        self._memory: Kept[tuple[Terms, Terms], Floats] = Kept(room)
+        self._changes: Kept[tuple[Terms, Terms], Floats] = Kept(room)
         self._machines: Kept[Hashable, Machine] = Kept(MACHINES)
         self._others: Kept[Hashable, Predictor] = Kept(OTHERS)
         self._drives: dict[tuple[Terms, Terms], Drives] = {}
@@ -165,9 +172,7 @@ class Predictor:
         out.machine = machine or self.machine
         out.experiment = self.experiment if rows is None else self.experiment.rows(rows)
         out._own = self._own if machine is None else _left_open(machine, self.experiment)
-        room = MOST_BYTES // OTHERS  # all that are kept together need no more than one predictor may
-        out._memory, out._changes, out._machines = Kept(room), Kept(room), Kept(MACHINES)
-        out._others, out._drives = Kept(OTHERS), {}
+        out._forget(MOST_BYTES // OTHERS)  # all that are kept together need no more than one predictor may
         return out
 
     def kept(self, key: Hashable, make: Callable[[], Predictor]) -> Predictor:
@@ -245,6 +250,11 @@ class Predictor:
         out, solved = motions(self.with_terms(terms), plan, self.threads)
         self.solved += solved
         return out
+
+
+def _far(shown: Floats) -> bool:
+    """Whether a machine that shows this stands where it is not commanded."""
+    return bool(np.nanmax(np.abs(shown), initial=0.0) > FAR)
 
 
 def true_wrench(experiment: Experiment, terms: Iterable[AppliedEffect]) -> Floats:

@@ -131,8 +131,9 @@ def corrected(given: Readings, terms: Sequence[Term], fixed: Sequence[AppliedEff
         weights = (DEGREES + 1.0) / (DEGREES + (noise / given.kappa) ** 2)
         given = given.weighed(np.minimum(weights, 1.0))
         found = _optimum(given, found.terms, found.others, fixed=fixed)
-    if given.predictor.is_sighted:  # frames and tools turn with the machine
-        given = replace(found.given, predictor=given.predictor.registered(found.prediction))
+    there = given.predictor.registered(found.prediction)
+    if there is not given.predictor:  # frames and tools turn with the machine
+        given = replace(found.given, predictor=there)
         found = _optimum(given, found.terms, found.others, fixed=fixed)
     return _determined(found)
 

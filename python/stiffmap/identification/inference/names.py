@@ -35,8 +35,8 @@ from stiffmap.identification.inference.world import (
     best_shape,
     largest_gain,
 )
-from stiffmap.identification.numbers.certificate import Tolerances, certified
-from stiffmap.identification.numbers.unknowns import Unknown, unknowns
+from stiffmap.identification.numbers.certificate import Tolerances
+from stiffmap.identification.numbers.unknowns import Unknown, uncertain
 from stiffmap.model import effects
 from stiffmap.model.description import AppliedEffect
 
@@ -215,10 +215,9 @@ def infer(
     e, clock = predictor.experiment, clock or Clock()
     noise, suspects = without_suspects(e, plan.base)
     plan = replace(plan, variants=tuple(v for v in plan.variants if v.candidate.kind not in exclude))
-    every = unknowns(predictor.machine.description, e, certified(tolerances, e))
-    uncertain = tuple(u for u in every if u.group not in exclude)
+    numbers = uncertain(predictor.machine.description, e, tolerances, exclude)
     clock.say("columns of the declared numbers")
-    found = columns(predictor, plan, noise.sigma, uncertain, seed)
+    found = columns(predictor, plan, noise.sigma, numbers, seed)
 
     used = np.isin(np.arange(len(e)), found.rows)
     drawn = predictor if used.all() else predictor.beside(rows=used)
@@ -236,7 +235,7 @@ def infer(
 
     clock.say("all effects at once")
     search = searched(found, predict, lambda: clock.over, travel=travel)
-    return Inferred(plan, noise, suspects, uncertain, found, search)
+    return Inferred(plan, noise, suspects, numbers, found, search)
 
 
 def terms(chosen: Sequence[Chosen]) -> tuple[AppliedEffect, ...]:

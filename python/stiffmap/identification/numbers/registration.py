@@ -8,10 +8,10 @@ import numpy as np
 
 from stiffmap.experiment.noise.outliers import without_suspects
 from stiffmap.experiment.noise.whitening import LinearProblem, fitted
-from stiffmap.experiment.prediction.predict import FAR, Predictor
-from stiffmap.identification.numbers.certificate import Tolerances, certified
+from stiffmap.experiment.prediction.predict import Predictor
+from stiffmap.identification.numbers.certificate import Tolerances
 from stiffmap.identification.numbers.sensitivity import predicted, sensitivity
-from stiffmap.identification.numbers.unknowns import unknowns
+from stiffmap.identification.numbers.unknowns import uncertain
 
 ROUNDS = 5
 """Gauss-Newton steps, each with the noise that the last one left."""
@@ -20,23 +20,21 @@ ROUNDS = 5
 def registered(predictor: Predictor, tolerances: Tolerances | None, exclude: Sequence[str]) -> Predictor:
     """The predictor with frames and tools of best fit where the machine stands with its uncertain numbers fitted; itself where no frame
     or tool is found by the readings, or the machine stands as commanded."""
-    e, base = predictor.experiment, predictor()
-    every = unknowns(predictor.machine.description, e, certified(tolerances, e))
-    uncertain = [u for u in every if u.group not in exclude]
-    if not predictor.is_sighted or not uncertain:
+    if not predictor.is_sighted:
         return predictor
+    e, base = predictor.experiment, predictor()
     noise, aside = without_suspects(e, base)
-    s = sensitivity(predictor, uncertain)
+    s = sensitivity(predictor, uncertain(predictor.machine.description, e, tolerances, exclude))
     values, shown = np.zeros(len(s.unknowns)), base
     for _ in range(ROUNDS):
         problem = LinearProblem.of(e, noise.sigma, shown, ~aside)
-        columns = problem.white(np.nan_to_num(s.columns))
-        left = problem.residual(shown) + columns @ values
-        size = max(1.0, 1.4826 * float(np.median(np.abs(left - columns @ values))))
-        known = np.vstack([columns / size, np.eye(len(values))])
-        values = fitted(known, np.append(left / size, np.zeros(len(values))))[0]
+        columns, left = problem.white(np.nan_to_num(s.columns)), problem.residual(shown)
+        size = max(1.0, 1.4826 * float(np.median(np.abs(left))))
+        whole = np.vstack([columns / size, np.eye(len(values))])
+        wanted = np.append((left + columns @ values) / size, np.zeros(len(values)))
+        values = fitted(whole, wanted)[0]
         moved = predicted(predictor, s.unknowns, values)
         if not np.isfinite(moved[problem.index]).all():
             return predictor
         shown = moved
-    return predictor.registered(shown) if np.nanmax(np.abs(shown)) > FAR else predictor
+    return predictor.registered(shown)

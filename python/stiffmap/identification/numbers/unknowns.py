@@ -15,7 +15,7 @@ import numpy as np
 
 from stiffmap.common.arguments import checked
 from stiffmap.experiment.experiment import Experiment, Floats
-from stiffmap.identification.numbers.certificate import INSTRUMENT, SCALE, Tolerances, frame_errors
+from stiffmap.identification.numbers.certificate import INSTRUMENT, SCALE, Tolerances, certified, frame_errors
 from stiffmap.model.description import TASK, Block, Body, Element, Joint, MachineDescription, Offset, Spring
 from stiffmap.model.with_errors import END
 
@@ -145,6 +145,14 @@ def unknowns(
     if not weighs:
         out = [p for p in out if p.group != "masses"]
     return out
+
+
+def uncertain(
+    description: MachineDescription, e: Experiment, tolerances: Tolerances | None, exclude: Sequence[str] = ()
+) -> tuple[Unknown, ...]:
+    """Unknowns with what the certificate of the experiment says of its instrument; `exclude`: groups that are known to be right."""
+    every = unknowns(description, e, certified(tolerances, e))
+    return tuple(u for u in every if u.group not in exclude)
 
 
 def _of_sequence(
