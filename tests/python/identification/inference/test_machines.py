@@ -12,14 +12,17 @@ import pytest
 import stiffmap as sm
 from stiffmap.experiment import Predictor, random_plan
 from stiffmap.experiment.channels import AXIS_CHANNELS
+from stiffmap.experiment.experiment import Floats
 from stiffmap.identification.candidates.candidates import Candidate
 from stiffmap.identification.candidates.sensitivity import CandidatePlan
 from stiffmap.identification.inference import machines
+from stiffmap.identification.inference.amplitudes import fitted
 from stiffmap.identification.inference.chosen import Term
 from stiffmap.identification.inference.constants import RARE
 from stiffmap.identification.inference.corrected import Corrected, along_travel, corrected, without
 from stiffmap.identification.inference.kernels import Covariance
 from stiffmap.identification.inference.names import infer
+from stiffmap.identification.inference.parts import Parts
 from stiffmap.identification.inference.readings import Readings
 from stiffmap.identification.numbers import unknowns
 from stiffmap.identification.numbers.sensitivity import predicted, sensitivity, zeros_anew
@@ -81,8 +84,13 @@ def test_the_machine_that_predicts_most_poses_better_is_handed_over_and_none_tha
     assert machines._best(left, "corrected", np.ones((30, 3)), np.arange(30)) == "corrected"
 
 
-def test_a_plain_calibration_has_no_gaps_and_nothing_of_a_set_up() -> None:
+@pytest.mark.parametrize("together", [True, False])
+def test_a_plain_calibration_has_no_gaps_and_nothing_of_a_set_up(
+    together: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Zeros off in an arm with a smooth error that no number has, read in two set-ups."""
+    if together:  # all numbers are then off alike, those of set-ups among them
+        monkeypatch.setattr(machines, "of_noise_alone", lambda c: fitted(c, Parts(c).together[:1]))
     machine = sm.load_machine("ur10")
     plan = random_plan(machine, "position", poses=24, repeats=1, seed=1)
     plan = replace(plan, setup=tuple("ab"[int(g) % 2] for g in plan.groups))
@@ -140,10 +148,13 @@ def test_zeros_of_a_set_up_are_straight_while_they_are_small(zero: float, most: 
     assert np.abs(whole - declared)[:, :3][read].max() > 1.5 * zero  # metres of an arm
 
 
-def test_what_is_far_off_in_rows_that_the_search_did_not_have_is_weighed_down() -> None:
-    """The zeros are then those of the other rows."""
+def test_what_is_far_off_in_rows_that_the_search_did_not_have_is_weighed_down(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The zeros are then those of the other rows, and so are the frames by which poses are predicted."""
     machine = sm.load_machine("orthoglide-revised")
-    p = Predictor(machine, random_plan(machine, "position", poses=40, repeats=1, seed=1))
+    plan = random_plan(machine, "position", poses=40, repeats=1, seed=1)
+    p = Predictor(machine, replace(plan, frame="unknown"))
     wanted = [u for u in unknowns(machine.description, p.experiment) if u.group == "zeros"]
     rng = np.random.default_rng(0)
     exact = predicted(p, wanted, np.array([1.0, -1.0, 0.5]))
@@ -156,6 +167,17 @@ def test_what_is_far_off_in_rows_that_the_search_did_not_have_is_weighed_down() 
     rest = Covariance(np.ones(n), np.zeros((n, 0)))
     found = corrected(Readings(p, e.sigma, rows, channel, 1.0, np.ones(n), rest, s, np.ones(3)), ())
     assert found.numbers == pytest.approx([1.0, -1.0, 0.5], abs=0.1)
+    left: dict[str, Floats] = {}
+
+    def best(each: dict[str, Floats], wanted: str, *_: object) -> str:
+        left.update(each)
+        return wanted
+
+    monkeypatch.setattr(machines, "_best", best)
+    none = np.zeros(len(e), dtype=bool)
+    machines.written({"calibrated": found}, p(), p, e.sigma, none, 0, lambda: False)
+    others = np.abs(left["calibrated"] / e.sigma)[np.arange(40) != 5]
+    assert np.sqrt(np.nanmean(others**2)) < 1.2  # a frame that the row moves would move them all
     weights = found.given.weights
     assert rows[np.argmin(weights)] == 5 and weights.min() < 1e-3 < 0.2 < np.sort(weights)[1]
 
