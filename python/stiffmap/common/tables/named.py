@@ -249,16 +249,16 @@ class PoseTable(NamedTable):
         return turns @ home
 
 
-def read_pose_table(place: Path, *, at_home: Floats | None = None) -> PoseTable:
-    """The table of a CSV file.
+def read_pose_table(place: Path, *, at_home: Floats | None = None, known: Known = KNOWN) -> PoseTable:
+    """The table of a CSV file, whose columns are the `known` ones and those of an orientation.
 
     `at_home` (3,) m stands in for x, y or z that have no column, along which a planar machine is not commanded; None: all three
     are wanted. Raises FileError naming file, line, column, what was expected and what was found.
     """
-    sheet = _sheet(place, KNOWN)
+    sheet = _sheet(place, known)
     found = orientation_of(sheet)
     columns = () if found.is_vector else found.columns  # rx, ry, rz are from home
-    table = PoseTable(**vars(named(sheet, KNOWN, columns)))
+    table = PoseTable(**vars(named(sheet, known, columns)))
     if columns:
         if {"rx", "ry", "rz"} & set(table.values):
             table.fail("orientations are given twice", sheet.header[columns[0]])

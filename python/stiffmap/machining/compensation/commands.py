@@ -19,9 +19,8 @@ from stiffmap.common.broadcasting import Floats, names_of, one_of, refused, trai
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs import number_cells, write_rows
 from stiffmap.common.short import short_repr
+from stiffmap.common.tables.named import KNOWN, WORD, Known, read_pose_table
 from stiffmap.experiment.experiment import AXES, Experiment
-from stiffmap.experiment.files.load import load_plan
-from stiffmap.experiment.poses.commanded import against_base
 from stiffmap.experiment.poses.configuration import coordinates_of, drive_jacobian
 from stiffmap.experiment.prediction.equilibria import motions
 from stiffmap.model.description import TASK
@@ -34,6 +33,19 @@ STEPS = 25
 DONE = 1e-10
 """m, rad: step of the commands below which they stand."""
 MM = 1e3
+WAY = ("approach_x", "approach_y", "approach_z")
+BARE = {
+    **dict.fromkeys("xyz", "mm"), **dict.fromkeys(("rotx", "roty", "rotz"), "rad"),
+    **dict.fromkeys(("fx", "fy", "fz"), "N"), **dict.fromkeys(("mx", "my", "mz"), "N*mm"),
+}  # fmt: skip
+"""Units of columns that name none."""
+WANTED = Known(
+    {**KNOWN.units, **dict.fromkeys(WAY, ""), "id": WORD},
+    KNOWN.usual,
+    {**KNOWN.aliases, "rotx": "rx", "roty": "ry", "rotz": "rz"},
+    lambda name, unit: (name, unit or BARE.get(name, "")),
+)
+"""What a table of wanted poses may have besides those of every table of poses."""
 
 
 @short_repr
@@ -66,6 +78,8 @@ class Commands:
     machine was not calibrated."""
     ids: tuple[str, ...] = ()
     """Of the rows, as a file of poses names them; else 1, 2 …"""
+    turns: str = ""
+    """Columns of a file that are orientations against the base, and how they turn, in words."""
 
     @property
     def ok(self) -> NDArray[np.bool_]:
@@ -124,7 +138,7 @@ def compensate(
         declared geometry.
     position, rotation
         (n, 3) m and (n, 3, 3) wanted tool poses; rotation None: as at home. Or a CSV file of poses (x, y, z in mm, and
-        where wanted loads, orientation, approach), whose own loads replace `wrench`.
+        where wanted loads, approach, orientation as in every table of poses), whose own loads replace `wrench`.
     actuators
         (n, actuators) instead: wanted is the pose that the declared machine takes there, and the commands stay in
         that configuration. Needed for redundant arms and other branches.
@@ -147,17 +161,20 @@ def compensate(
     StiffmapError
         For bad input.
     """
-    ids = None
+    ids, turns = (), ""
     one_of(point, machine.points, "point")
+    if isinstance(position, (str, PathLike)):
+        home, task = machine.description.home, machine.description.task
+        read = read_pose_table(Path(position), at_home=None if {*"xyz"} <= {*task} else home.p, known=WANTED)
+        position, rotation, turns = read.position, read.rotation(home.r), read.turns
+        ids = tuple(read.values.get("id", ()))
+        approach = read.block(WAY) if {*WAY} & {*read.values} else approach
+        wrench = read.wrench if read.loaded else wrench
     if approach is not None:
         approach = trailing(approach, (3,), "approach", "directions")
         lost = approach[~(np.linalg.norm(approach, axis=-1) > 0)]
         if lost.size:
             raise refused("approach", "directions with a length", str(lost[0].tolist()))
-    if isinstance(position, (str, PathLike)):
-        read = against_base(load_plan(Path(position), machine, "position"), machine.description.home.r)
-        position, rotation, approach, ids = read.position, read.rotation, read.approach, read.ids
-        wrench = read.wrench if read.wrench.any() else wrench
     plan = _plan(machine, position, rotation, actuators, wrench, approach, gravity, point, threads)
     assert plan.rotation is not None  # as the kinematics has it
     chosen = _components(machine, components)
@@ -191,6 +208,7 @@ def compensate(
         tuple(machine.compiled.names.is_prismatic(a) for a in machine.actuators),
         None if valid is None else valid.outside(machine, start, plan.wrench),
         ids or plan.ids,
+        turns,
     )
 
 

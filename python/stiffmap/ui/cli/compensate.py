@@ -148,6 +148,8 @@ def _commands(found: compensation.Commands, output: Path | None) -> dict[str, ob
     if found.beyond is not None:
         far = [found.ids[i] for i in np.flatnonzero(found.beyond)]
         told[BEYOND] = first_of(far) or "none"
+    if found.turns:
+        told["orientation against the base"] = found.turns
     return told | {
         "rows": len(found.ids),
         "corrected components": " ".join(found.components),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import warnings
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -199,6 +200,36 @@ def test_the_command_line_writes_commands(tmp_path: Path, capsys: pytest.Capture
     assert main(["compensate", "linear-delta", "--check", str(tmp_path / "nothing")]) == 2
     assert main(["compensate", "linear-delta"]) == 2
     assert "wanted poses" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("head", "form"),
+    [
+        ("X,Y,Z,A,B,C", lambda r: r.as_euler("ZYX", degrees=True)),
+        ("x [mm],y [mm],z [mm],W [deg],P [deg],R [deg]", lambda r: r.as_euler("xyz", degrees=True)),
+        ("x,y,z,qx,qy,qz,qw", lambda r: r.as_quat()),
+    ],
+)
+def test_orientations_of_a_table_are_those_of_every_table_of_poses(
+    head: str, form: Callable[[Rotation], np.ndarray], tmp_path: Path
+) -> None:
+    """The home of this arm is turned by half a turn against its base."""
+    machine = sm.load_machine("ur10").with_effect("zero_offset", element="elbow", error=1e-3)
+    home, turn = machine.description.home, Rotation.from_rotvec([0.1, 0.05, -0.02])
+    wanted = turn * Rotation.from_matrix(home.r)
+    rows = {
+        head: form(wanted),
+        "id,x,y,z,rotx,roty,rotz,approach_x": [*turn.as_rotvec(), 1.0],
+    }
+    for name, (top, numbers) in zip(("its.csv", "own.csv"), rows.items(), strict=True):
+        cells = [*("a",) * top.startswith("id"), *1e3 * np.array(home.p), *numbers]
+        (tmp_path / name).write_text(f"{top}\n{','.join(map(str, cells))}\n")
+    its, own = (sm.compensate(machine, tmp_path / name) for name in ("its.csv", "own.csv"))
+    by_array = sm.compensate(machine, home.p, wanted.as_matrix())
+    assert own.ids == ("a",)
+    assert its.turns and not own.turns
+    for found in (its, own):
+        assert found.actuators == pytest.approx(by_array.actuators, abs=1e-9)
 
 
 def test_what_compensation_leaves_of_held_out_readings(
