@@ -32,7 +32,7 @@ def checked_field(
     """The four arrays as float64 after all checks of shape, finiteness and geometry.
 
     Raises:
-        StiffmapError: wrong shape, NaN or infinity, fewer than three points, collinear points.
+        StiffmapError: wrong shape, NaN or infinity, fewer than three points, collinear points, a reference in another unit.
     """
     p = finite_array("points", points, (None, 3), "(n, 3) in m")
     check_points(p)
@@ -43,6 +43,12 @@ def checked_field(
             "displacements: expected a field that moves, got 0 m at every point of every case"
         )
     r = finite_array("reference", reference, (3,), "(3,) in m")
+    low, high = p.min(axis=0), p.max(axis=0)
+    off = (r - r.clip(low, high), 1e3 * r - (1e3 * r).clip(low, high), high - low)
+    far, other, size = (float(np.linalg.norm(v)) for v in off)
+    if far > size and other < size / 2:
+        found = f"one {far:.3g} m off, which times 1000 is among them: is it in m where mm are meant?"
+        raise StiffmapError(f"reference: expected a place near the points, {size:.3g} m wide; found {found}")
     return DisplacementField(p, u, w, r)
 
 

@@ -35,6 +35,10 @@ LINE = np.linspace(0, 1, 12)[:, None] * [[0.01, 0.02, 0.03]]
         ({"wrenches": WRENCHES[:4], "displacements": U[:4]}, "rank 4.*columns of My, Mz"),
         ({"wrenches": 0 * WRENCHES, "partial": True}, "at least one load case that is not zero"),
         ({"reference": [0, 0]}, r"reference: expected shape \(3,\)"),
+        (
+            {"reference": REFERENCE / 1e3},
+            "reference: expected a place near the points, .* times 1000 is among",
+        ),
         ({"points": "abc"}, "points: expected an array of numbers"),
         ({"noise": -1.0}, "noise: expected None"),
         ({"noise": [1e-8, 1e-8]}, "one or 6 positive numbers"),
