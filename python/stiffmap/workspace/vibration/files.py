@@ -164,6 +164,20 @@ def _about_peak(receptance: Complex) -> list[int]:
     return [*low[low < top][-1:], *low[low > top][:1]]
 
 
+def _gains_energy(frequency: Floats, receptance: Complex) -> bool:
+    """Whether the lines over the largest peak, three are enough, are those of one mode whose damping is below zero by more than three
+    standard uncertainties: with x the frequency by that of their middle, H (k - x² + i c x) = R."""
+    ends = _about_peak(receptance)
+    lines = [k for k in range(ends[0], ends[-1] + 1) if np.isfinite(receptance[k])] if len(ends) == 2 else []
+    if len(lines) < 3:
+        return False
+    H, x = receptance[lines] / np.nanmax(np.abs(receptance)), frequency[lines] / frequency[lines].mean()
+    A = np.stack([H, 1j * x * H, np.ones_like(H), 1j * np.ones_like(H)], axis=1)
+    A, y = np.concatenate([A.real, A.imag]), np.concatenate([(x**2 * H).real, (x**2 * H).imag])
+    found, inverse = np.linalg.pinv(A) @ y, np.linalg.pinv(A.T @ A)
+    return bool(found[1] < -3 * np.sqrt(((y - A @ found) ** 2).sum() / (len(y) - 4) * inverse[1, 1]))
+
+
 def _kind(unit: ResponseUnit) -> tuple[int | None, int]:
     """The derivatives, and 1 of a motion by force, -1 of a force by motion: dynamic stiffness, impedance, apparent mass."""
     inverse = _derivatives(ResponseUnit().over(unit))
@@ -379,9 +393,7 @@ def _check(one: MeasuredResponse) -> None:
     if bad.size:
         k = int(bad[0])
         raise StiffmapError(f"{where}: expected a coherence from 0 to 1; point {k + 1} has {c[k]:g}")
-    ends = _about_peak(one.receptance)
-    rise = np.diff(np.unwrap(np.angle(one.receptance[slice(*ends)]))) if len(ends) == 2 else np.empty(0)
-    if len(rise) > 2 and (rise > 0).all() and rise.sum() > 1:
+    if _gains_energy(one.frequency, one.receptance):
         what = "expected a phase that falls over the peak, found one that rises: turn its sign"
         raise StiffmapError(f"{where}: {what}")
     known = c[np.isfinite(c)]

@@ -423,10 +423,11 @@ def test_names_of_analysers(header, columns, tmp_path):
 @pytest.mark.parametrize("size", [1.0, -1.0], ids=["at the tool", "across"])
 @pytest.mark.parametrize("power", [0, 1, 2])
 @pytest.mark.parametrize("head", ["Real [{0}],Imag [{0}]", "Magnitude [{0}],Phase [deg]"])
-def test_a_phase_that_rises_over_the_peak_is_refused(size, power, head, tmp_path):
+@pytest.mark.parametrize("damping", [0.06, 0.02, 0.005], ids=["many lines", "three lines", "one line"])
+def test_a_phase_that_rises_over_the_peak_is_refused(size, power, head, damping, tmp_path):
     """Some analysers count the lag behind the force, or have exp(-iωt): a mode would be damped otherwise."""
     f = np.arange(4.0, 200.0, 2.0)
-    response = size * 1e-7 / (1 - (f / 120) ** 2 + 0.06j * f / 120) * (2j * np.pi * f) ** power
+    response = size * 1e-7 / (1 - (f / 120) ** 2 + 1j * damping * f / 120) * (2j * np.pi * f) ** power
     for turned in (response, response.conj()):
         polar = "Phase" in head
         pair = (abs(turned), np.angle(turned, deg=True)) if polar else (turned.real, turned.imag)
@@ -439,6 +440,21 @@ def test_a_phase_that_rises_over_the_peak_is_refused(size, power, head, tmp_path
         StiffmapError, match="expected a phase that falls over the peak, found one that rises"
     ):
         read_responses(tmp_path / "f.csv")
+
+
+@pytest.mark.parametrize("step", [0.5, 2.0])
+def test_modes_that_are_close_to_one_another_are_no_rising_phase(step, tmp_path):
+    """Their phase may rise between two peaks, seen across."""
+    rng = np.random.default_rng(5)
+    f = np.arange(20.0, 200.0, step)
+    for _ in range(20):
+        own, ratio = rng.uniform(60, 90, 4), rng.uniform(0.002, 0.03, 4)
+        x = f[:, None] / own
+        h = (rng.choice([-1, 1], 4) / (1 - x**2 + 2j * ratio * x)).sum(axis=1)
+        h += 0.01 * np.abs(h).max() * (rng.normal(size=len(f)) + 1j * rng.normal(size=len(f)))
+        rows = [f"{a},{b.real},{b.imag}" for a, b in zip(f, h, strict=True)]
+        (tmp_path / "f.csv").write_text("\n".join(["f [Hz],Real [m/N],Imag [m/N]", *rows]))
+        assert len(read_responses(tmp_path / "f.csv")) == 1
 
 
 def test_a_phase_that_rises_in_a_universal_file_is_refused(tmp_path):
