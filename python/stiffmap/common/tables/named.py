@@ -212,7 +212,8 @@ COLUMNS = {
 }  # fmt: skip
 """Name of a column of poses -> SI unit."""
 USUAL = {"m": "mm", "m/s": "mm/min", "rad": "deg"}
-KNOWN = Known(COLUMNS, {n: f"{n} [{USUAL.get(si, si)}]" for n, si in COLUMNS.items()}, {"time": "t"})
+ALIASES = {"time": "t"} | {f"rot{a}": f"r{a}" for a in "xyz"}
+KNOWN = Known(COLUMNS, {n: f"{n} [{USUAL.get(si, si)}]" for n, si in COLUMNS.items()}, ALIASES)
 
 
 @dataclass(eq=False)

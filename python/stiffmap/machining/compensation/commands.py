@@ -19,8 +19,9 @@ from stiffmap.common.broadcasting import Floats, names_of, one_of, refused, trai
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs import number_cells, write_rows
 from stiffmap.common.short import short_repr
-from stiffmap.common.tables.named import KNOWN, WORD, Known, read_pose_table
+from stiffmap.common.tables.named import KNOWN, WORD, read_pose_table
 from stiffmap.experiment.experiment import AXES, Experiment
+from stiffmap.experiment.files.fields import APPROACH, VECTOR
 from stiffmap.experiment.poses.configuration import coordinates_of, drive_jacobian
 from stiffmap.experiment.prediction.equilibria import motions
 from stiffmap.model.description import TASK
@@ -33,17 +34,13 @@ STEPS = 25
 DONE = 1e-10
 """m, rad: step of the commands below which they stand."""
 MM = 1e3
-WAY = ("approach_x", "approach_y", "approach_z")
-BARE = {
-    **dict.fromkeys("xyz", "mm"), **dict.fromkeys(("rotx", "roty", "rotz"), "rad"),
-    **dict.fromkeys(("fx", "fy", "fz"), "N"), **dict.fromkeys(("mx", "my", "mz"), "N*mm"),
-}  # fmt: skip
+BARE = dict.fromkeys("xyz", "mm") | dict.fromkeys(VECTOR, "rad") | dict.fromkeys(("mx", "my", "mz"), "N*mm")
+BARE |= dict.fromkeys(("fx", "fy", "fz"), "N")
 """Units of columns that name none."""
-WANTED = Known(
-    {**KNOWN.units, **dict.fromkeys(WAY, ""), "id": WORD},
-    KNOWN.usual,
-    {**KNOWN.aliases, "rotx": "rx", "roty": "ry", "rotz": "rz"},
-    lambda name, unit: (name, unit or BARE.get(name, "")),
+WANTED = replace(
+    KNOWN,
+    units={**KNOWN.units, **dict.fromkeys(APPROACH, ""), "id": WORD},
+    renamed=lambda name, unit: (name, unit or BARE.get(name, "")),
 )
 """What a table of wanted poses may have besides those of every table of poses."""
 
@@ -168,7 +165,7 @@ def compensate(
         read = read_pose_table(Path(position), at_home=None if {*"xyz"} <= {*task} else home.p, known=WANTED)
         position, rotation, turns = read.position, read.rotation(home.r), read.turns
         ids = tuple(read.values.get("id", ()))
-        approach = read.block(WAY) if {*WAY} & {*read.values} else approach
+        approach = read.block(APPROACH) if {*APPROACH} & {*read.values} else approach
         wrench = read.wrench if read.loaded else wrench
     if approach is not None:
         approach = trailing(approach, (3,), "approach", "directions")
