@@ -234,17 +234,9 @@ def _wrench(model: ExperimentFile, table: Table) -> Floats:
     return table.block(WRENCH, blank=False, missing=0.0)
 
 
-def load_plan(
-    path: Path,
-    machine: Machine,
-    quantity: str,
-    *,
-    axes: Sequence[str] = AXES[:3],
-    noise: float | None = None,
-    angle_noise: float = 1e-5,
-) -> Experiment:
+def load_plan(path: Path, machine: Machine, quantity: str, **readings: Any) -> Experiment:
     """Plan of a CSV file (mm, N and rad, or the unit that a header names: ``x [um]``) with x, y, z and, as wanted, loads,
-    orientation, order, temperature, branch, set-up, approach and points. Raises `FileError` naming file, row and column."""
+    orientation, order, temperature, branch, set-up, approach and points; its `readings` are those of `unread`. Raises `FileError` naming file, row and column."""
     units = ExperimentUnitsModel(length="mm", force="N", angle="rad")
     model = ExperimentFile(machine=machine.name, quantity=quantity, units=units)  # type: ignore[arg-type]
     table = Units(model, str(path)).of_header(read_table(path))
@@ -260,6 +252,6 @@ def load_plan(
         machine=machine.name,
         quantity=quantity,
         rotation_against="home",
-        **unread(n, quantity, axes, noise, angle_noise),
+        **unread(n, quantity, **readings),
         **rows,
     )

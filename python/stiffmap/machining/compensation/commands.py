@@ -20,8 +20,8 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs import number_cells, write_rows
 from stiffmap.common.short import short_repr
 from stiffmap.common.tables.named import KNOWN, WORD, read_pose_table
-from stiffmap.experiment.experiment import AXES, Experiment
-from stiffmap.experiment.files.fields import APPROACH, VECTOR
+from stiffmap.experiment.experiment import AXES, WRENCH, Experiment
+from stiffmap.experiment.files.fields import APPROACH, COUNTED, VECTOR, WORDS
 from stiffmap.experiment.poses.configuration import coordinates_of, drive_jacobian
 from stiffmap.experiment.prediction.equilibria import motions
 from stiffmap.model.description import TASK
@@ -34,12 +34,11 @@ STEPS = 25
 DONE = 1e-10
 """m, rad: step of the commands below which they stand."""
 MM = 1e3
-BARE = dict.fromkeys("xyz", "mm") | dict.fromkeys(VECTOR, "rad") | dict.fromkeys(("mx", "my", "mz"), "N*mm")
-BARE |= dict.fromkeys(("fx", "fy", "fz"), "N")
+BARE = dict(zip((*"xyz", *VECTOR, *WRENCH), np.repeat(["mm", "rad", "N", "N*mm"], 3).tolist(), strict=True))
 """Units of columns that name none."""
 WANTED = replace(
     KNOWN,
-    units={**KNOWN.units, **dict.fromkeys(APPROACH, ""), "id": WORD},
+    units={**KNOWN.units, **dict.fromkeys((*APPROACH, *COUNTED), ""), **dict.fromkeys(WORDS, WORD)},
     renamed=lambda name, unit: (name, unit or BARE.get(name, "")),
 )
 """What a table of wanted poses may have besides those of every table of poses."""

@@ -43,9 +43,8 @@ def checked_field(
             "displacements: expected a field that moves, got 0 m at every point of every case"
         )
     r = finite_array("reference", reference, (3,), "(3,) in m")
-    low, high = p.min(axis=0), p.max(axis=0)
-    off = (r - r.clip(low, high), 1e3 * r - (1e3 * r).clip(low, high), high - low)
-    far, other, size = (float(np.linalg.norm(v)) for v in off)
+    size = float(np.linalg.norm(np.ptp(p, axis=0)))
+    far, other = (float(np.linalg.norm(v - v.clip(p.min(axis=0), p.max(axis=0)))) for v in (r, 1e3 * r))
     if far > size and other < size / 2:
         found = f"one {far:.3g} m off, which times 1000 is among them: is it in m where mm are meant?"
         raise StiffmapError(f"reference: expected a place near the points, {size:.3g} m wide; found {found}")

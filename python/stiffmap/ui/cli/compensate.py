@@ -144,12 +144,10 @@ def _commands(found: compensation.Commands, output: Path | None) -> dict[str, ob
     if output is not None:
         found.write(output)
     lost = [found.ids[i] for i in np.flatnonzero(~found.ok)]
-    told: dict[str, object] = {}
+    told: dict[str, object] = {"orientation against the base": found.turns} if found.turns else {}
     if found.beyond is not None:
         far = [found.ids[i] for i in np.flatnonzero(found.beyond)]
         told[BEYOND] = first_of(far) or "none"
-    if found.turns:
-        told["orientation against the base"] = found.turns
     return told | {
         "rows": len(found.ids),
         "corrected components": " ".join(found.components),

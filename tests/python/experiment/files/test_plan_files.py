@@ -14,7 +14,14 @@ from stiffmap.experiment.files.load import load_plan
 
 def plan(folder: Path, text: str) -> sm.Experiment:
     (folder / "p.csv").write_text(text, encoding="utf-8")
-    return load_plan(folder / "p.csv", sm.load_machine("linear-delta"), "position")
+    return load_plan(
+        folder / "p.csv",
+        sm.load_machine("linear-delta"),
+        "position",
+        axes=("dx", "dy", "dz"),
+        noise=None,
+        angle_noise=1e-5,
+    )
 
 
 @pytest.mark.parametrize(
