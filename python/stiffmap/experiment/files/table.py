@@ -36,10 +36,13 @@ def read_table(path: Path, expected: int | None = None) -> Table:
     header = tuple(c.strip() for c in next(data, (1, []))[1])
     if not header:
         raise FileError("the file is empty", file=str(path))
-    if "id" not in header and header[0] in ("", "row", "Unnamed: 0"):  # of R and pandas
+    counted = header[0] in ("", "row", "Unnamed: 0")  # of R and pandas
+    beside = int(counted and "id" in header)  # that column says nothing more
+    if counted and not beside:
         header = ("id", *header[1:])
     refuse_twice(header, str(path), 1)
     columns, lines = packed(even(data, len(header), str(path), separator), len(header))
+    header, columns = header[beside:], columns[beside:]
     cells = (c for _, c in islice(rows(), 1, None))
     comma = separator not in ("", ",") and decimal_comma(cells, separator)
     if not lines:

@@ -70,6 +70,10 @@ def test_bad_input_is_one_clear_error(tmp_path: Path, head: str, rows: str, word
 def test_names_of_rows_are_those_that_programs_write(name: str, tmp_path: Path) -> None:
     e = sm.load_experiment(write(tmp_path, rows=ROWS.replace("id,", f"{name},", 1)))
     assert e.ids == ("1", "2", "3") and e.reading[0, 0] == pytest.approx(5e-5, rel=1e-12)
+    head, *rows = ROWS.splitlines()
+    beside = "\n".join([f"{name},{head}", *(f"{7 + k},{row}" for k, row in enumerate(rows)), ""])
+    found = sm.load_experiment(write(tmp_path, rows=beside))
+    assert found.ids == e.ids and np.array_equal(found.reading, e.reading, equal_nan=True)
 
 
 def test_letters_name_rows(tmp_path: Path) -> None:
