@@ -175,7 +175,7 @@ def _gains_energy(frequency: Floats, receptance: Complex) -> bool:
     A = np.stack([H, 1j * x * H, np.ones_like(H), 1j * np.ones_like(H)], axis=1)
     A, y = np.concatenate([A.real, A.imag]), np.concatenate([(x**2 * H).real, (x**2 * H).imag])
     found, inverse = np.linalg.pinv(A) @ y, np.linalg.pinv(A.T @ A)
-    return bool(found[1] < -3 * np.sqrt(((y - A @ found) ** 2).sum() / (len(y) - 4) * inverse[1, 1]) - 1e-6)
+    return bool(found[1] < -3 * np.sqrt(((y - A @ found) ** 2).sum() / (len(y) - 4) * inverse[1, 1]))
 
 
 def _kind(unit: ResponseUnit) -> tuple[int | None, int]:

@@ -219,7 +219,7 @@ def test_orientations_of_a_table_are_those_of_every_table_of_poses(
     wanted = turn * Rotation.from_matrix(home.r)
     rows = {
         head: form(wanted),
-        "id,x,y,z,rotx,roty,rotz,approach_x": [*turn.as_rotvec(), 1.0],
+        "id,x,y,z,rotx,roty,rotz,approach_x,order": [*turn.as_rotvec(), 1.0, 3.0],
     }
     for name, (top, numbers) in zip(("its.csv", "own.csv"), rows.items(), strict=True):
         cells = [*("a",) * top.startswith("id"), *1e3 * np.array(home.p), *numbers]
