@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
 from stiffmap.common.errors import FileError, suggestion, together
 from stiffmap.common.yaml_text import Document, KeyPath
-from stiffmap.model.files.schema.base import describe
+from stiffmap.model.files.schema.base import describe, unknown_key
 from stiffmap.model.files.schema.elements import SORTS
 
 M = TypeVar("M", bound=BaseModel)
@@ -47,6 +48,14 @@ def _one(error: Any, document: Document, file: str) -> FileError:
     return FileError(
         message, file=file, line=document.line(path) or (1 if document.lines else None), key=key_text(path)
     )
+
+
+def in_words(error: ValidationError, known: Sequence[str]) -> str:
+    """The first problem of data that are in no file and may have these keys, behind its key."""
+    first = error.errors(include_url=False)[0]
+    if first["type"] == "unexpected_keyword_argument":
+        return unknown_key(first["loc"][0], known)
+    return f"{key_text(first['loc'])}: {'missing' if first['type'] == 'missing' else _message(first)}"
 
 
 def key_text(path: KeyPath) -> str:
