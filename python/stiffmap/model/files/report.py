@@ -96,8 +96,9 @@ def _message(error: Any) -> str:
         wanted = context.get("min_length", context.get("max_length"))
         return f"expected {wanted} entries; found {context['actual_length']}"
     if kind.endswith("_type"):
+        sort = kind.removesuffix("_type").replace("tuple", "list")
         sorts = {"list": "a list", "dict": "a mapping", "string": "text", "bool": "true or false"}
-        return f"expected {sorts.get(kind.removesuffix('_type'), 'a number')}; found {describe(found)}"
+        return f"expected {sorts.get(sort, 'a number')}; found {describe(found)}"
     if kind.startswith(("greater_than", "less_than")):
         return f"{error['msg'].replace('Input should be', 'expected a number')}; found {describe(found)}"
     return str(context["error"] if kind == "value_error" else error["msg"])

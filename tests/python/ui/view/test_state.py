@@ -53,6 +53,7 @@ def test_a_damaged_link_is_one_error(word: str) -> None:
     [
         ([], "expected a mapping"),
         ({}, "position: missing"),
+        ({"position": 5}, "position: expected a list; found a number"),
         ({"position": [0, 0]}, r"position\[2\]: missing"),
         ({"position": [0, 0, "1"]}, r"position\[2\]: expected a number; found text \('1'\)"),
         ({"position": [0, 0, True]}, r"position\[2\]: expected a number"),
