@@ -14,7 +14,7 @@ import numpy as np
 
 from stiffmap.model.link.identify import identify_link
 from stiffmap.model.link.inputs import UNIT_WRENCHES
-from stiffmap.model.link.refine import richardson
+from stiffmap.model.link.pipeline import richardson
 from stiffmap.model.link.shapes import Bar
 from stiffmap.model.link.solve import Material, Setup, has_ccx, solve_ccx, solve_skfem
 

@@ -162,23 +162,18 @@ BENDING = Dimension(force=1, length=2)
 
 
 @lru_cache
-def _scale(length: str, force: str, mass: str, dimension: Dimension) -> Fraction:
-    return (
+def _scale(length: str, force: str, mass: str, dimension: Dimension) -> tuple[Fraction, int | None]:
+    """Of a dimension, and its exponent where it is a power of ten."""
+    scale = (
         LENGTHS[length] ** dimension.length
         * FORCES[force] ** dimension.force
         * MASSES[mass] ** dimension.mass
     )
-
-
-@lru_cache
-def _power_of_ten(scale: Fraction) -> int | None:
-    """Exponent of a scale that is a power of ten."""
     exponent = len(str(scale.numerator)) - len(str(scale.denominator))
-    return exponent if scale == Fraction(10) ** exponent else None
+    return scale, exponent if scale == Fraction(10) ** exponent else None
 
 
-def _rounded_once(number: str, scale: Fraction) -> float:
-    exponent = _power_of_ten(scale)
+def _rounded_once(number: str, scale: Fraction, exponent: int | None) -> float:
     if exponent is None or not number.replace(".", "").lstrip("-").isdigit():
         return float(Fraction(number) * scale)
     return float(f"{number}e{exponent}")
@@ -199,9 +194,9 @@ class UnitSystem:
         An angle that stands together with a force is in radians whatever `angle` says: stiffness, compliance, damping
         and friction per speed are per radian in every file. Otherwise a coupled matrix would not be symmetric.
         """
-        scale = _scale(self.length, self.force, self.mass, dimension)
+        scale, exponent = _scale(self.length, self.force, self.mass, dimension)
         # repr gives the decimal number that was written, so that no binary rounding enters twice
-        result = value if scale == 1 else _rounded_once(repr(float(value)), scale)
+        result = value if exponent == 0 else _rounded_once(repr(float(value)), scale, exponent)
         if self.angle == "deg" and dimension.angle and not dimension.force:
             result *= math.radians(1.0) ** dimension.angle
         return float(result)

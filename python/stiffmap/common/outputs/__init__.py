@@ -99,22 +99,6 @@ def write_text(
     return Path(path)
 
 
-def write_picture(path: str | os.PathLike[str], figure: Any, dpi: int) -> Path:
-    """Write a figure of matplotlib in the format that the file's name says; the same picture gives the same bytes.
-
-    Raises FileError where it cannot be written, StiffmapError for an unknown format.
-    """
-    target = Path(path)
-    try:
-        with writing(target) as fresh:
-            figure.savefig(fresh, dpi=dpi, metadata={"Software": None} if target.suffix == ".png" else None)
-    except StiffmapError:
-        raise
-    except ValueError as error:
-        raise StiffmapError(f"{target}: {error}") from error
-    return target
-
-
 def make_folder(path: str | os.PathLike[str]) -> Path:
     """The folder, made where it is missing; raises FileError where it cannot be."""
     folder = Path(path)

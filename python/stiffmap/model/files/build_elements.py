@@ -72,7 +72,7 @@ def build_elements(models: Sequence[ElementModel], context: Context) -> tuple[El
 
 
 def build_element(
-    model: ElementModel, context: Context, among: tuple[int, Sequence[ElementModel]] = (0, ())
+    model: ElementModel, context: Context, among: tuple[int, Sequence[ElementModel]]
 ) -> Element:
     """One element; `among`: its number and the sequence it is in."""
     here = context.named(getattr(model, str(sort_of(model))), model)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
 from stiffmap.common.errors import FileError, suggestion, together
 from stiffmap.common.yaml_text import Document, KeyPath
-from stiffmap.model.files.schema.base import describe
+from stiffmap.model.files.schema.base import describe, unknown_key
 from stiffmap.model.files.schema.elements import SORTS
 
 M = TypeVar("M", bound=BaseModel)
@@ -49,6 +50,14 @@ def _one(error: Any, document: Document, file: str) -> FileError:
     )
 
 
+def in_words(error: ValidationError, known: Sequence[str]) -> str:
+    """The first problem of data that are in no file and may have these keys, behind its key."""
+    first = error.errors(include_url=False)[0]
+    if first["type"] == "unexpected_keyword_argument":
+        return unknown_key(first["loc"][0], known)
+    return f"{key_text(first['loc'])}: {'missing' if first['type'] == 'missing' else _message(first)}"
+
+
 def key_text(path: KeyPath) -> str:
     """``legs.x.elements[2].axis``."""
     text = "".join(f"[{p}]" if isinstance(p, int) else f".{p}" for p in path)
@@ -87,8 +96,9 @@ def _message(error: Any) -> str:
         wanted = context.get("min_length", context.get("max_length"))
         return f"expected {wanted} entries; found {context['actual_length']}"
     if kind.endswith("_type"):
+        sort = kind.removesuffix("_type").replace("tuple", "list")
         sorts = {"list": "a list", "dict": "a mapping", "string": "text", "bool": "true or false"}
-        return f"expected {sorts.get(kind.removesuffix('_type'), 'a number')}; found {describe(found)}"
+        return f"expected {sorts.get(sort, 'a number')}; found {describe(found)}"
     if kind.startswith(("greater_than", "less_than")):
         return f"{error['msg'].replace('Input should be', 'expected a number')}; found {describe(found)}"
     return str(context["error"] if kind == "value_error" else error["msg"])

@@ -7,14 +7,13 @@ from pathlib import Path
 
 import typer
 
-from stiffmap.common.outputs import make_folder, write_picture, write_text
 from stiffmap.identification.diagnosis import Diagnosis, diagnose
 from stiffmap.identification.diagnosis.report.sentences import next_step
 from stiffmap.identification.numbers import Tolerances
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import refuse_unused, words_of_all
 from stiffmap.ui.cli.options import flag, option, written
-from stiffmap.ui.cli.output import Answer
+from stiffmap.ui.cli.output import Answer, write_files
 
 
 def command(
@@ -60,8 +59,6 @@ def write(result: Diagnosis, folder: Path, date: str | None = None, inputs: Sequ
     """All files of a diagnosis; raises `FileError` where the folder cannot be written."""
     from stiffmap.ui.report.diagnosis.pictures import figures
 
-    write_text(make_folder(folder) / "diagnosis.json", result.to_json())
-    result.machine.save(folder / "machine.yaml")
-    for name, figure in figures(result).items():
-        write_picture(folder / f"{name}.png", figure, dpi=130)
+    pictures = ((f"{name}.png", figure) for name, figure in figures(result).items())
+    write_files(folder, [("diagnosis.json", result.as_plain()), ("machine.yaml", result.machine), *pictures])
     result.report(folder / "report.html", date=date, inputs=inputs)

@@ -10,7 +10,7 @@ from stiffmap.ui.cli.options import option, written
 from stiffmap.ui.cli.output import Answer, write_files
 from stiffmap.ui.paper import Results, Statement, all_statements, compute
 from stiffmap.ui.paper.results import all_figures
-from stiffmap.ui.paper.statement import as_csv, as_markdown, as_rich, count, count_text
+from stiffmap.ui.paper.statement import as_markdown, as_rich, as_table, count, count_text
 
 NO_CURVES = "The paper prints no numbers of the curves in Figures 5 to 7; the numbers above are those of its text and Table 1."
 
@@ -44,5 +44,5 @@ def command(
 
 def _files(results: Results, statements: list[Statement], figures: bool) -> Iterator[tuple[str, Any]]:
     yield from all_figures(results).items() if figures else ()
-    yield "statements.csv", as_csv(statements)
+    yield "statements.csv", as_table(statements)
     yield "statements.md", as_markdown(statements)

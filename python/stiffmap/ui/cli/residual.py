@@ -2,14 +2,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from stiffmap.common.json_text import json_text
-from stiffmap.common.outputs import make_folder, write_picture, write_text
+from stiffmap.common.outputs import make_folder
 from stiffmap.experiment import Residual, residual
 from stiffmap.identification.validity import beyond
 from stiffmap.solve.machine import load_machine
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.options import option
-from stiffmap.ui.cli.output import Answer
+from stiffmap.ui.cli.output import Answer, write_files
 
 
 def command(
@@ -45,8 +44,6 @@ def command(
 def _write(r: Residual, rows: int, output: Path) -> None:
     from stiffmap.ui.plot.experiment import figures
 
-    place = make_folder(output)
-    r.write_table(place / "residual.csv")
-    write_text(place / "residual.json", json_text(r.as_plain(rows)))
-    for name, figure in figures(r).items():
-        write_picture(place / f"{name}.png", figure, dpi=130)
+    r.write_table(make_folder(output) / "residual.csv")
+    pictures = ((f"{name}.png", figure) for name, figure in figures(r).items())
+    write_files(output, [("residual.json", r.as_plain(rows)), *pictures])

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal
@@ -98,12 +96,9 @@ def as_markdown(statements: Sequence[Statement]) -> str:
     return "\n".join("| " + " | ".join(c.replace("|", "\\|") for c in row) + " |" for row in rows) + "\n"
 
 
-def as_csv(statements: Sequence[Statement]) -> str:
-    """For spreadsheets."""
-    out = io.StringIO()
-    rows = (["section", *HEAD[1:]], *map(cells, statements))
-    csv.writer(out, lineterminator="\n").writerows(rows)
-    return out.getvalue()
+def as_table(statements: Sequence[Statement]) -> tuple[list[str], list[tuple[str, ...]]]:
+    """Head and rows, for spreadsheets."""
+    return ["section", *HEAD[1:]], [*map(cells, statements)]
 
 
 def cells(s: Statement) -> tuple[str, ...]:

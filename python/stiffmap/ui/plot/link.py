@@ -11,12 +11,11 @@ from matplotlib.figure import SubFigure
 from mpl_toolkits.mplot3d import Axes3D
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-from stiffmap.common.outputs import write_picture
 from stiffmap.model.link.pipeline import PartLink
 from stiffmap.model.link.report import unit_factor, unit_name
 from stiffmap.model.link.result import Link
 from stiffmap.model.link.transport import Floats, Ints, standard_errors
-from stiffmap.ui.plot.style import BLUE, COLOURS, VERMILLION, new_figure, wrench_text
+from stiffmap.ui.plot.style import BLUE, COLOURS, VERMILLION, new_figure, save, wrench_text
 
 GREY = "#999999"
 MOST_TRIANGLES = 6000
@@ -36,7 +35,7 @@ def draw_link(link: Link, path: str | Path, part: PartLink | None = None) -> Non
     _draw_residuals(rows[-2], link, cases)
     error = link.standard_error if part is None else standard_errors(part.covariance)
     _draw_entries(rows[-1].add_subplot(), link, error)
-    write_picture(path, figure, dpi=110)
+    save(figure, path)
 
 
 def boundary_triangles(tets: Ints) -> Ints:

@@ -18,7 +18,8 @@ from matplotlib.figure import Figure
 
 from stiffmap.common import number_text
 from stiffmap.common.broadcasting import Floats
-from stiffmap.common.outputs import write_picture
+from stiffmap.common.errors import StiffmapError
+from stiffmap.common.outputs import writing
 from stiffmap.solve.labels import WRENCH
 
 MM, UM = 1e3, 1e6
@@ -135,10 +136,21 @@ def panel(index: int, of: int = 2) -> str:
     return f"({chr(ord('a') + index)})" if of > 1 else ""
 
 
-def save(figure: Figure, path: str | os.PathLike[str], dpi: int = 150) -> Path:
-    """Write a picture in the format that the file's name says.
+DPI = 150
+
+
+def save(figure: Figure, path: str | os.PathLike[str]) -> Path:
+    """Write a picture in the format that the file's name says; the same picture gives the same bytes.
 
     Raises FileError where the file cannot be written, StiffmapError for an unknown format.
     """
-    with paper_style():
-        return write_picture(path, figure, dpi)
+    target = Path(path)
+    metadata = {"Software": None} if target.suffix == ".png" else None
+    try:
+        with paper_style(), writing(target) as fresh:
+            figure.savefig(fresh, dpi=DPI, metadata=metadata)
+    except StiffmapError:
+        raise
+    except ValueError as error:
+        raise StiffmapError(f"{target}: {error}") from error
+    return target

@@ -22,7 +22,7 @@ from stiffmap.solve.compiled import Status
 from stiffmap.solve.kinematics import follow, inverse_kinematics
 from stiffmap.solve.machine import Machine, load_machine
 from stiffmap.ui.view.moment import Moment, moves
-from stiffmap.ui.view.state import History, ViewState, checked
+from stiffmap.ui.view.state import History, ViewState, state_of
 
 KEPT_MACHINES = 16
 
@@ -44,7 +44,7 @@ class ViewModel:
         self.meshes = meshes
         self.declared = machine
         self._machines: Kept[Hashable, Machine] = Kept(KEPT_MACHINES)
-        self.history = History(checked(state) if state else first_state(machine))
+        self.history = History(state or first_state(machine))
         self.message = ""
         self._check(self.state)
 
@@ -78,7 +78,7 @@ class ViewModel:
 
     def put(self, *, keep: bool = True, **values: Any) -> ViewState:
         """New values of the state; all or none. The message on the screen is cleared."""
-        new = checked(replace(self.state, **values))
+        new = state_of(**(vars(self.state) | values))
         if {"position", "rotation", "start", "changes"} & set(values):
             self._check(new)
         self.message = ""

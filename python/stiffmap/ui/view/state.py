@@ -5,27 +5,40 @@ from __future__ import annotations
 import base64
 import binascii
 import json
-import math
 import zlib
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields, replace
-from typing import Any
+from dataclasses import asdict, replace
+from typing import Annotated, Any, Literal
 
 import numpy as np
+from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic.dataclasses import dataclass
 from scipy.spatial.transform import Rotation
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import bounded
+from stiffmap.model.files.report import in_words
 from stiffmap.ui.view.plane import QUANTITIES
 
 PLANES = ("x", "y", "z", "free")
 MOST_LINK, MOST_TEXT = 16_000, 200_000  # characters of a permalink, and of what it says
 MOST_STATES = 200  # that can be undone
-Vector = tuple[float, float, float]
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False), AfterValidator(bounded)]
+Vector = tuple[Number, Number, Number]
 
 
-@dataclass(frozen=True)
+def _direction(v: tuple[float, float, float]) -> tuple[float, float, float]:
+    if not any(v):
+        raise ValueError("expected a direction, got (0, 0, 0)")
+    return v
+
+
+def _pairs(given: object) -> object:
+    return tuple(given.items()) if isinstance(given, Mapping) else given
+
+
+@dataclass(frozen=True, config=ConfigDict(extra="forbid"))
 class ViewState:
     """Pose, load, plane and what is changed in the machine; `position` alone has no default."""
 
@@ -39,20 +52,20 @@ class ViewState:
     """N·m on the tool."""
     gravity: Vector | None = None
     """m/s²; None: what the machine file says."""
-    plane: str = "z"
+    plane: Literal[PLANES] = "z"  # type: ignore[valid-type]
     """Axis across which the plane through the tool lies, or ``free``."""
-    normal: Vector = (0.0, 0.0, 1.0)
+    normal: Annotated[Vector, AfterValidator(_direction)] = (0.0, 0.0, 1.0)
     """Of a free plane."""
-    quantity: str = "deflection"
-    tolerance: float = 0.25e-3
+    quantity: Literal[tuple(QUANTITIES)] = "deflection"  # type: ignore[valid-type]
+    tolerance: Annotated[Number, Field(gt=0)] = 0.25e-3
     """m, tolerated deflection."""
-    magnification: float | None = None
+    magnification: Annotated[Number, Field(ge=0)] | None = None
     """Of the deflected machine; None: a round one that shows it well."""
-    frequency: float = 0.0
+    frequency: Annotated[Number, Field(ge=0)] = 0.0
     """Hz, of the dynamic stiffness."""
-    start: tuple[float, ...] | None = None
+    start: tuple[Number, ...] | None = None
     """All coordinates that name an assembly mode; None: that of home."""
-    changes: tuple[tuple[str, float], ...] = ()
+    changes: Annotated[tuple[tuple[str, Number], ...], BeforeValidator(_pairs)] = ()
     """Address of a number of the machine -> its value (SI)."""
 
     @property
@@ -87,62 +100,15 @@ def from_plain(data: object) -> ViewState:
     """The state that JSON data say; StiffmapError naming the key for anything else."""
     if not isinstance(data, Mapping):
         raise StiffmapError(f"view: expected a mapping of the state, got {type(data).__name__}")
-    known = {f.name for f in fields(ViewState)}
-    unknown = [k for k in data if k not in known]
-    if unknown:
-        raise StiffmapError(f"view: unknown key {unknown[0]!r}; expected {', '.join(sorted(known))}")
-    if "position" not in data:
-        raise StiffmapError("view: expected a position")
-    return checked(ViewState(**{k: _value(k, v) for k, v in data.items()}))
+    return state_of(**data)
 
 
-def checked(state: ViewState) -> ViewState:
-    """The state itself; StiffmapError naming what in it cannot be."""
-    for name in ("position", "rotation", "force", "moment", "gravity", "normal"):
-        value = getattr(state, name)
-        if value is not None and (len(value) != 3 or not all(map(math.isfinite, value))):
-            raise StiffmapError(f"{name}: expected 3 finite numbers, got {list(value)}")
-    if state.plane not in PLANES:
-        raise StiffmapError(f"plane: expected one of {', '.join(PLANES)}, got {state.plane!r}")
-    if not any(state.normal):
-        raise StiffmapError("normal: expected a direction, got (0, 0, 0)")
-    if state.quantity not in QUANTITIES:
-        raise StiffmapError(f"quantity: expected one of {', '.join(QUANTITIES)}, got {state.quantity!r}")
-    if not (math.isfinite(state.tolerance) and state.tolerance > 0):
-        raise StiffmapError(f"tolerance: expected a positive number, got {state.tolerance}")
-    for name in ("magnification", "frequency"):
-        value = getattr(state, name)
-        if value is not None and not (math.isfinite(value) and value >= 0):
-            raise StiffmapError(f"{name}: expected 0 or more, got {value}")
-    return state
-
-
-def _value(name: str, value: Any) -> Any:
-    if name in ("plane", "quantity"):
-        if not isinstance(value, str):
-            raise StiffmapError(f"{name}: expected a word, got {value!r}")
-        return value
-    if name in ("tolerance", "magnification", "frequency"):
-        return None if value is None and name == "magnification" else _number(name, value)
-    if name == "changes":
-        pairs = value.items() if isinstance(value, Mapping) else value
-        try:
-            return tuple((str(a), _number(str(a), v)) for a, v in pairs)
-        except (TypeError, ValueError) as problem:
-            if isinstance(problem, StiffmapError):
-                raise
-            raise StiffmapError("changes: expected pairs of an address and a number") from None
-    if value is None and name in ("rotation", "gravity", "start"):
-        return None
-    if not isinstance(value, list | tuple):
-        raise StiffmapError(f"{name}: expected a list of numbers, got {value!r}")
-    return tuple(_number(name, v) for v in value)
-
-
-def _number(name: str, value: object) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < math.inf:
-        raise StiffmapError(f"{name}: expected finite numbers, got {value!r}")
-    return float(bounded(value))
+def state_of(**values: Any) -> ViewState:
+    """The state with these values; StiffmapError naming what in it cannot be."""
+    try:
+        return ViewState(**values)
+    except ValidationError as error:
+        raise StiffmapError(in_words(error, [*ViewState.__dataclass_fields__])) from None
 
 
 def permalink(machine: str, state: ViewState) -> str:

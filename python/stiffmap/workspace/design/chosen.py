@@ -16,7 +16,7 @@ from stiffmap.common.outputs import write_text
 from stiffmap.common.yaml_text import Document
 from stiffmap.model.files.templates import expanded
 from stiffmap.solve.machine import Machine, load_machine
-from stiffmap.workspace.design.editing import Editor
+from stiffmap.workspace.design.editing import described, edited
 from stiffmap.workspace.design.judging import Judged, refine, values_of, violation
 from stiffmap.workspace.design.problem import DesignProblem, near
 from stiffmap.workspace.design.search import ParetoSet
@@ -50,12 +50,12 @@ def robustness(design: DesignProblem, x: Floats, *, draws: int = DRAWS) -> Robus
         return None
     places = tuple(f[0] for f in found)
     values, u = (np.array(column) for column in list(zip(*found, strict=True))[1:])
-    editor = Editor(document, design.machine_file, list(places))
     names = design.measures
 
     def at(numbers: Floats) -> dict[str, float]:
         given = dict(zip(places, map(float, numbers), strict=True))
-        return values_of(design, Machine(editor.description(given)))
+        made = described(edited(document.data, given), document, design.machine_file)
+        return values_of(design, Machine(made))
 
     pairs = [(at(values + step), at(values - step)) for step in SHARE * np.diag(u)]
     slopes = {n: np.array([(up[n] - down[n]) / (2 * SHARE) for up, down in pairs]) for n in names}

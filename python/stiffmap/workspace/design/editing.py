@@ -1,28 +1,15 @@
-"""Places in a machine file (``templates.leg.spring[foot].beam.EIz``, ``workspace.x[0]``), and machines whose numbers there change, made
-quickly: only the elements that hold such a number are built again."""
+"""Places in a machine file (``templates.leg.spring[foot].beam.EIz``, ``workspace.x[0]``), and machines whose numbers there change."""
 
 from __future__ import annotations
 
 import re
-from dataclasses import replace
-from functools import partial, reduce
-from operator import getitem
 from pathlib import Path
 from typing import Any
 
-from pydantic import TypeAdapter, ValidationError
-
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.yaml_text import Document
-from stiffmap.model.description import Element, MachineDescription
-from stiffmap.model.description.pose import Vector
-from stiffmap.model.description.tree import edit_path
-from stiffmap.model.files.build import build_workspace
-from stiffmap.model.files.build_elements import build_element
-from stiffmap.model.files.context import Context, Gathered
-from stiffmap.model.files.load import describe_document, validate
-from stiffmap.model.files.schema.base import BoxModel
-from stiffmap.model.files.schema.elements import ElementModel
+from stiffmap.model.description import MachineDescription
+from stiffmap.model.files.load import describe_document
 
 _STEP = re.compile(r"^([^\[\]]+)?((?:\[[^\[\]]+\])*)$")
 
@@ -101,124 +88,12 @@ def unshared(data: object) -> Any:
     return data
 
 
-Address = tuple[str | int, ...]
-_MODEL: TypeAdapter[Any] = TypeAdapter(ElementModel)
-
-
 def described(data: object, document: Document, file: str) -> MachineDescription:
     """The machine of a file's data, with the lines of its document."""
     return describe_document(Document(data, document.lines), file, Path(file).parent)
 
 
-class Editor:
-    """Descriptions of one machine file with other numbers at given places.
-
-    Places in elements of templates (or of legs without one) and in the workspace are edited in a description
-    that was built once. `can` is False where a place lies elsewhere, or where the file has what ties
-    elements together (effects, link files, strokes, bodies of links, homes per leg): the whole file is then to be built.
-    Uncertainties and notes stay those of the file.
-    """
-
-    def __init__(self, document: Document, file: str, places: list[str]) -> None:
-        self.document, self.file = document, file
-        self.can = True
-        try:
-            self._prepare(places)
-        except (StiffmapError, ValidationError, LookupError, TypeError):
-            self.can = False
-
-    def _prepare(self, places: list[str]) -> None:
-        data = self.document.data
-        text = str(data)
-        if data.get("effects") or "stroke" in text or "link:" in text or "'of':" in text:
-            raise LookupError("tied together")
-        model = validate(self.document, self.file)
-        self.base: MachineDescription = described(data, self.document, self.file)
-        self.context = Context(
-            self.file, self.document, Path(self.file).parent, self.base.units, model.materials, Gathered()
-        )
-        self.elements: dict[tuple[Address, Address], list[tuple[str, Address]]] = {}
-        self.space: list[tuple[str, Address]] = []
-        for place in places:
-            path = indices(data, place)
-            if path[0] == "workspace" and len(path) == 3:
-                self.space.append((place, path[1:]))
-                continue
-            start = _start(path)
-            end = start + _depth(path[start:])
-            self.elements.setdefault((path[:start], path[start:end]), []).append((place, path[end:]))
-        self.legs = {sequence: self._legs_of(sequence) for sequence, _ in self.elements}
-
-    def _legs_of(self, sequence: Address) -> list[str]:
-        """Names of the legs that are made of a sequence."""
-        name, legs = str(sequence[1]), self.document.data["legs"]
-        users = [name] if sequence[0] == "legs" else [n for n in legs if legs[n].get("template") == name]
-        if any("home" in legs[n] for n in users):
-            raise LookupError("homes per leg")
-        return users
-
-    def description(self, values: dict[str, float]) -> MachineDescription:
-        """The machine with these numbers (place: value in the file's units); StiffmapError where it cannot be."""
-        if not self.can:
-            return described(edited(self.document.data, values), self.document, self.file)
-        known: dict[str, Element] = {}
-        legs = {leg.name: leg for leg in self.base.legs}
-        for (sequence, address), places in self.elements.items():
-            raw = self._raw((*sequence, *address), places, values)
-            key = repr(raw)
-            if key not in known:
-                known[key] = self._element(raw, (*sequence, *address))
-            path = ".".join([*map(str, address[2::3]), known[key].name])  # branches, then the element
-            for name in self.legs[sequence]:
-                elements = edit_path(legs[name].elements, path, partial(_if_alike, known[key]))
-                legs[name] = replace(legs[name], elements=elements or legs[name].elements)
-        return replace(self.base, legs=tuple(legs.values()), workspace=self._workspace(values))
-
-    def _raw(self, at: Address, places: list[tuple[str, Address]], values: dict[str, float]) -> Any:
-        """A part of the file's data with the numbers of some places, each with the way to it inside the part."""
-        raw = unshared(reduce(getitem, at, self.document.data))
-        for place, inner in places:
-            _set(raw, inner, values[place])
-        return raw
-
-    def _element(self, raw: object, address: Address) -> Element:
-        here = self.context.at(*address)
-        try:
-            return build_element(_MODEL.validate_python(raw), here)
-        except ValidationError as error:
-            first = error.errors()[0]
-            here.fail(str(first.get("ctx", {}).get("error", first["msg"])))
-
-    def _workspace(self, values: dict[str, float]) -> tuple[Vector, Vector] | None:
-        if not self.space:
-            return self.base.workspace
-        box = BoxModel.model_validate(self._raw(("workspace",), self.space, values))
-        return build_workspace(box, self.context.at("workspace"), self.base.task, self.base.home)
-
-
-def _start(path: Address) -> int:
-    """Length of the way to the sequence of a template or leg."""
-    if path[0] == "templates" and isinstance(path[2], int):
-        return 2
-    if path[0] == "legs" and path[2] == "elements":
-        return 3
-    raise LookupError("a place outside elements and workspace")
-
-
-def _depth(inner: Address) -> int:
-    """Length of the way to the innermost element: number, then ``branches``, name, number, and so on."""
-    depth = 1
-    while len(inner) > depth + 2 and inner[depth] == "branches":
-        depth += 3
-    return depth
-
-
-def _if_alike(new: Element, old: Element) -> Element | None:
-    """In place of an element of its sort: a body may be called as the spring that follows it."""
-    return new if type(new) is type(old) else None
-
-
-def _set(raw: Any, path: Address, value: float) -> None:
+def _set(raw: Any, path: tuple[str | int, ...], value: float) -> None:
     for key in path[:-1]:
         raw = raw[key]
     last = path[-1]

@@ -32,7 +32,7 @@ class Judged:
 def judge(design: DesignProblem, x: Floats) -> Judged:
     """Evaluate a vector of variables; a machine that cannot be is infeasible, never an error."""
     try:
-        values = values_of(design, design.quick_machine(x))
+        values = values_of(design, design.machine(x))
     except StiffmapError as error:
         f, g = (np.full(len(of), IMPOSSIBLE) for of in (design.model.objectives, design.constraints))
         return Judged(f, g, {}, str(error))

@@ -22,7 +22,7 @@ from stiffmap.model.files.schema.base import EachOnce, FileModel, Name
 from stiffmap.model.files.shipped import find
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.redesign import on_branch_of, settled
-from stiffmap.workspace.design.editing import Editor, described, edited, indices, unshared
+from stiffmap.workspace.design.editing import described, edited, indices, unshared
 from stiffmap.workspace.performance.motion.motion_files import (
     Motion,
     given_or_shipped,
@@ -122,33 +122,19 @@ class DesignProblem:
 
     def data(self, x: Floats) -> Any:
         """The machine file's data with the design's numbers."""
-        return edited(self.document.data, self._numbers(x))
-
-    def _numbers(self, x: Floats) -> dict[str, float]:
-        """Place -> value in the file's units."""
         names = self.names(x)
-        return {place: evaluate(text, names) for place, text in self.model.numbers.items()}
-
-    def quick_machine(self, x: Floats) -> Machine:
-        """As `machine`, several times as quick; uncertainties and notes are those of the machine file."""
-        if not self._editor.can:
-            return self.machine(x)
-        description = self._editor.description(self._numbers(x))
-        return Machine(self._on_branch(description), start_nodes=START_NODES)
+        values = {place: evaluate(text, names) for place, text in self.model.numbers.items()}
+        return edited(self.document.data, values)
 
     @cached_property
     def toolpath(self) -> Motion | None:
         """The task's own path, for measures along it."""
         return None if self.requirements.toolpath is None else load_motion(self.requirements.toolpath)
 
-    @cached_property
-    def _editor(self) -> Editor:
-        document = Document(unshared(self.document.data), self.document.lines)
-        return Editor(document, self.machine_file, list(self.model.numbers))
-
     def machine(self, x: Floats) -> Machine:
         """The machine of a vector of variables; StiffmapError where it cannot be."""
-        return Machine(self._on_branch(described(self.data(x), self.document, self.machine_file)))
+        made = described(self.data(x), self.document, self.machine_file)
+        return Machine(self._on_branch(made), start_nodes=START_NODES)
 
     def _on_branch(self, description: MachineDescription) -> MachineDescription:
         """On the assembly branch of the machine file, where a home is searched for."""

@@ -27,7 +27,7 @@ sys.path.insert(0, sys.argv[1])
 from pathlib import Path
 import stiffmap as sm
 from stiffmap.model.description.tree import all_elements
-from stiffmap.model.files.json_schema import machine_schema
+from stiffmap.model.files.schema import MachineFile
 from stiffmap.model.addresses import moved, number
 
 assert sm.__file__.startswith(sys.argv[1]), sm.__file__
@@ -53,7 +53,8 @@ assert number(worn.description, key) == 1.2e-5
 assert abs(number(moved(worn.description, key, 1e-6), key) - 1.3e-5) < 1e-18
 worn.save(folder / "again.yaml")
 assert sm.load_machine(folder / "again.yaml").description == worn.description
-assert "lash" in str(machine_schema()) and "Lost motion." in str(machine_schema())
+schema = str(MachineFile.model_json_schema())
+assert "lash" in schema and "Lost motion." in schema
 for value, words in (("-1", "wear.lash: expected 0 to 0.01 (SI); found -1"), ("wide", "number"), ("20", "0.01")):
     try:
         machine(value)

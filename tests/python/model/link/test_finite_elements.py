@@ -15,8 +15,7 @@ from examples.link_bars import cantilever, rectangle, tube
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.link.identify import identify_link
 from stiffmap.model.link.mesh import face_area_centre, face_loads
-from stiffmap.model.link.pipeline import link_from_part
-from stiffmap.model.link.refine import observed_order, richardson
+from stiffmap.model.link.pipeline import link_from_part, observed_order, richardson
 from stiffmap.model.link.shapes import Bar, Foot, ForkBar, HollowBar
 from stiffmap.model.link.solve import (
     Material,

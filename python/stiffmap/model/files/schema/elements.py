@@ -208,7 +208,8 @@ def one_of(model: FileModel, keys: tuple[str, ...], *, required: bool = False) -
 
 def sort_of(data: object) -> str | None:
     """Sort of an element, as plain data or read; None where it has no key that says it, or several."""
-    found = [k for k in SORTS if (k in data if isinstance(data, dict) else hasattr(data, k))]
+    keys = data if isinstance(data, dict) else getattr(type(data), "model_fields", ())
+    found = [k for k in SORTS if k in keys]
     return found[0] if len(found) == 1 else None
 
 

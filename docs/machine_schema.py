@@ -1,12 +1,9 @@
-"""JSON schema of machine files, kept in docs/machine.schema.json for editors.
-
-``python -m stiffmap.model.files.json_schema docs/machine.schema.json`` writes it anew.
-"""
+"""JSON schema of machine files, kept in docs/machine.schema.json for editors: ``python docs/machine_schema.py`` writes it anew."""
 
 from __future__ import annotations
 
 import json
-import sys
+from pathlib import Path
 
 from stiffmap.common.outputs import write_text
 from stiffmap.model.files.schema import MachineFile
@@ -28,4 +25,4 @@ def schema_text() -> str:
 
 
 if __name__ == "__main__":
-    write_text(sys.argv[1], schema_text())
+    write_text(Path(__file__).with_name("machine.schema.json"), schema_text())

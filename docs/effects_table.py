@@ -1,6 +1,8 @@
-"""The kinds of effects as Markdown: docs/effects.md is checked against it."""
+"""The kinds of effects as Markdown, between the markers of docs/effects.md, which a test compares: ``python docs/effects_table.py``."""
 
 from __future__ import annotations
+
+from pathlib import Path
 
 from stiffmap.common.outputs import write_text
 from stiffmap.model.effects import registry
@@ -70,19 +72,10 @@ def reference() -> str:
     return "\n\n".join(parts)
 
 
-def main() -> None:
-    """Writes the reference part of a page between its markers: ``python -m stiffmap.model.effects.table PAGE``."""
-    import sys
-    from pathlib import Path
-
-    page = Path(sys.argv[1])
-    before, _, rest = page.read_text(encoding="utf-8").partition(BEGIN)
-    after = rest.partition(END)[2]
-    write_text(page, f"{before}{BEGIN}\n\n{reference()}\n\n{END}{after}")
-
-
-BEGIN = "<!-- kinds: begin (written by python -m stiffmap.model.effects.table docs/effects.md) -->"
+BEGIN = "<!-- kinds: begin (written by python docs/effects_table.py) -->"
 END = "<!-- kinds: end -->"
 
 if __name__ == "__main__":
-    main()
+    page = Path(__file__).with_name("effects.md")
+    before, _, rest = page.read_text(encoding="utf-8").partition(BEGIN)
+    write_text(page, f"{before}{BEGIN}\n\n{reference()}\n\n{END}{rest.partition(END)[2]}")
