@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import base64
 import shutil
 import warnings
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -81,9 +83,14 @@ def test_noise_of_any_size_is_no_defect(
 
 
 def test_a_number_of_a_link_to_the_view_is_bounded() -> None:
-    for state in (ViewState((0.0, 0.0, 1e300)), ViewState((0.0, 0.0, 0.0), tolerance=10**400)):
+    valid = b'"position":[0.0,0.0,0.0]'
+    packed = permalink("orthoglide-revised", ViewState((0.0, 0.0, 0.0)))
+    text = zlib.decompress(base64.urlsafe_b64decode(packed + "=" * (-len(packed) % 4)))
+    assert valid in text
+    for wrong in (b'"position":[0.0,0.0,1e300]', valid + b',"tolerance":1' + 400 * b"0"):
+        word = base64.urlsafe_b64encode(zlib.compress(text.replace(valid, wrong))).decode().rstrip("=")
         with pytest.raises(StiffmapError, match=r"at most|finite"):
-            from_permalink(permalink("orthoglide-revised", state))
+            from_permalink(word)
 
 
 def test_warnings_of_a_command_are_one_line(
