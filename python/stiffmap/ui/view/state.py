@@ -24,7 +24,11 @@ from stiffmap.ui.view.plane import QUANTITIES
 PLANES = ("x", "y", "z", "free")
 MOST_LINK, MOST_TEXT = 16_000, 200_000  # characters of a permalink, and of what it says
 MOST_STATES = 200  # that can be undone
-Number = Annotated[float, Field(strict=True, allow_inf_nan=False), AfterValidator(bounded)]
+Number = Annotated[
+    float,
+    Field(strict=True, allow_inf_nan=False),
+    BeforeValidator(lambda v: bounded(v) if isinstance(v, (int, float)) else v),
+]
 Vector = tuple[Number, Number, Number]
 
 
