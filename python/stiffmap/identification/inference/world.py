@@ -33,8 +33,9 @@ RIVALS_FITTED = 4
 """Places in an effect's stead that are fitted; effort only."""
 SAME_EVIDENCE = 2.0
 """Evidence, ln, within which the coarsest part has the name."""
-AT_MOST, FAR = 25, 1e6
-"""Steps to the optimum of effects that bend; the misfit of a machine that fails."""
+AT_MOST, ENOUGH, FAR = 25, 1e-4, 1e6
+"""Steps to the optimum of effects that bend, and the share of the squares whose gain ends them, effort only; the misfit of a machine
+that fails."""
 Shapes = tuple[tuple[int, int, tuple[tuple[str, float], ...]], ...]
 """Of a set of effects: each with its place's `id`, its shape on the grid, and where that was refined."""
 Bound = tuple[float, Place, Fit]
@@ -141,14 +142,11 @@ class World:
         fit = model.fit
         if id(model) in self.anchors:
             return self.anchors[id(model)][1]
-        gaps = [g.name for g in self.gaps]
+        gaps, found = [g.name for g in self.gaps], [fit]
         if any(p.name in gaps for p, _ in fit.on):
             effects = tuple(c.part for c in model.chosen)
-            bare = fitted(fit.columns, (*self.numbers, *effects), amplitudes(fit), fit.weights)
-        else:
-            bare = fit.without(gaps)
-        at_rest = np.array([0.0, *bare.t[1:]])
-        found = [fit, bare, evaluated(fit.columns, bare.parts, at_rest, bare.weights)]
+            found.append(fitted(fit.columns, (*self.numbers, *effects), amplitudes(fit), fit.weights))
+        found.append(found[-1].without(gaps, noise=1.0))
         self.anchors[id(model)] = model, found
         return found
 
@@ -256,9 +254,8 @@ class World:
                 return np.where(np.isfinite(left), left, FAR)
 
             begin = np.clip(begin, low + inside, high - inside)
-            self.optima[key] = least_squares(
-                residual, begin, "2-point", (low, high), x_scale="jac", diff_step=1e-3, max_nfev=AT_MOST
-            ).x
+            how = {"x_scale": "jac", "diff_step": 1e-3, "ftol": ENOUGH, "max_nfev": AT_MOST}
+            self.optima[key] = least_squares(residual, begin, "2-point", (low, high), **how).x
         return all_moved(chosen, self.optima[key])
 
     def _settled(self, model: Model) -> Model:
