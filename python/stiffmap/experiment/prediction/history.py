@@ -66,7 +66,7 @@ def history_motion(drives: Drives, plan: Experiment, terms: tuple[AppliedEffect,
         for name in _drives(machine, term):
             k = machine.actuators.index(name)
             more = _extra(machine, plan, name, -drives.effort[:, k], values, effect.drive)
-            out += _seen(machine, plan, name, drives.jacobian[:, :, k], more)
+            out += shown_of_drive(machine, plan, name, drives.jacobian[:, :, k], more)
     return out
 
 
@@ -104,8 +104,9 @@ def _extra(
     return out
 
 
-def _seen(machine: Machine, plan: Experiment, name: str, column: Floats, more: Floats) -> Floats:
-    """(n, c) what every channel shows of a drive's extra deflection."""
+def shown_of_drive(machine: Machine, plan: Experiment, name: str, column: Floats, more: Floats) -> Floats:
+    """(n, c) m, rad: what every channel shows where a drive stands off by `more` (n,) m or rad, which moves the tool by `column`
+    (n, 6) per unit."""
     twist = column * more[:, None]
     arm = positions_of(machine, plan) - plan.position
     linear = twist[:, :3] + np.cross(twist[:, 3:], arm)

@@ -63,7 +63,7 @@ def answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, cross
         models[CORRECTED] = along_travel(best, _given(predictor, found, v, more))
     listed = stands_out(columns, fit, found.suspects, models.values())
     clock.say("readings that no fit saw")
-    if models and cross_validate and not clock.over:
+    if (models or v.rest) and cross_validate and not clock.over:
         models = plain_calibration(predictor, found) | models
     made = written(models, base, predictor, sigma, listed, seed, lambda: clock.over or not cross_validate)
     held, late, listed = made.held_out, made.over_time, made.listed

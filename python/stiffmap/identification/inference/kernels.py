@@ -16,7 +16,10 @@ from scipy.linalg import cholesky, solve_triangular
 from scipy.spatial.distance import cdist
 
 from stiffmap.experiment.experiment import Experiment, Floats, Integers, Mask
-from stiffmap.experiment.poses.configuration import coordinates_of
+from stiffmap.experiment.poses.configuration import coordinates_of, drive_jacobian
+from stiffmap.experiment.prediction.history import shown_of_drive
+from stiffmap.model.description import Body, Joint
+from stiffmap.model.description.tree import all_elements
 from stiffmap.solve.machine import Machine
 
 LENGTHS = (0.6, 2.0)
@@ -25,6 +28,7 @@ SESSIONS = (0.07, 1.0)
 """Correlation times, in sessions."""
 WANDER = "wander"
 """With what the names of parts begin that go on over time."""
+SAG = "sag of the drives under the weight of the arm"
 FEW_DRIVES = 3
 """Drives up to which the place of the tool says what their coordinates do."""
 TOUCHED = 0.1
@@ -70,6 +74,8 @@ def gaps(machine: Machine, e: Experiment, points: ReadingPoints) -> Iterator[Ker
                 yield _field(f"field of {what} over {over}, {length:g}", here, x / length, None)
                 if e.quantity == "deflection":
                     yield _field(f"compliance of {what} over {over}, {length:g}", here, x / length, load)
+    if e.quantity == "position" and _lacks_sag(machine):
+        yield _sag(machine, e)
     yield from shared(e, points)
     when = e.hours if e.hours is not None else e.order
     if when is not None:
@@ -92,6 +98,32 @@ def _field(name: str, here: Mask, x: Floats, load: Floats | None) -> Kernel:
         return np.asarray(here[a.channel] * carried / a.sigma**2)
 
     return Kernel("field", name, between, own)
+
+
+def _lacks_sag(machine: Machine) -> bool:
+    """Whether this is an arm that sags, as every one does, but not in its file, which has no weights or no drives that yield."""
+    elements = [x for _, x in all_elements(machine.description)]
+    heavy = any(isinstance(x, Body) and x.mass > 0.0 for x in elements)
+    yields = any(isinstance(x, Joint) and x.actuated and x.law is not None for x in elements)
+    return len(machine.legs) == 1 and not (heavy and yields)
+
+
+def _sag(machine: Machine, e: Experiment) -> Kernel:
+    """Of drives that yield under the weight that they carry: each by what the tool rises with it, as the moment of a weight at the tool
+    says, and by its own compliance, of which nothing is known."""
+    up = np.array([0.0, 0.0, 1.0]) if e.gravity is None else -np.array(e.gravity)
+    jacobian = np.nan_to_num(drive_jacobian(machine, e))
+    rise = np.tensordot(up / max(float(np.linalg.norm(up)), 1e-300), jacobian[:, :3], (0, 1))
+    each = (
+        shown_of_drive(machine, e, name, jacobian[:, :, k], rise[:, k])
+        for k, name in enumerate(machine.actuators)
+    )
+    shown = np.stack(list(each), axis=-1)
+
+    def of(a: ReadingPoints) -> Floats:
+        return np.asarray(shown[a.rows, a.channel] / a.sigma[:, None])
+
+    return Kernel("field", SAG, lambda a, b: of(a) @ of(b).T, lambda a: np.sum(of(a) ** 2, axis=1))
 
 
 def _wander(name: str, t: Floats, session: Integers) -> Kernel:

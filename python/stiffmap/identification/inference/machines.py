@@ -122,7 +122,7 @@ def _chosen(
     e = predictor.experiment
     label, by = folds(e, seed)
     number = int(label.max()) + 1
-    last = list(models)[-1] if models else DECLARED
+    last = [DECLARED, *(m for m in models if m != PLAIN)][-1]
     if number < 2 or over():
         return last, None, listed
     left = {name: np.full_like(e.reading, np.nan) for name in (DECLARED, *models)}

@@ -11,7 +11,7 @@ from scipy.optimize import least_squares
 
 from stiffmap.experiment.experiment import Floats
 from stiffmap.identification.candidates.candidates import clash
-from stiffmap.identification.inference.amplitudes import QUIET, Fit, evaluated, fitted, refitted
+from stiffmap.identification.inference.amplitudes import QUIET, Fit, fitted, refitted
 from stiffmap.identification.inference.chosen import Chosen, all_moved, evidence, of_pairs
 from stiffmap.identification.inference.columns import Columns
 from stiffmap.identification.inference.constants import MOST_EFFECTS, ODDS, REFITS, SIZES
