@@ -41,7 +41,7 @@ from stiffmap.identification.inference.machines import (
     vouched,
     written,
 )
-from stiffmap.identification.inference.names import Inferred, put_instead, terms, with_travel
+from stiffmap.identification.inference.names import Inferred, put_instead, terms, with_travel, without_sag
 from stiffmap.identification.inference.parts import GAPS, NOISE
 from stiffmap.identification.inference.readings import Readings, readings
 from stiffmap.identification.inference.shares import gap_of, shares, tolerance_word, too_wide
@@ -58,9 +58,13 @@ def answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, cross
     clock.say("corrected machine")
     models, found, v, notes = _models(predictor, found)
     fit = found.search.best.fit
-    best = models.get(CORRECTED)
-    if best and (more := with_travel(fit, anew=False)) is not fit:
-        models[CORRECTED] = along_travel(best, _given(predictor, found, v, more))
+    best, own = models.get(CORRECTED), without_sag(fit)
+    if own is not fit:
+        given = _given(predictor, found, v, own)
+        if best or len(given.spread):
+            models[CORRECTED] = corrected(given, best.terms if best else ())
+    if CORRECTED in models and (more := with_travel(own, anew=False)) is not own:
+        models[CORRECTED] = along_travel(models[CORRECTED], _given(predictor, found, v, more))
     listed = stands_out(columns, fit, found.suspects, models.values())
     clock.say("readings that no fit saw")
     if (models or v.rest) and cross_validate and not clock.over:
@@ -76,7 +80,7 @@ def answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, cross
     which = made.which if made.which == DECLARED or (effects and made.which == CORRECTED) else CALIBRATED
     others = list(_alternatives(found, v, best, clock)) if best and effects else []
     several = bool(others or clock.left_out or any(n.numbers or n.equivalents[RIVALS:] for n in v.named))
-    rest, numbers = _rest(columns, fit, v, each, gap), _numbers(found, v, models.get(CORRECTED))
+    rest, numbers = _rest(columns, fit, v, each, gap), _numbers(found, v, best or models.get(CORRECTED))
     cut_short = clock.stopped and noise.lack_of_fit_before < RARE
     return Diagnosis(
         verdict=_word(v, effects, rest, several, cut_short or (numbers is not None and bool(numbers.wide))),
@@ -143,7 +147,7 @@ def _models(
     out: dict[str, Corrected] = {}
     v, plain = judged(found.columns, found.search), found.search.calibrated
     if v.named and plain is not None:
-        plain = with_travel(plain, anew=True)  # as a calibration has it
+        plain = with_travel(without_sag(plain), anew=True)  # as a calibration has it
         own = readings(predictor, found.uncertain, found.columns, plain, found.noise.sigma, found.suspects)
         if len(own.spread):
             out[CALIBRATED] = corrected(own, ())

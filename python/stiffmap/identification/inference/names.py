@@ -21,6 +21,8 @@ from stiffmap.identification.clock import Clock
 from stiffmap.identification.inference.amplitudes import Fit, evaluated, fitted
 from stiffmap.identification.inference.chosen import Chosen
 from stiffmap.identification.inference.columns import Columns, columns
+from stiffmap.identification.inference.constants import ODDS
+from stiffmap.identification.inference.kernels import SAG
 from stiffmap.identification.inference.parts import Part, Parts
 from stiffmap.identification.inference.places import Place
 from stiffmap.identification.inference.several import with_more_shapes
@@ -115,14 +117,22 @@ def searched(
 
 
 def _worlds(columns: Columns, predict: Predict | None, over: Callable[[], bool], travel: bool) -> list[World]:
-    """Exact, together and groups, as far as there are numbers and time."""
+    """Exact, together and groups, as far as there are numbers and time; with sag where it is worth the odds of a name."""
     parts = Parts(columns)
     gaps = (*parts.gaps, *parts.travel) if travel else parts.gaps
     worlds: dict[str, tuple[Part, ...]] = {EXACT: ()}
     if columns.unknowns and not over():
         worlds |= {"together": parts.together, "groups": parts.numbers}
     optima: dict[Shapes, Floats] = {}
-    return [World(columns, gaps, name, own, predict, over, optima) for name, own in worlds.items()]
+
+    def under(some: tuple[Part, ...]) -> list[World]:
+        return [World(columns, some, name, own, predict, over, optima) for name, own in worlds.items()]
+
+    found, bare = under(gaps), under(tuple(g for g in gaps if g.name != SAG))
+    if len(bare[0].gaps) == len(gaps):
+        return found
+    more, less = (max(w.null.score for w in each) for each in (found, bare))
+    return found if more - less > np.log(ODDS) + found[0].price else bare
 
 
 def _with_rivals(model: Model, searches: Sequence[World], found: Mapping[str, Model]) -> Search:
@@ -147,6 +157,16 @@ def with_travel(fit: Fit, *, anew: bool) -> Fit:
         return max(fit, fitted(fit.columns, parts, amplitudes(fit), fit.weights), key=lambda f: f.score)
     found = [fitted(c, parts) for c in (fit.columns, fit.columns.of_rows) if c]
     return max([fit, *found], key=lambda f: f.score)
+
+
+def without_sag(fit: Fit) -> Fit:
+    """The fit for a machine file, which cannot hold the sag that it lacks: numbers and effects take what they can of it; the same where
+    there is none."""
+    start = {p.name: t for p, t in fit.on}
+    if SAG not in start:
+        return fit
+    parts = [p for p in fit.parts if p.name != SAG]  # those that it has put out begin anew
+    return fitted(fit.columns, parts, start, fit.weights, fit.lighter)
 
 
 def of_noise_alone(columns: Columns) -> Fit | None:
