@@ -19,16 +19,17 @@ from stiffmap.workspace.vibration.extraction import extract_modes
 from stiffmap.workspace.vibration.files import MeasuredResponse, read_responses
 
 POSE, WAY = ("x", "y", "z"), ("dir_x", "dir_y", "dir_z")
-ABOVE_ZERO = ("frequency", "u", "u_damping", "u_dir")
+ABOVE_ZERO = ("frequency", "u", "u_damping", "u_dir", "q")
 NUMBERS = (*POSE, *ABOVE_ZERO, "damping", *WAY)
 UNITS = {
-    **dict.fromkeys(POSE, "m"), "frequency": "Hz", "u": "Hz", "u_damping": "percent", "u_dir": "", "damping": "percent",
+    **dict.fromkeys(POSE, "m"), "frequency": "Hz", "u": "Hz", "u_damping": "percent", "u_dir": "", "damping": "percent", "q": "",
     **dict.fromkeys(WAY, ""), **dict.fromkeys(("response", "along", "hammer", "mode"), WORD),
 }  # fmt: skip
 USUAL = {n: f"{n}_{ {'m': 'mm'}.get(u, u) }" for n, u in UNITS.items() if u not in ("", WORD)}
 ALIASES = {
     **dict.fromkeys(("f", "fn", "f_n", "freq", "natural_frequency", "eigenfrequency", "frequenz", "eigenfrequenz", "omega", "ω"), "frequency"),
     **dict.fromkeys(("zeta", "ζ", "damp", "damping_ratio", "dämpfung", "dämpfungsgrad", "lehr"), "damping"),
+    **dict.fromkeys(("q_factor", "quality_factor", "gütefaktor", "güte"), "q"),
     **dict.fromkeys(("mode_no", "mode_no.", "mode_number", "mode_nr"), "mode"),
     **{f"{shape}_{a}": f"dir_{a}" for a in "xyz" for shape in ("mode_shape", "shape", "phi", "direction")},
 }  # fmt: skip
@@ -95,7 +96,7 @@ class TapTest:
 def load_taps(path: str | PathLike[str], machine: Machine | Source | None = None) -> TapTest:
     """Table of tap tests from a CSV file.
 
-    Columns x_mm, y_mm, z_mm (commanded TCP) and frequency_Hz; where known u_Hz (else 1 %), damping_percent, u_damping_percent (else
+    Columns x_mm, y_mm, z_mm (commanded TCP) and frequency_Hz; where known u_Hz (else 1 %), damping_percent or Q, u_damping_percent (else
     20 % of it), dir_x, dir_y, dir_z (along which the tool moves in the mode, any length) and u_dir (of each of them). In place of
     frequency_Hz, `response` names a file of `read_responses` next to the table, measured at the TCP along the axis `along` (+x to -z)
     with the hammer along the axis `hammer`; universal files may say both themselves. Rows of one pose and hammer share their modes.
@@ -116,6 +117,10 @@ def load_taps(path: str | PathLike[str], machine: Machine | Source | None = None
         )
     for name in ABOVE_ZERO:
         t.check(name, lambda v: v > 0, "a number above zero")
+    if "q" in t.values:
+        if "damping" in t.values:
+            t.fail(f"expected the damping once, found it as '{t.header['damping']}' as well", "q")
+        t.values["damping"] = 50 / t.values["q"]
     least = (
         0.1 if t.size.get("damping", 1.0) == 1 else 0.0
     )  # in %, where all are below they may as well be ratios

@@ -100,9 +100,20 @@ def test_statics_and_frequencies_must_say_the_same(arm, static_scale, agree):
     assert ("agree (" in found.sentence) is agree and ("disagree by" in found.sentence) is not agree
 
 
+def test_a_quality_factor_is_a_damping_and_a_mac_says_nothing(tmp_path):
+    path = tmp_path / "taps.csv"
+    path.write_text("x_mm,y_mm,z_mm,frequency_Hz,Q,MAC,Temp [°C]\n1,2,3,40,16,0.98,21\n1,2,3,95,20,0.9,21\n")
+    with pytest.warns(UserWarning, match=r"left out: MAC, Temp \[°C\]"):
+        np.testing.assert_allclose(load_taps(path).ratio, [1 / 32, 1 / 40])
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
+        (
+            "x_mm,y_mm,z_mm,frequency_Hz,Q,damping_percent\n1,2,3,4,5,6\n",
+            "expected the damping once, found it as 'damping_percent'",
+        ),
         ("x_mm,y_mm,z_mm\n1,2,3\n", "missing frequency_Hz"),
         ("x_mm,y_mm,z_mm,frequency_Hz,tone\n1,2,3,4,5\n", "unknown column 'tone'"),
         (
