@@ -107,13 +107,30 @@ def read_named(path: Path, known: Known, sheet: str | None = None) -> NamedTable
     return named(_sheet(path, known, sheet), known)
 
 
-def _sheet(path: Path, known: Known, sheet: str | None = None) -> Table:
+def _sheet(path: Path, known: Known, sheet: str | None = None, *, repeated: bool = False) -> Table:
     names = ", ".join(known.usual.get(n, n) for n in known.units)
-    return read_sheet(path, sheet, Layout(known.has, strict=True, names=names))
+    return read_sheet(path, sheet, Layout(known.has, strict=True, repeated=repeated, names=names))
 
 
-def named(sheet: Table, known: Known, besides: Collection[int] = ()) -> NamedTable:
-    """Columns of a sheet, but some, by their known names; raises FileError."""
+def sets_of(path: Path, known: Known, shared: str) -> list[NamedTable]:
+    """A text or a workbook whose names come again, but a `shared` one: the first of each, the second of each, … Raises FileError."""
+    sheet = _sheet(path, known, repeated=True)
+    out, left = list[NamedTable](), {*range(len(sheet.header))}
+    while left or not out:
+        again: list[int] = []
+        out.append(named(sheet, known, {*range(len(sheet.header))} - left, again))
+        for part in ("header", "units", "size", "values"):
+            of, first = getattr(out[-1], part), getattr(out[0], part)
+            of.update({shared: first[shared]} if shared in first and shared not in of else {})
+        left = {*again}
+    return out
+
+
+def named(
+    sheet: Table, known: Known, besides: Collection[int] = (), again: list[int] | None = None
+) -> NamedTable:
+    """Columns of a sheet, but some, by their known names; raises FileError, also for a second one of a name where there is no `again`,
+    which takes them."""
     out, left = NamedTable(sheet.file, list(sheet.lines), sheet.top, {}, {}, {}, {}), []
     for i, (head, text) in enumerate(zip(sheet.header, sheet.names, strict=True)):
         meant = meaning_of(text)
@@ -125,6 +142,9 @@ def named(sheet: Table, known: Known, besides: Collection[int] = ()) -> NamedTab
             continue
         name, unit, size = _meaning(sheet, i, known, out)
         if not name:
+            continue
+        if name in out.header and again is not None:
+            again.append(i)
             continue
         if name in out.header:
             out.fail(f"a column is given twice, as '{out.header[name]}' and '{head}'")

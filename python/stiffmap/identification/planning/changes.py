@@ -88,11 +88,13 @@ class Comparison:
     @property
     def unexplained(self) -> tuple[str, ...]:
         """Experiments of which the followed numbers leave more than noise, in words."""
+        each = ((one, float(chdtrc(max(one.freedom, 1), one.chi2))) for one in (self.first, self.second))
+        what = "what is followed does not explain the readings"
+        then = "so that the numbers may stand for another cause; run diagnose on it next"
         return tuple(
-            f"{one.experiment.name}: what is followed does not explain the readings: {one.misfit:.2g} times their noise is left "
-            f"(lack of fit, p = {one.lack_of_fit:.2g}), so that the numbers may stand for another cause; run diagnose on it next"
-            for one in (self.first, self.second)
-            if one.lack_of_fit < RARE
+            f"{one.experiment.name}: {what}: {one.misfit:.2g} times their noise is left (lack of fit, p = {p:.2g}), {then}"
+            for one, p in each
+            if p < RARE
         )
 
     def as_plain(self) -> dict[str, Any]:

@@ -7,7 +7,6 @@ from os import PathLike
 from typing import Any
 
 import numpy as np
-from scipy.special import chdtrc
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
@@ -69,11 +68,6 @@ class Estimate:
     def misfit(self) -> float:
         """Root of chi-square per degree of freedom, at least 1: what a model that does not fit adds (Birge)."""
         return float(np.sqrt(max(1.0, self.chi2 / max(self.freedom, 1))))
-
-    @property
-    def lack_of_fit(self) -> float:
-        """p-value of what the fitted values leave of the readings, if that were their noise; NaN where nothing is left to contradict it."""
-        return float(chdtrc(self.freedom, self.chi2)) if self.freedom > 0 else float("nan")
 
     @property
     def worst(self) -> float:

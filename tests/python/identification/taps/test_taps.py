@@ -218,7 +218,8 @@ def test_assumed_damping_is_off_as_a_whole_and_from_mode_to_mode(arm, factor):
     assert fitted(problem, ()).chi2 == pytest.approx(np.log(factor) ** 2 / (each / n + 1.0), rel=1e-3)
 
 
-def test_a_perfect_response_is_as_uncertain_as_taps_repeat(tmp_path):
+@pytest.mark.parametrize("together", [False, True])
+def test_a_perfect_response_is_as_uncertain_as_taps_repeat(tmp_path, together):
     """Two modes without noise: frequency 0.2 %, damping 10 %, flexibility 5 % of the mode and 1 % of the largest (root of squares)."""
     f = np.linspace(20, 60, 400)
     modes = [(30.0, 0.02, np.array([3e-6, -4e-6, 0.0])), (45.0, 0.03, np.array([0.0, 1e-7, 0.0]))]
@@ -230,6 +231,10 @@ def test_a_perfect_response_is_as_uncertain_as_taps_repeat(tmp_path):
         lines = [f"{x},{h.real},{h.imag}" for x, h in zip(f.tolist(), H.tolist(), strict=True)]
         (tmp_path / f"{a}.csv").write_text("\n".join(["frequency_Hz,real_m/N,imag_m/N", *lines]) + "\n")
         rows.append(f"1000,0,0,{a}.csv,+{'xyz'[a]},-z")
+    if together:
+        each = [(tmp_path / f"{a}.csv").read_text().splitlines() for a in range(3)]
+        (tmp_path / "all.csv").write_text("\n".join(map(",".join, zip(*each, strict=True))))
+        rows[1:] = ["1000,0,0,all.csv,+x y +z,-z"]
     (tmp_path / "taps.csv").write_text("\n".join(rows) + "\n")
     t = load_taps(tmp_path / "taps.csv")
     size = [5e-6, 1e-7]
