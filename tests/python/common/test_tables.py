@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import stiffmap as sm
 from stiffmap.common.errors import FileError
@@ -278,6 +279,22 @@ def test_responses_of_complex_numbers(text: str, tmp_path: Path) -> None:
 def test_remarks_next_to_numbers_are_left_out(text: str, tmp_path: Path) -> None:
     (tmp_path / "p.csv").write_text(text, encoding="utf-8")
     assert read_pose_table(tmp_path / "p.csv").position[:, 0].tolist() == [0.0015, 0.002]
+
+
+@pytest.mark.parametrize("first", ["target_TCP_pose", "actual_TCP_pose"])
+def test_the_pose_of_a_robots_log_is_in_its_units_against_the_base(first: str, tmp_path: Path) -> None:
+    """m and radians; the commanded one before the measured one, joints and times are left out with a word."""
+    heads = [f"{n}_{k}" for n in ("actual_q", first, "actual_TCP_speed") for k in range(6)]
+    rows = np.arange(36.0).reshape(2, 18) / 50
+    if first.startswith("target"):
+        heads, rows = [f"actual_TCP_pose_{k}" for k in range(6)] + heads, np.hstack([rows[:, :6] + 1, rows])
+    cells = "\n".join(" ".join(map(repr, [0.1, *row])) for row in rows.tolist())
+    (tmp_path / "p.csv").write_text(f"timestamp {' '.join(heads)}\n{cells}\n")
+    with pytest.warns(UserWarning, match="p.csv: left out: timestamp, actual_"):
+        found = read_pose_table(tmp_path / "p.csv")
+    np.testing.assert_allclose(found.position, rows[:, -12:-9])
+    turned = found.rotation(np.diag([1.0, -1.0, -1.0]))
+    np.testing.assert_allclose(turned, Rotation.from_rotvec(rows[:, -9:-6]).as_matrix())
 
 
 @pytest.mark.parametrize(

@@ -302,6 +302,11 @@ DEFLECTION = (
 )
 OF_SOME = re.compile(f"(?i){DEFLECTION}|{FORCE}|{MOMENT}")
 """In a title whose unit is not that of all columns."""
+IN_SI = re.compile(
+    r"(?i)(actual|target)_(q|tcp_pose|tcp_force)_\d|.*[./](position|point|translation|force|torque)[./][xyz]|.*[./]position\[?\d+\]?|"
+    r".*/joint_states/.*/position"
+)
+"""Fields of logs that are in SI by their format: messages of ROS, and UR's RTDE."""
 COMMANDED = "target|cmd|nom|nominal|command|commanded|ref|desired|r?soll?"
 MEASURED = "act|actual|meas|measured|achieved|attained|r?ist|gemessen|mess"
 PATTERNS: tuple[tuple[str, str], ...] = (

@@ -241,7 +241,7 @@ def is_nothing(text: str) -> bool:
 
 def complex_number(cell: str) -> complex | None:
     """``0.1+0.2i``, ``(0.1-0.2j)`` or ``0.1 + j0.2``; None for what is none."""
-    match = COMPLEX.fullmatch(re.sub(r"[\s*]", "", cell))
+    match = COMPLEX.fullmatch(re.sub(r"[\s*]", "", cell).replace(",", "."))
     return None if match is None else complex(float(match[1]), float(match[2] + (match[3] or match[4])))
 
 

@@ -11,17 +11,19 @@ from __future__ import annotations
 
 import math
 import re
+import warnings
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NoReturn
 
 import numpy as np
 
 from stiffmap.common.broadcasting import Floats
-from stiffmap.common.errors import FileError, StiffmapError, suggestion
+from stiffmap.common.errors import FileError, StiffmapError, frames_of_this_package, suggestion
 from stiffmap.common.number_text import read_value
-from stiffmap.common.tables.header import meaning_of, split_unit
+from stiffmap.common.short import first_of
+from stiffmap.common.tables.header import IN_SI, meaning_of, split_unit
 from stiffmap.common.tables.lines import Spelling, finite_number, is_finite, number
 from stiffmap.common.tables.orientation import orientation_of
 from stiffmap.common.tables.sheet import Layout, read_sheet
@@ -33,6 +35,11 @@ SPELLED = {"s": SHORT_TIMES, "percent": {"%": 1.0, "-": 100.0, "1": 100.0}}
 PER = re.compile(r"_(?:per_)?(min|s|tooth|rev)$")
 COUNTER = re.compile(r"(?i)column \d+|unnamed: ?\d+|index|idx|line|sample|frame|record|pose|serial( no)?")
 """Names of columns that may number the rows, or groups of them; programs leave out the name, or write ``Unnamed: 0``."""
+ASIDE = re.compile(
+    r"(?i)time ?stamp|date|mac|mpc|coh(erence)?|(actual|target)_(q|qd|qdd|current|moment|tcp_\w+)_\d|(joint|q|j)[ _]?[1-9]|"
+    r"(robot|safety|joint)_(mode|status)(_\w+)?|runtime_state|speed_scaling"
+)
+"""Names of columns that programs write next to what a table is for; they are left out with a word."""
 WORD = "word"
 """In place of a unit: the column holds text."""
 
@@ -100,19 +107,44 @@ def read_named(path: Path, known: Known, sheet: str | None = None) -> NamedTable
     return named(_sheet(path, known, sheet), known)
 
 
-def _sheet(path: Path, known: Known, sheet: str | None = None) -> Table:
+def _sheet(path: Path, known: Known, sheet: str | None = None, *, repeated: bool = False) -> Table:
     names = ", ".join(known.usual.get(n, n) for n in known.units)
-    return read_sheet(path, sheet, Layout(known.has, strict=True, names=names))
+    return read_sheet(path, sheet, Layout(known.has, strict=True, repeated=repeated, names=names))
 
 
-def named(sheet: Table, known: Known, besides: Collection[int] = ()) -> NamedTable:
-    """Columns of a sheet, but some, by their known names; raises FileError."""
-    out = NamedTable(sheet.file, list(sheet.lines), sheet.top, {}, {}, {}, {})
+def sets_of(path: Path, known: Known, shared: str) -> list[NamedTable]:
+    """A text or a workbook whose names come again, but a `shared` one: the first of each, the second of each, … Raises FileError."""
+    sheet = _sheet(path, known, repeated=True)
+    out, left = list[NamedTable](), {*range(len(sheet.header))}
+    while left or not out:
+        again: list[int] = []
+        out.append(named(sheet, known, {*range(len(sheet.header))} - left, again))
+        for part in ("header", "units", "size", "values"):
+            of, first = getattr(out[-1], part), getattr(out[0], part)
+            of.update({shared: first[shared]} if shared in first and shared not in of else {})
+        left = {*again}
+    return out
+
+
+def named(
+    sheet: Table, known: Known, besides: Collection[int] = (), again: list[int] | None = None
+) -> NamedTable:
+    """Columns of a sheet, but some, by their known names; raises FileError, also for a second one of a name where there is no `again`,
+    which takes them."""
+    out, left = NamedTable(sheet.file, list(sheet.lines), sheet.top, {}, {}, {}, {}), []
     for i, (head, text) in enumerate(zip(sheet.header, sheet.names, strict=True)):
-        if i in besides or (not known.has(head) and (meaning_of(text) == "id" or _counts(sheet, i))):
+        meant = meaning_of(text)
+        if i in besides or (not known.has(head) and (meant == "id" or _counts(sheet, i))):
+            continue
+        said = ASIDE.fullmatch(text) and meant not in known.units
+        if not known.has(text) and (said or meant == "temperature") and sheet.is_numeric(i):
+            left.append(head)
             continue
         name, unit, size = _meaning(sheet, i, known, out)
         if not name:
+            continue
+        if name in out.header and again is not None:
+            again.append(i)
             continue
         if name in out.header:
             out.fail(f"a column is given twice, as '{out.header[name]}' and '{head}'")
@@ -121,6 +153,8 @@ def named(sheet: Table, known: Known, besides: Collection[int] = ()) -> NamedTab
         out.values[name] = (
             list(sheet.columns[i]) if words else size * _numbers(sheet, i, name, out, known.blank)
         )
+    if left:
+        warnings.warn(f"{sheet.file}: left out: {first_of(left)}", stacklevel=frames_of_this_package())
     return out
 
 
@@ -154,7 +188,8 @@ def _meaning(sheet: Table, column: int, known: Known, table: NamedTable) -> tupl
     head = sheet.header[column]
     text, unit = split_unit(head)
     name = _joined(text)
-    if not known.has(text) and not re.search(r"[])]\s*$", head):  # x_per_tooth_mm, real_m/N
+    named_so = known.has(text) or meaning_of(text) in known.units
+    if not named_so and not re.search(r"[])]\s*$", head):  # x_per_tooth_mm, real_m/N
         whole = re.sub(r"\s", "_", head)
         cuts = [m.start() for m in re.finditer("_", whole) if known.has(whole[: m.start()])]
         if cuts:
@@ -176,8 +211,8 @@ def _meaning(sheet: Table, column: int, known: Known, table: NamedTable) -> tupl
     si = known.units[name]
     if si in ("", WORD):
         return name, unit, 1.0
-    if not unit and known.assumed is not None:
-        unit = known.assumed.get(name, "")
+    if not unit:
+        unit = si if IN_SI.fullmatch(text) else (known.assumed or {}).get(name, "")
     if not unit:
         table.fail(
             f"the unit is missing: write {usual}; expected a unit such as in {usual}, found none", head
@@ -257,8 +292,12 @@ def read_pose_table(place: Path, *, at_home: Floats | None = None, known: Known 
     are wanted. Raises FileError naming file, line, column, what was expected and what was found.
     """
     sheet = _sheet(place, known)
+    if sheet.find("target_tcp_pose_0") is None:  # then the pose that was measured stands for it
+        header = (re.sub("(?i)^actual(?=_tcp_pose)", "target", h) for h in sheet.header)
+        sheet = replace(sheet, header=tuple(header))
     found = orientation_of(sheet)
-    columns = () if found.is_vector else found.columns  # rx, ry, rz are from home
+    from_home = found.is_vector and not IN_SI.fullmatch(sheet.names[found.columns[0]])  # rx, ry, rz
+    columns = () if from_home else found.columns
     table = PoseTable(**vars(named(sheet, known, columns)))
     if columns:
         if {"rx", "ry", "rz"} & set(table.values):

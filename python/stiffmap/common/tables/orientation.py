@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from stiffmap.common.broadcasting import Floats
+from stiffmap.common.tables.header import IN_SI
 from stiffmap.common.tables.table import Table
 from stiffmap.common.units import unit_of
 
@@ -40,7 +41,7 @@ class Orientation(NamedTuple):
         return self.turns == VECTOR
 
     def matrices(self, sheet: Table) -> Floats:
-        """(n, 3, 3) of quaternions or of angles, degrees where no unit is given. FileError for an empty cell."""
+        """(n, 3, 3) of quaternions, of a vector or of angles, degrees where no unit is given nor known. FileError for an empty cell."""
         from scipy.spatial.transform import Rotation
 
         values = np.stack([sheet.numbers(i) for i in self.columns], axis=1)
@@ -48,8 +49,11 @@ class Orientation(NamedTuple):
         sheet.check(~np.isnan(values).any(axis=1), lambda _: f"{first} …: found an empty cell")
         if not self.turns:
             return np.asarray(Rotation.from_quat(values[:, [1, 2, 3, 0]]).as_matrix())
-        units = (unit_of(sheet.unit(i) or "deg", "angle") for i in self.columns)
+        usual = "rad" if IN_SI.fullmatch(sheet.names[self.columns[0]]) else "deg"
+        units = (unit_of(sheet.unit(i) or usual, "angle") for i in self.columns)
         sizes = [u.size for u in units if u]
+        if self.is_vector:
+            return np.asarray(Rotation.from_rotvec(sizes * values).as_matrix())
         return np.asarray(Rotation.from_euler(self.turns, sizes * values).as_matrix())
 
 

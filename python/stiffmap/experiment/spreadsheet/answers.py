@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from copy import deepcopy
 from dataclasses import dataclass, field, fields
@@ -13,17 +12,12 @@ from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
-from stiffmap.common.tables.header import stated_unit, with_unit
+from stiffmap.common.tables.header import IN_SI, stated_unit, with_unit
 from stiffmap.common.tables.table import Table, column_letter
 from stiffmap.common.units import QUANTITIES, Unit, known, unit_of
 from stiffmap.experiment.files.fields import quantity_of
 from stiffmap.experiment.spreadsheet.guess import READINGS, Column, find_column, guess
 
-IN_SI = re.compile(
-    r"(?i)(actual|target)_(q|tcp_pose|tcp_force)_\d|.*[./](position|point|translation|force|torque)[./][xyz]|.*[./]position\[?\d+\]?|"
-    r".*/joint_states/.*/position"
-)
-"""Fields of logs that are in SI by their format: messages of ROS, and UR's RTDE."""
 SI = {q: unit for unit, q in QUANTITIES.items()}
 USUAL = {"length": "mm", "force": "N", "moment": "N*m", "angle": "deg", "temperature": "degC"}
 

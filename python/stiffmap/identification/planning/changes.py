@@ -20,6 +20,7 @@ from stiffmap.experiment.experiment import Experiment
 from stiffmap.experiment.noise.whitening import basis, readings_of
 from stiffmap.identification.inference.amplitudes import fitted
 from stiffmap.identification.inference.columns import Columns, Free, drawn
+from stiffmap.identification.inference.constants import RARE
 from stiffmap.identification.inference.kernels import ReadingPoints, gaps
 from stiffmap.identification.inference.parts import Part
 from stiffmap.identification.planning.design import joined
@@ -84,15 +85,27 @@ class Comparison:
         """Rows that the machine does not reach, in words."""
         return tuple(text for one in (self.first, self.second) for text in one.experiment.out_of_reach)
 
+    @property
+    def unexplained(self) -> tuple[str, ...]:
+        """Experiments of which the followed numbers leave more than noise, in words."""
+        each = ((one, float(chdtrc(max(one.freedom, 1), one.chi2))) for one in (self.first, self.second))
+        what = "what is followed does not explain the readings"
+        then = "so that the numbers may stand for another cause; run diagnose on it next"
+        return tuple(
+            f"{one.experiment.name}: {what}: {one.misfit:.2g} times their noise is left (lack of fit, p = {p:.2g}), {then}"
+            for one, p in each
+            if p < RARE
+        )
+
     def as_plain(self) -> dict[str, Any]:
         """Data of JSON, SI."""
-        changes = [vars(c) for c in self.changes]
-        return {"common": self.common, "p": self.p, "changes": changes, "left_out": list(self.left_out)}
+        more = {name: list(getattr(self, name)) for name in ("left_out", "unexplained")}
+        return {"common": self.common, "p": self.p, "changes": [vars(c) for c in self.changes], **more}
 
     def __str__(self) -> str:
         word = "one set of numbers serves both" if self.common else "the two differ"
         left = [f"left out: {text}" for text in self.left_out]
-        return "\n".join([f"{word} (p = {self.p:.2g})", *map(str, self.changes), *left])
+        return "\n".join([f"{word} (p = {self.p:.2g})", *map(str, self.changes), *self.unexplained, *left])
 
 
 def monitor(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from os import PathLike
 from pathlib import Path
+from typing import NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,16 +20,17 @@ from stiffmap.workspace.vibration.extraction import extract_modes
 from stiffmap.workspace.vibration.files import MeasuredResponse, read_responses
 
 POSE, WAY = ("x", "y", "z"), ("dir_x", "dir_y", "dir_z")
-ABOVE_ZERO = ("frequency", "u", "u_damping", "u_dir")
+ABOVE_ZERO = ("frequency", "u", "u_damping", "u_dir", "q")
 NUMBERS = (*POSE, *ABOVE_ZERO, "damping", *WAY)
 UNITS = {
-    **dict.fromkeys(POSE, "m"), "frequency": "Hz", "u": "Hz", "u_damping": "percent", "u_dir": "", "damping": "percent",
+    **dict.fromkeys(POSE, "m"), "frequency": "Hz", "u": "Hz", "u_damping": "percent", "u_dir": "", "damping": "percent", "q": "",
     **dict.fromkeys(WAY, ""), **dict.fromkeys(("response", "along", "hammer", "mode"), WORD),
 }  # fmt: skip
 USUAL = {n: f"{n}_{ {'m': 'mm'}.get(u, u) }" for n, u in UNITS.items() if u not in ("", WORD)}
 ALIASES = {
     **dict.fromkeys(("f", "fn", "f_n", "freq", "natural_frequency", "eigenfrequency", "frequenz", "eigenfrequenz", "omega", "ω"), "frequency"),
     **dict.fromkeys(("zeta", "ζ", "damp", "damping_ratio", "dämpfung", "dämpfungsgrad", "lehr"), "damping"),
+    **dict.fromkeys(("q_factor", "quality_factor", "gütefaktor", "güte"), "q"),
     **dict.fromkeys(("mode_no", "mode_no.", "mode_number", "mode_nr"), "mode"),
     **{f"{shape}_{a}": f"dir_{a}" for a in "xyz" for shape in ("mode_shape", "shape", "phi", "direction")},
 }  # fmt: skip
@@ -95,10 +97,11 @@ class TapTest:
 def load_taps(path: str | PathLike[str], machine: Machine | Source | None = None) -> TapTest:
     """Table of tap tests from a CSV file.
 
-    Columns x_mm, y_mm, z_mm (commanded TCP) and frequency_Hz; where known u_Hz (else 1 %), damping_percent, u_damping_percent (else
+    Columns x_mm, y_mm, z_mm (commanded TCP) and frequency_Hz; where known u_Hz (else 1 %), damping_percent or Q, u_damping_percent (else
     20 % of it), dir_x, dir_y, dir_z (along which the tool moves in the mode, any length) and u_dir (of each of them). In place of
-    frequency_Hz, `response` names a file of `read_responses` next to the table, measured at the TCP along the axis `along` (+x to -z)
-    with the hammer along the axis `hammer`; universal files may say both themselves. Rows of one pose and hammer share their modes.
+    frequency_Hz, `response` names a file of `read_responses` next to the table, measured at the TCP along the axis `along` (+x to -z;
+    +x +y +z of three responses in one table) with the hammer along the axis `hammer`; universal files may say both themselves. Rows of
+    one pose and hammer share their modes.
 
     machine: whose workspace the poses are checked against; None: they are not. Raises FileError naming line and column.
     """
@@ -116,9 +119,11 @@ def load_taps(path: str | PathLike[str], machine: Machine | Source | None = None
         )
     for name in ABOVE_ZERO:
         t.check(name, lambda v: v > 0, "a number above zero")
-    least = (
-        0.1 if t.size.get("damping", 1.0) == 1 else 0.0
-    )  # in %, where all are below they may as well be ratios
+    if "q" in t.values and "damping" in t.values:
+        t.fail(f"expected the damping once, found it as '{t.header['damping']}' as well", "q")
+    t.values |= {"damping": 50 / t.values["q"]} if "q" in t.values else {}
+    # in %, where all are below they may as well be ratios
+    least = 0.1 if t.size.get("damping", 1.0) == 1 else 0.0
     expected = "from 0 to below 100 %, and not all below 0.1 (a ratio of 0.02 is 2 %)"
     t.check(
         "damping", lambda v: (v == 0) | ((v > 0) & (v < 100) & (np.nanmax(v, initial=0) >= least)), expected
@@ -205,18 +210,15 @@ class Measured:
     file: str
     line: int
 
+    def fail(self, message: str, column: str) -> NoReturn:
+        raise FileError(message, file=self.file, line=self.line, key=column)
+
     def axis(self, given: str, own: str, column: str) -> str:
         """Of the accelerometer or the hammer: the table's word, or the end of the file's own."""
         word = given or own.rpartition(" ")[2]
         word = f"+{word}" if word in ("x", "y", "z") else word
         if word not in AXES:
-            found = f"'{word}'" if word else "none"
-            raise FileError(
-                f"expected one of {', '.join(AXES)}; found {found}",
-                file=self.file,
-                line=self.line,
-                key=column,
-            )
+            self.fail(f"expected one of {', '.join(AXES)}; found {repr(word) if word else 'none'}", column)
         return word
 
     def read(self) -> list[tuple[str, str, MeasuredResponse]]:
@@ -227,9 +229,14 @@ class Measured:
             raise FileError(
                 f"expected responses at one point, the TCP; found points {', '.join(points)}", file=str(self.place)
             )  # fmt: skip
+        words = self.along.split() or [""] * len(found)
+        words *= len(found) if len(words) == 1 and found[0].response else 1
+        if len(words) != len(found):
+            each = f"an axis for each of {len(found)} responses, as in '+x +y +z'"
+            self.fail(f"expected {each}; found '{self.along}'", "along")
         return [
-            (self.axis(self.along, r.response, "along"), self.axis(self.hammer, r.reference, "hammer"), r)
-            for r in found
+            (self.axis(word, r.response, "along"), self.axis(self.hammer, r.reference, "hammer"), r)
+            for word, r in zip(words, found, strict=True)
         ]
 
 

@@ -13,6 +13,7 @@ from scipy.ndimage import median_filter, uniform_filter1d
 from scipy.optimize import least_squares
 
 from stiffmap.common.broadcasting import Floats
+from stiffmap.common.tasks import on_one_thread
 from stiffmap.workspace.vibration.files import MeasuredResponse
 from stiffmap.workspace.vibration.response import Complex
 
@@ -37,6 +38,7 @@ class ExtractedModes:
     u_flexibility: Floats
 
 
+@on_one_thread
 def extract_modes(responses: list[MeasuredResponse]) -> ExtractedModes:
     """Modes of responses at the same frequencies (frequency, Hz; receptance, m/N), by their coherence or, without, their scatter."""
     f = responses[0].frequency

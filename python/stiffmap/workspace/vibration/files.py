@@ -14,7 +14,7 @@ import numpy as np
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError, StiffmapError, needed, refuse_folder
 from stiffmap.common.tables.lines import complex_number
-from stiffmap.common.tables.named import WORD, Known, NamedTable, read_named
+from stiffmap.common.tables.named import WORD, Known, NamedTable, sets_of
 from stiffmap.common.tables.workbook import TABLES
 from stiffmap.common.units import FREQUENCIES
 from stiffmap.workspace.vibration.response import Complex, frequency_axis
@@ -39,7 +39,7 @@ COLUMNS = Known(
         **dict.fromkeys(("im", "im(h)", "im(frf)", "imaginary", "imaginary_part", "imag_part", "imaginärteil"), "imag"),
         **dict.fromkeys(("mag", "amplitude", "|h|", "|frf|", "betrag", "gain", *MEANT), "magnitude"),
     },
-    lambda name, unit: ("frequency", unit) if unit.lower() in FREQUENCIES else (PREFIX.sub("", name).removesuffix("_db"), f"dB {unit}" if name.endswith("_db") else unit),
+    lambda name, unit: ("frequency", unit) if unit.lower() in FREQUENCIES else ("imag" if any((response_unit(unit) or ())[1:]) else "phase", unit) if not name else (PREFIX.sub("", name).removesuffix("_db"), f"dB {unit}" if name.endswith("_db") else unit),
 )  # fmt: skip
 FORMS = (("real", "imag"), ("magnitude", "phase"))
 EXAMPLES = "m/N, mm/N, um/N, m/s/N, m/s2/N, g/N and the like, N/m, N/um"
@@ -75,7 +75,7 @@ def read_responses(path: str | PathLike[str]) -> list[MeasuredResponse]:
         raise FileError("no such file of frequency responses", file=str(path))
     try:
         universal = p.suffix.lower() in UNIVERSAL or MARK.search(p.read_bytes())
-        found = _universal(p) if universal and p.suffix.lower() not in TABLES else [_table(p)]
+        found = _universal(p) if universal and p.suffix.lower() not in TABLES else _tables(p)
         for one in found:
             _check(one)
     except StiffmapError as problem:
@@ -85,14 +85,21 @@ def read_responses(path: str | PathLike[str]) -> list[MeasuredResponse]:
     return found
 
 
-def _table(path: Path) -> MeasuredResponse:
-    t = read_named(path, COLUMNS)
+def _tables(path: Path) -> list[MeasuredResponse]:
+    sets = sets_of(path, COLUMNS, "frequency")
+    if len({"coherence" in t.values for t in sets}) > 1:
+        sets[0].fail(f"expected a coherence of each of {len(sets)} responses, or of none", "coherence")
+    return [_table(t, f"{path.stem} {k}" if len(sets) > 1 else path.stem) for k, t in enumerate(sets, 1)]
+
+
+def _table(t: NamedTable, name: str) -> MeasuredResponse:
     if words := t.values.pop("response", None):
-        parts = [complex_number(c) for c in words]
+        beside = [(a, "real") for a, b in FORMS if b in t.values]  # FRF over two columns of numbers
+        parts = [complex_number(f"{c}+0i" if beside else c) for c in words]
         if None in parts:
             t.fail("expected complex numbers, such as 0.1+0.2i", "response", parts.index(None))
-        for n in ("real", "imag"):
-            t.values[n], t.units[n] = getattr(np.array(parts, complex), n), t.units["response"]
+        for n, part in beside or [("real", "real"), ("imag", "imag")]:
+            t.values[n], t.units[n] = getattr(np.array(parts, complex), part), t.units["response"]
     if t.units.get("coherence", "").endswith(("%", "percent")):
         t.values["coherence"] = t.values["coherence"] / 100
     if len(t.lines) < 2:
@@ -112,7 +119,7 @@ def _table(path: Path) -> MeasuredResponse:
         t.fail(
             f"expected one response, found two: {' and '.join(t.header[a] for a, _ in forms)}; leave one out"
         )
-    return MeasuredResponse(path.stem, f, found, t.values.get("coherence", np.full(len(f), np.nan)))
+    return MeasuredResponse(name, f, found, t.values.get("coherence", np.full(len(f), np.nan)))
 
 
 def _in_form(t: NamedTable, form: tuple[str, str], frequency: Floats) -> Complex:

@@ -50,6 +50,17 @@ def test_a_change_is_seen_and_none_is_invented(orthoglide: sm.Machine, plan: sm.
 
 
 @pytest.mark.parametrize(
+    ("effect", "word"), [("compliance actuator x scale=1", 0), ("length bar y error=0um", 1)]
+)
+def test_what_is_followed_may_not_explain_the_readings(
+    orthoglide: sm.Machine, plan: sm.Experiment, effect: str, word: int
+) -> None:
+    found = compare(orthoglide, simulate(orthoglide, plan, seed=0), twin(orthoglide, plan, 1.5, 1), effect)
+    assert len(found.as_plain()["unexplained"]) == word
+    assert str(found).count("does not explain the readings") == word
+
+
+@pytest.mark.parametrize(
     ("unit", "shown"), [("m", "0.0100 -> 0.0130 mm (0.003"), ("1", "0.0000100 -> 0.0000130 1")]
 )
 def test_lengths_of_changes_are_in_millimetres(unit: str, shown: str) -> None:

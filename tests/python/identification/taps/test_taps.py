@@ -100,9 +100,20 @@ def test_statics_and_frequencies_must_say_the_same(arm, static_scale, agree):
     assert ("agree (" in found.sentence) is agree and ("disagree by" in found.sentence) is not agree
 
 
+def test_a_quality_factor_is_a_damping_and_a_mac_says_nothing(tmp_path):
+    path = tmp_path / "taps.csv"
+    path.write_text("x_mm,y_mm,z_mm,frequency_Hz,Q,MAC,Temp [°C]\n1,2,3,40,16,0.98,21\n1,2,3,95,20,0.9,21\n")
+    with pytest.warns(UserWarning, match=r"left out: MAC, Temp \[°C\]"):
+        np.testing.assert_allclose(load_taps(path).ratio, [1 / 32, 1 / 40])
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
+        (
+            "x_mm,y_mm,z_mm,frequency_Hz,Q,damping_percent\n1,2,3,4,5,6\n",
+            "expected the damping once, found it as 'damping_percent'",
+        ),
         ("x_mm,y_mm,z_mm\n1,2,3\n", "missing frequency_Hz"),
         ("x_mm,y_mm,z_mm,frequency_Hz,tone\n1,2,3,4,5\n", "unknown column 'tone'"),
         (
@@ -207,7 +218,8 @@ def test_assumed_damping_is_off_as_a_whole_and_from_mode_to_mode(arm, factor):
     assert fitted(problem, ()).chi2 == pytest.approx(np.log(factor) ** 2 / (each / n + 1.0), rel=1e-3)
 
 
-def test_a_perfect_response_is_as_uncertain_as_taps_repeat(tmp_path):
+@pytest.mark.parametrize("together", [False, True])
+def test_a_perfect_response_is_as_uncertain_as_taps_repeat(tmp_path, together):
     """Two modes without noise: frequency 0.2 %, damping 10 %, flexibility 5 % of the mode and 1 % of the largest (root of squares)."""
     f = np.linspace(20, 60, 400)
     modes = [(30.0, 0.02, np.array([3e-6, -4e-6, 0.0])), (45.0, 0.03, np.array([0.0, 1e-7, 0.0]))]
@@ -219,6 +231,10 @@ def test_a_perfect_response_is_as_uncertain_as_taps_repeat(tmp_path):
         lines = [f"{x},{h.real},{h.imag}" for x, h in zip(f.tolist(), H.tolist(), strict=True)]
         (tmp_path / f"{a}.csv").write_text("\n".join(["frequency_Hz,real_m/N,imag_m/N", *lines]) + "\n")
         rows.append(f"1000,0,0,{a}.csv,+{'xyz'[a]},-z")
+    if together:
+        each = [(tmp_path / f"{a}.csv").read_text().splitlines() for a in range(3)]
+        (tmp_path / "all.csv").write_text("\n".join(map(",".join, zip(*each, strict=True))))
+        rows[1:] = ["1000,0,0,all.csv,+x y +z,-z"]
     (tmp_path / "taps.csv").write_text("\n".join(rows) + "\n")
     t = load_taps(tmp_path / "taps.csv")
     size = [5e-6, 1e-7]

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.optimize import curve_fit
+from threadpoolctl import threadpool_info, threadpool_limits
 
 import stiffmap as sm
-from stiffmap.workspace.vibration import tip_modes
+from stiffmap.workspace.vibration import extraction, tip_modes
 from stiffmap.workspace.vibration.extraction import _noise, extract_modes
 from stiffmap.workspace.vibration.files import MeasuredResponse
 
@@ -96,3 +97,17 @@ def test_rounding_is_no_mode_and_no_certainty(frequency, ratio, digits, coherenc
     assert found.frequency == pytest.approx([frequency], rel=1e-6)
     assert found.ratio == pytest.approx([ratio], rel=1e-4)
     assert found.u_ratio[0] > 1e-7 * ratio
+
+
+def test_an_extraction_runs_on_one_thread(monkeypatch):
+    seen, noise = set(), extraction._noise
+
+    def watched(*given):
+        seen.update(pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas")
+        return noise(*given)
+
+    monkeypatch.setattr(extraction, "_noise", watched)
+    f = np.linspace(5, 50, 40)
+    with threadpool_limits(limits=2, user_api="blas"):
+        extract_modes([MeasuredResponse("", f, 1e-6 / (1 - (f / 20) ** 2 + 0.1j), np.full(40, np.nan))])
+    assert seen == {1}

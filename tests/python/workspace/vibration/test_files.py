@@ -535,3 +535,39 @@ def test_a_second_form_may_be_in_decibels(size, tmp_path):
     rows = "".join(f"{k + 5},{','.join(map(str, line))}\n" for k, line in enumerate(lines))
     (tmp_path / "db.csv").write_text(f"frequency_Hz,real_m/N,imag_m/N,{size},phase_deg\n{rows}")
     np.testing.assert_allclose(read_responses(tmp_path / "db.csv")[0].receptance, h)
+
+
+H1 = "Frequency [Hz];H1 Ch2/Ch1 Real [m/N];H1 Ch2/Ch1 Imag [m/N];H1 Ch3/Ch1 Real [m/N];H1 Ch3/Ch1 Imag [m/N]"
+
+
+@pytest.mark.parametrize(
+    ("head", "rows"),
+    [
+        (H1, "{0};{1};{2};{3};{4}"),
+        (
+            "Frequency;FRF X;;FRF Y;\n;Real;Imag;Real;Imag\n[Hz];[m/N];[m/N];[m/N];[m/N]",
+            "{0};{1};{2};{3};{4}",
+        ),
+        ("Frequency;FRF;FRF\n[Hz];[m/N];[m/N]", "{0};{1}{2:+}i;{3}{4:+}i"),
+        ("Frequency;FRF;;FRF;\n[Hz];[m/N];[m/N];[m/N];[m/N]", "{0};{1};{2};{3};{4}"),
+        (
+            "Frequency [Hz];Real [m/N];Imag [m/N];Frequency [Hz];Real [m/N];Imag [m/N]",
+            "{0};{1};{2};{0};{3};{4}",
+        ),
+    ],
+)
+@pytest.mark.parametrize("comma", [False, True])
+def test_several_responses_in_one_table(tmp_path, head, rows, comma):
+    f = np.arange(5.0, 20.0)
+    H = np.array([s / (1 - (f / 12) ** 2 + 0.01j * f) for s in (1.5, 2.5)])
+    text = "\n".join(rows.format(a, x.real, x.imag, y.real, y.imag) for a, x, y in zip(f, *H, strict=True))
+    (tmp_path / "r.csv").write_text(f"{head}\n{text.replace('.', ',') if comma else text}\n")
+    found = read_responses(tmp_path / "r.csv")
+    np.testing.assert_allclose([r.receptance for r in found], H)
+    assert [r.name for r in found] == ["r 1", "r 2"]
+
+
+def test_one_coherence_of_two_responses_is_of_neither(tmp_path):
+    (tmp_path / "r.csv").write_text(f"{H1};Coherence\n5;1;0;1;0;1\n6;1;0;1;0;1\n")
+    with pytest.raises(StiffmapError, match="Coherence: expected a coherence of each of 2 responses"):
+        read_responses(tmp_path / "r.csv")
