@@ -90,9 +90,11 @@ class DHRow:
     a: float
     alpha: float
     slides: bool
-    range: tuple[float, float] | None
+    range: tuple[float, float] | None = None
     behind: Floats = field(default_factory=lambda: np.eye(4), compare=False)
     """(4, 4) frame of the tool behind the last joint's own."""
+    beta: float | None = None
+    """Hayati's fourth parameter, given where the next axis is parallel: Rz(theta) Tx(a) Rx(alpha) Ry(beta), and d is 0."""
 
 
 def read_dh(given: Table, units: Mapping[str, str], convention: str) -> list[DHRow]:

@@ -8,6 +8,7 @@ from os import PathLike
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg.lapack import dpstrf
 
 from stiffmap.common.broadcasting import names_of, whole_number
 from stiffmap.common.errors import StiffmapError
@@ -187,14 +188,7 @@ def independent(gram: Floats) -> NDArray[np.intp]:
     Pivoted elimination of AᵀA: the unknown that is most observable comes first and is projected out of the others, until what
     remains of each is below `SEEN`.
     """
-    left = np.array(gram, dtype=float)
-    kept: list[int] = []
-    for _ in range(len(left)):
-        size = np.diag(left).copy()
-        size[kept] = -np.inf
-        best = int(np.argmax(size))
-        if not size[best] > SEEN**2:
-            break
-        kept.append(best)
-        left = left - np.outer(left[best], left[best]) / left[best, best]
-    return np.array(sorted(kept), dtype=np.intp)
+    if not (np.diag(gram) > SEEN**2).any():
+        return np.zeros(0, np.intp)
+    _, pivots, rank, _ = dpstrf(gram, tol=SEEN**2)
+    return np.sort(pivots[:rank]).astype(np.intp) - 1

@@ -15,6 +15,7 @@ from stiffmap.experiment.noise.whitening import LinearProblem
 from stiffmap.experiment.prediction.history import Terms
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.experiment.virtual.plans import plan_of_poses
+from stiffmap.identification.candidates.candidates import words
 from stiffmap.identification.inference.optimum import covariance
 from stiffmap.identification.planning.estimate import fitted, slopes
 from stiffmap.solve.machine import Machine
@@ -39,8 +40,7 @@ class Information:
         if not parameters:
             raise StiffmapError("plan: the effects have no number that could be fitted")
         self.names = tuple(
-            f"{t.kind} of {t.element} {' '.join(t.legs)}: {p.name}"
-            for t, p in ((known[i], p) for i, p in parameters)
+            f"{words(known[i].kind, known[i].element, known[i].legs)}: {p.name}" for i, p in parameters
         )
         self.units = tuple(p.unit for _, p in parameters)
         self.scale = np.array([p.scale for _, p in parameters])

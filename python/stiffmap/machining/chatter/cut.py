@@ -19,12 +19,13 @@ from stiffmap.common.broadcasting import (
     instance_of,
     real_array,
     real_number,
+    refused,
     thread_count,
     whole_number,
 )
 from stiffmap.common.errors import StiffmapError
 from stiffmap.machining.process.description import EndMill, Process, own_arc, with_coefficients
-from stiffmap.machining.process.load import GivenProcess, as_process
+from stiffmap.machining.process.load import GivenProcess, as_process, spindle_rate
 from stiffmap.solve.compiled import multipliers
 from stiffmap.workspace.maps.inputs import unit
 from stiffmap.workspace.vibration.modes import TipModes
@@ -189,18 +190,10 @@ def spindle_speed(speed: object, process: Process) -> float:
     """rad/s of a number in rad/s, or text such as 5000 rpm; None: the process's own."""
     if speed is None:
         return process.spindle
-    if isinstance(speed, str):
-        number, _, unit = speed.strip().partition(" ")
-        scale = {"rpm": 2 * pi / 60, "Hz": 2 * pi, "rad/s": 1.0}.get(unit.strip())
-        try:
-            speed = float(number) * (scale or np.nan)
-        except ValueError:
-            speed = np.nan
-    out = real_number(speed, "speed", "a spindle speed in rad/s, or text such as '5000 rpm'")
-    if not (np.isfinite(out) and out > 0):
-        raise StiffmapError(
-            f"speed: expected a spindle speed above zero in rad/s, or text such as '5000 rpm', got {speed!r}"
-        )
+    what = "a spindle speed above zero in rad/s, or text such as '5000 rpm'"
+    out = spindle_rate(speed.strip()) if isinstance(speed, str) else real_number(speed, "speed", what)
+    if not 0 < out < np.inf:
+        raise refused("speed", what, repr(speed))
     return out
 
 

@@ -24,7 +24,6 @@ from stiffmap.machining.chatter.cut import (
     multiplier_map,
 )
 from stiffmap.machining.chatter.zero_order import (
-    FEED,
     TOOL,
     at_periods,
     coupling_depth,
@@ -121,7 +120,7 @@ def stability_lobes(
         machine = as_machine(machine)
     p = milling_process(process)
     along = flange(machine, pose.get("rotation")) if tool is None else unit(tool, "tool")
-    ahead = _across(along) if feed is None else unit(feed, "feed")
+    ahead = np.eye(3)[int(abs(along[0]) >= np.sqrt(0.5))] if feed is None else unit(feed, "feed")
     modes, said = _modes(machine, position, cut_axes(ahead, along), pose)
     if extra := list(also):
         modes = modes.and_also(mode_rows(extra))
@@ -167,10 +166,6 @@ def flange(machine: object, rotation: ArrayLike | None) -> Floats:
     home = machine.description.home.r
     r = home if rotation is None else as_rotations(real_array(rotation, "rotation"))
     return np.asarray((1.0 if home[2, 2] > np.sqrt(0.5) else -1.0) * r[..., :, 2].reshape(-1, 3)[0])
-
-
-def _across(tool: Floats) -> Floats:
-    return np.array(FEED if abs(tool[0]) < np.sqrt(0.5) * np.linalg.norm(tool) else (0.0, 1.0, 0.0))
 
 
 def _limits_at(

@@ -3,30 +3,18 @@
 from stiffmap.machining.compensation.axis_errors import AxisErrors, axis_errors, axis_errors_of_map
 from stiffmap.machining.compensation.check import CompensationCheck, check_compensation
 from stiffmap.machining.compensation.commands import Commands, compensate
-from stiffmap.machining.compensation.geometry import (
-    DhRow,
-    corrected_geometry,
-    corrected_urdf,
-    dh_list,
-    write_dh,
-    write_urdf,
-)
-from stiffmap.machining.compensation.tables import FORMATS, compensation_table, read_table, write_table
+from stiffmap.machining.compensation.geometry import write_dh, write_urdf
+from stiffmap.machining.compensation.tables import compensation_table, read_table, write_table
 
 __all__ = [
-    "FORMATS",
     "AxisErrors",
     "Commands",
     "CompensationCheck",
-    "DhRow",
     "axis_errors",
     "axis_errors_of_map",
     "check_compensation",
     "compensate",
     "compensation_table",
-    "corrected_geometry",
-    "corrected_urdf",
-    "dh_list",
     "read_table",
     "write_dh",
     "write_table",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 
@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.outputs import write_text, writing
+from stiffmap.experiment.spreadsheet.dh import DHRow
 from stiffmap.machining.toolpath.gcode.words import decimal
 from stiffmap.model.description import Element, Joint, MachineDescription, Offset, Pose, Spring
 from stiffmap.model.description.tree import edit_all
@@ -29,20 +30,6 @@ estimation", CDC 1983)."""
 Frame = tuple[Floats, Floats]
 DIGITS = 9
 """Decimals of mm and deg in a table of Denavit and Hartenberg, and of rotations."""
-
-
-@dataclass(frozen=True)
-class DhRow:
-    """One joint, m and rad: Rz(q + theta) Tz(d) Tx(a) Rx(alpha), or Rz(q + theta) Tx(a) Rx(alpha) Ry(beta)."""
-
-    joint: str
-    theta: float
-    d: float
-    a: float
-    alpha: float
-    beta: float | None = None
-    """rad; given where the next axis is parallel, and d is then 0."""
-    prismatic: bool = False
 
 
 def corrected_geometry(description: MachineDescription) -> tuple[MachineDescription, list[str]]:
@@ -109,7 +96,7 @@ def serial_joints(description: MachineDescription) -> tuple[list[tuple[Joint, Fr
     return joints, (p, r)
 
 
-def dh_list(description: MachineDescription) -> tuple[Frame, list[DhRow], Frame]:
+def dh_list(description: MachineDescription) -> tuple[Frame, list[DHRow], Frame]:
     """Base frame, one row per joint but the last, whose frame and the tool's are left: (p, R) of the first
     frame in base axes, rows, and (p, R) of the tool in the last row's frame turned by the last joint."""
     joints, (tool_p, tool_r) = serial_joints(description)
@@ -123,7 +110,7 @@ def dh_list(description: MachineDescription) -> tuple[Frame, list[DhRow], Frame]
         rows.append(row)
         frame = (o + x @ step[0], x @ step[1])
     o, x = frame
-    rows.append(DhRow(joints[-1][0].name, 0.0, 0.0, 0.0, 0.0, None, joints[-1][0].kind == "prismatic"))
+    rows.append(DHRow(joints[-1][0].name, 0.0, 0.0, 0.0, 0.0, joints[-1][0].kind == "prismatic"))
     return base, rows, (x.T @ (tool_p - o), x.T @ tool_r)
 
 
@@ -139,7 +126,7 @@ def write_dh(machine: Machine, path: str | PathLike[str]) -> list[str]:
     for row in rows:
         numbers = np.degrees(row.theta), 1e3 * row.d, 1e3 * row.a, np.degrees(row.alpha)
         beta = "" if row.beta is None else decimal(np.degrees(row.beta), DIGITS)
-        lines.append(",".join([row.joint, *(decimal(v, DIGITS) for v in numbers), beta]))
+        lines.append(",".join([row.name, *(decimal(v, DIGITS) for v in numbers), beta]))
     for name, shift, turn in (("base", p, r), ("tool", q, s)):
         cells = ",".join(decimal(v, DIGITS) for v in (*(1e3 * shift), *turn.ravel()))
         lines.append(f"# {name}: x y z in mm, rotation by rows,{cells}")
@@ -155,7 +142,7 @@ def _with_z(z: Floats) -> Floats:
     return np.column_stack([x, np.cross(z, x), z])
 
 
-def _row(joint: Joint, q: Floats, z: Floats) -> tuple[DhRow, Frame]:
+def _row(joint: Joint, q: Floats, z: Floats) -> tuple[DHRow, Frame]:
     """Row from a frame to the next axis: a point q on it and its direction z, both in the frame."""
     z = z / np.linalg.norm(z)
     slides = joint.kind == "prismatic"
@@ -167,13 +154,13 @@ def _row(joint: Joint, q: Floats, z: Floats) -> tuple[DhRow, Frame]:
         turned = Rotation.from_euler("z", theta).inv().apply(z)
         beta, alpha = float(np.arcsin(turned[0])), float(np.arctan2(-turned[1], turned[2]))
         r = Rotation.from_euler("ZXY", [theta, alpha, beta]).as_matrix()
-        return DhRow(joint.name, theta, 0.0, a, alpha, beta, slides), (foot, r)
+        return DHRow(joint.name, theta, 0.0, a, alpha, slides, beta=beta), (foot, r)
     x = across / size
     # o + d z0 + a x = q + s z
     d, a, _ = np.linalg.solve(np.column_stack([[0.0, 0.0, 1.0], x, -z]), q)
     theta, alpha = float(np.arctan2(x[1], x[0])), float(np.arctan2(size, z[2]))
     r = Rotation.from_euler("ZX", [theta, alpha]).as_matrix()
-    row = DhRow(joint.name, theta, float(d), float(a), alpha, None, slides)
+    row = DHRow(joint.name, theta, float(d), float(a), alpha, slides)
     return row, (np.array([0.0, 0.0, d]) + a * x, r)
 
 

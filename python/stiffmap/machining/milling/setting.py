@@ -12,12 +12,10 @@ from scipy.spatial.transform import Rotation
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.machining.process.description import Process, mean_force, widened
+from stiffmap.machining.process.force import SMALL
 from stiffmap.machining.toolpath import Placement, Points, Toolpath, engagement
 from stiffmap.machining.toolpath.engagement import Engagement, part_side
 from stiffmap.solve.machine import Machine
-
-SMALL = 1e-8
-"""m of a central difference of the force."""
 
 
 @dataclass(frozen=True, eq=False)

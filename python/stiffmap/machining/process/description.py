@@ -219,29 +219,6 @@ def mean_force(process: Process, width: ArrayLike, axial: ArrayLike, faster: Arr
     return np.asarray(np.maximum(a, 0.0)[..., None] * force)
 
 
-SHALLOWEST = 1e-9
-"""m: below this width the slope is that at this width (it grows without bound as the arc vanishes)."""
-
-
-def slopes(process: Process, width: ArrayLike, axial: ArrayLike) -> tuple[Floats, Floats]:
-    """(..., 3) N/m and (..., 3) N/m: of the mean force by width and by depth."""
-    w, a = np.broadcast_arrays(np.asarray(width, float), np.asarray(axial, float))
-    by_depth = mean_force(process, w, np.ones_like(a)) * (a > 0)[..., None]
-    if process.cut.side == "slot":
-        return np.zeros_like(by_depth), by_depth
-    edge, chip = densities(process)
-    d = process.tool.diameter
-    inside = (w > 0) & (w < d)
-    safe = np.clip(w, min(SHALLOWEST, d / 4), d * (1 - 1e-12))
-    f, t = engaged(process, safe)
-    phi = f if process.cut.side == "climb" else t
-    s, c = np.sin(phi), np.cos(phi)
-    tangential, radial, along = (edge[i] + chip[i] * s for i in range(3))
-    arc = 1 / np.sqrt(safe * (d - safe))  # of the arc by the width
-    at = np.stack([-tangential * c - radial * s, tangential * s - radial * c, along], axis=-1)
-    return (np.where(inside, arc, 0.0) * np.maximum(a, 0.0))[..., None] * at, by_depth
-
-
 def tangential_force(process: Process, width: ArrayLike, axial: ArrayLike) -> Floats:
     """N, mean tangential force at the rim: torque over radius."""
     w, a = np.broadcast_arrays(np.asarray(width, float), np.asarray(axial, float))

@@ -16,7 +16,6 @@ from stiffmap.machining.process.description import (
     Process,
     mean_force,
     own_arc,
-    slopes,
     tangential_force,
     with_coefficients,
 )
@@ -25,6 +24,8 @@ from stiffmap.machining.process.load import GivenProcess, as_process
 STEPS = 720
 """Angles of a revolution, about; the nearest multiple of the teeth is taken."""
 SLICES = 60
+SMALL = 1e-8
+"""m of a central difference of the force."""
 
 
 @cache
@@ -169,7 +170,12 @@ def cutting_force(process: GivenProcess) -> CuttingForce:
     spectrum = 2 * np.abs(np.fft.rfft(force, axis=0)) / len(angle)
     order = np.arange(1, n * ORDERS + 1)
     order = order[order < len(spectrum)]
-    side, depth = slopes(p, p.cut.radial, p.cut.axial)
+    step = min(
+        SMALL, p.tool.diameter - p.cut.radial
+    )  # no width changes the arc of a tool that is engaged all around
+    ends = mean_force(p, p.cut.radial + np.array([step, -step]), p.cut.axial)
+    side = (ends[0] - ends[1]) / (2 * step or 1.0)
+    depth = mean_force(p, p.cut.radial, 1.0)
     tangential = float(tangential_force(p, p.cut.radial, p.cut.axial))
     wall = -1.0 if p.cut.side == "climb" else 1.0  # the part lies on this side of the normal
     notes = [p.note] if p.note else []

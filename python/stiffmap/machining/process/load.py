@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from math import isfinite, pi
+from math import isfinite, nan, pi
 from os import PathLike
 from pathlib import Path
 from typing import Any, Literal, NoReturn
@@ -12,6 +12,7 @@ from typing import Any, Literal, NoReturn
 from pydantic import Field, create_model
 
 from stiffmap.common.errors import FileError, StiffmapError, refuse_folder, suggestion
+from stiffmap.common.number_text import number_in
 from stiffmap.common.units import FREQUENCIES, feed_unit
 from stiffmap.common.yaml_text import Document, read
 from stiffmap.machining.process.description import Cut, EndMill, Kienzle, Law, Process, Tool, Trimming
@@ -101,14 +102,15 @@ class NumberReader:
             self.fail(f"expected a number above zero{limit}, found {value!r}", *keys)
         return out
 
-    def rate(self, value: object, *keys: str) -> float:
-        """rad/s of ``6000 rpm`` or ``100 Hz``."""
-        text = str(value).strip()
-        unit = max((u for u in FREQUENCIES if text.lower().endswith(u)), key=len, default="")
-        out = self.positive(text.lower().removesuffix(unit), "", *keys) * FREQUENCIES[unit] if unit else 0.0
-        if not 0 < 2 * pi * out <= FASTEST:
-            self.fail(f"expected a speed such as 6000 rpm, up to 1e6 rpm; found {text!r}", *keys)
-        return 2 * pi * out
+
+def spindle_rate(text: str) -> float:
+    """rad/s of ``6000 rpm`` or ``100 Hz``; NaN where that is no speed of a spindle, above zero and up to 1e6 rpm."""
+    unit = max((u for u in FREQUENCIES if text.lower().endswith(u)), key=len, default="")
+    try:
+        out = 2 * pi * (number_in(text.lower().removesuffix(unit)) * FREQUENCIES[unit]) if unit else nan
+    except ValueError:
+        return nan
+    return out if 0 < out <= FASTEST else nan
 
 
 def process_of(document: Document, file: str) -> Process:
@@ -116,7 +118,11 @@ def process_of(document: Document, file: str) -> Process:
     expected = "a process file is a mapping with name, tool, law, spindle, feed and cut"
     m = validated(ProcessFile, document, file, expected)
     r = NumberReader(document, file)
-    tool, spindle = _tool(m, r), r.rate(m.spindle, "spindle")
+    tool, spindle = _tool(m, r), spindle_rate(str(m.spindle).strip())
+    if not spindle > 0:
+        r.fail(
+            f"expected a speed such as 6000 rpm, above zero, up to 1e6 rpm; found {m.spindle!r}", "spindle"
+        )
     feed, cut, law = _feed(m.feed, tool, spindle, r), _cut(m, tool, r), _law(m, tool, r)
     tolerance = None if m.tolerance is None else r.positive(m.tolerance, "m", "tolerance", most=tool.diameter)
     process = Process(m.name, tool, law, spindle, feed, cut, tolerance, m.title, m.source, r.uncertainty)

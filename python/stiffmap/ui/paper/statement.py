@@ -76,18 +76,12 @@ def as_rich(statements: Sequence[Statement]) -> RenderableType:
     out: list[RenderableType] = []
     for s in statements:
         lines = [f"§{s.section} [bold]“{escape(s.words)}”[/]"]
-        lines.append(
-            f"paper: {escape(s.printed)}; ours: {escape(s.ours)}: [{COLOUR[s.verdict]}]{verdict_text(s)}[/]"
-        )
+        verdict = f"{s.verdict}{', but it is an input of our model' * s.own_input}"
+        lines.append(f"paper: {escape(s.printed)}; ours: {escape(s.ours)}: [{COLOUR[s.verdict]}]{verdict}[/]")
         lines += [f"[dim]{escape(s.because)}[/]"] if s.because else []
         out += [Padding(Text.from_markup(t), (0, 0, 0, INDENT if i else 0)) for i, t in enumerate(lines)]
         out.append(Text(""))
     return Group(*out)
-
-
-def verdict_text(s: Statement) -> str:
-    """The verdict, and whether agreement is more than our own input."""
-    return f"{s.verdict}, but it is an input of our model" if s.own_input else str(s.verdict)
 
 
 def as_markdown(statements: Sequence[Statement]) -> str:

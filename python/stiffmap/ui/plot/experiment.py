@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from scipy.special import fdtrc
 
 from stiffmap.experiment.comparison.residual import Residual
-from stiffmap.experiment.experiment import Experiment, Floats
+from stiffmap.experiment.experiment import WRENCH, Experiment, Floats
 from stiffmap.identification.diagnosis.report.result import Diagnosis
 from stiffmap.ui.plot.style import AFTER, BEFORE, MM, UM, new_figure
 
@@ -146,21 +146,9 @@ def _label(e: Experiment, channel: int) -> str:
     return f"{c.name}, {'µm' if c.unit == 'm' else 'µrad'}"
 
 
-def _coordinates(e: Experiment) -> list[Driver]:
-    return [(f"{c}, mm", e.position[:, i] * MM, []) for i, c in enumerate("xyz")]
-
-
-def _forces(e: Experiment) -> list[Driver]:
-    return [(f"f{c}, N", e.wrench[:, i], []) for i, c in enumerate("xyz") if e.wrench[:, i].any()]
-
-
-def _series(e: Experiment) -> list[Driver]:
-    return [(n, x, []) for n, x in (("order", e.order), ("temperature", e.temperature)) if x is not None]
-
-
 def pose_drivers(e: Experiment) -> list[Driver]:
     """Commanded coordinates; actuator coordinates where they are commanded."""
-    out = _coordinates(e)
+    out: list[Driver] = [(f"{c}, mm", e.position[:, i] * MM, []) for i, c in enumerate("xyz")]
     if e.other is not None:
         out.append(("distance, mm", np.linalg.norm(e.other - e.position, axis=1) * MM, []))
     for i, c in enumerate(e.command_of):
@@ -174,10 +162,9 @@ def force_drivers(e: Experiment) -> list[Driver]:
     """Components and size of the force, its direction, and moments."""
     if not e.wrench.any():
         return []
-    force = e.wrench[:, :3]
-    out = _forces(e)
-    moments = [i for i in range(3, 6) if e.wrench[:, i].any()]
-    out += [(f"m{'xyz'[i - 3]}, N·m", e.wrench[:, i], []) for i in moments]
+    force, units = e.wrench[:, :3], ("N", "N·m")
+    acting = [i for i in range(6) if e.wrench[:, i].any()]
+    out: list[Driver] = [(f"{WRENCH[i]}, {units[i // 3]}", e.wrench[:, i], []) for i in acting]
     if not force.any():
         return out
     out.append(("size of the force, N", np.linalg.norm(force, axis=1), []))
@@ -203,7 +190,8 @@ def direction_name(ratio: Floats) -> str:
 
 def history_drivers(e: Experiment) -> list[Driver]:
     """Order, temperature, branch, set-up."""
-    out = _series(e)
+    series = (("order", e.order), ("temperature", e.temperature))
+    out: list[Driver] = [(n, x, []) for n, x in series if x is not None]
     for name, words in (("branch", e.branch), ("set-up", e.setup)):
         if words:
             labels, at = np.unique(words, return_inverse=True)
@@ -265,7 +253,8 @@ def trends(d: Diagnosis, drivers: list[Driver]) -> Figure:
 
 def drivers_of(e: Experiment) -> list[Driver]:
     """What residuals of a diagnosis are drawn against, whole numbers for the branch."""
-    out = _coordinates(e) + _forces(e) + _series(e)
+    forces = [f for f in force_drivers(e) if f[0] in ("fx, N", "fy, N", "fz, N")]
+    out = [*pose_drivers(e)[:3], *forces, *(s for s in history_drivers(e) if not s[2])]
     if e.branch:
         unloading = np.array([b == "unloading" for b in e.branch], float)
         out.append(("branch: 0 loading, 1 unloading", unloading, []))

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-import json
-from dataclasses import dataclass
+from collections.abc import Sequence
 from html import escape
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stiffmap.common.broadcasting import Floats
-from stiffmap.common.errors import FileError
 from stiffmap.common.kept import Kept
 from stiffmap.experiment import Experiment
 from stiffmap.experiment.calls import residual
+from stiffmap.identification.diagnosis.report.findings import Effect
+from stiffmap.identification.diagnosis.report.result import Diagnosis, read_diagnosis
+from stiffmap.identification.diagnosis.report.sentences import effect_text
 from stiffmap.solve.machine import Machine, load_machine
 from stiffmap.ui.plot.loaded import round_factor
 from stiffmap.ui.plot.skeleton import element_links
@@ -24,9 +25,6 @@ from stiffmap.ui.plot.style import BLUE, GREEN, VERMILLION
 from stiffmap.ui.view.moment import Moment
 from stiffmap.ui.view.plane import rgb
 from stiffmap.ui.view.scene import DIAGNOSED, Scene
-
-if TYPE_CHECKING:
-    from stiffmap.identification.diagnosis.report.result import Diagnosis
 
 DRAWN = 0.06  # of the machine's extent, the longest arrow and the widest ribbon
 MOST_POINTS = 400  # of a path that are solved
@@ -39,62 +37,21 @@ RESULT, CORRECTED = "diagnosis.json", "machine.yaml"
 """Files of the folder that ``stiffmap diagnose -o`` wrote."""
 
 
-@dataclass(frozen=True)
-class ShownEffect:
-    """An effect on its element; `legs` is empty where the element is in none."""
-
-    kind: str
-    element: str
-    legs: tuple[str, ...]
-    text: str
-
-    def links(self, machine: Machine) -> list[int]:
-        """Which links of a drawing are lit for it."""
-        return element_links(machine, self.element, self.legs)
-
-
-@dataclass(frozen=True, eq=False)
-class ShownFindings:
+class ShownFindings(NamedTuple):
     """A verdict, the effects that it names, and the machine with them."""
 
     verdict: str
-    effects: tuple[ShownEffect, ...]
+    effects: Sequence[Effect]
     machine: Machine
 
 
 def findings(diagnosis: Diagnosis | str | PathLike[str]) -> ShownFindings:
     """Of a `Diagnosis`, or of the folder of one (or its ``diagnosis.json``); FileError where that cannot be read."""
-    if isinstance(diagnosis, str | PathLike):
-        return _from_folder(Path(diagnosis))
-    return ShownFindings(
-        diagnosis.verdict, tuple(map(_named, diagnosis.as_plain()["effects"])), diagnosis.machine
-    )
-
-
-def _from_folder(given: Path) -> ShownFindings:
-    file = given / RESULT if given.is_dir() else given
-    try:
-        data = json.loads(file.read_text(encoding="utf-8"))
-        verdict, effects = str(data["verdict"]), tuple(map(_named, data["effects"]))
-    except OSError as problem:
-        message = f"{problem.strerror}; expected the folder that stiffmap diagnose -o wrote"
-        raise FileError(message, file=str(file)) from None
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
-        raise FileError(f"expected the {RESULT} that stiffmap diagnose -o wrote", file=str(file)) from None
-    return ShownFindings(verdict, effects, load_machine(file.with_name(CORRECTED)))
-
-
-def _named(e: Any) -> ShownEffect:
-    legs = tuple(map(str, e["legs"]))
-    where = f", leg{'s' if len(legs) > 1 else ''} {', '.join(legs)}" if legs else ""
-    values = ", ".join(
-        f"{name} {v[0]:.4g} [{v[1]:.4g}, {v[2]:.4g}] {v[3]}" for name, v in e["parameters"].items()
-    )
-    others = len(e["aliases"])
-    more = f" (or {others} other place{'s' if others > 1 else ''})" if others else ""
-    return ShownEffect(
-        str(e["kind"]), str(e["element"]), legs, f"{e['kind']} of {e['element']}{where}: {values}{more}"
-    )
+    if not isinstance(diagnosis, str | PathLike):
+        return ShownFindings(diagnosis.verdict, diagnosis.effects, diagnosis.machine)
+    file = Path(diagnosis)
+    file = file / RESULT if file.is_dir() else file
+    return ShownFindings(*read_diagnosis(file), load_machine(file.with_name(CORRECTED)))
 
 
 class Data:
@@ -161,13 +118,13 @@ class Data:
         scene.points("/rows/places", places, rgb("#444444"), 0.005)
 
     def _effects(self, scene: Scene, moment: Moment, found: ShownFindings) -> None:
-        scene.diagnosed = list(dict.fromkeys(i for e in found.effects for i in e.links(moment.machine)))
-        named = "; ".join(escape(e.text) for e in found.effects) or "no effect is named"
+        links = [element_links(moment.machine, e.element, e.legs) for e in found.effects]
+        scene.diagnosed = list(dict.fromkeys(i for each in links for i in each))
+        named = "; ".join(escape(effect_text(e)) for e in found.effects) or "no effect is named"
         self._said["Diagnosis (pink)"] = f"{escape(found.verdict)}: {named}"
-        for i, e in enumerate(found.effects):
-            links = e.links(moment.machine)
-            if links:
-                middle = scene.rest.links[links[0]].mean(axis=0)
+        for i, (e, lit) in enumerate(zip(found.effects, links, strict=True)):
+            if lit:
+                middle = scene.rest.links[lit[0]].mean(axis=0)
                 scene.api.add_label(f"/diagnosis/{i}", f"{e.kind} of {e.element}", position=tuple(middle))
 
     def _ribbon(self, scene: Scene, moment: Moment, path: Floats) -> None:

@@ -85,7 +85,12 @@ def test_the_command_line(
         save_experiment(twin(orthoglide, plan, scale, 0), tmp_path / name)
     told = {
         "effects": [
-            {"kind": "compliance", "element": "actuator", "legs": ["x"], "parameters": {"scale": [1.3]}}
+            {
+                "kind": "compliance",
+                "element": "actuator",
+                "legs": ["x"],
+                "parameters": {"scale": [1.3, 1.2, 1.4, "1"]},
+            }
         ]
     }
     (tmp_path / "d.json").write_text(json.dumps(told))

@@ -17,10 +17,9 @@ from stiffmap.machining.compensation import (
     axis_errors,
     check_compensation,
     compensate,
-    corrected_geometry,
-    dh_list,
     write_dh,
 )
+from stiffmap.machining.compensation.geometry import corrected_geometry, dh_list
 from stiffmap.ui.cli.app import main
 
 MACHINES = (

@@ -9,7 +9,8 @@ import pytest
 
 import stiffmap as sm
 from stiffmap.common.errors import FileError
-from stiffmap.machining.compensation import FORMATS, axis_errors, axis_errors_of_map, read_table, write_table
+from stiffmap.machining.compensation import axis_errors, axis_errors_of_map, read_table, write_table
+from stiffmap.machining.compensation.tables import FORMATS
 from stiffmap.ui.cli.app import main
 
 LINE = np.linspace(0.65, 1.25, 7)

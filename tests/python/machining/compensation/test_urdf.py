@@ -16,7 +16,7 @@ from tests.python.model.urdf.oracle import Robot
 
 import stiffmap as sm
 from stiffmap.common.errors import FileError
-from stiffmap.machining.compensation import corrected_urdf
+from stiffmap.machining.compensation.geometry import corrected_urdf
 from stiffmap.model.description import Joint, Offset, Pose
 from stiffmap.model.urdf import import_urdf
 from stiffmap.ui.cli.app import main

@@ -14,7 +14,6 @@ from stiffmap.machining.process.description import (
     EndMill,
     Trimming,
     mean_force,
-    slopes,
     tangential_force,
     widened,
 )
@@ -76,17 +75,19 @@ def test_revolution_has_that_mean_and_the_tooth_passing_line() -> None:
     assert found.peak >= np.linalg.norm(found.mean)
 
 
-def test_slopes_have_the_order_of_central_differences() -> None:
+def test_slopes_are_the_limit_of_central_differences() -> None:
     p = sm.load_process(process("climb", "6 mm"))
-    by_width, by_depth = slopes(p, 6e-3, 3e-3)
+    by_width = sm.cutting_force(p).stiffness_side
     errors = []
     for h in (4e-4, 2e-4):
         errors.append(
-            np.abs((mean_force(p, 6e-3 + h, 3e-3) - mean_force(p, 6e-3 - h, 3e-3)) / (2 * h) - by_width).max()
+            abs((mean_force(p, 6e-3 + h, 3e-3) - mean_force(p, 6e-3 - h, 3e-3))[1] / (2 * h) - by_width)
         )
     assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.1)
-    assert by_depth == pytest.approx(mean_force(p, 6e-3, 1.0))
-    assert sm.cutting_force(p).stiffness_side == pytest.approx(by_width[1])
+    blind = sm.cutting_force(replace(p, cut=replace(p.cut, through=False)))
+    assert blind.stiffness_depth == pytest.approx(mean_force(p, 6e-3, 3e-3)[1] / 3e-3)
+    assert sm.cutting_force("slot").stiffness_side == 0.0
+    assert sm.cutting_force(process("climb", "25 mm")).stiffness_side == 0.0
 
 
 def test_trimming_spends_the_energy_of_what_it_removes() -> None:

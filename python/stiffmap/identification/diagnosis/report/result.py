@@ -241,21 +241,33 @@ def _limits(d: Diagnosis) -> str:
     )
 
 
+def read_diagnosis(file: Path) -> tuple[str, list[Effect]]:
+    """Verdict and effects of a ``diagnosis.json``; raises `FileError` for another file."""
+    with reading(file):
+        try:
+            data: Any = parse_json(file.read_text(encoding="utf-8"))
+            found = [
+                Effect(
+                    str(e["kind"]), str(e["element"]), tuple(map(str, e["legs"])),
+                    {n: (*np.array([v, a, b], float).tolist(), str(s)) for n, (v, a, b, s) in e["parameters"].items()},
+                    list(e.get("aliases", ())), {},
+                )
+                for e in data["effects"]
+            ]  # fmt: skip
+        except (ValueError, KeyError, TypeError, AttributeError, OverflowError):
+            what = "expected a diagnosis as `stiffmap diagnose --json` writes it"
+            raise FileError(what, file=str(file)) from None
+    return str(data.get("verdict", "")), found
+
+
 def diagnosed(path: Path) -> list[AppliedEffect]:
     """Effects that the diagnosis of a ``diagnosis.json`` names; raises `FileError` for another file, and where it names none."""
-    with reading(path):
-        try:
-            data: Any = parse_json(path.read_text(encoding="utf-8"))
-            terms = []
-            for e in data["effects"]:
-                values = tuple((n, float(v[0])) for n, v in e["parameters"].items())
-                if effects.get(e["kind"]).derived:
-                    values = values[:1]  # what follows from it says the same in other words
-                terms.append(AppliedEffect(e["kind"], e["element"], tuple(e["legs"]), values))
-        except (ValueError, KeyError, TypeError, IndexError, AttributeError, OverflowError):
-            raise FileError(
-                "expected a diagnosis as `stiffmap diagnose --json` writes it", file=str(path)
-            ) from None
+    terms = []
+    for e in read_diagnosis(path)[1]:
+        values = tuple((n, v) for n, (v, *_) in e.parameters.items())
+        if e.kind in effects.kinds() and effects.get(e.kind).derived:
+            values = values[:1]  # what follows from it says the same in other words
+        terms.append(AppliedEffect(e.kind, e.element, e.legs, values))
     if not terms:
         raise FileError("the diagnosis names no effect that could be followed", file=str(path))
     return terms

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import vector_text
 from stiffmap.solve.budget import budget_where_stable, in_shares
@@ -50,8 +49,8 @@ def quick_deflection(case: Case) -> Found:
     c = case.still.compliance[:, :3, :3]
     if not (case.still.status == Status.CONVERGED).all():
         return over_poses(case.positions, np.where(case.still.status == Status.CONVERGED, 0.0, np.nan), "low")
-    value, vector = weakest(c[:, axes][:, :, axes])
-    linear = case.force * value
+    _, values, vectors = np.linalg.svd(c[:, axes][:, :, axes])
+    linear = case.force * values[:, 0]
     loaded = np.full(len(linear), np.nan)
     ratio = 1.0
     for _ in range(len(linear)):
@@ -60,7 +59,7 @@ def quick_deflection(case: Case) -> Found:
         if not todo.any():
             break
         wrench = np.zeros((int(todo.sum()), 6))
-        wrench[:, axes] = case.force * vector[todo]
+        wrench[:, axes] = case.force * vectors[todo, 0]
         s = case.machine.solve(
             case.positions[todo], wrench, rotation=case.rotation, gravity=case.gravity, stiffness=False,
             threads=case.threads,
@@ -72,14 +71,6 @@ def quick_deflection(case: Case) -> Found:
         ratio = max(ratio, float((d / linear[todo]).max()))
     some = np.isfinite(loaded)
     return over_poses(case.positions[some], loaded[some], "low", f"under {case.force:.4g} N")
-
-
-def weakest(block: Floats) -> tuple[Floats, Floats]:
-    """(n,) largest singular value of (n, 2, 2) and (n, 2) the direction that it magnifies."""
-    a, b, c = (np.einsum("ni,ni->n", block[:, :, i], block[:, :, j]) for i, j in ((0, 0), (0, 1), (1, 1)))
-    angle = np.arctan2(2 * b, a - c) / 2
-    vector = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    return np.linalg.norm((block @ vector[..., None])[..., 0], axis=1), vector
 
 
 MOST, QUICK = 201, 25  # samples of a toolpath
