@@ -109,19 +109,21 @@ def _lacks_sag(machine: Machine) -> bool:
 
 
 def _sag(machine: Machine, e: Experiment) -> Kernel:
-    """Of drives that yield under the weight that they carry: each by what the tool rises with it, as the moment of a weight at the tool
-    says, and by its own compliance, of which nothing is known."""
-    up = np.array([0.0, 0.0, 1.0]) if e.gravity is None else -np.array(e.gravity)
-    jacobian = np.nan_to_num(drive_jacobian(machine, e))
-    rise = np.tensordot(up / max(float(np.linalg.norm(up)), 1e-300), jacobian[:, :3], (0, 1))
-    each = (
-        shown_of_drive(machine, e, name, jacobian[:, :, k], rise[:, k])
-        for k, name in enumerate(machine.actuators)
+    """Of turning drives that yield under the weight that they carry: each by what the tool rises with it, as the moment of a weight at
+    the tool says, and by its own compliance, of which nothing is known."""
+    gravity = np.broadcast_to(
+        e.gravity or (0.0, 0.0, -1.0) if e.gravity_of is None else e.gravity_of, (len(e), 3)
     )
-    shown = np.stack(list(each), axis=-1)
+    up = -gravity / np.maximum(np.linalg.norm(gravity, axis=1, keepdims=True), 1e-300)
+    jacobian, shown = np.nan_to_num(drive_jacobian(machine, e)), []
+    for k, name in enumerate(machine.actuators):
+        if not machine.compiled.names.is_prismatic(name):
+            column = jacobian[:, :, k]
+            shown.append(shown_of_drive(machine, e, name, column, np.sum(column[:, :3] * up, axis=1)))
+    each = np.stack(shown, axis=-1) if shown else np.zeros((*e.reading.shape, 1))
 
     def of(a: ReadingPoints) -> Floats:
-        return np.asarray(shown[a.rows, a.channel] / a.sigma[:, None])
+        return np.asarray(each[a.rows, a.channel] / a.sigma[:, None])
 
     return Kernel("field", SAG, lambda a, b: of(a) @ of(b).T, lambda a: np.sum(of(a) ** 2, axis=1))
 
