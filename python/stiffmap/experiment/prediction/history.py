@@ -53,7 +53,7 @@ def history_motion(drives: Drives, plan: Experiment, terms: tuple[AppliedEffect,
     """
     if plan.order is None:
         raise StiffmapError(f"{plan.name}: {terms[0].kind} needs the column 'order': rows in order of time")
-    if any(kind.pair for c in plan.extra if (kind := kind_of(c))):
+    if reads_pairs(plan):
         raise StiffmapError(
             f"{plan.name}: {terms[0].kind} cannot be predicted for distances between two poses"
         )
@@ -102,6 +102,11 @@ def _extra(
         run = here[np.argsort(plan.order[here], kind="stable")]
         out[run] = drive(force[run], compliance, values) - compliance * force[run]
     return out
+
+
+def reads_pairs(plan: Experiment) -> bool:
+    """Whether some readings are taken between two commanded poses."""
+    return any(kind.pair for c in plan.extra if (kind := kind_of(c)))
 
 
 def shown_of_drive(machine: Machine, plan: Experiment, name: str, column: Floats, more: Floats) -> Floats:

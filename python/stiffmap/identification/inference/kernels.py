@@ -17,7 +17,7 @@ from scipy.spatial.distance import cdist
 
 from stiffmap.experiment.experiment import Experiment, Floats, Integers, Mask
 from stiffmap.experiment.poses.configuration import coordinates_of, drive_jacobian
-from stiffmap.experiment.prediction.history import shown_of_drive
+from stiffmap.experiment.prediction.history import reads_pairs, shown_of_drive
 from stiffmap.model.description import Body, Joint
 from stiffmap.model.description.tree import all_elements
 from stiffmap.solve.machine import Machine
@@ -28,6 +28,8 @@ SESSIONS = (0.07, 1.0)
 """Correlation times, in sessions."""
 WANDER = "wander"
 """With what the names of parts begin that go on over time."""
+SMALL = 1e-6
+"""rad per m of rise: readings such as lengths are not linear in larger motions."""
 SAG = "sag of the drives under the weight of the arm"
 FEW_DRIVES = 3
 """Drives up to which the place of the tool says what their coordinates do."""
@@ -74,7 +76,7 @@ def gaps(machine: Machine, e: Experiment, points: ReadingPoints) -> Iterator[Ker
                 yield _field(f"field of {what} over {over}, {length:g}", here, x / length, None)
                 if e.quantity == "deflection":
                     yield _field(f"compliance of {what} over {over}, {length:g}", here, x / length, load)
-    if e.quantity == "position" and _lacks_sag(machine):
+    if e.quantity == "position" and not reads_pairs(e) and _lacks_sag(machine):
         yield _sag(machine, e)
     yield from shared(e, points)
     when = e.hours if e.hours is not None else e.order
@@ -118,8 +120,8 @@ def _sag(machine: Machine, e: Experiment) -> Kernel:
     jacobian, shown = np.nan_to_num(drive_jacobian(machine, e)), []
     for k, name in enumerate(machine.actuators):
         if not machine.compiled.names.is_prismatic(name):
-            column = jacobian[:, :, k]
-            shown.append(shown_of_drive(machine, e, name, column, np.sum(column[:, :3] * up, axis=1)))
+            rise = np.sum(jacobian[:, :3, k] * up, axis=1)
+            shown.append(shown_of_drive(machine, e, name, jacobian[:, :, k], SMALL * rise) / SMALL)
     each = np.stack(shown, axis=-1) if shown else np.zeros((*e.reading.shape, 1))
 
     def of(a: ReadingPoints) -> Floats:
