@@ -236,7 +236,8 @@ def _wrench(model: ExperimentFile, table: Table) -> Floats:
 
 def load_plan(path: Path, machine: Machine, quantity: str, **readings: Any) -> Experiment:
     """Plan of a CSV file (mm, N and rad, or the unit that a header names: ``x [um]``) with x, y, z and, as wanted, loads,
-    orientation, order, temperature, branch, set-up, approach and points; its `readings` are those of `unread`. Raises `FileError` naming file, row and column."""
+    orientation, order, temperature, branch, set-up, approach and points; its `readings` are those of `unread`. Raises `FileError` naming
+    file, row and column."""
     units = ExperimentUnitsModel(length="mm", force="N", angle="rad")
     model = ExperimentFile(machine=machine.name, quantity=quantity, units=units)  # type: ignore[arg-type]
     table = Units(model, str(path)).of_header(read_table(path))

@@ -37,12 +37,12 @@ def read_table(path: Path, expected: int | None = None) -> Table:
     if not header:
         raise FileError("the file is empty", file=str(path))
     counted = header[0] in ("", "row", "Unnamed: 0")  # of R and pandas
-    beside = int(counted and "id" in header)  # that column says nothing more
-    if counted and not beside:
+    spare = int(counted and "id" in header)  # that column says nothing more
+    if counted and not spare:
         header = ("id", *header[1:])
     refuse_twice(header, str(path), 1)
     columns, lines = packed(even(data, len(header), str(path), separator), len(header))
-    header, columns = header[beside:], columns[beside:]
+    header, columns = header[spare:], columns[spare:]
     cells = (c for _, c in islice(rows(), 1, None))
     comma = separator not in ("", ",") and decimal_comma(cells, separator)
     if not lines:

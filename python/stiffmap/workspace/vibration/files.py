@@ -94,11 +94,11 @@ def _tables(path: Path) -> list[MeasuredResponse]:
 
 def _table(t: NamedTable, name: str) -> MeasuredResponse:
     if words := t.values.pop("response", None):
-        beside = [(a, "real") for a, b in FORMS if b in t.values]  # FRF over two columns of numbers
-        parts = [complex_number(f"{c}+0i" if beside else c) for c in words]
+        split = [(a, "real") for a, b in FORMS if b in t.values]  # FRF over two columns of numbers
+        parts = [complex_number(f"{c}+0i" if split else c) for c in words]
         if None in parts:
             t.fail("expected complex numbers, such as 0.1+0.2i", "response", parts.index(None))
-        for n, part in beside or [("real", "real"), ("imag", "imag")]:
+        for n, part in split or [("real", "real"), ("imag", "imag")]:
             t.values[n], t.units[n] = getattr(np.array(parts, complex), part), t.units["response"]
     if t.units.get("coherence", "").endswith(("%", "percent")):
         t.values["coherence"] = t.values["coherence"] / 100
