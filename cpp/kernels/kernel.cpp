@@ -128,7 +128,23 @@ struct Block : Answers {
       const CommandErrorProgram& k = of.errors[i];
       s.a_base[k.coordinate] += command_error(of, k, s.closed[k.of]);
     }
+    if (of.sags) sag(of);
     return set_strokes(of, s);
+  }
+
+  /// Each drive by what the tip rises with it (theory G4).
+  void sag(const Program& of) {
+    Frame tip = Closing::base_frame();
+    walk<Build::nominal>(of, of.chains[of.root], s.closed, tip, s);
+    const V3 g{splat(in.gravity[0]), splat(in.gravity[1]), splat(in.gravity[2])};
+    const bool weighs = in.gravity[0] != 0 || in.gravity[1] != 0 || in.gravity[2] != 0;
+    const V3 up = weighs ? (-1.0 / root(dot(g, g))) * g : V3{splat(0), splat(0), splat(1)};
+    for (int d = 0; d < of.drive_count; ++d) {
+      const DriveProgram& k = of.drives[d];
+      if (k.sag == 0) continue;
+      const JointSlot& joint = s.joints[k.slot];
+      s.a_base[k.coordinate] -= k.sag * dot(up, cross(joint.w, tip.p - joint.o));
+    }
   }
 
   M set_start() {

@@ -65,7 +65,7 @@ struct CommandErrorProgram {
 
 struct DriveProgram {
   std::int32_t coordinate, slot, prismatic;
-  double home, compliance_slope, force_limit;
+  double home, compliance_slope, force_limit, sag;
 };
 
 struct CoordinateProgram {
@@ -200,6 +200,7 @@ struct Program {
   std::int32_t closes;         ///< 1: leg by leg, 2: all at once (`legs` is then the whole machine)
   std::int32_t task[6];        ///< commanded pose components, rotations about the axes of the commanded frame
   std::int32_t open_task;      ///< some are not
+  std::int32_t sags;           ///< some drives sag
   std::int32_t starts_linear;  ///< a law with knots or friction: Newton starts with all laws linear
   std::int32_t hardens;        ///< a law with a cubic term
   std::int32_t bends;          ///< laws with corners, and none of them sticks: a deflection says the force

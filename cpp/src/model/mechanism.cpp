@@ -255,6 +255,10 @@ void Mechanism::finish(const std::vector<ExternalSpring>& springs) {
     require(names.insert(c.name).second, "element names", "different names within a sequence", c.name);
   home_coordinates = VecX::Zero(size());
   for (Index j = 0; j < size(); ++j) home_coordinates[j] = coordinates[static_cast<std::size_t>(j)].home;
+  for (const Drive& d : drives)
+    require(d.numbers.sag == 0 ||
+                (loops.empty() && coordinates[static_cast<std::size_t>(d.coordinate)].type == JointType::revolute),
+            d.name + ".sag", "a joint that turns, of a machine of one chain", "another");
   set_rest();
   find_joints();
   find_balls();

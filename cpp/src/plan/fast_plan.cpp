@@ -131,7 +131,8 @@ void fill_tables(const Mechanism& m, const CompiledChains& chains, FastPlanData&
     const bool cable = m.coordinates[static_cast<std::size_t>(k.coordinate)].cable >= 0;
     const auto joint = cable ? DriveSlot{i32(k.coordinate), -1, 1} : chains.drives[i];
     d.drives.push_back({joint.coordinate, joint.slot, joint.prismatic, m.home_coordinates[k.coordinate],
-                        k.numbers.compliance_slope, k.numbers.force_limit});
+                        k.numbers.compliance_slope, k.numbers.force_limit, k.numbers.sag});
+    d.program.sags |= k.numbers.sag != 0;
   }
   add_strokes(m, d);
   for (const ElasticJoint& e : chains.elastic) {

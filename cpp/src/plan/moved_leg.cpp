@@ -86,7 +86,8 @@ std::int32_t moved_leg(const Program& p, const Program& q) {
   for (std::int32_t i = 0; i < p.error_count; ++i)
     if (!same(p.errors[i], q.errors[i])) one.name(of(p.errors[i].coordinate));
   for (std::int32_t i = 0; i < p.drive_count; ++i)
-    if (p.drives[i].home != q.drives[i].home || p.drives[i].compliance_slope != q.drives[i].compliance_slope)
+    if (p.drives[i].home != q.drives[i].home || p.drives[i].compliance_slope != q.drives[i].compliance_slope ||
+        p.drives[i].sag != q.drives[i].sag)
       one.name(of(p.drives[i].coordinate));
   return one.fails ? nobody : one.leg;
 }

@@ -221,12 +221,12 @@ ClosureResult prepare_pose(const Mechanism& m, const PoseInput& in, SolveWorkspa
     for (std::size_t i = 0; i < m.loops.size(); ++i)
       ws.problem.misfit.segment<6>(6 * static_cast<Index>(i)) =
           frame_error(ws.nominal.at(m.loops[i].primary), ws.nominal.at(m.loops[i].end));
+  ws.problem.gravity = in.gravity;
   if (!command(m, ws.x, ws.problem)) {
     closure.status = Status::unreachable;  // a ram that is not there
     return closure;
   }
   start_state(m, ws.x, ws.state);
-  ws.problem.gravity = in.gravity;
   ws.problem.load_points = in.load_points;
   ws.problem.wrenches = in.wrenches;
   ws.problem.load_frames.clear();

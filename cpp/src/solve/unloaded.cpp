@@ -1,7 +1,23 @@
 // SPDX-License-Identifier: MIT
 #include "unloaded.hpp"
 
+#include <algorithm>
+
 namespace stiffmap::unloaded {
+namespace {
+
+/// Each drive by what the tip rises with it (theory G4).
+void sag(const Mechanism& m, const VecX& x, Problem& p) {
+  if (std::all_of(m.drives.begin(), m.drives.end(), [](const Drive& d) { return d.numbers.sag == 0; })) return;
+  Frames nominal(m);
+  forward(m, Geometry::nominal, x, nominal);
+  const Vec3 up = p.gravity.isZero(0) ? Vec3::UnitZ() : Vec3(-p.gravity.normalized());
+  for (const Drive& d : m.drives)
+    p.base[d.coordinate] -= d.numbers.sag * up.dot(column(m, nominal, d.coordinate, nominal.at(m.tip).p).head<3>());
+}
+
+}  // namespace
+
 bool command(const Mechanism& m, const VecX& x, Problem& p) {
   p.friction_sign.setZero();
   for (Index j = 0; j < m.size(); ++j) {
@@ -13,6 +29,7 @@ bool command(const Mechanism& m, const VecX& x, Problem& p) {
     p.drive_scale[d.coordinate] = 1 + d.numbers.compliance_slope * (u - m.home_coordinates[d.coordinate]);
     for (const auto& [coordinate, of, error] : d.errors) p.base[coordinate] += error(x[of]);
   }
+  sag(m, x, p);
   bool known = true;
   for (std::size_t i = 0; i < m.groups.size(); ++i) {
     const SpringGroup& g = m.groups[i];

@@ -33,7 +33,13 @@ FREQUENCIES = {
 """Of what turns or swings, in Hz by their names in small letters."""
 FEEDS = {"ipm": "in/min", "ipr": "in/rev", "ipt": "in/tooth", "u": "rev", "r": "rev", "z": "tooth", "zahn": "tooth"}  # fmt: skip
 """Other ways to write a feed, or what it is by."""
-DISPLAY_UNITS = {"m": (1e3, "mm"), "m/N": (1e3, "mm/N"), "rad": (1e3, "mrad"), "1/m": (1e-3, "1/mm")}
+DISPLAY_UNITS = {
+    "m": (1e3, "mm"),
+    "m/N": (1e3, "mm/N"),
+    "rad": (1e3, "mrad"),
+    "rad/m": (1e3, "mrad/m"),
+    "1/m": (1e-3, "1/mm"),
+}
 """In which results are printed, by the unit of SI; others as they are."""
 QUANTITIES = {"m": "length", "N": "force", "N*m": "moment", "rad": "angle"}
 """By the unit of SI."""

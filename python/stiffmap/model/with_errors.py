@@ -112,6 +112,7 @@ CHANGES: dict[str, tuple[tuple[type, ...], Callable[[Any, Any], Element]]] = {
     "zero": ((Joint,), lambda e, by: _with_error(e, CommandError(offset=by))),
     "gain": ((Joint,), lambda e, by: _with_error(e, CommandError(slope=by, reference=e.home[0]))),
     "travel": ((Joint,), lambda e, knots: _with_error(e, CommandError(knots=knots))),
+    "sag": ((Joint,), lambda e, by: replace(e, sag=e.sag + by)),
     "compliance": ((Joint, Spring), _compliance),
     "mass": ((Body,), _mass),
 }

@@ -51,6 +51,7 @@ enum class BallChart : std::uint8_t {
 struct DriveNumbers {
   double compliance_slope = 0;  ///< relative change of the drive's compliance per unit of travel from home
   double force_limit = 1e300;
+  double sag = 0;  ///< of a drive that turns, rad per m by which the tip rises with it (theory G4)
 };
 
 /// Every one by its name, as Python gives it.
@@ -61,6 +62,7 @@ struct DriveNumber {
 inline constexpr DriveNumber drive_numbers[] = {
     {"compliance_slope", &DriveNumbers::compliance_slope},
     {"force_limit", &DriveNumbers::force_limit},
+    {"sag", &DriveNumbers::sag},
 };
 
 /// One-axis joint. Actuated: `law` is the drive's compliance (none: rigid).

@@ -33,7 +33,7 @@ from stiffmap.identification.inference.machines import (
     vouched,
     written,
 )
-from stiffmap.identification.inference.names import Inferred, infer, without_sag
+from stiffmap.identification.inference.names import Inferred, infer
 from stiffmap.identification.inference.readings import readings
 from stiffmap.identification.inference.shares import of_numbers, shares, tolerance_word, too_wide
 from stiffmap.identification.inference.verdict import judged
@@ -106,7 +106,7 @@ def _answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, star
     exact = best.score - found.search.exact < np.log(ODDS)
     fit = best.fit if best.world == EXACT else found.search.calibrated or best.fit
     clock.say("calibrated machine")
-    given = readings(predictor, found.uncertain, columns, without_sag(fit), sigma, found.suspects)
+    given = readings(predictor, found.uncertain, columns, fit, sigma, found.suspects)
     at = corrected(given, ()) if given.drives or (len(given.spread) and not exact) else None
     models = {CALIBRATED: at} if at else {}
     listed = stands_out(columns, best.fit, found.suspects, models.values())

@@ -41,7 +41,7 @@ from stiffmap.identification.inference.machines import (
     vouched,
     written,
 )
-from stiffmap.identification.inference.names import Inferred, put_instead, terms, with_travel, without_sag
+from stiffmap.identification.inference.names import Inferred, put_instead, terms, with_travel
 from stiffmap.identification.inference.parts import GAPS, NOISE
 from stiffmap.identification.inference.readings import Readings, readings
 from stiffmap.identification.inference.shares import gap_of, shares, tolerance_word, too_wide
@@ -58,13 +58,9 @@ def answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, cross
     clock.say("corrected machine")
     models, found, v, notes = _models(predictor, found)
     fit = found.search.best.fit
-    best, own = models.get(CORRECTED), without_sag(fit)
-    if own is not fit:
-        given = _given(predictor, found, v, own)
-        if best or len(given.spread):
-            models[CORRECTED] = corrected(given, best.terms if best else ())
-    if CORRECTED in models and (more := with_travel(own, anew=False)) is not own:
-        models[CORRECTED] = along_travel(models[CORRECTED], _given(predictor, found, v, more))
+    best = models.get(CORRECTED)
+    if best and (more := with_travel(fit, anew=False)) is not fit:
+        models[CORRECTED] = along_travel(best, _given(predictor, found, v, more))
     listed = stands_out(columns, fit, found.suspects, models.values())
     clock.say("readings that no fit saw")
     if (models or v.rest) and cross_validate and not clock.over:
@@ -147,7 +143,7 @@ def _models(
     out: dict[str, Corrected] = {}
     v, plain = judged(found.columns, found.search), found.search.calibrated
     if v.named and plain is not None:
-        plain = with_travel(without_sag(plain), anew=True)  # as a calibration has it
+        plain = with_travel(plain, anew=True)  # as a calibration has it
         own = readings(predictor, found.uncertain, found.columns, plain, found.noise.sigma, found.suspects)
         if len(own.spread):
             out[CALIBRATED] = corrected(own, ())

@@ -136,6 +136,12 @@ class Columns:
             e, rows, channel, np.ones(n), spared, np.zeros((n, 0)), residual, zero, (), none, np.arange(n)
         )
 
+    def without(self, group: str) -> Columns:
+        """Without the numbers of a group."""
+        kept = [u.group != group for u in self.unknowns]
+        some = tuple(u for u in self.unknowns if u.group != group)
+        return replace(self, unknowns=some, numbers=self.numbers[:, kept])
+
     def rotated(self, values: Floats) -> Floats:
         """(m, ...) of the readings' (N, ...), m or rad: in noise, without what frames and zeros could be."""
         return np.asarray(self.free.T @ (values / self.sigma.reshape(-1, *(1,) * (values.ndim - 1))))

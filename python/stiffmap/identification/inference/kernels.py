@@ -16,10 +16,7 @@ from scipy.linalg import cholesky, solve_triangular
 from scipy.spatial.distance import cdist
 
 from stiffmap.experiment.experiment import Experiment, Floats, Integers, Mask
-from stiffmap.experiment.poses.configuration import coordinates_of, drive_jacobian
-from stiffmap.experiment.prediction.history import reads_pairs, shown_of_drive
-from stiffmap.model.description import Body, Joint
-from stiffmap.model.description.tree import all_elements
+from stiffmap.experiment.poses.configuration import coordinates_of
 from stiffmap.solve.machine import Machine
 
 LENGTHS = (0.6, 2.0)
@@ -28,9 +25,6 @@ SESSIONS = (0.07, 1.0)
 """Correlation times, in sessions."""
 WANDER = "wander"
 """With what the names of parts begin that go on over time."""
-SMALL = 1e-6
-"""rad per m of rise: readings such as lengths are not linear in larger motions."""
-SAG = "sag of the drives under the weight of the arm"
 FEW_DRIVES = 3
 """Drives up to which the place of the tool says what their coordinates do."""
 TOUCHED = 0.1
@@ -76,8 +70,6 @@ def gaps(machine: Machine, e: Experiment, points: ReadingPoints) -> Iterator[Ker
                 yield _field(f"field of {what} over {over}, {length:g}", here, x / length, None)
                 if e.quantity == "deflection":
                     yield _field(f"compliance of {what} over {over}, {length:g}", here, x / length, load)
-    if e.quantity == "position" and not reads_pairs(e) and _lacks_sag(machine):
-        yield _sag(machine, e)
     yield from shared(e, points)
     when = e.hours if e.hours is not None else e.order
     if when is not None:
@@ -100,34 +92,6 @@ def _field(name: str, here: Mask, x: Floats, load: Floats | None) -> Kernel:
         return np.asarray(here[a.channel] * carried / a.sigma**2)
 
     return Kernel("field", name, between, own)
-
-
-def _lacks_sag(machine: Machine) -> bool:
-    """Whether this is an arm that sags, as every one does, but not in its file, which has no weights or no drives that yield."""
-    elements = [x for _, x in all_elements(machine.description)]
-    heavy = any(isinstance(x, Body) and x.mass > 0.0 for x in elements)
-    yields = any(isinstance(x, Joint) and x.actuated and x.law is not None for x in elements)
-    return len(machine.legs) == 1 and not (heavy and yields)
-
-
-def _sag(machine: Machine, e: Experiment) -> Kernel:
-    """Of turning drives that yield under the weight that they carry: each by what the tool rises with it, as the moment of a weight at
-    the tool says, and by its own compliance, of which nothing is known."""
-    gravity = np.broadcast_to(
-        e.gravity or (0.0, 0.0, -1.0) if e.gravity_of is None else e.gravity_of, (len(e), 3)
-    )
-    up = -gravity / np.maximum(np.linalg.norm(gravity, axis=1, keepdims=True), 1e-300)
-    jacobian, shown = np.nan_to_num(drive_jacobian(machine, e)), []
-    for k, name in enumerate(machine.actuators):
-        if not machine.compiled.names.is_prismatic(name):
-            rise = np.sum(jacobian[:, :3, k] * up, axis=1)
-            shown.append(shown_of_drive(machine, e, name, jacobian[:, :, k], SMALL * rise) / SMALL)
-    each = np.stack(shown, axis=-1) if shown else np.zeros((*e.reading.shape, 1))
-
-    def of(a: ReadingPoints) -> Floats:
-        return np.asarray(each[a.rows, a.channel] / a.sigma[:, None])
-
-    return Kernel("field", SAG, lambda a, b: of(a) @ of(b).T, lambda a: np.sum(of(a) ** 2, axis=1))
 
 
 def _wander(name: str, t: Floats, session: Integers) -> Kernel:

@@ -22,7 +22,6 @@ from stiffmap.identification.inference.amplitudes import Fit, evaluated, fitted
 from stiffmap.identification.inference.chosen import Chosen
 from stiffmap.identification.inference.columns import Columns, columns
 from stiffmap.identification.inference.constants import ODDS
-from stiffmap.identification.inference.kernels import SAG
 from stiffmap.identification.inference.parts import Part, Parts
 from stiffmap.identification.inference.places import Place
 from stiffmap.identification.inference.several import with_more_shapes
@@ -38,7 +37,7 @@ from stiffmap.identification.inference.world import (
     largest_gain,
 )
 from stiffmap.identification.numbers.certificate import Tolerances
-from stiffmap.identification.numbers.unknowns import Unknown, uncertain
+from stiffmap.identification.numbers.unknowns import SAG, Unknown, uncertain
 from stiffmap.model import effects
 from stiffmap.model.description import AppliedEffect
 
@@ -117,22 +116,14 @@ def searched(
 
 
 def _worlds(columns: Columns, predict: Predict | None, over: Callable[[], bool], travel: bool) -> list[World]:
-    """Exact, together and groups, as far as there are numbers and time; with sag where it is worth the odds of a name."""
+    """Exact, together and groups, as far as there are numbers and time."""
     parts = Parts(columns)
     gaps = (*parts.gaps, *parts.travel) if travel else parts.gaps
     worlds: dict[str, tuple[Part, ...]] = {EXACT: ()}
     if columns.unknowns and not over():
         worlds |= {"together": parts.together, "groups": parts.numbers}
     optima: dict[Shapes, Floats] = {}
-
-    def under(some: tuple[Part, ...]) -> list[World]:
-        return [World(columns, some, name, own, predict, over, optima) for name, own in worlds.items()]
-
-    found, bare = under(gaps), under(tuple(g for g in gaps if g.name != SAG))
-    if len(bare[0].gaps) == len(gaps):
-        return found
-    more, less = (max(w.null.score for w in each) for each in (found, bare))
-    return found if more - less > np.log(ODDS) + found[0].price else bare
+    return [World(columns, gaps, name, own, predict, over, optima) for name, own in worlds.items()]
 
 
 def _with_rivals(model: Model, searches: Sequence[World], found: Mapping[str, Model]) -> Search:
@@ -159,21 +150,22 @@ def with_travel(fit: Fit, *, anew: bool) -> Fit:
     return max([fit, *found], key=lambda f: f.score)
 
 
-def without_sag(fit: Fit) -> Fit:
-    """The fit for a machine file, which cannot hold the sag that it lacks: numbers and effects take what they can of it; the same where
-    there is none."""
-    start = {p.name: t for p, t in fit.on}
-    if SAG not in start:
-        return fit
-    parts = [p for p in fit.parts if p.name != SAG]  # those that it has put out begin anew
-    return fitted(fit.columns, parts, start, fit.weights, fit.lighter)
+def _where_it_sags(columns: Columns) -> Columns:
+    """The columns; without the sag of drives unless that is worth the odds of a name: every arm sags, and few so that it shows."""
+    if SAG not in columns.groups:
+        return columns
+    rigid = columns.without(SAG)
+    worlds, bare = (_worlds(c, None, lambda: False, False) for c in (columns, rigid))
+    more, less = (max(w.null.score for w in each) for each in (worlds, bare))
+    return columns if more - less > np.log(ODDS) + worlds[0].price else rigid
 
 
 def of_noise_alone(columns: Columns) -> Fit | None:
     """The best fit of the numbers that set-ups share, with noise and nothing else; None where there are none."""
-    parts = Parts(columns)
-    shared = [p for p in parts.numbers if not columns.unknowns[columns.groups[p.name][0]].setup]
-    found = [fitted(columns, some) for some in (parts.together[:1], shared) if some]
+    parts, groups = Parts(columns), columns.groups
+    of_setups = [name for name, index in groups.items() if columns.unknowns[index[0]].setup]
+    shared = ([p for p in some if p.name not in of_setups] for some in (parts.together, parts.numbers))
+    found = [fitted(columns, some) for some in shared if some]
     return max(found, key=lambda f: f.score, default=None)
 
 
@@ -237,7 +229,7 @@ def infer(
     plan = replace(plan, variants=tuple(v for v in plan.variants if v.candidate.kind not in exclude))
     numbers = uncertain(predictor.machine.description, e, tolerances, exclude)
     clock.say("columns of the declared numbers")
-    found = columns(predictor, plan, noise.sigma, numbers, seed)
+    found = _where_it_sags(columns(predictor, plan, noise.sigma, numbers, seed))
 
     used = np.isin(np.arange(len(e)), found.rows)
     drawn = predictor if used.all() else predictor.beside(rows=used)

@@ -10,6 +10,7 @@ from scipy.linalg import solve_triangular
 from stiffmap.experiment.experiment import Floats
 from stiffmap.identification.inference.columns import Columns
 from stiffmap.identification.inference.constants import NUMBERS_SD, SIZES, WIDEST
+from stiffmap.identification.numbers.unknowns import SAG
 
 GAPS = ("field", "pose")
 """Kinds of parts that nobody can name."""
@@ -53,7 +54,7 @@ class Parts:
     numbers: tuple[Part, ...] = field(init=False)
     """One for each group."""
     together: tuple[Part, ...] = field(init=False)
-    """One for all groups, and one for each that a set-up has for itself."""
+    """One for all groups, one for sag, and one for each that a set-up has for itself."""
     gaps: tuple[Part, ...] = field(init=False)
     travel: tuple[Part, ...] = field(init=False)
     """Errors along the travel of the drives."""
@@ -61,8 +62,9 @@ class Parts:
     def __post_init__(self) -> None:
         c = self.columns
         self.numbers = tuple(Part(name, "number", c.numbers[:, index]) for name, index in c.groups.items())
-        shared = c.numbers[:, [not u.setup for u in c.unknowns]]
-        alone = [p for p, i in zip(self.numbers, c.groups.values(), strict=True) if c.unknowns[i[0]].setup]
+        apart = [bool(u.setup) or u.group == SAG for u in c.unknowns]
+        shared = c.numbers[:, ~np.array(apart, dtype=bool)]
+        alone = [p for p, i in zip(self.numbers, c.groups.values(), strict=True) if apart[i[0]]]
         self.together = (Part(ALL_NUMBERS, "number", shared), *alone) if c.unknowns else ()
         self.gaps = tuple(Part(name, kind, full=k) for kind, name, k in c.gaps)
         self.travel = tuple(Part(name, "travel", f) for name, f, _ in c.travel)

@@ -14,7 +14,7 @@ from stiffmap.identification.inference.columns import Columns
 from stiffmap.identification.inference.constants import ODDS, STANDS_OUT
 from stiffmap.identification.inference.parts import GAPS, NOISE, Part
 from stiffmap.identification.inference.world import amplitudes
-from stiffmap.identification.numbers.unknowns import Unknown
+from stiffmap.identification.numbers.unknowns import SAG, Unknown
 
 LEAST = 0.005
 """Share from which a part is named."""
@@ -83,9 +83,10 @@ def too_wide(fit: Fit, named: Sequence[Unknown] = ()) -> tuple[WideGroup, ...]:
     own = tuple(Part(u.name, "effect", c.numbers[:, [c.unknowns.index(u)]]) for u in named)
     if own:
         fit = fitted(c, (*fit.parts, *own), amplitudes(fit), fit.weights)
+    named_sag = any(u.group == SAG for u in named)  # no tolerance of a maker's
     for k, p in enumerate(fit.parts):
         t = float(fit.t[1 + k])
-        if p.kind != "number" or t <= max(0.0, OFF):
+        if p.kind != "number" or t <= max(0.0, OFF) or (p.name == SAG and named_sag):
             continue
         other = fit.t.copy()
         other[1 + k] = 0.0

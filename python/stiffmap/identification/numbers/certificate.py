@@ -34,6 +34,8 @@ class Tolerances:
         Scale of a drive's coordinate (1).
     compliance, mass
         Relative.
+    sag
+        Of a drive of an arm whose file has no weights: rad per m by which the tool rises with it.
     instrument
         Scale of the instrument that reads positions: a laser tracker's certificate says 1e-5.
     tool
@@ -51,6 +53,7 @@ class Tolerances:
     gain: float = 2e-4
     compliance: float = 0.2
     mass: float = 0.05
+    sag: float = 1e-4
     instrument: float = 1e-5
     tool: float = 5e-4
     frame: float = 0.0

@@ -17,11 +17,14 @@ from stiffmap.common.arguments import checked
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.identification.numbers.certificate import INSTRUMENT, SCALE, Tolerances, certified, frame_errors
 from stiffmap.model.description import TASK, Block, Body, Element, Joint, MachineDescription, Offset, Spring
+from stiffmap.model.description.tree import all_elements
 from stiffmap.model.with_errors import END
 
+SAG = "sag"
+"""Of the drives of an arm under its weight, which its file does not have: every arm sags."""
 GROUPS = (
     "zeros", "gains", "axis positions", "axis directions", "guide lean", "link lengths", "rod mismatch", "width", "tool",
-    "drive compliance", "link compliance", "masses", INSTRUMENT,
+    "drive compliance", "link compliance", "masses", SAG, INSTRUMENT,
 )  # fmt: skip
 GEOMETRY = GROUPS[:9]
 ALONG = 0.999
@@ -118,6 +121,7 @@ def unknowns(
     t = tolerances or Tolerances()
     bare = description.declared or description
     given = Declared({k: u for k, u in bare.uncertainty if u > 0.0}, t)
+    lacks_sag = len(bare.legs) == 1 and not _sags(bare)
     loaded = bool(experiment.wrench.any() or experiment.gravity or bare.gravity)
     weighs = bool(experiment.gravity or bare.gravity)
     out: list[Unknown] = []
@@ -142,9 +146,18 @@ def unknowns(
             out.append(Unknown(full, INSTRUMENT, unit, u, (((INSTRUMENT, name), 1.0),)))
     if not loaded:
         out = [p for p in out if p.group not in ("drive compliance", "link compliance")]
+    if not lacks_sag:
+        out = [p for p in out if p.group != SAG]
     if not weighs:
         out = [p for p in out if p.group != "masses"]
     return out
+
+
+def _sags(description: MachineDescription) -> bool:
+    """Whether drives yield under weights that the file has."""
+    elements = [e for _, e in all_elements(description)]
+    heavy = any(isinstance(e, Body) and e.mass > 0.0 for e in elements)
+    return heavy and any(isinstance(e, Joint) and e.actuated and e.law is not None for e in elements)
 
 
 def uncertain(
@@ -212,6 +225,8 @@ def _of_joint(e: Joint, name: str, leg: str, given: Declared, place: Floats) -> 
         u = given.single(name, ["home", "command_errors.offset"], u)
         yield _single("zero", name, leg, "zeros", unit, u)
         yield _single("gain", name, leg, "gains", "1", given.single(name, ["command_errors.slope"], t.gain))
+        if not slides:
+            yield _single("sag", name, leg, SAG, "rad/m", given.single(name, ["sag"], t.sag))
     if e.law is not None and not e.law.cubic and not e.law.knots:
         group = "drive compliance" if e.actuated else "link compliance"
         u = given.single(name, ["stiffness", "law.stiffness"], t.compliance, e.law.stiffness)

@@ -60,9 +60,11 @@ def _joint(e: Joint, name: str, left: list[str]) -> list[Element]:
     offset = sum(c.offset for c in e.command_errors)
     if any(c.slope or c.amplitude or c.knots for c in e.command_errors) or e.guide_errors:
         left.append(f"{name}: errors along its travel")
+    if e.sag:
+        left.append(f"{name}: sag of the drive")
     if e.law is not None:
         left.append(f"{name}: compliance of the drive")
-    plain = replace(e, command_errors=(), guide_errors=())
+    plain = replace(e, sag=0.0, command_errors=(), guide_errors=())
     if not offset:
         return [plain]
     axis = np.array(e.axes[0])

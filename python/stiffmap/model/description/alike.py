@@ -39,7 +39,9 @@ def _nominal(e: Element) -> Element:
         case Offset():
             return replace(e, actual=None)
         case Joint():
-            bare = replace(e, compliance_slope=0.0, command_errors=(), guide_errors=(), friction=None)
+            bare = replace(
+                e, compliance_slope=0.0, sag=0.0, command_errors=(), guide_errors=(), friction=None
+            )
             return replace(bare, law=None, axis_laws=(), rest=None, drive=None)
         case Spring():
             return Spring(e.name)
@@ -127,7 +129,7 @@ def _strains(e: Element) -> bool:
             return True  # gravity or pretension may stretch it differently from what its controller believes
         case Joint():
             sprung = not e.actuated and any(e.laws)  # away from home
-            return bool(e.command_errors or e.guide_errors or sprung)
+            return bool(e.command_errors or e.guide_errors or e.sag or sprung)
         case Spring():
             return any(e.rest)
     return False

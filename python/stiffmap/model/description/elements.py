@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from stiffmap.common.units import LENGTH, MASS
+from stiffmap.common.units import LENGTH, MASS, Dimension
 from stiffmap.model.description.laws import CommandError, GuideError, JointFriction, Law
 from stiffmap.model.description.numbers import interval, number, required
 from stiffmap.model.description.pose import Pose, Rows, Vector
@@ -64,6 +64,9 @@ class Joint:
     compliance_slope
         Relative change of the drive's compliance per metre (or rad) of the commanded coordinate,
         measured from the closed home configuration.
+    sag
+        Of a drive that turns, in a machine of one leg without loops: rad per m by which the tool would rise per rad of it. So
+        a drive yields under a weight at the tool, where the file has no weights and compliances. Theory G4.
     friction
         Of a passive joint without a law.
     """
@@ -84,6 +87,10 @@ class Joint:
     compliance_slope: float = number(
         "compliance_slope", "Relative change of the drive's compliance per travel.",
         default=0.0, coordinate=-1, core="compliance_slope",
+    )  # fmt: skip
+    sag: float = number(
+        "sag", "How far a drive that turns gives way under the arm, per length by which the tool rises with it.",
+        default=0.0, coordinate=1, fixed=Dimension(length=-1), core="sag",
     )  # fmt: skip
     damping: float | None = number(
         "damping", "Viscous damping of its motion about the equilibrium.",

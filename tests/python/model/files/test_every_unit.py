@@ -41,7 +41,7 @@ def numbers(angular: bool) -> dict[str, Any]:
     return {
         "limits": [f"-0.61 {c}", f"0.97 {c}"], "damping": f"41.3 {per}", "loss_factor": 0.031,
         "range": [f"-0.51 {c}", f"0.83 {c}"], "speed": f"1.7 {c}", "force": f"333 {e}",
-        "encoder_error": f"1.1e-5 {c}", "compliance_slope": f"0.37 {c}-1",
+        "encoder_error": f"1.1e-5 {c}", "compliance_slope": f"0.37 {c}-1", "sag": f"1.3e-3 {c} L-1",
         "friction": {"coulomb": f"7.1 {e}", "viscous": {"value": f"0.83 {per}", "u": f"0.013 {per}"}},
         "command_errors": [{
             "offset": f"1.3e-4 {c}", "slope": 1.1e-4, "amplitude": f"2.3e-5 {c}", "period": f"0.017 {c}",

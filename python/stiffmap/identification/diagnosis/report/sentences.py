@@ -12,7 +12,7 @@ from stiffmap.identification.candidates.candidates import words
 from stiffmap.identification.diagnosis.report.findings import Effect
 from stiffmap.identification.diagnosis.report.separation import Separation
 from stiffmap.identification.diagnosis.slips.axes import Slip
-from stiffmap.identification.inference.kernels import SAG, WANDER
+from stiffmap.identification.inference.kernels import WANDER
 from stiffmap.identification.inference.verdict import CLEARLY, NOISIER
 from stiffmap.model.effects import registry
 
@@ -193,11 +193,6 @@ def next_step(d: Any) -> str:
         )
     if d.verdict == "unattributed" and left_is(d, WANDER):
         return "Let machine and instrument warm up, and read one pose again and again between the others: it shows the drift alone."
-    if d.verdict == "unattributed" and left_is(d, SAG):
-        return (
-            "Write the masses of the links and the compliances of the drives into the machine's file, and gravity into experiment.yaml, "
-            "and diagnose again: what yields under its own weight then has a name, and can be corrected."
-        )
     if d.verdict == "unattributed":
         return (
             "Look at where the difference is largest (What is left), check the instrument's frame, the tool and "
