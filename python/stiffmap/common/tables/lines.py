@@ -104,11 +104,16 @@ def kept(
     lines: Iterable[tuple[int, list[str]]], aside: list[str] | None = None
 ) -> Iterator[tuple[int, list[str]]]:
     """Lines with something in them that are no comments; comments with a word in them are said in `aside`."""
-    for n, cells in lines:
-        if filled(cells) and not cells[0].lstrip().startswith(COMMENTS):
-            yield n, cells
-        elif aside is not None and re.search(r"[^\W_]", text := " ".join(cells)):
-            aside.append(f"row {n} is a remark: {text.strip()[:40]}")
+    for block in blocks(lines):
+        begins = {c[0].lstrip()[:1] if c else "" for _, c in block}
+        if begins.isdisjoint(("", *(mark[0] for mark in COMMENTS))):
+            yield from block
+            continue
+        for n, cells in block:
+            if filled(cells) and not cells[0].lstrip().startswith(COMMENTS):
+                yield n, cells
+            elif aside is not None and re.search(r"[^\W_]", text := " ".join(cells)):
+                aside.append(f"row {n} is a remark: {text.strip()[:40]}")
 
 
 def even(
@@ -123,18 +128,22 @@ def even(
     With `aside` a row may be short, unless blanks leave open which cell it lacks, and words behind the last column are said there.
     """
     behind: list[str] = []
-    for n, cells in chain.from_iterable(blocks(rows)):  # what is said of several rows comes first
-        if len(cells) != width:
-            more = [c.strip() for c in cells[width:] if c.strip()]
-            found = max((i for i, c in enumerate(cells, 1) if i == width or c.strip()), default=0)
-            found = found if len(cells) > width else len(cells)
-            unclear = NUMBER.fullmatch(more[0]) if more else separator == " "
-            if separator and found != width and (unclear or aside is None):
-                what = f"expected {width} values, found {found}{UNNAMED * (found == width + 1)}"
-                raise FileError(what, file=file, line=n)
-            behind += [f"row {n}, '{' '.join(more)[:40]}' behind the last column"] if more else []
-            cells = [*cells, *[""] * width][:width]
-        yield n, cells
+    for block in blocks(rows):  # what is said of several rows comes first
+        if {len(cells) for _, cells in block} == {width}:
+            yield from block
+            continue
+        for n, cells in block:
+            if len(cells) != width:
+                more = [c.strip() for c in cells[width:] if c.strip()]
+                found = max((i for i, c in enumerate(cells, 1) if i == width or c.strip()), default=0)
+                found = found if len(cells) > width else len(cells)
+                unclear = NUMBER.fullmatch(more[0]) if more else separator == " "
+                if separator and found != width and (unclear or aside is None):
+                    what = f"expected {width} values, found {found}{UNNAMED * (found == width + 1)}"
+                    raise FileError(what, file=file, line=n)
+                behind += [f"row {n}, '{' '.join(more)[:40]}' behind the last column"] if more else []
+                cells = [*cells, *[""] * width][:width]
+            yield n, cells
     if behind and aside is not None:
         aside.append(behind[0] + (f", and {len(behind) - 1} rows like it" if len(behind) > 1 else ""))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import chain, islice, takewhile, zip_longest
 from pathlib import Path
@@ -11,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from stiffmap.common.errors import FileError
+from stiffmap.common.number_text import LARGEST
 from stiffmap.common.tables.cells import Cells, blocks, filled, packed
 from stiffmap.common.tables.header import (
     MOST_LINES,
@@ -24,7 +26,6 @@ from stiffmap.common.tables.header import (
 )
 from stiffmap.common.tables.lines import (
     COMMENTS,
-    NUMBER,
     Lines,
     Spelling,
     decimal_comma,
@@ -287,6 +288,19 @@ def _counts(cells: Sequence[str], spelling: Spelling) -> bool:
     return [*dict.fromkeys(numbers)] == [*range(1, len({*numbers}) + 1)]
 
 
+def _all_readings(rows: Sequence[Line]) -> bool:
+    """Whether rows have as many cells each, a column of plain numbers, and a first one that never says mean or sum."""
+    width = len(rows[0][1])
+    begins = (cells[0].strip() for _, cells in rows)
+    ends = [cells[-1].strip() for _, cells in rows]
+    return (
+        {len(cells) for _, cells in rows} == {width}
+        and not any(not word or STATISTICS.fullmatch(word) for word in begins)
+        and (_plain_numbers(ends) or not any(map(MEAN.fullmatch, {*ends})))
+        and any(_plain_numbers([cells[i] for _, cells in rows]) for i in reversed(range(width)))
+    )
+
+
 def _labels(rows: Sequence[Line], header: Sequence[str], layout: Layout, comma: bool) -> set[int]:
     """First lines that begin with a word, where all others begin with a number: channels or sensors below the names of columns,
     of which some are known, but not the first."""
@@ -297,6 +311,15 @@ def _labels(rows: Sequence[Line], header: Sequence[str], layout: Layout, comma: 
     lines = {n for n, _ in takewhile(lambda b: not (re.search(r"\d", b[1]) or is_nothing(b[1])), begins)}
     numbers = [is_finite(c, Spelling(comma)) for n, c in begins if n not in lines]
     return lines if numbers and all(numbers) else set()
+
+
+def _plain_numbers(cells: Sequence[str]) -> bool:
+    text = "".join(cells)
+    if "_" in text or not text.isascii():
+        return False
+    with suppress(ValueError):
+        return all(abs(float(c)) <= LARGEST for c in cells)
+    return False
 
 
 def _data(
@@ -314,14 +337,16 @@ def _data(
     `names`: all that stands above the rows.
     """
     labels = _labels(rows, header, layout, spelling.comma) if rows[0] is begun else set[int]()
+    if not labels and _all_readings(rows):
+        yield from rows
+        return
     means = MEAN.fullmatch(begun[1][-1].strip())
     for n, cells in rows:
         first = next(c.strip() for c in cells if c.strip())
         last = cells[-1].strip()
-        plain = NUMBER.fullmatch(first)
-        if n in labels or (not plain and STATISTICS.fullmatch(first) and number(first, spelling) is None):
+        if n in labels or (STATISTICS.fullmatch(first) and number(first, spelling) is None):
             aside.append(f"row {n}, '{first}', is no reading")
-        elif not NUMBER.fullmatch(last) and MEAN.fullmatch(last) and not means and len(cells) == len(header):
+        elif MEAN.fullmatch(last) and not means and len(cells) == len(header):
             aside.append(f"row {n}, '{last}', is no reading")
         elif not any(is_finite(c, spelling) for c in cells):
             if _begins_table(cells, names, len(header), spelling, layout):
