@@ -90,7 +90,9 @@ class Table:
 
         def found(row: int) -> str:
             cell = [*self.columns[column]][row]
-            return f"column '{self.header[column]}': expected a number; found {repr(cell) if cell else 'an empty cell'}"
+            expected = "a finite number" if cell.strip().lower().strip("+-") in ("nan", "inf") else "a number"
+            shown = repr(cell) if cell else "an empty cell"
+            return f"column '{self.header[column]}': expected {expected}; found {shown}"
 
         def one(cell: str, row: int) -> float:
             value = number(cell, Spelling())
