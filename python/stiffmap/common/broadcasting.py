@@ -170,11 +170,6 @@ def rows(values: Floats, shape: tuple[int, ...], tail: tuple[int, ...]) -> Float
     return np.ascontiguousarray(np.broadcast_to(values, shape + tail)).reshape((math.prod(shape),) + tail)
 
 
-def rows_or_one(values: Floats, shape: tuple[int, ...], tail: tuple[int, ...]) -> Floats:
-    """C-contiguous copy of shape (batch size, *tail), or (1, *tail) where one is meant for all."""
-    return rows(values, () if values.ndim == len(tail) else shape, tail)
-
-
 def thread_count(threads: int | None) -> int:
     """Number of threads: all that this process may use unless said otherwise."""
     if threads is None:

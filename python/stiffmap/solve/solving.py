@@ -15,7 +15,6 @@ from stiffmap.common.broadcasting import (
     names_of,
     one_of,
     rows,
-    rows_or_one,
     thread_count,
     whole_number,
     wrench_array,
@@ -148,7 +147,7 @@ def _solve(
         steps = whole_number(o.load_steps, "load_steps", 1, what="'auto' or a positive number")
     answer = machine.solve(
         rows(p, shape, (3,)),
-        rows_or_one(r, shape, (3, 3)),
+        rows(r, () if r.ndim == 2 else shape, (3, 3)),  # one for all
         _stacked([w, *extra.values()], shape),
         load_points=loaded,
         load_types=types,

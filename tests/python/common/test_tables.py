@@ -87,7 +87,7 @@ def test_a_workbook_is_a_table_of_every_command(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("x [mm];y [mm];z [mm]\n1;2;3\n1;zwei;3\n", r"line 3: y \[mm\]: expected a number, found 'zwei'"),
+        ("x [mm];y [mm];z [mm]\n1;2;3\n1;zwei;3\n", r"line 3: column 'y \[mm\]': expected a number; found 'zwei'"),
         ("x [kg],y [mm],z [mm]\n1,2,3\n1,2,4\n", r"line 1: x \[kg\]: expected a unit such as in x.*, found kg"),
         ("# one\n\nx [mm],y [mm],z [mm]\n1,2,3\n\n1,2\n", "line 6: expected 3 values, found 2"),
         ("x [mm],y [mm],z [mm]\n1,2,3\n1,2,3,4\n", "line 3: expected 3 values, found 4"),

@@ -243,10 +243,6 @@ def number_cells(values: Iterable[float]) -> list[str]:
     return ["" if v != v else f"{v:.9g}" for v in values]
 
 
-def _counted(rows: Iterable[Sequence[object]], count: Iterator[int]) -> Iterator[Sequence[object]]:
-    return (row for row, _ in zip(rows, count, strict=False))
-
-
 def write_rows(
     path: str | os.PathLike[str],
     header: Sequence[str],
@@ -258,5 +254,6 @@ def write_rows(
     with writing(path) as fresh, fresh.open("w", newline="", encoding=encoding) as stream:
         out = csv.writer(stream)
         out.writerow([guarded(c) for c in header])
-        out.writerows([guarded(c) if type(c) is str else c for c in row] for row in _counted(rows, count))
+        each = (row for row, _ in zip(rows, count, strict=False))
+        out.writerows([guarded(c) if type(c) is str else c for c in row] for row in each)
     return next(count)

@@ -108,12 +108,12 @@ def kept(
         begins = {c[0].lstrip()[:1] if c else "" for _, c in block}
         if begins.isdisjoint(("", *(mark[0] for mark in COMMENTS))):
             yield from block
-        else:
-            for n, c in filter(lambda line: filled(line[1]), block):
-                if not c[0].strip().startswith(COMMENTS):
-                    yield n, c
-                elif aside is not None and re.search(r"[^\W_]", text := " ".join(c)):
-                    aside.append(f"row {n} is a remark: {text.strip()[:40]}")
+            continue
+        for n, cells in block:
+            if filled(cells) and not cells[0].lstrip().startswith(COMMENTS):
+                yield n, cells
+            elif aside is not None and re.search(r"[^\W_]", text := " ".join(cells)):
+                aside.append(f"row {n} is a remark: {text.strip()[:40]}")
 
 
 def even(
@@ -128,46 +128,24 @@ def even(
     With `aside` a row may be short, unless blanks leave open which cell it lacks, and words behind the last column are said there.
     """
     behind: list[str] = []
-    for block in blocks(rows):
+    for block in blocks(rows):  # what is said of several rows comes first
         if {len(cells) for _, cells in block} == {width}:
             yield from block
-        else:
-            yield from ((n, _even(n, c, width, file, separator, aside is not None, behind)) for n, c in block)
+            continue
+        for n, cells in block:
+            if len(cells) != width:
+                more = [c.strip() for c in cells[width:] if c.strip()]
+                found = max((i for i, c in enumerate(cells, 1) if i == width or c.strip()), default=0)
+                found = found if len(cells) > width else len(cells)
+                unclear = NUMBER.fullmatch(more[0]) if more else separator == " "
+                if separator and found != width and (unclear or aside is None):
+                    what = f"expected {width} values, found {found}{UNNAMED * (found == width + 1)}"
+                    raise FileError(what, file=file, line=n)
+                behind += [f"row {n}, '{' '.join(more)[:40]}' behind the last column"] if more else []
+                cells = [*cells, *[""] * width][:width]
+            yield n, cells
     if behind and aside is not None:
         aside.append(behind[0] + (f", and {len(behind) - 1} rows like it" if len(behind) > 1 else ""))
-
-
-def _even(
-    n: int, cells: list[str], width: int, file: str, separator: str, short: bool, behind: list[str]
-) -> list[str]:
-    """One row of `even`; it may be `short`, and what stands `behind` its last column is said there."""
-    if (found := len(cells)) == width:
-        return cells
-    more = [c.strip() for c in cells[width:] if c.strip()]
-    if found > width:
-        found = max(i for i, c in enumerate(cells, 1) if i == width or c.strip())
-    unclear = NUMBER.fullmatch(more[0]) if more else separator == " "
-    if separator and found != width and (unclear or not short):
-        raise FileError(
-            f"expected {width} values, found {found}{UNNAMED * (found == width + 1)}", file=file, line=n
-        )
-    if more:
-        behind.append(f"row {n}, '{' '.join(more)[:40]}' behind the last column")
-    return [*cells, *[""] * width][:width]
-
-
-def finite_number(cell: str, blank: Sequence[str] = ()) -> float:
-    """The finite number in a cell, NaN where it is one of `blank`; ValueError of what was expected and what was found."""
-    if cell.lower() in blank:
-        return math.nan
-    try:
-        value = number_in(cell)
-    except ValueError:
-        empty = "an empty cell; what holds for several rows stands in each of them"
-        raise ValueError("a number", repr(cell) if cell else empty) from None
-    if not math.isfinite(value):
-        raise ValueError("a finite number", cell)
-    return value
 
 
 def plain(text: str) -> str:

@@ -24,7 +24,7 @@ from stiffmap.common.errors import FileError, StiffmapError, frames_of_this_pack
 from stiffmap.common.number_text import read_value
 from stiffmap.common.short import first_of
 from stiffmap.common.tables.header import IN_SI, meaning_of, split_unit
-from stiffmap.common.tables.lines import Spelling, finite_number, is_finite, number
+from stiffmap.common.tables.lines import Spelling, is_finite
 from stiffmap.common.tables.orientation import orientation_of
 from stiffmap.common.tables.sheet import Layout, read_sheet
 from stiffmap.common.tables.table import Table
@@ -62,7 +62,7 @@ class Known:
 
     def has(self, name: str) -> bool:
         """Whether a table may have a column of this name, without its unit."""
-        return _joined(name) in {*self.units, *self.aliases}
+        return re.sub(r"\s+", "_", name.lower()) in {*self.units, *self.aliases}
 
 
 @dataclass(eq=False)
@@ -150,9 +150,7 @@ def named(
             out.fail(f"a column is given twice, as '{out.header[name]}' and '{head}'")
         out.header[name], out.units[name], out.size[name] = head, unit, size
         words = known.units[name] == WORD
-        out.values[name] = (
-            list(sheet.columns[i]) if words else size * _numbers(sheet, i, name, out, known.blank)
-        )
+        out.values[name] = list(sheet.columns[i]) if words else size * sheet.numbers(i, blank=known.blank)
     if left:
         warnings.warn(f"{sheet.file}: left out: {first_of(left)}", stacklevel=frames_of_this_package())
     return out
@@ -165,29 +163,11 @@ def _counts(sheet: Table, column: int) -> bool:
     return bool(np.isin(np.diff(sheet.numbers(column)), (0.0, 1.0)).all())
 
 
-def _numbers(sheet: Table, column: int, name: str, table: NamedTable, blank: bool) -> Floats:
-    def one(cell: str, row: int) -> float:
-        value = number(cell, Spelling())
-        if value is None or (value != value and not blank):
-            try:
-                return finite_number(cell)
-            except ValueError as problem:
-                expected, found = problem.args
-                table.fail(f"expected {expected}, found {found}", name, row)
-        return value
-
-    return sheet.with_points(column).numbers(one)
-
-
-def _joined(name: str) -> str:
-    return re.sub(r"\s+", "_", name.lower())
-
-
 def _meaning(sheet: Table, column: int, known: Known, table: NamedTable) -> tuple[str, str, float]:
     """Name of a column, nothing where no cell is a number, its unit as written, and the SI size of that."""
     head = sheet.header[column]
     text, unit = split_unit(head)
-    name = _joined(text)
+    name = re.sub(r"\s+", "_", text.lower())
     named_so = known.has(text) or meaning_of(text) in known.units
     if not named_so and not re.search(r"[])]\s*$", head):  # x_per_tooth_mm, real_m/N
         whole = re.sub(r"\s", "_", head)

@@ -13,10 +13,11 @@ from numpy.typing import ArrayLike
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError, MissingColumnError, suggestion
+from stiffmap.common.number_text import number_in
 from stiffmap.common.outputs import unguarded
 from stiffmap.common.tables.cells import Cells
 from stiffmap.common.tables.header import split_unit
-from stiffmap.common.tables.lines import Spelling, finite_number, number, with_points
+from stiffmap.common.tables.lines import Spelling, number, with_points
 
 
 @dataclass(frozen=True)
@@ -83,20 +84,26 @@ class Table:
         """A column of numbers as text, with decimal points."""
         return with_points(self.columns[column]) if self.decimal_comma else self.columns[column]
 
-    def numbers(self, column: int) -> Floats:
-        """A column as a workshop writes it; NaN where nothing was read. FileError names the line of what is no number."""
+    def numbers(self, column: int, *, blank: bool = True) -> Floats:
+        """A column as a workshop writes it; NaN where nothing was read, if it may be `blank`. FileError names the line of what is no
+        number."""
+
+        def found(row: int) -> str:
+            cell = [*self.columns[column]][row]
+            expected = "a finite number" if cell.strip().lower().strip("+-") in ("nan", "inf") else "a number"
+            shown = repr(cell) if cell else "an empty cell"
+            return f"column '{self.header[column]}': expected {expected}; found {shown}"
 
         def one(cell: str, row: int) -> float:
             value = number(cell, Spelling())
             if value is None:
                 place = f"{column_letter(column)}{self.lines[row]}"
-                self.fail(
-                    f"column '{self.header[column]}': expected a number; found {cell!r} (cell {place})", row
-                )
+                self.fail(f"{found(row)} (cell {place})", row)
             return value
 
         if column not in self._read:
             self._read[column] = self.with_points(column).numbers(one)
+        self.check(blank | ~np.isnan(self._read[column]), found)
         return self._read[column]
 
     def is_numeric(self, column: int) -> bool:
@@ -123,11 +130,18 @@ class Table:
         """A column by its name, plain numbers alone, in SI; with `blank`, empty cells are NaN (a value that was not read)."""
 
         def one(cell: str, row: int) -> float:
+            if blank and cell.lower() in ("", "nan", "na"):
+                return np.nan
             try:
-                return finite_number(cell, ("", "nan", "na") if blank else ())
-            except ValueError as problem:
-                expected, found = problem.args
-                self.fail(f"column '{column}': expected {expected}; found {found}", row)
+                value, expected = number_in(cell), "a finite number"
+            except ValueError:
+                value, expected = np.inf, "a number"
+            if not np.isfinite(value):
+                empty = "an empty cell; what holds for several rows stands in each of them"
+                self.fail(
+                    f"column '{column}': expected {expected}; found {repr(cell) if cell else empty}", row
+                )
+            return value
 
         found = self.with_points(self._named(column)).numbers(one)
         return found * self.sizes[column] if self.sizes.get(column, 1.0) != 1.0 else found

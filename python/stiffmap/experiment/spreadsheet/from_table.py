@@ -27,7 +27,7 @@ from stiffmap.experiment.spreadsheet import dialogue
 from stiffmap.experiment.spreadsheet.answers import Answers, Meant, Question
 from stiffmap.experiment.spreadsheet.convert import ImportedSheet, write_folder
 from stiffmap.experiment.spreadsheet.dh import LAYOUT, LEG, QUANTITIES, arm, left_out, read_dh
-from stiffmap.experiment.spreadsheet.guess import has_meaning
+from stiffmap.experiment.spreadsheet.guess import guessed
 from stiffmap.experiment.spreadsheet.instrument import Instrument, as_readings, load_instrument
 from stiffmap.experiment.spreadsheet.joints import (
     DIFFERENCES,
@@ -135,7 +135,9 @@ def experiment_from_table(
     rows = None if joints is None else read_dh(joints, given.units, dh_convention)
     drives = drives if rows is None else {f"{LEG}.{r.name}": r.slides for r in rows}
     numbered = any(h.strip("+-").isdigit() for many in chosen.values() for h in many)
-    layout = Layout(lambda n: has_meaning(n) or bool(JOINT.fullmatch(n)), tuple(header), numbered, which)
+    layout = Layout(
+        lambda n: guessed(n) != "note" or bool(JOINT.fullmatch(n)), tuple(header), numbered, which
+    )
 
     def declared_for(m: Meant) -> Machine:
         if rows is None or dh is None:

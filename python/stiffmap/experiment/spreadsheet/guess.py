@@ -101,11 +101,6 @@ def find_column(wanted: str, headers: Sequence[str]) -> int:
     return found[0]
 
 
-def has_meaning(name: str) -> bool:
-    """Whether a name without its unit stands for a column of an experiment."""
-    return guessed(name) != "note"
-
-
 def guessed(name: str) -> str:
     """Column of an experiment that a name without its unit stands for; ``note`` for none."""
     return _meaning(name)[0]

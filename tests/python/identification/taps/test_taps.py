@@ -120,7 +120,7 @@ def test_a_quality_factor_is_a_damping_and_a_mac_says_nothing(tmp_path):
             "x_mm,y_mm,z_mm,frequency_Hz\n1,2,3,-4\n",
             "line 2.*frequency_Hz: expected a number above zero, found -4",
         ),
-        ("x_mm,y_mm,z_mm,frequency_Hz\n1,2,3,low\n", "frequency_Hz: expected a number, found 'low'"),
+        ("x_mm,y_mm,z_mm,frequency_Hz\n1,2,3,low\n", "column 'frequency_Hz': expected a number; found 'low'"),
         ("x_mm,y_mm,z_mm,frequency_Hz,u_Hz\n1,2,3,9,0\n", "u_Hz: expected a number above zero"),
         (
             "x_mm,y_mm,z_mm,frequency_Hz,damping_percent\n1,2,3,9,0\n1,2,3,9,0.02\n",

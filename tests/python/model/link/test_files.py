@@ -168,7 +168,7 @@ def write(tmp_path, name, text):
             "a.csv",
             csv_text().replace("\n2.0,", "\ntwo,"),
             None,
-            "line 4: node: expected a number, found 'two'",
+            "line 4: column 'node': expected a number; found 'two'",
         ),
         (
             "a.csv",

@@ -89,7 +89,7 @@ def test_tables_as_analysers_write_them(tmp_path, head, columns):
         ("frequency_Hz,real_furlong,imag_furlong\n1,1,0\n2,1,0\n", "UNIT one of m/N"),
         (
             "frequency_Hz,real_m/N,imag_m/N\n1,1,0\n2,high,0\n",
-            "line 3: real_m/N: expected a number, found 'high'",
+            "line 3: column 'real_m/N': expected a number; found 'high'",
         ),
     ],
 )
