@@ -36,12 +36,10 @@ from stiffmap.identification.inference.machines import (
     DECLARED,
     Written,
     lack_of_fit,
-    plain_calibration,
-    stands_out,
     vouched,
     written,
 )
-from stiffmap.identification.inference.names import Inferred, put_instead, terms, with_travel, without_sag
+from stiffmap.identification.inference.names import Inferred, put_instead, with_travel, without_sag
 from stiffmap.identification.inference.parts import GAPS, NOISE
 from stiffmap.identification.inference.readings import Readings, readings
 from stiffmap.identification.inference.shares import gap_of, shares, tolerance_word, too_wide
@@ -54,7 +52,7 @@ RIVALS = 3
 
 def answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, cross_validate: bool) -> Diagnosis:
     """The diagnosis of an experiment."""
-    e, columns, sigma, base = predictor.experiment, found.columns, found.noise.sigma, found.plan.base
+    e, columns, sigma = predictor.experiment, found.columns, found.noise.sigma
     clock.say("corrected machine")
     models, found, v, notes = _models(predictor, found)
     fit = found.search.best.fit
@@ -65,11 +63,9 @@ def answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, cross
             models[CORRECTED] = corrected(given, best.terms if best else ())
     if CORRECTED in models and (more := with_travel(own, anew=False)) is not own:
         models[CORRECTED] = along_travel(models[CORRECTED], _given(predictor, found, v, more))
-    listed = stands_out(columns, fit, found.suspects, models.values())
     clock.say("readings that no fit saw")
-    if (models or v.rest) and cross_validate and not clock.over:
-        models = plain_calibration(predictor, found) | models
-    made = written(models, base, predictor, sigma, listed, seed, lambda: clock.over or not cross_validate)
+    plain = bool(models or v.rest)
+    made = written(models, predictor, found, seed, lambda: clock.over or not cross_validate, plain=plain)
     held, late, listed = made.held_out, made.over_time, made.listed
     noise = _noise(found, made, best, v.noise)
     each, gap = shares(columns, fit), gap_of(columns, fit)
@@ -108,7 +104,7 @@ def answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, cross
             *([] if late is None else [str(late)]),
         ],
         shares=each,
-        machine=vouched(predictor, made, _said(which, effects, e), columns),
+        machine=vouched(predictor, made, _said(which, effects, e)),
         declared=predictor.machine,
         experiment=e,
         residual_before=made.left[0],
@@ -127,7 +123,7 @@ def answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, cross
 def _change(predictor: Predictor, c: Chosen) -> Floats:
     """(n, c) m, rad: what an effect adds to the readings; nothing where the machine cannot have it."""
     try:
-        return predictor(terms([c])) - predictor()
+        return predictor([c.term]) - predictor()
     except StiffmapError:
         return np.zeros_like(predictor.experiment.reading)
 
@@ -135,8 +131,7 @@ def _change(predictor: Predictor, c: Chosen) -> Floats:
 def _given(predictor: Predictor, found: Inferred, v: Verdict, fit: Fit) -> Readings:
     """The readings under the amplitudes of a fit, with what a verdict refuses to name."""
     nameless = [_change(predictor, c) for c, _ in v.refused]
-    own = found.uncertain, found.columns, fit, found.noise.sigma, found.suspects
-    return readings(predictor, *own, nameless, v.as_effects)
+    return readings(predictor, found, fit, nameless, v.as_effects)
 
 
 def _models(
@@ -148,7 +143,7 @@ def _models(
     v, plain = judged(found.columns, found.search), found.search.calibrated
     if v.named and plain is not None:
         plain = with_travel(without_sag(plain), anew=True)  # as a calibration has it
-        own = readings(predictor, found.uncertain, found.columns, plain, found.noise.sigma, found.suspects)
+        own = readings(predictor, found, plain)
         if len(own.spread):
             out[CALIBRATED] = corrected(own, ())
     while True:
@@ -156,7 +151,7 @@ def _models(
         if not v.named and not len(given.spread):
             break
         chosen = [n.chosen for n in v.named]
-        starts = [Term.of(c.place.candidate, t) for c, t in zip(chosen, terms(chosen), strict=True)]
+        starts = [Term.of(c.place.candidate, c.term) for c in chosen]
         try:
             best = corrected(given, starts)
         except StiffmapError as problem:
@@ -202,7 +197,7 @@ def _alternatives(
                 clock.leave_out("other places of the effects, fitted")
                 return
             other = put_instead(found.search.best.fit, n.chosen, place)
-            start = Term.of(place.candidate, terms([other])[0])
+            start = Term.of(place.candidate, other.term)
             try:
                 fitted = instead(best, [*best.terms[:k], start, *best.terms[k + 1 :]])
             except StiffmapError:
@@ -219,7 +214,7 @@ def _word(v: Verdict, effects: Sequence[Effect], rest: Sequence[Rest], several: 
         return "ambiguous"
     if effects or v.beyond:
         return "effects+unattributed" if rest else "effects"
-    return "unattributed" if rest or v.word == "unattributed" or off else "none"
+    return "unattributed" if rest or off else "none"
 
 
 def _noise(found: Inferred, made: Written, best: Corrected | None, scale: float) -> NoiseReport:

@@ -84,12 +84,14 @@ class Fit:
         """Whether the noise has heavy tails: some readings lie far from the others and count less."""
         return bool(np.any(self.weights != 1.0))
 
+    @property
+    def amplitudes(self) -> dict[str, float]:
+        """ln variances, by the names of the noise and of the parts."""
+        return dict(zip([NOISE, *(p.name for p in self.parts)], self.t.tolist(), strict=True))
+
     def amplitude(self, name: str) -> float:
         """Standard deviation of a part; 0 where it is not in the model."""
-        return next(
-            (float(np.exp(0.5 * t)) for p, t in zip(self.parts, self.t[1:], strict=True) if p.name == name),
-            0.0,
-        )
+        return float(np.exp(0.5 * self.amplitudes.get(name, -np.inf)))
 
     @property
     def on(self) -> list[tuple[Part, float]]:

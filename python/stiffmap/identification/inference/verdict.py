@@ -160,7 +160,7 @@ def refusal(columns: Columns, fit: Fit, c: Chosen) -> tuple[float, str]:
     rest = fit.without([c.part.name])
     if without_a_pose(columns, rest, c) < np.log(ODDS):
         return 0.0, ONE_POSE
-    scatter, worst = unevenness(columns, rest, c.lines(columns) @ c.values / columns.sigma)
+    scatter, worst = unevenness(columns, rest, columns.lines(c.variant) @ c.values / columns.sigma)
     return scatter, f"its strength differs along {worst}" if worst else ""
 
 
@@ -193,7 +193,7 @@ def by_chance(columns: Columns, fit: Fit, c: Chosen) -> float:
 def without_a_pose(columns: Columns, rest: Fit, c: Chosen) -> float:
     """Gain of ln likelihood by an effect of one strength, at its least over all poses left out in turn; infinite where all
     readings are of one."""
-    raw = c.lines(columns) @ c.values / columns.sigma
+    raw = columns.lines(c.variant) @ c.values / columns.sigma
     pattern, r = rest.white(columns.free.T @ raw), rest.white(rest.columns.residual)
     pose = columns.experiment.groups[columns.rows]
     out: list[float] = []
