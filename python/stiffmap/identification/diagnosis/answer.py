@@ -115,7 +115,7 @@ def answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, cross
         refused=[*dict.fromkeys(f"{c.place.candidate}: {why}" for c, why in (*v.refused, *v.gone))],
         which=which,
         stopped=clock.stopped or bool(clock.left_out),
-        not_tried=list(clock.left_out),
+        not_tried=[*dict.fromkeys(clock.left_out)],
         seed=seed,
     )
 
@@ -194,7 +194,7 @@ def _alternatives(
     for k, n in enumerate(v.named):
         for place in n.equivalents[:RIVALS]:
             if clock.over:
-                clock.leave_out("other places of the effects, fitted")
+                clock.left_out.append("other places of the effects, fitted")
                 return
             other = put_instead(found.search.best.fit, n.chosen, place)
             start = Term.of(place.candidate, other.term)

@@ -95,7 +95,7 @@ def written(
     listed = stands_out(found, models.values())
     if plain and not over():
         models = plain_calibration(predictor, found) | models
-    which, held, listed = _chosen(models, e, declared, sigma, listed, seed, over)
+    which, held, listed = _chosen(models, e, found, listed, seed, over)
     machine, there, prediction, promise = predictor.machine, e, declared, None
     if best := models.get(which):
         machine, there, prediction = machine_of(best), best.experiment, best.prediction
@@ -115,14 +115,13 @@ def written(
 def _chosen(
     models: dict[str, Corrected],
     e: Experiment,
-    declared: Floats,
-    sigma: Floats,
+    found: Inferred,
     listed: Mask,
     seed: int,
     over: Callable[[], bool],
 ) -> tuple[str, HeldOut | None, Mask]:
     """Which machine is handed over, each fold of readings predicted from all others; (n,) rows that stand alone there."""
-    label, by = folds(e, seed)
+    declared, sigma, (label, by) = found.plan.base, found.noise.sigma, folds(e, seed)
     number = int(label.max()) + 1
     last = [DECLARED, *(m for m in models if m != PLAIN)][-1]
     if number < 2 or over():

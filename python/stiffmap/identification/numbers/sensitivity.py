@@ -83,8 +83,8 @@ def slopes_at(predictor: Predictor, unknowns: Sequence[Unknown], values: Floats)
     here = moves_of(pairs)
     scale = here.pop((INSTRUMENT, SCALE), 0.0)
     terms = (scaled(description, scale),) if scale else ()
-    apart = any(u.setup and not u.of_instrument for u, _ in pairs)  # a machine for each set-up
-    plain = [k for k, u in enumerate(unknowns) if not u.setup and not u.of_instrument]
+    apart = any(u.setup and u.group != INSTRUMENT for u, _ in pairs)  # a machine for each set-up
+    plain = [k for k, u in enumerate(unknowns) if not u.setup and u.group != INSTRUMENT]
 
     @cache
     def base() -> Predictor:

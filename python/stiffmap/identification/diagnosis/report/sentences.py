@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from math import isfinite
 from typing import Any
 
-from stiffmap.common.number_text import with_uncertainty, within
+from stiffmap.common.number_text import place_text, with_uncertainty, within
 from stiffmap.common.units import DISPLAY_UNITS
 from stiffmap.identification.candidates.candidates import words
 from stiffmap.identification.diagnosis.report.findings import Effect
@@ -246,8 +246,7 @@ def effect_text(e: Effect) -> str:
 
 def separation_text(s: Separation) -> str:
     """Where, load, axis, how many."""
-    where = ", ".join(f"{1e3 * v:.0f}" for v in s.position)
     load = ", ".join(f"{v:.0f}" for v in s.force)
     many = f"{s.readings or 'no sensible number of'} reading{'s' if s.readings != 1 else ''}"
     gap = f"{1e3 * s.difference:.4f} mm"
-    return f"read {s.axis} at ({where}) mm under force ({load}) N: they differ by {gap}, {many}"
+    return f"read {s.axis} at {place_text(s.position, '.0f')} under force ({load}) N: they differ by {gap}, {many}"
