@@ -254,11 +254,7 @@ def _rest(columns: Columns, fit: Fit, v: Verdict, each: dict[str, float], gap: F
     if share == 0.0:  # no part of the model: what stays at the fit
         share = min(1.0, float(np.sum(in_noise**2) / np.sum(columns.residual**2)))
     pose = e.groups
-    number = int(pose.max()) + 1
-    count = np.maximum(np.bincount(pose, minlength=number), 1)
-    each_pose = np.stack(
-        [np.bincount(pose, in_noise[:, a] ** 2, number) / count for a in range(gap.shape[1])]
-    )
+    each_pose = np.stack([np.bincount(pose, one**2) for one in in_noise.T]) / np.bincount(pose)
     axis, k = np.unravel_index(int(np.argmax(each_pose)), each_pose.shape)
     x, y, z = (float(c) for c in e.position[pose == k][0])
     size = float(np.sqrt(np.mean(gap[pose == k][:, axis] ** 2)))

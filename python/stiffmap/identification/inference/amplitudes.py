@@ -101,9 +101,7 @@ class Fit:
 
     def spread(self, group: str) -> float:
         """Standard deviation of the numbers of a group, in standard uncertainties: its own, or that of all together."""
-        return self.amplitude(group) or (
-            0.0 if any(p.name == group for p in self.parts) else self.amplitude(ALL_NUMBERS)
-        )
+        return self.amplitude(group if group in self.amplitudes else ALL_NUMBERS)
 
     def mean(self, part: Part) -> Floats:
         """(m,) posterior mean of what a part of the model adds to the readings."""
