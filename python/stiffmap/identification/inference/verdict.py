@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg import orth
 from scipy.special import chdtrc, ndtri
 
 from stiffmap.experiment.experiment import WRENCH, Experiment, Floats, Integers
@@ -198,7 +199,7 @@ def without_a_pose(columns: Columns, rest: Fit, c: Chosen) -> float:
     pose = columns.experiment.groups[columns.rows]
     out: list[float] = []
     for k in np.unique(pose) if np.ptp(pose) > 0 else ():
-        gone = np.linalg.qr(rest.white(columns.free[pose == k].T))[0]
+        gone = orth(rest.white(columns.free[pose == k].T))  # averages of repeats are one direction
         a, b = pattern - gone @ (gone.T @ pattern), r - gone @ (gone.T @ r)
         out.append(0.5 * float(a @ b) ** 2 / max(float(a @ a), 1e-12))
     return min(out, default=np.inf)

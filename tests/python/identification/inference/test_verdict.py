@@ -75,6 +75,15 @@ def test_an_effect_that_one_pose_alone_shows_has_no_name():
     assert verdict.refusal(c, fit, chosen)[1] == "it rests on the readings of one pose"
 
 
+def test_repeats_of_a_pose_take_no_more_away_with_it_than_their_average():
+    c, fit, chosen = flat(1, np.full(READINGS, 5.0))
+    rest, twice = fit.without(["effect"]), {n: getattr(c, n).repeat(2) for n in ("rows", "channel", "use")}
+    both = replace(c, free=c.free.repeat(2, axis=0) / 2**0.5, sigma=np.full(2 * READINGS, 2**0.5), **twice)
+    assert verdict.without_a_pose(both, rest, chosen) == pytest.approx(
+        verdict.without_a_pose(c, rest, chosen)
+    )
+
+
 @pytest.mark.parametrize(("slips", "rest"), [(False, "effect"), (True, "")])
 def test_what_one_pose_shows_is_unexplained_unless_readings_slip(slips, rest):
     c, fit, chosen = flat(1, np.where(np.arange(READINGS) < 5, 30.0, 0.0))
