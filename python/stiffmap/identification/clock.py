@@ -26,7 +26,7 @@ class Clock:
     until: float = float("inf")
     progress: Progress | None = None
     stopped: bool = False
-    left_out: dict[str, None] = field(default_factory=dict)
+    left_out: list[str] = field(default_factory=list)
     """What was not tried for that."""
 
     @staticmethod
@@ -36,10 +36,6 @@ class Clock:
         if not most >= 0:
             raise refused("time_limit", "seconds, 0 or more", f"{most:g}")
         return Clock(time.monotonic() + most, progress)
-
-    def leave_out(self, what: str) -> None:
-        """Note what is not tried."""
-        self.left_out[what] = None
 
     def say(self, what: str) -> None:
         """Tell what is tried now."""

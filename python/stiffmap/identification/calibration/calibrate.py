@@ -14,7 +14,6 @@ from stiffmap.common.broadcasting import names_of, whole_number
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.tasks import on_one_thread
 from stiffmap.experiment.calls import as_experiment
-from stiffmap.experiment.comparison.limitations import refuse
 from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.noise.outliers import swapped
 from stiffmap.experiment.prediction.predict import Predictor
@@ -25,14 +24,7 @@ from stiffmap.identification.inference.amplitudes import Fit
 from stiffmap.identification.inference.columns import Columns
 from stiffmap.identification.inference.constants import ODDS
 from stiffmap.identification.inference.corrected import Corrected, corrected
-from stiffmap.identification.inference.machines import (
-    CALIBRATED,
-    DECLARED,
-    plain_calibration,
-    stands_out,
-    vouched,
-    written,
-)
+from stiffmap.identification.inference.machines import CALIBRATED, DECLARED, vouched, written
 from stiffmap.identification.inference.names import Inferred, infer
 from stiffmap.identification.inference.readings import readings
 from stiffmap.identification.inference.shares import of_numbers, shares, tolerance_word, too_wide
@@ -92,9 +84,7 @@ def calibrate(
             raise StiffmapError(f"calibration: unknown group '{name}'; there are: {', '.join(GROUPS)}")
     clock, start = Clock.of(time_limit, progress), time.perf_counter()
     with clock.on_interrupt():
-        predictor = Predictor(declared, data, threads=threads)
-        refuse(predictor.experiment, predictor())
-        predictor = registered(predictor, tolerances, exclude)
+        predictor = registered(Predictor(declared, data, threads=threads), tolerances, exclude)
         without_effects = CandidatePlan(predictor(), (), ())
         found = infer(predictor, without_effects, tolerances, exclude, clock, seed, travel=True)
         return _answer(predictor, found, clock, seed, start)
@@ -102,19 +92,15 @@ def calibrate(
 
 def _answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, start: float) -> Calibration:
     e, columns, best = predictor.experiment, found.columns, found.search.best
-    base, sigma = found.plan.base, found.noise.sigma
     exact = best.score - found.search.exact < np.log(ODDS)
     fit = best.fit if best.world == EXACT else found.search.calibrated or best.fit
     clock.say("calibrated machine")
-    given = readings(predictor, found.uncertain, columns, fit, sigma, found.suspects)
+    given = readings(predictor, found, fit)
     at = corrected(given, ()) if given.drives or (len(given.spread) and not exact) else None
     models = {CALIBRATED: at} if at else {}
-    listed = stands_out(columns, best.fit, found.suspects, models.values())
     clock.say("readings that no fit saw")
-    if not exact and not clock.over:
-        models = plain_calibration(predictor, found) | models
-    made = written(models, base, predictor, sigma, listed, seed, lambda: clock.over)
-    listed, at = made.listed, models.get(made.which, at)
+    made = written(models, predictor, found, seed, lambda: clock.over, plain=not exact)
+    listed, at = made.listed, made.best or at
     rows, rank = table_of(columns, found.search.calibrated or fit, at)
     verdict = judged(columns, found.search)
     wide = too_wide(fit, verdict.out_of_tolerance)
@@ -145,10 +131,10 @@ def _answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, star
         rest=rest,
         profiles=at.profiles if at and made.which != DECLARED else (),
         outliers=tuple(e.ids[i] for i in np.flatnonzero(listed)),
-        swapped=tuple((e.ids[i], e.ids[j]) for i, j in swapped(e, made.left[1], sigma, listed)),
+        swapped=tuple((e.ids[i], e.ids[j]) for i, j in swapped(e, made.left[1], found.noise.sigma, listed)),
         failed=given.sensitivity.failed,
         stopped=clock.stopped,
-        machine=vouched(predictor, made, f"Numbers calibrated by experiment {e.name}.", columns),
+        machine=vouched(predictor, made, f"Numbers calibrated by experiment {e.name}."),
         validity=covered(predictor.machine, e, ~listed),
         over_time=made.over_time,
         experiment=e,

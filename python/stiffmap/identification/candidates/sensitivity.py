@@ -246,7 +246,7 @@ def plan_of(predictor: Predictor, clock: Clock | None = None) -> CandidatePlan:
     for candidate in tried:
         if clock.over:
             where = "some places" if candidate.kind == kind else "any place"
-            clock.leave_out(f"{candidate.kind} at {where}: no sensitivities")
+            clock.left_out.append(f"{candidate.kind} at {where}: no sensitivities")
             whole = False
             continue
         if candidate.kind != kind:

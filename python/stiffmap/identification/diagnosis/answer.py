@@ -36,12 +36,10 @@ from stiffmap.identification.inference.machines import (
     DECLARED,
     Written,
     lack_of_fit,
-    plain_calibration,
-    stands_out,
     vouched,
     written,
 )
-from stiffmap.identification.inference.names import Inferred, put_instead, terms, with_travel
+from stiffmap.identification.inference.names import Inferred, put_instead, with_travel
 from stiffmap.identification.inference.parts import GAPS, NOISE
 from stiffmap.identification.inference.readings import Readings, readings
 from stiffmap.identification.inference.shares import gap_of, shares, tolerance_word, too_wide
@@ -54,18 +52,16 @@ RIVALS = 3
 
 def answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, cross_validate: bool) -> Diagnosis:
     """The diagnosis of an experiment."""
-    e, columns, sigma, base = predictor.experiment, found.columns, found.noise.sigma, found.plan.base
+    e, columns, sigma = predictor.experiment, found.columns, found.noise.sigma
     clock.say("corrected machine")
     models, found, v, notes = _models(predictor, found)
     fit = found.search.best.fit
     best = models.get(CORRECTED)
     if best and (more := with_travel(fit, anew=False)) is not fit:
         models[CORRECTED] = along_travel(best, _given(predictor, found, v, more))
-    listed = stands_out(columns, fit, found.suspects, models.values())
     clock.say("readings that no fit saw")
-    if (models or v.rest) and cross_validate and not clock.over:
-        models = plain_calibration(predictor, found) | models
-    made = written(models, base, predictor, sigma, listed, seed, lambda: clock.over or not cross_validate)
+    plain = bool(models or v.rest)
+    made = written(models, predictor, found, seed, lambda: clock.over or not cross_validate, plain=plain)
     held, late, listed = made.held_out, made.over_time, made.listed
     noise = _noise(found, made, best, v.noise)
     each, gap = shares(columns, fit), gap_of(columns, fit)
@@ -104,7 +100,7 @@ def answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, cross
             *([] if late is None else [str(late)]),
         ],
         shares=each,
-        machine=vouched(predictor, made, _said(which, effects, e), columns),
+        machine=vouched(predictor, made, _said(which, effects, e)),
         declared=predictor.machine,
         experiment=e,
         residual_before=made.left[0],
@@ -115,7 +111,7 @@ def answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, cross
         refused=[*dict.fromkeys(f"{c.place.candidate}: {why}" for c, why in (*v.refused, *v.gone))],
         which=which,
         stopped=clock.stopped or bool(clock.left_out),
-        not_tried=list(clock.left_out),
+        not_tried=[*dict.fromkeys(clock.left_out)],
         seed=seed,
     )
 
@@ -123,7 +119,7 @@ def answer(predictor: Predictor, found: Inferred, clock: Clock, seed: int, cross
 def _change(predictor: Predictor, c: Chosen) -> Floats:
     """(n, c) m, rad: what an effect adds to the readings; nothing where the machine cannot have it."""
     try:
-        return predictor(terms([c])) - predictor()
+        return predictor([c.term]) - predictor()
     except StiffmapError:
         return np.zeros_like(predictor.experiment.reading)
 
@@ -131,8 +127,7 @@ def _change(predictor: Predictor, c: Chosen) -> Floats:
 def _given(predictor: Predictor, found: Inferred, v: Verdict, fit: Fit) -> Readings:
     """The readings under the amplitudes of a fit, with what a verdict refuses to name."""
     nameless = [_change(predictor, c) for c, _ in v.refused]
-    own = found.uncertain, found.columns, fit, found.noise.sigma, found.suspects
-    return readings(predictor, *own, nameless, v.as_effects)
+    return readings(predictor, found, fit, nameless, v.as_effects)
 
 
 def _models(
@@ -144,7 +139,7 @@ def _models(
     v, plain = judged(found.columns, found.search), found.search.calibrated
     if v.named and plain is not None:
         plain = with_travel(plain, anew=True)  # as a calibration has it
-        own = readings(predictor, found.uncertain, found.columns, plain, found.noise.sigma, found.suspects)
+        own = readings(predictor, found, plain)
         if len(own.spread):
             out[CALIBRATED] = corrected(own, ())
     while True:
@@ -152,7 +147,7 @@ def _models(
         if not v.named and not len(given.spread):
             break
         chosen = [n.chosen for n in v.named]
-        starts = [Term.of(c.place.candidate, t) for c, t in zip(chosen, terms(chosen), strict=True)]
+        starts = [Term.of(c.place.candidate, c.term) for c in chosen]
         try:
             best = corrected(given, starts)
         except StiffmapError as problem:
@@ -195,10 +190,10 @@ def _alternatives(
     for k, n in enumerate(v.named):
         for place in n.equivalents[:RIVALS]:
             if clock.over:
-                clock.leave_out("other places of the effects, fitted")
+                clock.left_out.append("other places of the effects, fitted")
                 return
             other = put_instead(found.search.best.fit, n.chosen, place)
-            start = Term.of(place.candidate, terms([other])[0])
+            start = Term.of(place.candidate, other.term)
             try:
                 fitted = instead(best, [*best.terms[:k], start, *best.terms[k + 1 :]])
             except StiffmapError:
@@ -215,7 +210,7 @@ def _word(v: Verdict, effects: Sequence[Effect], rest: Sequence[Rest], several: 
         return "ambiguous"
     if effects or v.beyond:
         return "effects+unattributed" if rest else "effects"
-    return "unattributed" if rest or v.word == "unattributed" or off else "none"
+    return "unattributed" if rest or off else "none"
 
 
 def _noise(found: Inferred, made: Written, best: Corrected | None, scale: float) -> NoiseReport:
@@ -255,11 +250,7 @@ def _rest(columns: Columns, fit: Fit, v: Verdict, each: dict[str, float], gap: F
     if share == 0.0:  # no part of the model: what stays at the fit
         share = min(1.0, float(np.sum(in_noise**2) / np.sum(columns.residual**2)))
     pose = e.groups
-    number = int(pose.max()) + 1
-    count = np.maximum(np.bincount(pose, minlength=number), 1)
-    each_pose = np.stack(
-        [np.bincount(pose, in_noise[:, a] ** 2, number) / count for a in range(gap.shape[1])]
-    )
+    each_pose = np.stack([np.bincount(pose, one**2) for one in in_noise.T]) / np.bincount(pose)
     axis, k = np.unravel_index(int(np.argmax(each_pose)), each_pose.shape)
     x, y, z = (float(c) for c in e.position[pose == k][0])
     size = float(np.sqrt(np.mean(gap[pose == k][:, axis] ** 2)))

@@ -11,7 +11,6 @@ from stiffmap.common.broadcasting import names_of, whole_number
 from stiffmap.common.number_text import within
 from stiffmap.common.tasks import on_one_thread
 from stiffmap.experiment.calls import as_experiment
-from stiffmap.experiment.comparison.limitations import refuse
 from stiffmap.experiment.experiment import Experiment
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.identification.candidates.sensitivity import plan_of
@@ -84,25 +83,19 @@ def diagnose(
         if name not in GROUPS:
             get(name)
     with clock.on_interrupt():
-        predictor = Predictor(declared, data, threads=threads)
-        refuse(predictor.experiment, predictor())
-        predictor = registered(predictor, tolerances, exclude)
         times = [time.perf_counter()]
         slips: list[Slip] = []
-        plan = plan_of(predictor, clock)
-        clock.say("units, signs, swaps and shifted rows")
-        while len(slips) < SLIPS and not clock.over:
-            found = find_slip(predictor, plan)
+        while True:
+            predictor = registered(Predictor(declared, data, threads=threads), tolerances, exclude)
+            plan = plan_of(predictor, clock)
+            clock.say("units, signs, swaps and shifted rows")
+            found = find_slip(predictor, plan) if len(slips) < SLIPS and not clock.over else None
             if found is None:
                 break
-            slip, undone = found
+            slip, data = found
             slips.append(slip)
             if not slip.undone:
                 break
-            predictor = Predictor(declared, undone, threads=threads)
-            refuse(predictor.experiment, predictor())
-            predictor = registered(predictor, tolerances, exclude)
-            plan = plan_of(predictor, clock)
         times.append(time.perf_counter())
         inferred = infer(predictor, plan, tolerances, exclude, clock, seed)
         times.append(time.perf_counter())

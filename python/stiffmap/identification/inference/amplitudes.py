@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.linalg import LinAlgError
@@ -84,12 +85,14 @@ class Fit:
         """Whether the noise has heavy tails: some readings lie far from the others and count less."""
         return bool(np.any(self.weights != 1.0))
 
+    @property
+    def amplitudes(self) -> dict[str, float]:
+        """ln variances, by the names of the noise and of the parts."""
+        return dict(zip([NOISE, *(p.name for p in self.parts)], self.t.tolist(), strict=True))
+
     def amplitude(self, name: str) -> float:
         """Standard deviation of a part; 0 where it is not in the model."""
-        return next(
-            (float(np.exp(0.5 * t)) for p, t in zip(self.parts, self.t[1:], strict=True) if p.name == name),
-            0.0,
-        )
+        return float(np.exp(0.5 * self.amplitudes.get(name, -np.inf)))
 
     @property
     def on(self) -> list[tuple[Part, float]]:
@@ -98,9 +101,7 @@ class Fit:
 
     def spread(self, group: str) -> float:
         """Standard deviation of the numbers of a group, in standard uncertainties: its own, or that of all together."""
-        return self.amplitude(group) or (
-            0.0 if any(p.name == group for p in self.parts) else self.amplitude(ALL_NUMBERS)
-        )
+        return self.amplitude(group if group in self.amplitudes else ALL_NUMBERS)
 
     def mean(self, part: Part) -> Floats:
         """(m,) posterior mean of what a part of the model adds to the readings."""
@@ -111,9 +112,10 @@ class Fit:
         """(m, ...) L⁻¹ values."""
         return np.asarray(solve_triangular(self.root, values, lower=True, check_finite=False))
 
-    def inverse(self) -> Floats:
-        """(m, m) V⁻¹, its lower half; zero above the diagonal."""
-        return np.asarray(dpotri(self.root, lower=1)[0])
+    @cached_property
+    def at_readings(self) -> Floats:
+        """(N,) information of each reading: the diagonal of B V⁻¹ Bᵀ."""
+        return np.asarray(np.sum(self.white(self.columns.free.T) ** 2, axis=0))
 
     def without(self, names: Sequence[str], noise: float | None = None) -> Fit:
         """The same with some parts taken away, nothing fitted anew; `noise`: κ of the result."""
@@ -190,7 +192,7 @@ def _heavy(fit: Fit, mean: Floats, sd: Floats) -> Floats:
 
 def evaluated(columns: Columns, parts: Sequence[Part], t: Floats, weights: Floats) -> Fit:
     """The evidence at given amplitudes."""
-    fit, along = _evaluate(columns, tuple(parts), t, weights, columns.spared.of_noise(1.0 / weights))
+    fit, along = _evaluate(columns, tuple(parts), t, weights, columns.of_noise(weights))
     return _priced(fit, _price(fit, _information(fit, along)))
 
 
@@ -219,14 +221,11 @@ def _known_by_repeats(columns: Columns) -> bool:
     return freedom >= FEWEST_REPEATS and squares > 0.0
 
 
-def noise_part(f: Fit, information: Floats | None = None) -> tuple[Floats, Floats]:
-    """(N,) posterior mean and standard deviation of the noise of each reading; `information` (N,) of each, where it is known."""
-    c = f.columns
+def noise_part(f: Fit) -> tuple[Floats, Floats]:
+    """(N,) posterior mean and standard deviation of the noise of each reading."""
     variance = f.noise**2 / f.weights
-    if information is None:
-        information = c.spared.at_readings(f.inverse())
-    back = c.free @ f.solved
-    return variance * back, np.sqrt(np.maximum(variance - variance**2 * information, 0.0))
+    back = f.columns.free @ f.solved
+    return variance * back, np.sqrt(np.maximum(variance - variance**2 * f.at_readings, 0.0))
 
 
 def _evaluate(
@@ -236,7 +235,7 @@ def _evaluate(
     nothing."""
     variance = np.exp(t)
     on = _on(parts, t)
-    v = np.asfortranarray(variance[0] * noise)
+    v = np.asfortranarray(variance[0] * noise.T)
     for a, full in [
         (1.0, columns.zero),
         *((variance[k], p.full) for k, p in on.items() if p.full is not None),
@@ -265,18 +264,17 @@ def _on(parts: tuple[Part, ...], t: Floats) -> dict[int, Part]:
     return {k: p for k, p in enumerate(parts, 1) if t[k] > OFF}
 
 
-def _gradient(fit: Fit, along: Floats, inverse: Floats, information: Floats) -> Floats:
-    """(1 + k,) slope of the score, priced without; `information` (N,) of each reading."""
+def _gradient(fit: Fit, along: Floats, noise: Floats) -> Floats:
+    """(1 + k,) slope of the score, priced without; `noise` (m, m) as in `Columns.of_noise`."""
     trace, on = np.zeros(len(fit.t)), _on(fit.parts, fit.t)
     short = {k: p.factor for k, p in on.items() if p.factor is not None}
     if short:
         squares = np.sum(fit.white(np.hstack(list(short.values()))) ** 2, axis=0)
         ends = np.cumsum([f.shape[1] for f in short.values()])
         trace[list(short)] = [x.sum() for x in np.split(squares, ends[:-1])]
-    for k, p in on.items():
-        if p.full is not None:
-            trace[k] = 2.0 * np.vdot(inverse.T, p.full) - np.diag(inverse) @ np.diag(p.full)
-    trace[0] = np.sum(information / fit.weights)
+    inverse = np.asarray(dpotri(fit.root, lower=1)[0])  # its lower half; zero above the diagonal
+    for k, full in {0: noise, **{k: p.full for k, p in on.items() if p.full is not None}}.items():
+        trace[k] = 2.0 * np.vdot(inverse.T, full) - np.diag(inverse) @ np.diag(full)
     centre, sd = _prior(fit)
     slope = along.T @ fit.solved - np.exp(fit.t) * trace
     return np.asarray(0.5 * slope - (fit.t - centre) / sd**2)
@@ -359,7 +357,7 @@ def _optimum(
     if heavy:
         begun = _optimum(columns, parts, t, weights)
         t, weights = begun.t, _heavy(begun, *noise_part(begun))
-    damping, noise = SHRINK, columns.spared.of_noise(1.0 / weights)
+    damping, noise = SHRINK, columns.of_noise(weights)
     most = np.array([np.inf, *(p.most for p in parts)])
     t = np.minimum(t, most)
     fit, along = _evaluate(columns, parts, t, weights, noise)
@@ -367,12 +365,10 @@ def _optimum(
     price = _price(fit, information)
     for _ in range(WEIGHINGS if heavy else STEPS):
         if gradient is None:
-            inverse = fit.inverse()
-            at_readings = columns.spared.at_readings(inverse)
-            gradient = _gradient(fit, along, inverse, at_readings)
+            gradient = _gradient(fit, along, noise)
             if heavy:
-                weights = _heavy(fit, *noise_part(fit, at_readings))
-                noise = columns.spared.of_noise(1.0 / weights)
+                weights = _heavy(fit, *noise_part(fit))
+                noise = columns.of_noise(weights)
         scale = np.maximum(np.diag(information), 1e-2)
         free = np.flatnonzero((fit.t < most) | (gradient < 0.0))
         step = np.zeros(len(t))

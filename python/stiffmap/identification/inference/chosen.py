@@ -122,13 +122,18 @@ class Chosen:
         """Linear parameters with their values, SI; nothing where the strengths are not theirs."""
         return self.place.candidate.strengths(self.values)
 
-    def lines(self, columns: Columns) -> Floats:
-        """(N, p) m, rad: its columns, per scale of each linear parameter."""
-        return columns.lines(self.variant)
+    @property
+    def term(self) -> AppliedEffect:
+        """The effect with its strengths, SI, within their bounds."""
+        given = dict(self.variant.shape) | dict(self.refined)
+        given |= {p.name: float(np.clip(value, p.lower, p.upper)) for p, value in self.strengths}
+        if self.variant.start is not None:
+            given |= self.variant.start(self.values)
+        return self.place.candidate.term_of(given)
 
     def rotated(self, columns: Columns) -> Floats:
         """(m, p) change of the readings per scale of each linear parameter, in what frames leave free."""
-        return columns.rotated(self.lines(columns))
+        return columns.rotated(columns.lines(self.variant))
 
     def by_posterior(self, fit: Fit) -> Chosen:
         """With the strengths of its posterior mean in a fit."""

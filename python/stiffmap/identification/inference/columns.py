@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg.blas import dsymm
+from scipy.linalg.blas import dsyrk
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.experiment import Experiment, Floats, Integers
@@ -27,52 +27,6 @@ from stiffmap.identification.inference.places import NULL, Place, places
 from stiffmap.identification.inference.travel import drives_of
 from stiffmap.identification.numbers.sensitivity import Sensitivity, sensitivity, zeros_anew
 from stiffmap.identification.numbers.unknowns import Unknown
-
-
-@dataclass(frozen=True, eq=False)
-class Free:
-    """Directions that averages of repeats and unknown frames, tools and zeros leave free: of N readings with M averages, of which q
-    directions are taken, m = M - q.
-
-    They are columns of a block reflector (Schreiber, Parlett, SIAM J. Numer. Anal. 25 (1988) 189): all but a few of them are readings
-    themselves but for a few directions. So noise of any weights costs as much as those few, not as all.
-    """
-
-    mean: Floats
-    """(N, M) orthonormal columns that average repeats: one number in each row."""
-    low: Floats
-    """(m, q) the taken directions at all averages but the first q, turned so that the first q are symmetric."""
-    gain: Floats
-    """(m, q)."""
-    matrix: Floats
-    """(N, m) the free directions: of the averages -lowᵀ, then 1 - gain lowᵀ."""
-
-    @staticmethod
-    def across(taken: Floats, mean: Floats) -> Free:
-        """Across orthonormal directions `taken` (M, q) of averages."""
-        q = taken.shape[1]
-        left, _, right = np.linalg.svd(taken[:q])
-        turned = taken @ (right.T @ left.T)
-        low = turned[q:]
-        gain = np.linalg.solve(np.eye(q) + turned[:q], low.T).T
-        return Free(mean, low, gain, mean @ np.vstack([-low.T, np.eye(len(low)) - gain @ low.T]))
-
-    def of_noise(self, variance: Floats) -> Floats:
-        """(m, m) covariance along the free directions of noise of variances (N,)."""
-        d = (self.mean**2).T @ variance
-        q = self.low.shape[1]
-        scaled = d[q:, None] * self.gain
-        half = scaled - 0.5 * self.low @ (np.diag(d[:q]) + self.gain.T @ scaled)
-        across = half @ self.low.T
-        return np.asarray((np.diag(d[q:]) - across - across.T).T)
-
-    def at_readings(self, information: Floats) -> Floats:
-        """(N,) diagonal at the readings of a symmetric matrix (m, m) along the free directions, of which the lower half is read."""
-        along = dsymm(1.0, information, self.low, lower=1)
-        inner = self.low.T @ along
-        rest = np.diag(information) + np.sum(self.gain * (self.gain @ inner - 2.0 * along), axis=1)
-        return np.asarray(self.mean**2 @ np.append(np.diag(inner), rest))
-
 
 MOST_READINGS = 600
 """Readings that are compared with each other; of more, whole poses are drawn. Effort only: an (N, N) matrix is factorised."""
@@ -91,8 +45,8 @@ class Columns:
     """(N,) channel of each reading."""
     sigma: Floats
     """(N,) m, rad: declared standard deviation of each reading."""
-    spared: Free
-    """Directions that averaging over repeats and unknown frames, tools and zeros leave."""
+    free: Floats
+    """(N, m) orthonormal directions that averages of repeats and unknown frames, tools and zeros leave free."""
     frames: Floats
     """(N, q) orthonormal directions of unknown frames, tools and zeros."""
     residual: Floats
@@ -116,10 +70,9 @@ class Columns:
     """Whether the lengths of a row share one weight of heavy tails, and the angles, as where an instrument slips; else each reading has
     its own."""
 
-    @property
-    def free(self) -> Floats:
-        """(N, m) orthonormal."""
-        return self.spared.matrix
+    def of_noise(self, weights: Floats) -> Floats:
+        """(m, m) covariance along the free directions of noise of weights (N,), its upper half; zero below the diagonal."""
+        return np.asarray(dsyrk(1.0, self.free / np.sqrt(weights)[:, None], trans=1, lower=1).T)
 
     def scale_of(self, kernel: Kernel) -> float:
         """Variance of a kernel in a part of mean variance one."""
@@ -128,12 +81,12 @@ class Columns:
         return len(self) / size if size > 0.0 else 0.0
 
     @staticmethod
-    def bare(e: Experiment, rows: Integers, channel: Integers, spared: Free, residual: Floats) -> Columns:
+    def bare(e: Experiment, rows: Integers, channel: Integers, free: Floats, residual: Floats) -> Columns:
         """Of N readings in noise and a residual (m,) in what is free of them: without numbers, gaps and effects."""
-        n, m = spared.matrix.shape
+        n, m = free.shape
         none, zero = np.zeros((m, 0)), np.zeros((m, m))
         return Columns(
-            e, rows, channel, np.ones(n), spared, np.zeros((n, 0)), residual, zero, (), none, np.arange(n)
+            e, rows, channel, np.ones(n), free, np.zeros((n, 0)), residual, zero, (), none, np.arange(n)
         )
 
     def without(self, group: str) -> Columns:
@@ -210,10 +163,8 @@ def columns(
         )
     raw = (e.reading - base)[index] / noise
     mean = _averages(e, rows, channel, noise, raw)
-    frames = mean.T @ (nuisance_columns(e, base)[index] / noise[:, None])
-    q = basis(frames) if frames.shape[1] else frames
-    spared = Free.across(q, mean)
-    free = spared.matrix
+    q = basis(mean.T @ (nuisance_columns(e, base)[index] / noise[:, None]))
+    free = mean @ across(q)
     if not free.shape[1]:
         raise StiffmapError(
             f"{e.name}: unknown frames, tools and zeros take up all {len(rows)} readings; read more poses or declare what is known"
@@ -233,7 +184,7 @@ def columns(
         rows,
         channel,
         noise,
-        spared,
+        free,
         mean @ q,
         free.T @ raw,
         common @ common.T,
@@ -245,6 +196,11 @@ def columns(
         tuple(_along_travel(predictor, s, index, noise, free)),
         repeated(within, mean),
     )
+
+
+def across(taken: Floats) -> Floats:
+    """(M, M - q) orthonormal directions at right angles to orthonormal ones (M, q)."""
+    return np.asarray(np.linalg.qr(taken, mode="complete")[0][:, taken.shape[1] :])
 
 
 def repeated(within: Floats, mean: Floats) -> tuple[float, float]:

@@ -115,7 +115,8 @@ def corrected(given: Readings, terms: Sequence[Term], fixed: Sequence[AppliedEff
     """The optimum, from the values of the terms and the declared numbers, next to effects that are `fixed`."""
     found = _optimum(given, terms, fixed=fixed)
     for _ in range(WEIGHINGS):
-        if _bends(given, found):
+        alone = given.predicted(found.numbers, ())
+        if len(found.numbers) and bends(given.white, given.sensitivity, found.numbers, alone):
             anew = sensitivity_at(given.predictor, given.sensitivity, found.numbers)
             given = replace(given, sensitivity=anew)
             found = _optimum(given, found.terms, found.others, fixed=fixed)
@@ -258,16 +259,6 @@ def _change(
         if np.isfinite(there[given.rows, given.channel]).all():
             return np.asarray((there - here) / h)
     return np.zeros_like(here)
-
-
-def _bends(given: Readings, found: Corrected) -> bool:
-    """Whether the numbers' columns at the optimum are others than those in use."""
-    if not len(found.numbers):
-        return False
-    alone = given.predicted(found.numbers, ())
-    if not np.isfinite(alone[given.rows, given.channel]).all():
-        return False
-    return bends(given.white, given.sensitivity, found.numbers, alone, 1.0)
 
 
 def machine_of(found: Corrected) -> Machine:

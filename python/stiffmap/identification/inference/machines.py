@@ -11,13 +11,12 @@ from scipy.special import fdtrc
 
 from stiffmap.experiment.channels import metres
 from stiffmap.experiment.comparison.residual import Summary, summary
-from stiffmap.experiment.experiment import Floats, Integers, Mask
+from stiffmap.experiment.experiment import Experiment, Floats, Integers, Mask
 from stiffmap.experiment.noise.outliers import GROSS
 from stiffmap.experiment.noise.over_time import OverTime, over_time
 from stiffmap.experiment.noise.whitening import LinearProblem, folds, left_unseen, nuisance_part
 from stiffmap.experiment.prediction.predict import Predictor
-from stiffmap.identification.inference.amplitudes import Fit
-from stiffmap.identification.inference.columns import MOST_READINGS, Columns, drawn
+from stiffmap.identification.inference.columns import MOST_READINGS, drawn
 from stiffmap.identification.inference.constants import DEGREES, STANDS_OUT
 from stiffmap.identification.inference.corrected import Corrected, columns_of, corrected, machine_of, without
 from stiffmap.identification.inference.names import Inferred, of_noise_alone
@@ -51,6 +50,8 @@ class Written:
 
     which: str
     """``declared``, ``calibrated`` or ``corrected``."""
+    best: Corrected | None
+    """None: the declared machine."""
     machine: Machine
     held_out: HeldOut | None
     """None where there are not two groups of readings, or time is over."""
@@ -75,28 +76,28 @@ def plain_calibration(predictor: Predictor, found: Inferred) -> dict[str, Correc
     fit = of_noise_alone(found.columns)
     if fit is None:
         return {}
-    of_setups = [u for u in found.columns.unknowns if u.setup]
-    own = found.uncertain, found.columns, fit, found.noise.sigma, found.suspects
-    given = readings(predictor, *own, exact=of_setups)
+    given = readings(predictor, found, fit, exact=[u for u in found.columns.unknowns if u.setup])
     return {PLAIN: corrected(given, ())} if len(given.spread) else {}
 
 
 def written(
     models: dict[str, Corrected],
-    declared: Floats,
     predictor: Predictor,
-    sigma: Floats,
-    listed: Mask,
+    found: Inferred,
     seed: int,
     over: Callable[[], bool],
+    *,
+    plain: bool,
 ) -> Written:
-    """The last of some machines, by name, unless another of them or the declared one is clearly better; `declared` (n, c) is what that
-    one shows, `sigma` (n, c) the standard deviation of each reading, m or rad, `listed` (n,) rows that stand alone."""
-    e = predictor.experiment
-    which, held, listed = _chosen(models, declared, predictor, sigma, listed, seed, over)
+    """The last of some machines, by name, unless another of them or the declared one is clearly better; `plain`: a plain calibration
+    is one of the others."""
+    e, declared, sigma = predictor.experiment, found.plan.base, found.noise.sigma
+    listed = stands_out(found, models.values())
+    if plain and not over():
+        models = plain_calibration(predictor, found) | models
+    which, held, listed = _chosen(models, e, found, listed, seed, over)
     machine, there, prediction, promise = predictor.machine, e, declared, None
-    if which != DECLARED:
-        best = models[which]
+    if best := models.get(which):
         machine, there, prediction = machine_of(best), best.experiment, best.prediction
         promise = promised(best)
         if held is not None and held.by == "poses":
@@ -106,21 +107,21 @@ def written(
     before, after = (r - nuisance_part(p, r) for p, r in zip(problems, difference, strict=True))
     first, last = (summary(np.where(listed[:, None], np.nan, r), sigma, e.channels) for r in (before, after))
     late = over_time(problems[1], problems[1].residual(prediction))
-    return Written(which, machine, held, promise, listed, difference[1], (before, after), (first, last), late)
+    return Written(
+        which, best, machine, held, promise, listed, difference[1], (before, after), (first, last), late
+    )
 
 
 def _chosen(
     models: dict[str, Corrected],
-    declared: Floats,
-    predictor: Predictor,
-    sigma: Floats,
+    e: Experiment,
+    found: Inferred,
     listed: Mask,
     seed: int,
     over: Callable[[], bool],
 ) -> tuple[str, HeldOut | None, Mask]:
     """Which machine is handed over, each fold of readings predicted from all others; (n,) rows that stand alone there."""
-    e = predictor.experiment
-    label, by = folds(e, seed)
+    declared, sigma, (label, by) = found.plan.base, found.noise.sigma, folds(e, seed)
     number = int(label.max()) + 1
     last = [DECLARED, *(m for m in models if m != PLAIN)][-1]
     if number < 2 or over():
@@ -137,7 +138,8 @@ def _chosen(
             left[name][own] = unseen[own]
     best = _best(left, last, sigma, e.groups)
     if best == PLAIN:
-        listed = listed | set_aside(models[best])
+        given = models[best].given
+        listed = listed | np.isin(np.arange(len(e)), given.rows[given.weights < SET_ASIDE])
     before, after = (
         summary(np.where(listed[:, None], np.nan, left[name]), sigma, e.channels) for name in (DECLARED, best)
     )
@@ -239,7 +241,7 @@ def lack_of_fit(left: Floats, heavy: bool, fitted: int, known_by: int) -> float:
     return float(fdtrc(free, max(1, known_by), square.sum() / free))
 
 
-def vouched(predictor: Predictor, made: Written, said: str, columns: Columns) -> Machine:
+def vouched(predictor: Predictor, made: Written, said: str) -> Machine:
     """The machine that is handed over; its file says what it has from which experiment (`said`), what the readings that do not stand
     alone covered, and by how much its prediction of others is off."""
     if made.which == DECLARED:
@@ -250,26 +252,18 @@ def vouched(predictor: Predictor, made: Written, said: str, columns: Columns) ->
     valid = covered(predictor.machine, e, ~made.listed)
     error, u = made.promise or (np.nan, np.nan)
     if np.isfinite(error):
-        unit = "m" if metres(e.channels)[columns.channel].any() else "rad"
-        valid = replace(valid, error=error, error_u=u, unit=unit)
+        valid = replace(valid, error=error, error_u=u, unit=made.sizes[0].size[1])
     return valid.kept_by(Machine(replace(d, source=source, declared=declared)))
 
 
-def stands_out(columns: Columns, fit: Fit, suspects: Mask, models: Iterable[Corrected]) -> Mask:
+def stands_out(found: Inferred, models: Iterable[Corrected]) -> Mask:
     """(n,) rows with a reading that heavy tails give next to no weight, in the search or in a machine; of rows that neither has, those
     that stood alone from the first."""
-    out, seen = suspects.copy(), np.zeros_like(suspects)
-    weights = [(columns.rows, fit.weights), *((m.given.rows, m.given.weights) for m in models)]
+    out, seen = found.suspects.copy(), np.zeros_like(found.suspects)
+    searched = found.columns.rows, found.search.best.fit.weights
+    weights = [searched, *((m.given.rows, m.given.weights) for m in models)]
     for rows, w in reversed(weights):
         out[rows[~seen[rows]]] = False
         seen[rows] = True
         out[rows[w < SET_ASIDE]] = True
-    return out
-
-
-def set_aside(found: Corrected) -> Mask:
-    """(n,) rows with a reading that a machine gives next to no weight."""
-    given = found.given
-    out = np.zeros(len(given.predictor.experiment), dtype=bool)
-    out[given.rows[given.weights < SET_ASIDE]] = True
     return out

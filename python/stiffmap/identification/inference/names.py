@@ -32,14 +32,12 @@ from stiffmap.identification.inference.world import (
     Predict,
     Shapes,
     World,
-    amplitudes,
     best_shape,
     largest_gain,
 )
 from stiffmap.identification.numbers.certificate import Tolerances
 from stiffmap.identification.numbers.unknowns import SAG, Unknown, uncertain
 from stiffmap.model import effects
-from stiffmap.model.description import AppliedEffect
 
 BEHIND = 30.0
 """Evidence, ln, by which a world may fall short of the best one for its effects to get further shapes; effort only."""
@@ -145,7 +143,7 @@ def with_travel(fit: Fit, *, anew: bool) -> Fit:
     if not more:
         return fit
     if not anew:
-        return max(fit, fitted(fit.columns, parts, amplitudes(fit), fit.weights), key=lambda f: f.score)
+        return max(fit, fitted(fit.columns, parts, fit.amplitudes, fit.weights), key=lambda f: f.score)
     found = [fitted(c, parts) for c in (fit.columns, fit.columns.of_rows) if c]
     return max([fit, *found], key=lambda f: f.score)
 
@@ -237,7 +235,7 @@ def infer(
     before = plan.base[found.rows, found.channel]
 
     def predict(chosen: Sequence[Chosen]) -> Floats:
-        added = terms(chosen)
+        added = [c.term for c in chosen]
         whole = any(effects.get(t.kind).drive for t in added)  # what drives remember is of the rows before
         try:
             shown = predictor(added)[used] if whole else drawn(added)
@@ -248,15 +246,3 @@ def infer(
     clock.say("all effects at once")
     search = searched(found, predict, lambda: clock.over, travel=travel)
     return Inferred(plan, noise, suspects, numbers, found, search)
-
-
-def terms(chosen: Sequence[Chosen]) -> tuple[AppliedEffect, ...]:
-    """The effects with their strengths, SI."""
-    out = []
-    for c in chosen:
-        given = dict(c.variant.shape) | dict(c.refined)
-        given |= {p.name: float(np.clip(value, p.lower, p.upper)) for p, value in c.strengths}
-        if c.variant.start is not None:
-            given |= c.variant.start(c.values)
-        out.append(c.place.candidate.term_of(given))
-    return tuple(out)

@@ -17,6 +17,7 @@ from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.identification.inference.amplitudes import NOTHING, Fit
 from stiffmap.identification.inference.columns import Columns, drawn, zeros
 from stiffmap.identification.inference.kernels import Covariance, ReadingPoints, covariance, gaps
+from stiffmap.identification.inference.names import Inferred
 from stiffmap.identification.inference.travel import DriveErrors, Profile, drives_of, knots_of
 from stiffmap.identification.numbers.sensitivity import Sensitivity, predicted, sensitivity, zeros_anew
 from stiffmap.identification.numbers.unknowns import Unknown, joint_name
@@ -121,26 +122,19 @@ class Readings:
 
 def readings(
     predictor: Predictor,
-    uncertain: Sequence[Unknown],
-    columns: Columns,
+    found: Inferred,
     fit: Fit,
-    sigma: Floats,
-    suspects: Mask,
     without_name: Sequence[Floats] = (),
     exact: Sequence[Unknown] = (),
 ) -> Readings:
-    """The readings of an experiment under the amplitudes of a fit.
+    """The readings of an experiment under the amplitudes of a fit to what a search had.
 
-    uncertain
-        The numbers of the columns, and those that no reading shows.
-    suspects
-        (n,) rows that stand alone before any cause is known.
     without_name
         (n, c) m, rad: what effects of the fit that have no name add to the readings.
     exact
         Numbers that are as declared, since an effect speaks of them.
     """
-    e = predictor.experiment
+    e, columns, sigma = predictor.experiment, found.columns, found.noise.sigma
     rows, channel = readings_of(e, predictor())
     kept = drawn(e.groups[rows], 0, MOST_FITTED)
     rows, channel = rows[kept], channel[kept]
@@ -155,14 +149,14 @@ def readings(
     ]
     patterns = [np.nan_to_num(change[rows, channel])[:, None] / own[:, None] for change in without_name]
     weights = np.full(sigma.shape, 1.0)
-    weights[suspects] = NOTHING
+    weights[found.suspects] = NOTHING
     weights[columns.rows, columns.channel] = fit.weights
     weights = weights[rows, channel]
     rest = covariance(points, some, kernels, fit.noise**2 / weights, np.hstack([zeros(e, points), *patterns]))
     size = {k: fit.spread(group) for group, index in columns.groups.items() for k in index}
     known = [(u, size[k]) for k, u in enumerate(columns.unknowns) if u not in exact]
     unknowns = tuple(u for u, s in known if s > 0.0)
-    s = zeros_anew(sensitivity(predictor, uncertain), e)
+    s = zeros_anew(sensitivity(predictor, found.uncertain), e)
     drives = tuple(_erring(predictor, s, columns, amplitude))
     index = [s.unknowns.index(u) for u in unknowns]
     s = replace(s, unknowns=unknowns, columns=s.columns[..., index])

@@ -17,7 +17,7 @@ from stiffmap.identification.inference.chosen import Chosen, evidence
 from stiffmap.identification.inference.constants import MOST_EFFECTS, ODDS
 from stiffmap.identification.inference.parts import log_mean
 from stiffmap.identification.inference.places import Place, Shape
-from stiffmap.identification.inference.world import PROGRESS, SHORT, Model, World, amplitudes, largest_gain
+from stiffmap.identification.inference.world import PROGRESS, SHORT, Model, World, largest_gain
 
 APART = 0.5
 """Mean squared cosine between the directions of two shapes, below which they are two effects."""
@@ -65,7 +65,7 @@ def _further(world: World, model: Model, beat: float) -> Iterator[Model]:
         bare = Chosen.at(place, k)
         if own.part.name == bare.part.name:
             bare = replace(bare, part=replace(bare.part, name=f"{bare.part.name}, 2"))
-        start = amplitudes(fit) | {bare.part.name: largest_gain(fit, bare.part)}
+        start = fit.amplitudes | {bare.part.name: largest_gain(fit, bare.part)}
         more = fitted(fit.columns, (*fit.parts, bare.part), start, fit.weights, fit.lighter)
         score = model.score + more.score - fit.score + float(log_mean(gain)) - float(gain[k])
         added = bare.by_posterior(more)

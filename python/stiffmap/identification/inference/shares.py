@@ -13,7 +13,6 @@ from stiffmap.identification.inference.amplitudes import OFF, Fit, evaluated, fi
 from stiffmap.identification.inference.columns import Columns
 from stiffmap.identification.inference.constants import ODDS, STANDS_OUT
 from stiffmap.identification.inference.parts import GAPS, NOISE, Part
-from stiffmap.identification.inference.world import amplitudes
 from stiffmap.identification.numbers.unknowns import SAG, Unknown
 
 LEAST = 0.005
@@ -82,7 +81,7 @@ def too_wide(fit: Fit, named: Sequence[Unknown] = ()) -> tuple[WideGroup, ...]:
     c, out = fit.columns, []
     own = tuple(Part(u.name, "effect", c.numbers[:, [c.unknowns.index(u)]]) for u in named)
     if own:
-        fit = fitted(c, (*fit.parts, *own), amplitudes(fit), fit.weights)
+        fit = fitted(c, (*fit.parts, *own), fit.amplitudes, fit.weights)
     named_sag = any(u.group == SAG for u in named)  # no tolerance of a maker's
     for k, p in enumerate(fit.parts):
         t = float(fit.t[1 + k])

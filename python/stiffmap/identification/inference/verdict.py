@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg import orth
 from scipy.special import chdtrc, ndtri
 
 from stiffmap.experiment.experiment import WRENCH, Experiment, Floats, Integers
@@ -160,7 +161,7 @@ def refusal(columns: Columns, fit: Fit, c: Chosen) -> tuple[float, str]:
     rest = fit.without([c.part.name])
     if without_a_pose(columns, rest, c) < np.log(ODDS):
         return 0.0, ONE_POSE
-    scatter, worst = unevenness(columns, rest, c.lines(columns) @ c.values / columns.sigma)
+    scatter, worst = unevenness(columns, rest, columns.lines(c.variant) @ c.values / columns.sigma)
     return scatter, f"its strength differs along {worst}" if worst else ""
 
 
@@ -193,12 +194,12 @@ def by_chance(columns: Columns, fit: Fit, c: Chosen) -> float:
 def without_a_pose(columns: Columns, rest: Fit, c: Chosen) -> float:
     """Gain of ln likelihood by an effect of one strength, at its least over all poses left out in turn; infinite where all
     readings are of one."""
-    raw = c.lines(columns) @ c.values / columns.sigma
+    raw = columns.lines(c.variant) @ c.values / columns.sigma
     pattern, r = rest.white(columns.free.T @ raw), rest.white(rest.columns.residual)
     pose = columns.experiment.groups[columns.rows]
     out: list[float] = []
     for k in np.unique(pose) if np.ptp(pose) > 0 else ():
-        gone = np.linalg.qr(rest.white(columns.free[pose == k].T))[0]
+        gone = orth(rest.white(columns.free[pose == k].T))  # averages of repeats are one direction
         a, b = pattern - gone @ (gone.T @ pattern), r - gone @ (gone.T @ r)
         out.append(0.5 * float(a @ b) ** 2 / max(float(a @ a), 1e-12))
     return min(out, default=np.inf)

@@ -15,7 +15,7 @@ from stiffmap.identification.inference.amplitudes import QUIET, Fit, fitted, ref
 from stiffmap.identification.inference.chosen import Chosen, all_moved, evidence, of_pairs
 from stiffmap.identification.inference.columns import Columns
 from stiffmap.identification.inference.constants import MOST_EFFECTS, ODDS, REFITS, SIZES
-from stiffmap.identification.inference.parts import NOISE, Part, gains, log_mean, spectrum
+from stiffmap.identification.inference.parts import Part, gains, log_mean, spectrum
 from stiffmap.identification.inference.places import Place
 
 EXACT = "exact"
@@ -85,7 +85,7 @@ class World:
         it would fall short of that even if each effect that may follow, and their exchanges, gained as much as the last one."""
         model = null = self.null
         if begin.chosen:
-            same = self._fit(begin.chosen, amplitudes(begin.fit), begin.fit.weights)
+            same = self._fit(begin.chosen, begin.fit.amplitudes, begin.fit.weights)
             model = max(null, self._settled(same), key=lambda m: m.score)
         limit = float(np.log(ODDS)) + self.price
         while len(model.chosen) < MOST_EFFECTS and not self.over():
@@ -145,7 +145,7 @@ class World:
         gaps, found = [g.name for g in self.gaps], [fit]
         if any(p.name in gaps for p, _ in fit.on):
             effects = tuple(c.part for c in model.chosen)
-            found.append(fitted(fit.columns, (*self.numbers, *effects), amplitudes(fit), fit.weights))
+            found.append(fitted(fit.columns, (*self.numbers, *effects), fit.amplitudes, fit.weights))
         found.append(found[-1].without(gaps, noise=1.0))
         self.anchors[id(model)] = model, found
         return found
@@ -153,7 +153,7 @@ class World:
     def _with(self, model: Model, places: Sequence[Place], anchor: Fit) -> Model:
         """The model with further effects, fitted from the anchor."""
         chosen = list(model.chosen)
-        start = {**{g.name: QUIET for g in self.gaps}, **amplitudes(anchor)}
+        start = {**{g.name: QUIET for g in self.gaps}, **anchor.amplitudes}
         for place in places:
             chosen.append(Chosen.at(place, best_shape(anchor, place)))
             start[chosen[-1].part.name] = largest_gain(anchor, chosen[-1].part)
@@ -304,7 +304,7 @@ class World:
     def less(self, model: Model, c: Chosen) -> Model:
         """The effects of a model but one, in this world."""
         kept = tuple(o for o in model.chosen if o.part.name != c.part.name)
-        return self._fit(kept, amplitudes(model.fit), model.fit.weights, model.fit.lighter)
+        return self._fit(kept, model.fit.amplitudes, model.fit.weights, model.fit.lighter)
 
     def without(self, model: Model, gone: Chosen, heir: Sequence[Place]) -> Model:
         """The model without an effect, or with another place in its stead, at its best shapes."""
@@ -358,11 +358,6 @@ def _gain(fit: Fit, missed: Floats) -> float:
 def _near(one: Floats, other: Floats) -> bool:
     """Whether two changes of the readings are the same within a tenth, or within the noise."""
     return float(np.linalg.norm(one - other)) < max(SETTLED, 0.1 * float(np.linalg.norm(one)))
-
-
-def amplitudes(fit: Fit) -> dict[str, float]:
-    """ln variances of a fit, by the names of its parts."""
-    return {NOISE: float(fit.t[0]), **{p.name: float(t) for p, t in zip(fit.parts, fit.t[1:], strict=True)}}
 
 
 def best_shape(anchor: Fit, place: Place) -> int:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from stiffmap.experiment.comparison.limitations import refuse
 from stiffmap.experiment.noise.outliers import without_suspects
 from stiffmap.experiment.noise.whitening import LinearProblem, fitted
 from stiffmap.experiment.prediction.predict import Predictor
@@ -19,10 +20,11 @@ ROUNDS = 5
 
 def registered(predictor: Predictor, tolerances: Tolerances | None, exclude: Sequence[str]) -> Predictor:
     """The predictor with frames and tools of best fit where the machine stands with its uncertain numbers fitted; itself where no frame
-    or tool is found by the readings, or the machine stands as commanded."""
+    or tool is found by the readings, or the machine stands as commanded. Raises StiffmapError for readings that cannot be compared."""
+    e, base = predictor.experiment, predictor()
+    refuse(e, base)
     if not predictor.is_sighted:
         return predictor
-    e, base = predictor.experiment, predictor()
     noise, aside = without_suspects(e, base)
     s = sensitivity(predictor, uncertain(predictor.machine.description, e, tolerances, exclude))
     values, shown = np.zeros(len(s.unknowns)), base

@@ -83,8 +83,8 @@ def slopes_at(predictor: Predictor, unknowns: Sequence[Unknown], values: Floats)
     here = moves_of(pairs)
     scale = here.pop((INSTRUMENT, SCALE), 0.0)
     terms = (scaled(description, scale),) if scale else ()
-    apart = any(u.setup and not u.of_instrument for u, _ in pairs)  # a machine for each set-up
-    plain = [k for k, u in enumerate(unknowns) if not u.setup and not u.of_instrument]
+    apart = any(u.setup and u.group != INSTRUMENT for u, _ in pairs)  # a machine for each set-up
+    plain = [k for k, u in enumerate(unknowns) if not u.setup and u.group != INSTRUMENT]
 
     @cache
     def base() -> Predictor:
@@ -146,17 +146,15 @@ def sensitivity(predictor: Predictor, unknowns: Sequence[Unknown]) -> Sensitivit
     return _KEPT.made(key, lambda: _differences(predictor, unknowns))
 
 
-def bends(
-    white: Callable[[Floats], Floats], s: Sensitivity, values: Floats, prediction: Floats, least: float = 0.0
-) -> bool:
+def bends(white: Callable[[Floats], Floats], s: Sensitivity, values: Floats, prediction: Floats) -> bool:
     """Whether the columns at the fit differ so much from `s.columns` that standard deviations would be wrong.
 
-    Along the fit's own direction they differ by twice what the straight line misses; `white` (n, c) -> (N,), and `least`, in
-    noise, is no difference.
+    Along the fit's own direction they differ by twice what the straight line misses; `white` (n, c) -> (N,), and the noise of one
+    reading is no difference.
     """
     straight = s.columns @ values
     missed = white(prediction - s.base - straight)
-    return 2.0 * float(np.linalg.norm(missed)) > max(BENT * float(np.linalg.norm(white(straight))), least)
+    return 2.0 * float(np.linalg.norm(missed)) > max(BENT * float(np.linalg.norm(white(straight))), 1.0)
 
 
 def sensitivity_at(predictor: Predictor, s: Sensitivity, values: Floats) -> Sensitivity:

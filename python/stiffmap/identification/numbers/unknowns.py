@@ -50,11 +50,6 @@ class Unknown:
     setup: str = ""
     """Set-up whose rows alone it moves; empty: all."""
 
-    @property
-    def of_instrument(self) -> bool:
-        """Whether the instrument is meant, not the machine."""
-        return self.group == INSTRUMENT
-
 
 @dataclass(frozen=True)
 class Declared:

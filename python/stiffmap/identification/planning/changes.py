@@ -19,7 +19,7 @@ from stiffmap.experiment.calls import Effects, as_experiment, effects_of
 from stiffmap.experiment.experiment import Experiment
 from stiffmap.experiment.noise.whitening import basis, readings_of
 from stiffmap.identification.inference.amplitudes import fitted
-from stiffmap.identification.inference.columns import Columns, Free, drawn
+from stiffmap.identification.inference.columns import Columns, across, drawn
 from stiffmap.identification.inference.constants import RARE
 from stiffmap.identification.inference.kernels import ReadingPoints, gaps
 from stiffmap.identification.inference.parts import Part
@@ -173,8 +173,7 @@ def _left(machine: Machine, a: Estimate, b: Estimate, numbers: Floats, residual:
     channel = np.concatenate([read[0][1], read[1][1]])
     white = block_diag(*(x.problem.white_lines(np.eye(len(r[0]))) for x, r in zip((a, b), read, strict=True)))
     frames = block_diag(a.problem.nuisance, b.problem.nuisance)
-    spared = Free.across(basis(np.hstack([frames, numbers])), np.eye(len(frames)))
-    free = spared.matrix
+    free = across(basis(np.hstack([frames, numbers])))
     kernels, parts = {}, []
     points = ReadingPoints(rows, channel, np.ones(len(rows)))
     # the hours of one session are not those of the other
@@ -186,7 +185,7 @@ def _left(machine: Machine, a: Estimate, b: Estimate, numbers: Floats, residual:
         if size > 0.0:
             kernels[kernel.name] = shown / size
             parts.append(Part(kernel.name, kernel.kind, full=free.T @ kernels[kernel.name] @ free))
-    columns = Columns.bare(e, rows, channel, spared, free.T @ residual)
+    columns = Columns.bare(e, rows, channel, free, free.T @ residual)
     fit = fitted(columns, parts)
     noise = fit.noise**2 * np.eye(len(residual))
     return sum((fit.amplitude(name) ** 2 * kernel for name, kernel in kernels.items()), noise)

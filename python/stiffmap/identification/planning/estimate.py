@@ -104,9 +104,7 @@ def estimate(machine: Machine, experiment: Experiment | str | PathLike[str], ter
     found = optimum(lambda x: problem.residual(predictor(at(x))), begin, bounds, columns, STEPS)
     spread, rank = covariance(found.jacobian)
     return Estimate(
-        tuple(
-            f"{words(t.kind, t.element, t.legs)}: {p.name}" for t, p in ((begun[i], p) for i, p in parameters)
-        ),
+        names_of(begun, parameters),
         tuple(p.unit for _, p in parameters),
         scale,
         found.x * scale,
@@ -129,6 +127,11 @@ def fitted(description: MachineDescription, terms: Terms) -> list[tuple[int, Par
         given = dict(t.parameters)
         out += [(i, p) for p in known if p.name in given and p.fitted]
     return out
+
+
+def names_of(terms: Terms, parameters: list[tuple[int, Parameter]]) -> tuple[str, ...]:
+    """``kind of element, leg x: parameter`` of each."""
+    return tuple(f"{words(t.kind, t.element, t.legs)}: {p.name}" for i, p in parameters for t in [terms[i]])
 
 
 def values_of(terms: Terms, parameters: list[tuple[int, Parameter]]) -> Floats:

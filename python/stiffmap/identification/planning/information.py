@@ -15,9 +15,8 @@ from stiffmap.experiment.noise.whitening import LinearProblem
 from stiffmap.experiment.prediction.history import Terms
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.experiment.virtual.plans import plan_of_poses
-from stiffmap.identification.candidates.candidates import words
 from stiffmap.identification.inference.optimum import covariance
-from stiffmap.identification.planning.estimate import fitted, slopes
+from stiffmap.identification.planning.estimate import fitted, names_of, slopes
 from stiffmap.solve.machine import Machine
 
 RIDGE = 1e-9
@@ -39,9 +38,7 @@ class Information:
         parameters = fitted(machine.description, known)
         if not parameters:
             raise StiffmapError("plan: the effects have no number that could be fitted")
-        self.names = tuple(
-            f"{words(known[i].kind, known[i].element, known[i].legs)}: {p.name}" for i, p in parameters
-        )
+        self.names = names_of(known, parameters)
         self.units = tuple(p.unit for _, p in parameters)
         self.scale = np.array([p.scale for _, p in parameters])
         self.columns = slopes(predictor, known, parameters) * self.scale

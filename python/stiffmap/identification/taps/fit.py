@@ -20,7 +20,7 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.identification.candidates.candidates import Candidate
 from stiffmap.identification.candidates.sensitivity import Variant
 from stiffmap.identification.inference.chosen import Chosen
-from stiffmap.identification.inference.columns import Columns, Free
+from stiffmap.identification.inference.columns import Columns, across
 from stiffmap.identification.inference.constants import NOISE_SD, ODDS, RARE
 from stiffmap.identification.inference.names import put_instead, searched
 from stiffmap.identification.inference.optimum import Optimum, covariance, differences, optimum
@@ -192,10 +192,9 @@ def columns_of(problem: TapsProblem, tried: Sequence[Candidate], at: FittedCause
     """The readings, by their noise, as the inference takes them."""
     lines, taken = at.lines, [c for c, _ in at.causes]
     m = len(lines.residual)
-    spared = Free.across(np.linalg.qr(at.own)[0], np.eye(m))  # causes of the fit move with further ones
-    free = spared.matrix
+    free = across(np.linalg.qr(at.own)[0])  # causes of the fit move with further ones
     residual = free.T @ (lines.jacobian @ lines.x - lines.residual)
-    bare = Columns.bare(problem.plan, problem.row[problem.used], np.zeros(m, np.intp), spared, residual)
+    bare = Columns.bare(problem.plan, problem.row[problem.used], np.zeros(m, np.intp), free, residual)
     unknowns = tuple(Unknown(key, key.rpartition("/")[2], "", u) for key, _, u in problem.numbers)
     found = (place_of(problem, c, at, free) for c in tried if c not in taken)
     places = tuple(p for p in found if p.shapes)

@@ -250,7 +250,7 @@ def test_a_fault_does_not_disappear_with_more_readings(name: str, what: str, pos
     p = Predictor(machine, data)
     names = unknowns(machine.description, p.experiment)
     rng = np.random.default_rng(0)
-    t = 0.5 * rng.standard_normal(len(names)) * np.array([not u.of_instrument for u in names])
+    t = 0.5 * rng.standard_normal(len(names)) * np.array([u.group != "instrument" for u in names])
     quiet = predicted(p, names, t)
     t[[u.name for u in names].index(what)] = 12.0
     x = (data.position - data.position.mean(0)) / np.ptp(data.position, axis=0)

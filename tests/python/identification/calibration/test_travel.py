@@ -136,7 +136,9 @@ def test_a_corrected_machine_has_what_waves_leave_along_the_travel(monkeypatch: 
     off = sm.Machine(edited(rippled.description, {}, knots), like=rippled)
     e = read(plan, Predictor(off, plan)())
     models: dict[str, Corrected] = {}
-    monkeypatch.setattr(answer, "written", lambda some, *a: models.update(some) or written(some, *a))
+    monkeypatch.setattr(
+        answer, "written", lambda some, *a, **k: models.update(some) or written(some, *a, **k)
+    )
     d, c = sm.diagnose(machine, e), calibrate(machine, e)
     assert d.which == "corrected" and ("periodic_error", ("y",)) in [
         (f.kind, tuple(f.legs)) for f in d.effects

@@ -21,7 +21,6 @@ from stiffmap.identification.diagnosis.report.separation import Separation
 from stiffmap.identification.inference.chosen import Chosen, Term
 from stiffmap.identification.inference.kernels import WANDER
 from stiffmap.identification.inference.machines import written
-from stiffmap.identification.inference.names import terms
 from stiffmap.identification.inference.places import Place
 from stiffmap.identification.inference.verdict import NOISIER
 
@@ -43,7 +42,7 @@ def test_an_effect_that_the_machine_cannot_have_adds_nothing(slope: float, there
     c = Chosen(place, 0, part, np.array([slope / candidate.linear[0].scale]))
     if not there:
         with pytest.raises(sm.StiffmapError):
-            p(terms([c]))
+            p([c.term])
     assert bool(np.abs(_change(p, c)).max() > 0.0) is there
 
 
@@ -164,8 +163,8 @@ def test_more_than_noise_that_stays_at_the_best_fit_is_no_none(monkeypatch: pyte
     good = sm.diagnose("orthoglide-revised", DATA / "B-none", seed=0, cross_validate=False)
     assert good.verdict == "none" and good.noise.lack_of_fit_after > 1e-3
 
-    def worse(*given: Any) -> Any:
-        made = written(*given)
+    def worse(*given: Any, **more: Any) -> Any:
+        made = written(*given, **more)
         return replace(made, left=(made.left[0], 1.5 * made.left[1]))
 
     monkeypatch.setattr(answer, "written", worse)

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
+import stiffmap as sm
 from stiffmap.experiment import Experiment
 from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.noise.whitening import LinearProblem
@@ -98,7 +98,8 @@ def test_separation_reads_where_two_explanations_differ_most(monkeypatch: pytest
 
     e = readings_of_dx(np.zeros(4))
     box = ((0.0, 0.0, 0.0), (2.0, 1.0, 1.0))
-    machine: Any = SimpleNamespace(description=SimpleNamespace(workspace=box))
+    orthoglide = sm.load_machine("orthoglide-revised")
+    machine = sm.Machine(replace(orthoglide.description, workspace=box), like=orthoglide)
 
     class Fake:
         def __init__(self, machine: Any, plan: Experiment, threads: int | None = None) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from stiffmap.experiment.channels import Channel
-from stiffmap.identification.inference.columns import Columns, Free
+from stiffmap.identification.inference.columns import Columns, across
 from stiffmap.identification.inference.parts import Part
 
 READINGS, FREE = 40, 3
@@ -26,7 +26,7 @@ def columns(rng: np.random.Generator, residual: np.ndarray | None = None, repeat
         rows=np.arange(READINGS),
         channel=np.zeros(READINGS, dtype=np.intp),
         sigma=np.ones(READINGS),
-        spared=Free.across(taken, np.eye(READINGS)),
+        free=across(taken),
         frames=np.zeros((READINGS, 0)),
         residual=rng.normal(size=m) * 2.0 if residual is None else residual,
         zero=0.1 * zero @ zero.T,

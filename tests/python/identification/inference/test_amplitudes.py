@@ -41,19 +41,20 @@ def test_the_likelihood_is_that_of_the_covariance_and_its_gradient_that_of_diffe
     each = rng.uniform(0.2, 1.2, len(size)) if heavy else np.ones(len(size))
     w = each[label]
     at = rng.uniform(-1.5, 1.0, 4)
-    noise = c.free.T @ (c.free / w[:, None])
+    noise = c.of_noise(w)
 
     def objective(x):
         return amplitudes._evaluate(c, some, x, w, noise)
 
     fit, along = objective(at)
-    inverse = fit.inverse()
-    gradient = amplitudes._gradient(fit, along, inverse, c.spared.at_readings(inverse))
+    gradient = amplitudes._gradient(fit, along, noise)
     information = amplitudes._information(fit, along)
     expected = multivariate_normal(cov=dense(c, some, at, w)).logpdf(c.residual)
     gaussian = sum(norm.logpdf(0.0, scale=w**-0.5))
     bound = sum(map(ln_bound, np.zeros(len(size)), each, size)) - gaussian if heavy else 0.0
     assert fit.likelihood == pytest.approx(expected + bound, abs=1e-8)
+    inside = c.free @ np.linalg.inv(dense(c, some, at, w)) @ c.free.T
+    np.testing.assert_allclose(fit.at_readings, np.diag(inside), rtol=1e-10)
     errors = []
     for h in (1e-2, 5e-3):
         steps = h * np.eye(4)

@@ -32,8 +32,8 @@ def test_of_many_readings_those_in_use_are_predicted_as_among_all(
     assert len(np.unique(found.rows)) < len(data)
     place = next(p for p in found.places if p.candidate.kind == kind)
     bare = Chosen.at(place, 0)
-    chosen = [Chosen(place, 0, bare.part, np.full(bare.lines(found).shape[1], 3.0))]
-    change = predictor(names.terms(chosen)) - plan.base
+    chosen = [Chosen(place, 0, bare.part, np.full(bare.rotated(found).shape[1], 3.0))]
+    change = predictor([c.term for c in chosen]) - plan.base
     expected = found.rotated(change[found.rows, found.channel])
     assert np.abs(expected).max() > 1.0
     assert asked["predict"](chosen) == pytest.approx(expected, rel=1e-9, abs=1e-9)

@@ -174,8 +174,8 @@ def test_what_is_far_off_in_rows_that_the_search_did_not_have_is_weighed_down(
         return wanted
 
     monkeypatch.setattr(machines, "_best", best)
-    none = np.zeros(len(e), dtype=bool)
-    machines.written({"calibrated": found}, p(), p, e.sigma, none, 0, lambda: False)
+    searched = infer(p, CandidatePlan(p(), (), ()))
+    machines.written({"calibrated": found}, p, searched, 0, lambda: False, plain=False)
     others = np.abs(left["calibrated"] / e.sigma)[np.arange(40) != 5]
     assert np.sqrt(np.nanmean(others**2)) < 1.2  # a frame that the row moves would move them all
     weights = found.given.weights

@@ -19,7 +19,7 @@ from stiffmap.identification.inference.amplitudes import fitted
 from stiffmap.identification.inference.chosen import Chosen
 from stiffmap.identification.inference.columns import Columns
 from stiffmap.identification.inference.constants import ODDS
-from stiffmap.identification.inference.names import Search, infer, searched, terms, with_travel
+from stiffmap.identification.inference.names import Search, infer, searched, with_travel
 from stiffmap.identification.inference.parts import Parts
 from stiffmap.identification.inference.places import Place, Shape
 from stiffmap.identification.inference.verdict import TOLERABLE, Beyond, effect_of, judged
@@ -198,7 +198,7 @@ def test_a_machine_as_declared_gets_no_name_and_a_soft_drive_its_size():
     v = judged(c, s)
     (one,) = v.named
     assert one.chosen.place.candidate.place == ("compliance", "carriage", ("b",))
-    assert dict(terms([one.chosen])[0].parameters)["scale"] == pytest.approx(1.5, abs=0.05)
+    assert dict(one.chosen.term.parameters)["scale"] == pytest.approx(1.5, abs=0.05)
 
 
 def test_readings_of_two_set_ups_whose_frames_are_unknown():

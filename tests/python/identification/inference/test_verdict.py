@@ -14,7 +14,6 @@ from tests.python.identification.inference.synthetic import READINGS, columns
 from stiffmap.experiment.channels import Channel
 from stiffmap.identification.inference import amplitudes, verdict
 from stiffmap.identification.inference.chosen import Chosen
-from stiffmap.identification.inference.columns import Free
 from stiffmap.identification.inference.names import Search
 from stiffmap.identification.inference.parts import Part, Parts
 from stiffmap.identification.inference.places import Place, Shape
@@ -57,8 +56,7 @@ def test_one_strength_everywhere_passes_and_two_do_not():
 def test_the_homogeneity_test_is_that_of_weighted_means():
     """In white noise without frames: χ² of block means about their common mean."""
     c, _, _ = flat(3, np.full(READINGS, 2.0))
-    all_free = Free.across(np.zeros((READINGS, 0)), np.eye(READINGS))
-    c = replace(c, spared=all_free, residual=c.free @ c.residual, zero=np.zeros((READINGS, READINGS)))
+    c = replace(c, free=np.eye(READINGS), residual=c.free @ c.residual, zero=np.zeros((READINGS, READINGS)))
     plain = amplitudes.evaluated(c, (), np.zeros(1), np.ones(READINGS))
     block = (np.arange(READINGS) % 3).astype(np.intp)
     means = np.array([c.residual[block == b].mean() for b in range(3)])
@@ -75,6 +73,15 @@ def test_an_effect_that_one_pose_alone_shows_has_no_name():
     c, fit, chosen = flat(1, alone)
     assert verdict.without_a_pose(c, fit.without(["effect"]), chosen) < np.log(20)
     assert verdict.refusal(c, fit, chosen)[1] == "it rests on the readings of one pose"
+
+
+def test_repeats_of_a_pose_take_no_more_away_with_it_than_their_average():
+    c, fit, chosen = flat(1, np.full(READINGS, 5.0))
+    rest, twice = fit.without(["effect"]), {n: getattr(c, n).repeat(2) for n in ("rows", "channel", "use")}
+    both = replace(c, free=c.free.repeat(2, axis=0) / 2**0.5, sigma=np.full(2 * READINGS, 2**0.5), **twice)
+    assert verdict.without_a_pose(both, rest, chosen) == pytest.approx(
+        verdict.without_a_pose(c, rest, chosen)
+    )
 
 
 @pytest.mark.parametrize(("slips", "rest"), [(False, "effect"), (True, "")])
@@ -217,8 +224,7 @@ def test_gaps_take_a_name_only_as_far_as_they_would_show_its_pattern_by_chance(w
     gap = Part("gap", "field", full=np.exp(-0.5 * ((x[:, None] - x) / width) ** 2))
     pattern = np.cos(wave * x)
     some = (chosen.place,) * 10
-    all_free = Free.across(np.zeros((m, 0)), np.eye(m))
-    c = replace(c, spared=all_free, residual=2.0 * pattern, zero=np.zeros((m, m)), places=some)
+    c = replace(c, free=np.eye(m), residual=2.0 * pattern, zero=np.zeros((m, m)), places=some)
     part = replace(chosen.part, factor=pattern[:, None])
     fit = amplitudes.evaluated(c, [gap, part], 2.0 * np.log([1.0, 4.0, 2.0]), np.ones(m))
     share = width * np.sqrt(np.pi / 2.0) * np.exp(-0.5 * (wave * width) ** 2)

@@ -14,7 +14,7 @@ import numpy as np
 from stiffmap.common.errors import FileError, reading
 from stiffmap.common.from_above import from_above
 from stiffmap.common.json_text import json_text, parse_json, plain
-from stiffmap.common.number_text import percent, with_uncertainty
+from stiffmap.common.number_text import percent, place_text, with_uncertainty
 from stiffmap.common.short import first_of, short_repr, titled
 from stiffmap.experiment.comparison.residual import Summary
 from stiffmap.experiment.experiment import Experiment, Floats, Mask
@@ -228,9 +228,8 @@ def _left(d: Diagnosis) -> str:
 def _place(p: Rest) -> str:
     if p.position is None:
         return ""
-    where = ", ".join(f"{1e3 * v:.0f}" for v in p.position)
     unit = "mrad" if p.axis.startswith("r") else "mm"
-    return f"; largest in {p.axis} at ({where}) mm, {1e3 * p.size:.4g} {unit} rms"
+    return f"; largest in {p.axis} at {place_text(p.position, '.0f')}, {1e3 * p.size:.4g} {unit} rms"
 
 
 def _limits(d: Diagnosis) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from math import isfinite
 from typing import Any
 
-from stiffmap.common.number_text import with_uncertainty, within
+from stiffmap.common.number_text import place_text, with_uncertainty, within
 from stiffmap.common.units import DISPLAY_UNITS
 from stiffmap.identification.candidates.candidates import words
 from stiffmap.identification.diagnosis.report.findings import Effect
@@ -24,6 +24,7 @@ UNITS = {
 }  # fmt: skip
 """Factor from SI, and the unit that a workshop reads."""
 NAMES = {"actuator": "drive"}
+NAMELESS = ("none", "unattributed")
 ALIASES = 2
 """What cannot be distinguished from an effect: how many the headline names."""
 
@@ -104,11 +105,6 @@ def off_as_a_group(d: Any) -> bool:
     return bool(not d.unexplained and d.calibration and d.calibration.wide and not d.calibration.beyond)
 
 
-def beyond_noise(d: Any) -> bool:
-    """Whether the readings differ from a machine that is as declared by clearly more than their noise: the first limitation says why."""
-    return bool(d.limitations and d.before.size[0] > CLEARLY * d.noise_size / max(1.0, d.noise.scale))
-
-
 def left_is(d: Any, what: str) -> bool:
     """Whether something is left without a name, and nothing else than this."""
     return bool(d.unexplained) and all(p.what.startswith(what) for p in d.unexplained)
@@ -135,36 +131,61 @@ def alias_words(a: Mapping[str, Any]) -> str:
     return f"{registry.get(a['kind']).title} ({_element(a['element'], a['legs'])})"
 
 
-def _of_machine(d: Any, verdict: str) -> str:
-    """The verdict on the machine; the largest share of the difference first, be it an effect or a number."""
+def _nameless(d: Any, verdict: str) -> tuple[str, str]:
+    """The verdict on a machine of which nothing has a name, and what to do with it."""
     before, unit = d.before.size
     size = f"{1e6 * before:.1f} µ{unit} rms, noise {1e6 * d.noise_size:.1f} µ{unit}"
+    if verdict == "none":
+        if d.calibration is not None:
+            return (
+                f"No cause apart from the machine's uncertain numbers; they are {d.calibration.verdict} ({size}).",
+                "Nothing to mend. machine.yaml holds the machine that predicts readings best which it has not seen.",
+            )
+        if d.stopped:
+            return f"The diagnosis was stopped before it found anything ({size}).", "Let it come to its end."
+        agrees = f"The machine agrees with its file within what these readings can show ({size})"
+        # the readings differ from it by clearly more than their noise: the first limitation says why
+        if d.limitations and before > CLEARLY * d.noise_size / max(1.0, d.noise.scale):
+            return (
+                f"{agrees}; {d.limitations[0]}.",
+                "Nothing to correct at the machine. Check the instrument and read again before you keep these readings as a record.",
+            )
+        return f"{agrees}.", "Nothing to correct. Keep the readings as the record of this state."
+    if left_is(d, NOISIER):
+        times = d.noise.scale * before / d.noise_size
+        return (
+            f"The readings scatter {times:.2g} times as much as is stated ({size}), and show nothing else for certain.",
+            "State the noise that the instrument has here, or read every condition twice, and diagnose again.",
+        )
+    if left_is(d, WANDER):
+        return (
+            f"What the readings differ by from the file ({size}) goes on from row to row over time, as a drift of the instrument or of the machine does.",
+            "Let machine and instrument warm up, and read one pose again and again between the others: it shows the drift alone.",
+        )
+    if off_as_a_group(d):
+        return (
+            f"The machine differs from its file ({size}) by more than its numbers are uncertain, and none of them alone can be named.",
+            "Read more poses and other loads, which tell numbers apart; or give the uncertainties that they have (u in the machine's "
+            "file, or --tolerance). Until then plan and compensate with machine.yaml.",
+        )
+    nothing = "nothing that was tried" if d.stopped else "no single cause known to stiffmap"
+    step = (
+        "Look at where the difference is largest (What is left), check the instrument's frame, the tool and "
+        "where the load acts first, and read again there."
+    )
+    return f"The machine differs from its file ({size}), and {nothing} explains how.", step
+
+
+def _of_machine(d: Any, verdict: str) -> str:
+    """The verdict on the machine; the largest share of the difference first, be it an effect or a number."""
+    if verdict in NAMELESS:
+        return _nameless(d, verdict)[0]
     found = [(e.evidence.get("share", 0.0), sentence(e) + aliases(e)) for e in d.effects]
     found += [(n.share, str(n)) for n in (d.calibration.beyond if d.calibration else ())]
     named = "; ".join(text for _, text in sorted(found, key=lambda f: -f[0]))
-    if verdict == "none" and d.calibration is not None:
-        return (
-            f"No cause apart from the machine's uncertain numbers; they are {d.calibration.verdict} ({size})."
-        )
-    if verdict == "none" and d.stopped:
-        return f"The diagnosis was stopped before it found anything ({size})."
-    if verdict == "none":
-        but = f"; {d.limitations[0]}" if beyond_noise(d) else ""
-        return f"The machine agrees with its file within what these readings can show ({size}){but}."
-    if verdict == "unattributed" and left_is(d, NOISIER):
-        times = d.noise.scale * before / d.noise_size
-        return f"The readings scatter {times:.2g} times as much as is stated ({size}), and show nothing else for certain."
-    if verdict == "unattributed" and left_is(d, WANDER):
-        return f"What the readings differ by from the file ({size}) goes on from row to row over time, as a drift of the instrument or of the machine does."
-    if verdict == "unattributed" and off_as_a_group(d):
-        return f"The machine differs from its file ({size}) by more than its numbers are uncertain, and none of them alone can be named."
-    if verdict == "unattributed":
-        nothing = "nothing that was tried" if d.stopped else "no single cause known to stiffmap"
-        return f"The machine differs from its file ({size}), and {nothing} explains how."
     rest = " Part of the difference remains unexplained." if d.unexplained else ""
-    if verdict == "ambiguous":
-        return f"The readings are explained by more than one cause. First of them: {named}.{rest}"
-    return f"{named}.{rest}"
+    head = "The readings are explained by more than one cause. First of them: " * (verdict == "ambiguous")
+    return f"{head}{named}.{rest}"
 
 
 def next_step(d: Any) -> str:
@@ -174,30 +195,8 @@ def next_step(d: Any) -> str:
             "Check this at the machine and in the sheet, correct the readings and diagnose again; look for no cause in the "
             "machine before."
         )
-    if d.verdict == "none" and d.calibration is not None:
-        return "Nothing to mend. machine.yaml holds the machine that predicts readings best which it has not seen."
-    if d.verdict == "none" and d.stopped:
-        return "Let it come to its end."
-    if d.verdict == "none" and beyond_noise(d):
-        return "Nothing to correct at the machine. Check the instrument and read again before you keep these readings as a record."
-    if d.verdict == "unattributed" and left_is(d, NOISIER):
-        return (
-            "State the noise that the instrument has here, or read every condition twice, and diagnose again."
-        )
-    if d.verdict == "none":
-        return "Nothing to correct. Keep the readings as the record of this state."
-    if d.verdict == "unattributed" and off_as_a_group(d):
-        return (
-            "Read more poses and other loads, which tell numbers apart; or give the uncertainties that they have (u in the machine's "
-            "file, or --tolerance). Until then plan and compensate with machine.yaml."
-        )
-    if d.verdict == "unattributed" and left_is(d, WANDER):
-        return "Let machine and instrument warm up, and read one pose again and again between the others: it shows the drift alone."
-    if d.verdict == "unattributed":
-        return (
-            "Look at where the difference is largest (What is left), check the instrument's frame, the tool and "
-            "where the load acts first, and read again there."
-        )
+    if d.verdict in NAMELESS:
+        return _nameless(d, d.verdict)[1]
     if d.verdict == "ambiguous" and not d.alternatives:
         return "Inspect this place, and read more poses or other loads: declared numbers that are off explain these nearly as well."
     if d.verdict == "ambiguous" and d.separations:
@@ -242,8 +241,7 @@ def effect_text(e: Effect) -> str:
 
 def separation_text(s: Separation) -> str:
     """Where, load, axis, how many."""
-    where = ", ".join(f"{1e3 * v:.0f}" for v in s.position)
     load = ", ".join(f"{v:.0f}" for v in s.force)
     many = f"{s.readings or 'no sensible number of'} reading{'s' if s.readings != 1 else ''}"
     gap = f"{1e3 * s.difference:.4f} mm"
-    return f"read {s.axis} at ({where}) mm under force ({load}) N: they differ by {gap}, {many}"
+    return f"read {s.axis} at {place_text(s.position, '.0f')} under force ({load}) N: they differ by {gap}, {many}"

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from stiffmap.common.broadcasting import random_numbers
-from stiffmap.experiment.experiment import Experiment, Floats
+from stiffmap.experiment.experiment import AXES, Experiment, Floats
 from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.experiment.readings import kind_of
-from stiffmap.model.description import AppliedEffect, MachineDescription
+from stiffmap.experiment.virtual.plans import plan_of_poses, with_joints
+from stiffmap.model.description import AppliedEffect
+from stiffmap.solve.machine import Machine
 
 WANTED = 5.0
 """Standard deviations between the two predictions that the measurement must reach."""
+KEPT = ("reference_temperature", "point", "load_point", "gravity", "loop")
+"""Of an experiment, what its trial has too."""
 
 
 @dataclass(frozen=True)
@@ -40,11 +44,11 @@ def separation(
     """Best reading, of those that the machine can reach, of a trial plan: workspace corners, centre and random poses, six force
     directions; `floor` (c,) is the noise of each channel."""
     e = predictor.experiment
-    plan = _trial(e, predictor.machine.description, seed)
+    plan = _trial(e, predictor.machine, seed)
     at = Predictor(predictor.machine, plan, threads=predictor.threads)
     trial = at.experiment
     gap = at(one) - at(other)
-    floor = floor[_kept(e)]
+    floor = floor[[kind_of(c) is None for c in e.channels]]
     sigma = np.where(np.isfinite(floor), floor, np.inf)
     clear = np.nan_to_num(np.abs(gap) / sigma)
     row, axis = np.unravel_index(int(np.argmax(clear)), clear.shape)
@@ -56,15 +60,10 @@ def separation(
     return Separation((x, y, z), (fx, fy, fz), name, float(gap[row, axis]), number)
 
 
-def _kept(e: Experiment) -> list[int]:
-    """Axes of a pose and joints."""
-    return [i for i, c in enumerate(e.channels) if kind_of(c) is None]
-
-
-def _trial(e: Experiment, description: MachineDescription, seed: int) -> Experiment:
+def _trial(e: Experiment, machine: Machine, seed: int) -> Experiment:
     low, high = e.position.min(axis=0), e.position.max(axis=0)
-    if description.workspace is not None:
-        low, high = np.array(description.workspace)
+    if machine.description.workspace is not None:
+        low, high = np.array(machine.description.workspace)
     corners = np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, -1).T
     middle = np.vstack([corners * 0.98 + 0.02 * (low + high) / 2, (low + high) / 2])
     poses = np.vstack([middle, random_numbers(seed).uniform(low, high, (15, 3))])
@@ -75,24 +74,12 @@ def _trial(e: Experiment, description: MachineDescription, seed: int) -> Experim
             [np.vstack([np.eye(3), -np.eye(3), np.full((1, 3), 3**-0.5)]) * size, np.zeros((7, 3))]
         )
         loads = np.vstack([loads, 0.25 * loads])
-    n = len(poses) * len(loads)
-    position = np.repeat(poses, len(loads), axis=0)
-    read = np.where(e.axis_read, 0.0, np.nan)[_kept(e)]
-    return Experiment(
-        name="trial",
-        machine=e.machine,
-        quantity=e.quantity,
-        ids=tuple(map(str, range(n))),
-        position=position,
-        wrench=np.tile(loads, (len(poses), 1)),
-        reading=np.tile(read, (n, 1)),
-        sigma=np.full((n, len(read)), np.nan),
-        extra=tuple(c for c in e.extra if c.joint),
+    joints = [c for c in e.extra if c.joint]
+    plan = plan_of_poses(machine, e.quantity, poses, loads, axes=[a for a in e.axes if a in AXES])
+    plan, n = with_joints(plan, joints, [1.0] * len(joints)), len(poses) * len(loads)
+    return replace(
+        plan,
         order=None if e.order is None else np.linspace(e.order.min(), e.order.max(), n),
         temperature=None if e.temperature is None else np.full(n, float(e.temperature.max())),
-        reference_temperature=e.reference_temperature,
-        point=e.point,
-        load_point=e.load_point,
-        gravity=e.gravity,
-        loop=e.loop,
+        **{name: getattr(e, name) for name in KEPT},
     )

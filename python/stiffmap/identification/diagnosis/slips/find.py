@@ -8,8 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from typing import NamedTuple
+from functools import cache, partial
 
 import numpy as np
 
@@ -40,16 +39,6 @@ KEPT = 2.0
 """Rms of a check, over the noise, up to which it holds."""
 ROWS = 400
 """Rows that are judged at most."""
-
-
-class JudgedSlip(NamedTuple):
-    """A mistake, and shares of the misfit beyond noise."""
-
-    hypothesis: Hypothesis
-    left: float
-    """What stays with it."""
-    with_part: float
-    """What stays with it and the best single part of the machine."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +95,8 @@ class SlipReadings:
     """The first rows of an experiment, at most `ROWS`, and what each single part of the machine would change in them.
 
     base (n, c) is the prediction of the declared machine, sigma (n, c) the noise of readings that do not stand alone, least (n, c)
-    that of rows that may be shifted, all in m or rad; problem: the readings in noise sigma.
+    that of rows that may be shifted, all in m or rad; problem: the readings in noise sigma; screen: the parts of the machine, made
+    where they are asked for.
     """
 
     def __init__(self, predictor: Predictor, plan: CandidatePlan) -> None:
@@ -115,14 +105,10 @@ class SlipReadings:
         if len(e) > ROWS:
             part = e.rows(np.arange(ROWS))
             predictor = Predictor(predictor.machine, part, threads=predictor.threads)
-        self.predictor, self.variants, self.experiment = predictor, plan.variants, predictor.experiment
+        self.predictor, self.experiment = predictor, predictor.experiment
         self.base, self.sigma, self.least = plan.base[:ROWS], noise.sigma[:ROWS], quiet(e, noise)[:ROWS]
         self.problem = LinearProblem.of(self.experiment, self.sigma, self.base)
-
-    @cached_property
-    def screen(self) -> Screen:
-        """The parts of the machine."""
-        return Screen.of(self.problem, self.variants)
+        self.screen = cache(partial(Screen.of, self.problem, plan.variants))
 
 
 def find_slip(predictor: Predictor, plan: CandidatePlan) -> tuple[Slip, Experiment] | None:
@@ -138,33 +124,37 @@ def find_slip(predictor: Predictor, plan: CandidatePlan) -> tuple[Slip, Experime
     of = float(misfit @ misfit)
     if len(problem) < FEWEST or of < MISFIT * problem.freedom:
         return None
-    judged = [j for j in _judged(s, problem) if j.with_part < LEFT]
+    judged = [j for j in _judged(s, problem) if j[2] < LEFT]
     if not judged:
         return None
-    best = min(j.with_part for j in judged)
+    best = min(with_part for *_, with_part in judged)
     slack = max(SAME * best, 3.0 * (2.0 * problem.freedom) ** 0.5 / of)
-    alike = (j for j in judged if j.with_part <= best + slack)
-    first, *others = sorted(alike, key=lambda j: (j.hypothesis.changes, j.left))
-    h = first.hypothesis
+    alike = (j for j in judged if j[2] <= best + slack)
+    (h, left, with_part), *others = sorted(alike, key=lambda j: (j[0].changes, j[1]))
     # shifted rows look like noise where they are repeats: of that the noise of the readings holds too much
     noise = float(np.nanmedian((sigma / s.sigma) ** 2))
+    residual, parts = s.problem.residual(s.base), s.screen()
+    one, two = (
+        _excess(x, float(residual @ residual), noise * problem.freedom)
+        for x in (parts.left(residual), parts.left_by_two(residual))
+    )
     possible = h.physical or h.kind != "factor"
-    one, two = best_parts(s, noise * problem.freedom)
-    if possible and first.with_part > min(BETTER * one - slack, two + slack):
+    if possible and with_part > min(BETTER * one - slack, two + slack):
         return None
-    also = (j.hypothesis.check for j in others if j.hypothesis.changes <= h.changes)
+    also = (o.check for o, *_ in others if o.changes <= h.changes)
     same = tuple(dict.fromkeys(check for check in also if check != h.check))[:3]
     after = h.undo(whole) if h.undo else whole
     undone, evidence = h.undo is not None, _evidence(whole, after)
-    return Slip(h.kind, h.seen, h.check, same, first.left, undone, evidence, h.factor), after
+    return Slip(h.kind, h.seen, h.check, same, left, undone, evidence, h.factor), after
 
 
-def _judged(s: SlipReadings, problem: LinearProblem) -> Iterator[JudgedSlip]:
-    """Mistakes that take away enough to be one, jointly with a fault that the machine may have as well."""
+def _judged(s: SlipReadings, problem: LinearProblem) -> Iterator[tuple[Hypothesis, float, float]]:
+    """Mistakes that take away enough to be one, with the shares of the misfit beyond noise that stay with each alone, and jointly with
+    the best single fault that the machine may have as well."""
     for h in _hypotheses(s, problem):
         left = _left(h, problem)
         if left < MOST:
-            yield JudgedSlip(h, left, min(left, _beside(s, h)))
+            yield h, left, min(left, _beside(s, h))
 
 
 def _beside(s: SlipReadings, h: Hypothesis) -> float:
@@ -179,7 +169,7 @@ def _beside(s: SlipReadings, h: Hypothesis) -> float:
     misfit = problem.residual(s.base)
     residual = problem.white(np.nan_to_num(gap))
     scale = 1.0 if h.factor is None else abs(h.factor)
-    return _excess(scale**2 * s.screen.left(residual), float(misfit @ misfit), problem.freedom)
+    return _excess(scale**2 * s.screen().left(residual), float(misfit @ misfit), problem.freedom)
 
 
 def _excess(left: float, of: float, freedom: float) -> float:
@@ -206,7 +196,7 @@ def _hypotheses(s: SlipReadings, problem: LinearProblem) -> Iterator[Hypothesis]
         yield from gauges(e, s.base)
         yield from shifts(e, s.base)
     if e.quantity == "deflection":
-        yield from factors(e, problem, s.base, lambda p: s.screen.left(s.problem.residual(p)))
+        yield from factors(e, problem, s.base, lambda p: s.screen().left(s.problem.residual(p)))
         if e.wrench[:, :3].any():
             yield from loads(s.predictor)
 
@@ -220,14 +210,6 @@ def _left(h: Hypothesis, problem: LinearProblem) -> float:
         gap = own.white(e.reading - np.where(np.isfinite(prediction), prediction, e.reading))
         values.append(float(gap @ gap))
     return _excess(values[0], values[1], own.freedom)
-
-
-def best_parts(s: SlipReadings, freedom: float) -> tuple[float, float]:
-    """Shares of the misfit beyond noise that the best single part of the machine and the best two leave."""
-    residual = s.problem.residual(s.base)
-    of = float(residual @ residual)
-    one, two = (_excess(x, of, freedom) for x in (s.screen.left(residual), s.screen.left_by_two(residual)))
-    return one, two
 
 
 def _evidence(before: Experiment, after: Experiment) -> tuple[str, ...]:
