@@ -276,7 +276,7 @@ def put(row: int, column: int, text: str) -> str:
 
 
 BAD = [
-    *((put(row, 1, t), rf"line {row + 1}: column 'Fx_N': expected a number; found '{t}'") for row, t in ((1, "nan"), (3, "inf"), (5, "NaN"))),
+    *((put(row, 1, t), rf"line {row + 1}: column 'Fx_N': expected a finite number; found '{t}'") for row, t in ((1, "nan"), (3, "inf"), (5, "NaN"))),
     *((put(2, 3, t), rf"line 3: column 'Fz_N': expected a number; found '{t}'") for t in ("x", "1_0", "70.9 N")),
     *((put(3, 0, t), rf"line 4: feed_per_tooth_mm: expected a number above zero, found {t}") for t in ("0", "-0.1", "-5")),
     *((put(4, k, "0"), rf"line 5: {n}: expected a number above zero, found 0") for k, n in ((4, "teeth"), (5, "axial_mm"))),

@@ -295,7 +295,7 @@ def test_nan_in_a_field_file_through_the_command(run, tmp_path):
     (tmp_path / "cases.csv").write_text(CASES)
     done = run("field.csv", "--cases", "cases.csv", "--reference", "310,0,0")
     assert done.exit_code == 2
-    assert "field.csv, line 5: column 'ux [m]': expected a number; found 'nan'" in done.output
+    assert "field.csv, line 5: column 'ux [m]': expected a finite number; found 'nan'" in done.output
 
 
 def test_missing_extra_names_the_command(monkeypatch):
