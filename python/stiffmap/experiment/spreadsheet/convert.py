@@ -60,6 +60,9 @@ def understand(m: Meant, loaded: bool = False) -> ImportedSheet:
     for c in used:
         if c.meaning not in WORDS:
             sheet.numbers(c.index)  # raises, naming the line
+    for c in (c for c in used if c.meaning in m.constants):
+        way = f"--set {c.meaning}: column '{c.name}' says it row by row; leave one of the two out"
+        raise StiffmapError(f"{sheet.file}: {way}")
     known = {c.meaning for c in used} | set(m.constants)
     if drives:  # the pose follows from them
         columns = [replace(c, meaning="note") if c.meaning in POSE else c for c in columns]

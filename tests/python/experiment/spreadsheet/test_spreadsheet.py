@@ -109,6 +109,12 @@ def test_everything_may_be_guessed(tmp_path: Path, capsys: pytest.CaptureFixture
     [
         ("a;b\n1;2\n", (), "which column is the position x? Say --map x='HEADER'"),
         ("x [mm];y [mm];q\n1;2;3\n", ("--set", "z=0"), "which column is a reading? Say --map dx='HEADER'"),
+        ("x;y;Z;fx;dx\n1;2;3;4;5\n", ("--set", "z=0"), "--set z: column 'Z' says it row by row"),
+        (
+            "x;y;z;load;direction;dx\n1;2;3;4;+z;5\n",
+            ("--set", "fz=1"),
+            "--set fz: column '+load along z' says",
+        ),
         (
             "x [mm];y [mm];dx\n1;2;3\n",
             ("--set", "z=0"),

@@ -13,6 +13,7 @@ from stiffmap.experiment import Experiment, Predictor
 from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.virtual.plans import with_distances
 from stiffmap.identification.diagnosis import Diagnosis
+from stiffmap.identification.diagnosis.report.sentences import next_step
 from stiffmap.identification.inference import names
 from stiffmap.identification.inference.columns import Columns
 from stiffmap.identification.numbers import unknowns
@@ -56,6 +57,7 @@ def test_sag_of_an_arm_without_weights_is_named_and_in_the_file(arm: Arm) -> Non
     assert d.verdict.startswith("effects") and not d.effects
     assert d.calibration is not None and {n.group for n in d.calibration.beyond} == {SAG}
     assert d.shares[SAG] > 0.8
+    assert "every arm sags" in next_step(d)
     assert d.after.rms < 0.2 * d.before.rms
     sags = {name: joint.sag for name, joint in joints(d.machine.description).items()}
     assert min(sags["arm.shoulder"], sags["arm.elbow"]) > 1e-5

@@ -158,7 +158,11 @@ def test_metres_are_seen_where_the_workspace_holds_the_origin_and_elsewhere(name
     [
         ("r.csv,,+z", "1,1,0\n2,1,0\n3,1,1", "line 2: along: expected one of .*found none"),
         ("r.csv,+z,up", "1,1,0\n2,1,0\n3,1,1", "line 2: hammer: expected one of .*found 'up'"),
-        ("r.csv,+z,+z", "1,1,0\n2,nan,0\n3,1,1", "r.csv, line 3: column 'real_m/N': expected a finite number"),
+        (
+            "r.csv,+z,+z",
+            "1,1,0\n2,nan,0\n3,1,1",
+            "r.csv, line 3: column 'real_m/N': expected a finite number",
+        ),
         (
             "r.csv,+x +z,+z",
             "1,1,0\n2,1,0\n3,1,1",

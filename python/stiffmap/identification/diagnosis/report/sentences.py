@@ -14,6 +14,7 @@ from stiffmap.identification.diagnosis.report.separation import Separation
 from stiffmap.identification.diagnosis.slips.axes import Slip
 from stiffmap.identification.inference.kernels import WANDER
 from stiffmap.identification.inference.verdict import CLEARLY, NOISIER
+from stiffmap.identification.numbers.unknowns import SAG
 from stiffmap.model.effects import registry
 
 LISTED = 5
@@ -214,6 +215,11 @@ def next_step(d: Any) -> str:
         return (
             "Inspect this place and the others that fit the readings as well (the report lists them). The corrected machine file "
             "predicts the tool equally well, whichever of them it is."
+        )
+    if not d.effects and d.calibration and all(n.group == SAG for n in d.calibration.beyond):
+        return (
+            "Plan and compensate with machine.yaml: every arm sags. For its stiffness write masses of the links, compliances of the drives "
+            "and gravity into the file."
         )
     return "Inspect this place; until it is mended, plan and compensate with machine.yaml."
 
