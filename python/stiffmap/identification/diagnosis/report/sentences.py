@@ -21,7 +21,7 @@ LISTED = 5
 """Steps left out, numbers, and what cannot be distinguished from an effect: how many are named."""
 UNITS = {
     "m": (1e6, "µm"), "m/N": (1e6, "µm/N"), "1/m": (1e-3, "1/mm"),
-    "rad": (1e3, "mrad"), "rad/(N*m)": (1e3, "mrad/(N·m)"), "1": (1.0, ""),
+    "rad": (1e3, "mrad"), "rad/m": (1e3, "mrad/m"), "rad/(N*m)": (1e3, "mrad/(N·m)"), "1": (1.0, ""),
 }  # fmt: skip
 """Factor from SI, and the unit that a workshop reads."""
 NAMES = {"actuator": "drive"}
