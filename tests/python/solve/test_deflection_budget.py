@@ -128,20 +128,13 @@ def test_the_loaded_picture_shows_what_gravity_does(
     assert size in drawn[0].get_suptitle()
 
 
-def test_show_load_writes_picture_page_and_shares(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    out, page = tmp_path / "m.png", tmp_path / "m.html"
-    code = main(
-        ["show", "five-bar", "--load", "0", "-100", "0", "-o", str(out), "--page", str(page), "--json"]
-    )
-    assert code == 0
+def test_show_load_writes_picture_and_shares(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "m.png"
+    assert main(["show", "five-bar", "--load", "0", "-100", "0", "-o", str(out), "--json"]) == 0
     data = json.loads(capsys.readouterr().out)
     shares = {n: e["share"] for n, e in data["elements"].items()}
     assert sum(shares.values()) + data["second_order"] == pytest.approx(1.0)
     assert out.read_bytes().startswith(b"\x89PNG")
-    text = page.read_text(encoding="utf-8")
-    assert "http" not in text and "left.motor" in text and '"links"' in text
-    assert main(["show", "five-bar", "--page", str(page), "--no-picture"]) == 2
-    assert "--page: needs --load" in capsys.readouterr().err
 
 
 def test_a_map_says_where_its_worst_pose_gives_way(

@@ -29,9 +29,6 @@ def command(
     output: Path | None = written("Picture to write. [default: MACHINE.png]"),
     effect: options.Effects = None,
     load: str | None = option("Force on the tool in N, e.g. 300,0,0: draw the machine deformed by it."),
-    page: Path | None = written(
-        "With --load: also write a page (HTML) in which the machine turns.", None, "--page"
-    ),
     view: str | None = option("Elevation and azimuth of the view, deg. [default: 22,35; flat: from above]"),
     picture: bool = option("Draw the machine.", True),
 ) -> Answer:
@@ -46,7 +43,7 @@ def command(
     Examples:
       [cyan]stiffmap show orthoglide-revised[/cyan]
       [cyan]stiffmap show tripteron --at 300,400,500 -o tripteron.png --view 15,-60[/cyan]
-      [cyan]stiffmap show orthoglide-revised --at -200,-200,-200 --load 300,0,0 --page loaded.html[/cyan]
+      [cyan]stiffmap show orthoglide-revised --at -200,-200,-200 --load 300,0,0[/cyan]
     """
     m, p, how = machine_at(machine, effect, at, turned)
     r = how["rotation"]
@@ -56,17 +53,11 @@ def command(
     counts = mobility(m, k.coordinates)
     wrench = None if load is None else np.r_[numbers(load, "load", 3), np.zeros(3)]
     file = _draw(m, p, r, output or Path(f"{m.name}.png"), view, wrench) if picture else None
-    if page is not None:
-        from stiffmap.ui.report.sheet import write_page
-
-        if wrench is None:
-            raise StiffmapError("--page: needs --load, the force under which the machine is drawn")
-        write_page(m, page, p, wrench, rotation=r)
     if wrench is None:
         return Answer(as_plain(m, counts, file), _lines(m, counts, file))
     budget = deflection_budget(m, p, wrench, rotation=r)
     found = {"machine": m.name, "wrench": wrench} | budget.as_plain()
-    return Answer(found, [str(budget)], [f for f in (file, page) if f is not None])
+    return Answer(found, [str(budget)], [] if file is None else [file])
 
 
 def _draw(m: Machine, p: Any, r: Any, path: Path, view: str | None, wrench: Any) -> Path:

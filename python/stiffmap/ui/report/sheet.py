@@ -1,10 +1,9 @@
-"""What pages are made of: the jinja2 templates next to this file, pictures, where a report comes from; the report of one table: the answer,
-its numbers, its pictures; and the loaded machine that turns under the mouse. One file, no server, nothing from the network."""
+"""What pages are made of: the jinja2 templates next to this file, pictures, where a report comes from; and the report of one table: the
+answer, its numbers, its pictures. One file, no server, nothing from the network."""
 
 from __future__ import annotations
 
 import base64
-import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -12,21 +11,13 @@ from io import BytesIO
 from os import PathLike
 from pathlib import Path
 
-import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from matplotlib.figure import Figure
-from numpy.typing import ArrayLike
 from PIL import Image
 
-from stiffmap.common.broadcasting import Floats
 from stiffmap.common.fingerprints import file_digest
-from stiffmap.common.number_text import length_text, length_unit, vector_text
 from stiffmap.common.outputs import write_text
 from stiffmap.common.version import __version__
-from stiffmap.solve.budget import deflection_budget
-from stiffmap.solve.machine import Machine
-from stiffmap.ui.plot.loaded import LoadedShape, loaded_shape
-from stiffmap.ui.plot.style import leg_colours
 
 SHOWN = 16  # digits of a digest that are printed
 PAUSE = 70  # ms between two frames
@@ -117,52 +108,3 @@ def write_sheet(
         provenance=provenance(None, None, (), digests)[1:],  # a command has no date of its own
     )
     return write_text(path, text)
-
-
-def write_page(
-    machine: Machine,
-    path: str | PathLike[str],
-    position: ArrayLike | None = None,
-    wrench: ArrayLike = (0.0, 0.0, -300.0, 0.0, 0.0, 0.0),
-    *,
-    rotation: ArrayLike | None = None,
-) -> Path:
-    """Write the page; raises FileError where it cannot be written, StiffmapError for a failed pose."""
-    shape = loaded_shape(machine, position, wrench, rotation=rotation)
-    budget = deflection_budget(machine, position, wrench, rotation=rotation)
-    size = sum(v * v for v in shape.displacement[:3]) ** 0.5
-    unit, scale, decimals = length_unit(size)
-    text = render(
-        "machine.html",
-        name=machine.name,
-        title=machine.description.title,
-        position=vector_text(1e3 * budget.position),
-        force=vector_text(budget.wrench[:3]),
-        size=length_text(size),
-        unit=unit,
-        factor=shape.factor,
-        budget=[(n, f"{scale * size * s:.{decimals}f}", 100 * s) for n, _, s in budget.ranked()],
-        data=json.dumps(scene(shape, machine.legs)),
-    )
-    return write_text(path, text)
-
-
-def scene(shape: LoadedShape, legs: tuple[str, ...]) -> dict[str, object]:
-    """Lines and points at rest and under load (mm), for the page's script."""
-    colours, rest, loaded = leg_colours(legs), shape.rest, shape.loaded
-    links = [
-        {"leg": leg, "colour": colours[leg], "rest": _mm(a), "loaded": _mm(b)}
-        for leg, a, b in zip(rest.legs, rest.links, loaded.links, strict=True)
-    ]
-    points = ("actuators", "passive", "tcp")
-    return {
-        "links": links,
-        "guides": list(map(_mm, rest.guides)),
-        **{n: {"rest": _mm(getattr(rest, n)), "loaded": _mm(getattr(loaded, n))} for n in points},
-        "force": list(map(float, shape.force)),
-        "factor": shape.factor,
-    }
-
-
-def _mm(points: Floats) -> list[list[float]]:
-    return [[float(f"{1e3 * v:.7g}") for v in p] for p in np.atleast_2d(points)]

@@ -73,7 +73,7 @@ def test_from_a_sketch_to_a_map(machine: str, capsys: pytest.CaptureFixture[str]
     assert main(["new", "starter.yaml"]) == 0  # what one starts from; its keys are those used above
     assert main(["check", machine]) == 0
     assert "usable" in capsys.readouterr().out
-    assert main(["show", machine, "--load", "0", "-100", "0", "--page", "mine.html"]) == 0
+    assert main(["show", machine, "--load", "0", "-100", "0"]) == 0
     assert "of which" in capsys.readouterr().out
     assert main(["map", machine, "--force", "100", "--points", "3", "-o", "map", "--json"]) == 0
     data = json.loads(capsys.readouterr().out)

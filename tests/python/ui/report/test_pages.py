@@ -14,13 +14,6 @@ from stiffmap.identification.diagnosis.report.findings import Effect
 from stiffmap.identification.diagnosis.report.sentences import measured, sentence
 from stiffmap.ui.cli import main
 from stiffmap.ui.report.diagnosis.pictures import before_after, maps
-from stiffmap.ui.report.sheet import write_page
-
-
-@pytest.mark.parametrize("width", [500, 900])
-def test_the_page_of_a_loaded_machine(width: int, tmp_path: Path) -> None:
-    page = write_page(sm.load_machine("five-bar"), tmp_path / "m.html", None, [0, -100.0, 0, 0, 0, 0])
-    assert look(page, tmp_path, width) == {"wide": 0, "lost": 0, "console": 0}
 
 
 def test_an_effect_is_said_as_one_says_it() -> None:
