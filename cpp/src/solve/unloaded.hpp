@@ -7,8 +7,8 @@
 
 namespace stiffmap::unloaded {
 
-/// Drive and guide coordinates with their errors, compliances of drives and links at that stroke (theory G1-G4, S3), with
-/// the problem's gravity; false where a link has none.
+/// Drive and guide coordinates with their errors, compliances of drives and links at that stroke (theory G1-G4, S3),
+/// with the problem's gravity; false where a link has none.
 bool command(const Mechanism& m, const VecX& x, Problem& p);
 
 /// Where the laws about a home coordinate stand.

@@ -93,7 +93,7 @@ def test_bad_motion_files_name_the_key(tmp_path, old, new, words):
         ("y [cm]", "x [cm]", "twice"),
         ("0.2,10", "0.05,10", r"line 4: t .*: times must increase; 0.05 s follows 0.1 s"),
         ("0.2,10", "0.2,ten", r"line 4: column 'x .*': expected a number; found 'ten'"),
-        ("0.2,10", "0.2,nan", "expected a number"),
+        ("0.2,10", "0.2,nan", "expected a finite number"),
         ("z [m]", "fz [N]", "no column z"),
         (ROWS, "x [mm],y [mm],z [mm],A,B,C\n0,0,0,0,0,0\n1,0,0,0,0,0\n", "line 1: expected no orientations"),
     ],
