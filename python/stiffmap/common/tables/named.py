@@ -62,7 +62,7 @@ class Known:
 
     def has(self, name: str) -> bool:
         """Whether a table may have a column of this name, without its unit."""
-        return re.sub(r"\s+", "_", name.lower()) in {*self.units, *self.aliases}
+        return _joined(name) in {*self.units, *self.aliases}
 
 
 @dataclass(eq=False)
@@ -163,11 +163,15 @@ def _counts(sheet: Table, column: int) -> bool:
     return bool(np.isin(np.diff(sheet.numbers(column)), (0.0, 1.0)).all())
 
 
+def _joined(name: str) -> str:
+    return re.sub(r"\s+", "_", name.lower())
+
+
 def _meaning(sheet: Table, column: int, known: Known, table: NamedTable) -> tuple[str, str, float]:
     """Name of a column, nothing where no cell is a number, its unit as written, and the SI size of that."""
     head = sheet.header[column]
     text, unit = split_unit(head)
-    name = re.sub(r"\s+", "_", text.lower())
+    name = _joined(text)
     named_so = known.has(text) or meaning_of(text) in known.units
     if not named_so and not re.search(r"[])]\s*$", head):  # x_per_tooth_mm, real_m/N
         whole = re.sub(r"\s", "_", head)

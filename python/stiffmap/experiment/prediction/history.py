@@ -53,7 +53,7 @@ def history_motion(drives: Drives, plan: Experiment, terms: tuple[AppliedEffect,
     """
     if plan.order is None:
         raise StiffmapError(f"{plan.name}: {terms[0].kind} needs the column 'order': rows in order of time")
-    if reads_pairs(plan):
+    if any(kind.pair for c in plan.extra if (kind := kind_of(c))):
         raise StiffmapError(
             f"{plan.name}: {terms[0].kind} cannot be predicted for distances between two poses"
         )
@@ -66,7 +66,7 @@ def history_motion(drives: Drives, plan: Experiment, terms: tuple[AppliedEffect,
         for name in _drives(machine, term):
             k = machine.actuators.index(name)
             more = _extra(machine, plan, name, -drives.effort[:, k], values, effect.drive)
-            out += shown_of_drive(machine, plan, name, drives.jacobian[:, :, k], more)
+            out += _shown_of_drive(machine, plan, name, drives.jacobian[:, :, k], more)
     return out
 
 
@@ -104,12 +104,7 @@ def _extra(
     return out
 
 
-def reads_pairs(plan: Experiment) -> bool:
-    """Whether some readings are taken between two commanded poses."""
-    return any(kind.pair for c in plan.extra if (kind := kind_of(c)))
-
-
-def shown_of_drive(machine: Machine, plan: Experiment, name: str, column: Floats, more: Floats) -> Floats:
+def _shown_of_drive(machine: Machine, plan: Experiment, name: str, column: Floats, more: Floats) -> Floats:
     """(n, c) m, rad: what every channel shows where a drive stands off by `more` (n,) m or rad, which moves the tool by `column`
     (n, 6) per unit."""
     twist = column * more[:, None]

@@ -116,7 +116,7 @@ def unknowns(
     t = tolerances or Tolerances()
     bare = description.declared or description
     given = Declared({k: u for k, u in bare.uncertainty if u > 0.0}, t)
-    lacks_sag = len(bare.legs) == 1 and not _sags(bare)
+    sags = experiment.quantity == "position" and _lacks_sag(bare)
     loaded = bool(experiment.wrench.any() or experiment.gravity or bare.gravity)
     weighs = bool(experiment.gravity or bare.gravity)
     out: list[Unknown] = []
@@ -141,18 +141,20 @@ def unknowns(
             out.append(Unknown(full, INSTRUMENT, unit, u, (((INSTRUMENT, name), 1.0),)))
     if not loaded:
         out = [p for p in out if p.group not in ("drive compliance", "link compliance")]
-    if not lacks_sag:
+    if not sags:
         out = [p for p in out if p.group != SAG]
     if not weighs:
         out = [p for p in out if p.group != "masses"]
     return out
 
 
-def _sags(description: MachineDescription) -> bool:
-    """Whether drives yield under weights that the file has."""
+def _lacks_sag(description: MachineDescription) -> bool:
+    """Whether this is an arm, one leg without loops, whose file has no weights or no drives that yield under them."""
     elements = [e for _, e in all_elements(description)]
     heavy = any(isinstance(e, Body) and e.mass > 0.0 for e in elements)
-    return heavy and any(isinstance(e, Joint) and e.actuated and e.law is not None for e in elements)
+    yields = any(isinstance(e, Joint) and e.actuated and e.law is not None for e in elements)
+    arm = len(description.legs) == 1 and not any(isinstance(e, Block) for e in elements)
+    return arm and not (heavy and yields)
 
 
 def uncertain(

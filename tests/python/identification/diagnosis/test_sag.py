@@ -115,3 +115,11 @@ def test_readings_between_two_poses_have_none(arm: Arm) -> None:
 def test_which_drives_may_sag(machine: sm.Machine, count: int) -> None:
     plan = sm.experiment.random_plan(machine, "position", poses=8, seed=1)
     assert sum(u.group == SAG for u in unknowns(machine.description, plan)) == count
+
+
+def test_a_leg_with_loops_and_deflections_have_none() -> None:
+    delta, arm = (rigid_and_weightless(sm.load_machine(name)) for name in ("rotary-delta", "ur10"))
+    leg = replace(delta.description, legs=delta.description.legs[:1])
+    for description, quantity in ((leg, "position"), (arm.description, "deflection")):
+        plan = sm.experiment.random_plan(arm, quantity, poses=8, seed=1)
+        assert not [u.name for u in unknowns(description, plan) if u.group == SAG]
