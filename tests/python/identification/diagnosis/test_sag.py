@@ -12,10 +12,12 @@ import stiffmap as sm
 from stiffmap.experiment import Experiment, Predictor
 from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.virtual.plans import with_distances
+from stiffmap.identification.candidates.sensitivity import CandidatePlan
 from stiffmap.identification.diagnosis import Diagnosis
 from stiffmap.identification.diagnosis.report.sentences import next_step
 from stiffmap.identification.inference import names
-from stiffmap.identification.inference.columns import Columns
+from stiffmap.identification.inference.columns import Columns, columns
+from stiffmap.identification.inference.parts import ALL_NUMBERS, Parts
 from stiffmap.identification.numbers import unknowns
 from stiffmap.identification.numbers.unknowns import SAG
 from stiffmap.model.description import Body, Joint
@@ -86,6 +88,20 @@ def test_sag_that_is_not_worth_a_name_is_left_out(arm: Arm, monkeypatch: pytest.
     monkeypatch.setattr(names, "searched", lambda c, *a, **k: given.append(c) or search(c, *a, **k))
     assert found(declared, plan, Predictor(declared, plan)()).verdict == "none"
     assert SAG not in given[0].groups
+
+
+def test_sag_has_a_size_of_its_own_next_to_all_other_numbers(arm: Arm) -> None:
+    _, declared, plan = arm
+    predictor = Predictor(declared, plan)
+    numbers = unknowns(declared.description, plan)
+    c = columns(predictor, CandidatePlan(predictor(), (), ()), np.full(plan.reading.shape, NOISE), numbers)
+    shared, own = Parts(c).together
+    assert (shared.name, own.name) == (ALL_NUMBERS, SAG)
+    assert shared.factor is not None and own.factor is not None
+    assert [shared.factor.shape[1], own.factor.shape[1]] == [
+        len(c.unknowns) - len(c.groups[SAG]),
+        len(c.groups[SAG]),
+    ]
 
 
 def test_a_lead_error_of_that_arm_keeps_its_name(arm: Arm) -> None:
