@@ -264,19 +264,24 @@ def _on(parts: tuple[Part, ...], t: Floats) -> dict[int, Part]:
     return {k: p for k, p in enumerate(parts, 1) if t[k] > OFF}
 
 
-def _gradient(fit: Fit, along: Floats, noise: Floats) -> Floats:
-    """(1 + k,) slope of the score, priced without; `noise` (m, m) as in `Columns.of_noise`."""
-    trace, on = np.zeros(len(fit.t)), _on(fit.parts, fit.t)
+def _gradient(fit: Fit, along: Floats) -> Floats:
+    """(1 + k,) slope of the score, priced without. Traces of V⁻¹ with all parts of V sum to m, which gives that of the noise."""
+    trace, on, variance = np.zeros(len(fit.t)), _on(fit.parts, fit.t), np.exp(fit.t)
     short = {k: p.factor for k, p in on.items() if p.factor is not None}
     if short:
         squares = np.sum(fit.white(np.hstack(list(short.values()))) ** 2, axis=0)
         ends = np.cumsum([f.shape[1] for f in short.values()])
         trace[list(short)] = [x.sum() for x in np.split(squares, ends[:-1])]
-    inverse = np.asarray(dpotri(fit.root, lower=1)[0])  # its lower half; zero above the diagonal
-    for k, full in {0: noise, **{k: p.full for k, p in on.items() if p.full is not None}}.items():
-        trace[k] = 2.0 * np.vdot(inverse.T, full) - np.diag(inverse) @ np.diag(full)
+    whole = {k: p.full for k, p in on.items() if p.full is not None}
+    given = len(fit.columns) - float(variance[list(short)] @ trace[list(short)])
+    if whole or fit.columns.zero.any():
+        inverse = np.asarray(dpotri(fit.root, lower=1)[0])  # its lower half; zero above the diagonal
+        for k, full in {0: fit.columns.zero, **whole}.items():
+            trace[k] = 2.0 * np.vdot(inverse.T, full) - np.diag(inverse) @ np.diag(full)
+            given -= trace[k] * (variance[k] if k else 1.0)
+    trace[0] = given / variance[0]
     centre, sd = _prior(fit)
-    slope = along.T @ fit.solved - np.exp(fit.t) * trace
+    slope = along.T @ fit.solved - variance * trace
     return np.asarray(0.5 * slope - (fit.t - centre) / sd**2)
 
 
@@ -365,7 +370,7 @@ def _optimum(
     price = _price(fit, information)
     for _ in range(WEIGHINGS if heavy else STEPS):
         if gradient is None:
-            gradient = _gradient(fit, along, noise)
+            gradient = _gradient(fit, along)
             if heavy:
                 weights = _heavy(fit, *noise_part(fit))
                 noise = columns.of_noise(weights)

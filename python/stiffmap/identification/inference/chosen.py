@@ -6,8 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.linalg.blas import dtrmm
-from scipy.linalg.lapack import dtrtri
 from scipy.special import log_ndtr, ndtri
 
 from stiffmap.experiment.experiment import Floats, Mask
@@ -17,61 +15,45 @@ from stiffmap.identification.inference.amplitudes import Fit
 from stiffmap.identification.inference.columns import Columns
 from stiffmap.identification.inference.constants import SIZES
 from stiffmap.identification.inference.parts import Part, gains, log_mean
-from stiffmap.identification.inference.places import Place, Shape, possible
+from stiffmap.identification.inference.places import Place, Shape, possible, side_by_side
 from stiffmap.model.description import AppliedEffect
 from stiffmap.model.effects import Parameter, get
 
 PAIR_STRIDE = 3
 """Of the sizes that pairs are tried with: every third; effort only."""
-AT_ONCE = 512
-"""Directions that are solved for together."""
 
 
 def evidence(fit: Fit, places: tuple[Place, ...]) -> list[Floats]:
     """Per place, (shapes,) mean over sizes of the gain of evidence of an effect there, ln; worked out once for each fit."""
-    by_rank: dict[int, list[tuple[Floats, int, Shape]]] = {}
-    for p in places:
-        if id(p) not in fit.gain:
-            fit.gain[id(p)] = np.empty(len(p.shapes))
-            for k, s in enumerate(p.shapes):
-                by_rank.setdefault(s.directions.shape[1], []).append((fit.gain[id(p)], k, s))
-    asked = sum(rank * len(members) for rank, members in by_rank.items())
-    # of the factor: products with it take half the time, and pay where many are asked for
-    inverse = dtrtri(fit.root, lower=1)[0] if asked > len(fit.columns) else None
-    for rank, members in by_rank.items():
-        for begin in range(0, len(members), max(1, AT_ONCE // rank)):
-            some = members[begin : begin + max(1, AT_ONCE // rank)]
-            for (to, k, _), gain in zip(
-                some, _of_rank(fit, [s for _, _, s in some], rank, inverse), strict=True
-            ):
-                to[k] = gain
+    new = [p for p in places if id(p) not in fit.gain]
+    if new:
+        spans = [p.span[0] for p in new]
+        ends = np.cumsum([u.shape[1] for u in spans])[:-1]
+        for p, white in zip(new, np.split(fit.white(np.hstack(spans)), ends, axis=1), strict=True):
+            fit.gain[id(p)] = _of_place(fit, p, white)
     return [fit.gain[id(p)] for p in places]
 
 
-def _of_rank(fit: Fit, shapes: list[Shape], rank: int, inverse: Floats | None = None) -> Floats:
-    directions = np.concatenate([s.directions.T for s in shapes]).T
-    scale = len(fit.columns) / rank  # of a factor's square over that of the directions
-    white = fit.white(directions) if inverse is None else dtrmm(1.0, inverse, directions, lower=1)
-    white = white.T.reshape(len(shapes), rank, -1)
-    inside, vectors = np.linalg.eigh(scale * (white @ white.transpose(0, 2, 1)))
-    along = np.sqrt(scale) * (directions.T @ fit.solved).reshape(len(shapes), rank)
-    z = np.einsum("iab,ia->ib", vectors, along)
-    gain = gains(inside, z)
-    if rank == 1:
-        sign = np.array([s.sign for s in shapes])[:, None]
-        straight = (vectors[:, 0, 0] * z[:, 0])[:, None]
-        side = log_ndtr(sign * straight * SIZES / np.sqrt(1.0 + inside * SIZES**2)) + np.log(2.0)
-        gain = gain + np.where(sign == 0, 0.0, side)
+def _of_place(fit: Fit, place: Place, white: Floats) -> Floats:
+    """Of a place with its span (m, r) whitened."""
+    span, factors = place.span
+    shapes, rank = len(place.shapes), factors.shape[1] // len(place.shapes)
+    along = (factors.T @ (span.T @ fit.solved)).reshape(shapes, rank)
+    own = (np.linalg.qr(white, mode="r") @ factors).T.reshape(shapes, rank, -1)
+    of_two = own @ own.transpose(0, 2, 1)
+    inside, vectors = np.linalg.eigh(of_two)
+    gain = gains(inside, np.einsum("iab,ia->ib", vectors, along))
+    sign = np.array([s.sign for s in place.shapes])[:, None]
+    if sign.any():  # of one direction each
+        side = log_ndtr(sign * along[:, :1] * SIZES / np.sqrt(1.0 + of_two[:, 0, :1] * SIZES**2))
+        gain = gain + np.where(sign == 0, 0.0, side + np.log(2.0))
     return log_mean(gain)
 
 
 def of_pairs(fit: Fit, shapes: Sequence[Shape]) -> Floats:
     """(s, s) gain of evidence by every two of some shapes together, mean over both sizes; nothing of one with itself."""
-    m, s = len(fit.columns), len(shapes)
-    rank = max(v.directions.shape[1] for v in shapes)
-    factor = np.zeros((m, s, rank))
-    for k, v in enumerate(shapes):
-        factor[:, k, : v.directions.shape[1]] = v.factor
+    factor = side_by_side(shapes)
+    m, s, rank = factor.shape
     white = fit.white(factor.reshape(m, -1))
     gram = (white.T @ white).reshape(s, rank, s, rank).swapaxes(1, 2)
     z = (factor.reshape(m, -1).T @ fit.solved).reshape(s, rank)

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
+from scipy.linalg import qr
 
 from stiffmap.experiment.experiment import Floats, Integers
 from stiffmap.identification.candidates.candidates import Candidate
@@ -49,6 +52,29 @@ class Place:
     aliases: tuple[Candidate, ...] = ()
     wider: tuple[Candidate, ...] = ()
     """Candidates of more directions that contain its own."""
+
+    @cached_property
+    def span(self) -> tuple[Floats, Floats]:
+        """(m, r) orthonormal directions that span all shapes, far fewer than those of many waves; and (r, shapes p) the factors of all
+        shapes `side_by_side` along them."""
+        factors = side_by_side(self.shapes)
+        some = whole = factors.reshape(len(factors), -1)
+        if whole.shape[1] > len(
+            whole
+        ):  # as many sums of them as can be apart, drawn at random, span the same
+            some = whole @ np.random.default_rng(0).normal(size=whole.shape[::-1])
+        u, r, _ = qr(some, mode="economic", pivoting=True)
+        size = np.abs(np.diag(r))
+        span = u[:, size > NULL * size[0]]
+        return span, span.T @ whole
+
+
+def side_by_side(shapes: Sequence[Shape]) -> Floats:
+    """(m, shapes, p) factors, with columns of zeros where a shape has fewer than p."""
+    factors = np.zeros((len(shapes[0].directions), len(shapes), max(s.directions.shape[1] for s in shapes)))
+    for k, s in enumerate(shapes):
+        factors[:, k, : s.directions.shape[1]] = s.factor
+    return factors
 
 
 def places(

@@ -47,7 +47,7 @@ def test_the_likelihood_is_that_of_the_covariance_and_its_gradient_that_of_diffe
         return amplitudes._evaluate(c, some, x, w, noise)
 
     fit, along = objective(at)
-    gradient = amplitudes._gradient(fit, along, noise)
+    gradient = amplitudes._gradient(fit, along)
     information = amplitudes._information(fit, along)
     expected = multivariate_normal(cov=dense(c, some, at, w)).logpdf(c.residual)
     gaussian = sum(norm.logpdf(0.0, scale=w**-0.5))

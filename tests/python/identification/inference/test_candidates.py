@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -36,10 +37,17 @@ def likelihood(c, v, effects):
     return multivariate_normal(cov=v).logpdf(c.residual)
 
 
-@pytest.mark.parametrize(("rank", "count"), [(1, 3), (2, 3), (5, 3), (5, READINGS // 4)])
-def test_one_effect_is_worth_the_mean_over_its_sizes(rank, count):
-    """Few by their solutions, more directions than readings by the inverse of the factor."""
-    c, fit, shapes, v = setting(rank, (rank,) * count)
+@pytest.mark.parametrize("inside", [None, 6])
+@pytest.mark.parametrize("ranks", [(1, 1, 1), (2, 2, 2), (5, 5, 5), (1, 2, 5), (5, *(4,) * (READINGS // 3))])
+def test_one_effect_is_worth_the_mean_over_its_sizes(ranks, inside):
+    """Few or more directions than readings, in all of their space or in a small part of it."""
+    c, fit, shapes, v = setting(ranks[0], ranks)
+    if inside:
+        rng = np.random.default_rng(inside)
+        part = np.linalg.qr(rng.normal(size=(len(c), inside)))[0]
+        across = [np.linalg.qr(rng.normal(size=(inside, r)))[0] for r in ranks]
+        shapes = tuple(replace(s, directions=part @ a) for s, a in zip(shapes, across, strict=True))
+        assert Place(None, shapes).span[0].shape[1] == min(inside, sum(ranks))  # type: ignore[arg-type]
     found = candidates.evidence(fit, (Place(None, shapes[:1]), Place(None, shapes[1:])))  # type: ignore[arg-type]
     each = np.concatenate(found)
     for s, gain in zip(shapes, each, strict=True):
@@ -51,8 +59,8 @@ def test_one_effect_is_worth_the_mean_over_its_sizes(rank, count):
 def test_what_can_only_grow_is_worth_twice_as_much_one_way_and_little_the_other():
     _, fit, shapes, _ = setting(7, (1,))
     u = shapes[0].directions
-    both = [Shape(shapes[0].variant, u, s) for s in (0, 1, -1)]
-    free, up, down = np.exp(candidates._of_rank(fit, both, 1))
+    both = tuple(Shape(shapes[0].variant, u, s) for s in (0, 1, -1))
+    free, up, down = np.exp(candidates.evidence(fit, (Place(None, both),))[0])  # type: ignore[arg-type]
     assert up + down == pytest.approx(2.0 * free, rel=1e-9)
     assert (up > down) == (float(u[:, 0] @ fit.solved) > 0.0)
 
