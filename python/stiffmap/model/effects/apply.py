@@ -158,7 +158,8 @@ def place_of(
     effect: EffectType, machine: MachineDescription, element: str | None, legs: Sequence[str] | None
 ) -> tuple[str, tuple[str, ...]]:
     """Element and legs (in the machine's order); raises StiffmapError listing those that exist."""
-    places = _places(effect, machine)
+    key = (id(effect), id(machine))  # both are held, so that their numbers stay theirs
+    places = _PLACES.made(key, lambda: (effect, machine, effect.places(machine)))[2]
     names = list(dict.fromkeys(name for name, _ in places))
     element = _element(effect, names, element)
     having = {leg for name, at in places for leg in at if name == element}
@@ -172,12 +173,7 @@ def place_of(
 
 
 _PLACES = Kept[tuple[int, int], tuple[EffectType, MachineDescription, list[Place]]](256)
-
-
-def _places(effect: EffectType, machine: MachineDescription) -> list[Place]:
-    """Where a machine may have an effect; asked once for the last few, since fits add the same effects again and again."""
-    key = (id(effect), id(machine))  # both are held, so that their numbers stay theirs
-    return _PLACES.made(key, lambda: (effect, machine, effect.places(machine)))[2]
+"""Where a machine may have an effect, for the last few: fits add the same effects again and again."""
 
 
 def _element(effect: EffectType, names: list[str], element: str | None) -> str:

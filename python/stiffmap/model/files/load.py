@@ -70,14 +70,9 @@ def describe_document(document: Document, file: str, folder: Path) -> MachineDes
     """Schema, then SI, then effects."""
     if isinstance(document.data, dict):
         document = expanded(document, file)
-    model = validate(document, file)
+    model = validated(MachineFile, document, file, "a machine file is a mapping with name, units and legs")
     base = build(model, document, file, folder)
     if not model.effects:
         return base
     applied = apply_records(base, tuple(build_effect(e) for e in model.effects))
     return applied if applied.declared is not None else replace(applied, declared=base)
-
-
-def validate(document: Document, file: str) -> MachineFile:
-    """Plain data against the schema; raises `FileError` with every problem."""
-    return validated(MachineFile, document, file, "a machine file is a mapping with name, units and legs")

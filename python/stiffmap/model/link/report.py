@@ -4,27 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from stiffmap.common.errors import StiffmapError
 from stiffmap.model.link.transport import Floats
 
-
-def unit_factor(length: str) -> Floats:
-    """(6, 6) factor from SI entries to mm/N, 1/N, rad/(N·mm) for "mm", ones for "m".
-
-    Raises:
-        StiffmapError: another unit.
-    """
-    if length not in {"m", "mm"}:
-        raise StiffmapError(f'length: expected "m" or "mm", got {length!r}')
-    per = np.repeat([1e3, 1.0] if length == "mm" else [1.0, 1.0], 3)
-    return np.outer(per, per) / (1e3 if length == "mm" else 1.0)
+UNIT_FACTOR = np.kron([[1e3, 1.0], [1.0, 1e-3]], np.ones((3, 3)))
+"""(6, 6) from SI entries to mm/N, 1/N, rad/(N·mm), as the paper prints them."""
 
 
-def unit_name(i: int, j: int, length: str) -> str:
+def unit_name(i: int, j: int) -> str:
     """Unit of entry (i, j), zero-based: for example ``mm/N``."""
-    if i < 3 and j < 3:
-        return f"{length}/N"
-    return f"rad/(N·{length})" if i >= 3 and j >= 3 else "1/N"
+    return ("mm/N", "1/N", "rad/(N·mm)")[i // 3 + j // 3]
 
 
 def smallest_eigenvalue(compliance: Floats, covariance: Floats) -> tuple[float, float]:

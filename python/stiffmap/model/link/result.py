@@ -15,7 +15,7 @@ from stiffmap.common.short import table, titled
 from stiffmap.model.link.checks import DisplacementField, finite_array
 from stiffmap.model.link.noise import Correlation, FieldNoise
 from stiffmap.model.link.regression import Regression, constrain, structure
-from stiffmap.model.link.report import findings, unit_factor, unit_name
+from stiffmap.model.link.report import UNIT_FACTOR, findings, unit_name
 from stiffmap.model.link.rigidfit import RigidFit, design_matrix
 from stiffmap.model.link.transport import (
     Bools,
@@ -167,20 +167,14 @@ class Link:
         return np.asarray(np.cov(np.einsum("kea,ska->se", gain, twists).T))
 
     def _repr_html_(self) -> str:
-        c, s = self.compliance * unit_factor("mm"), self.standard_error * unit_factor("mm")
+        c, s = self.compliance * UNIT_FACTOR, self.standard_error * UNIT_FACTOR
         shown = np.argwhere(np.triu(~self.insignificant | np.eye(6, dtype=bool)))
-        rows = [
-            (f"k{i + 1}{j + 1}", f"{c[i, j]:.4g}", f"{s[i, j]:.1g}", unit_name(i, j, "mm")) for i, j in shown
-        ]
+        rows = [(f"k{i + 1}{j + 1}", f"{c[i, j]:.4g}", f"{s[i, j]:.1g}", unit_name(i, j)) for i, j in shown]
         return titled("compliance of the link", table(("entry", "value", "±", "unit"), rows))
 
-    def report(self, length: str = "mm") -> str:
-        """The table of the paper's Table 1 with error bars, then what speaks for and against the fit.
-
-        Args:
-            length: "mm" prints mm/N, 1/N, rad/(N·mm) as the paper does; "m" prints SI.
-        """
-        return "\n".join([*_table(self, length), *_field_lines(self), *_matrix_lines(self)])
+    def report(self) -> str:
+        """The table of the paper's Table 1 (mm/N, 1/N, rad/(N·mm)) with error bars, then what speaks for and against the fit."""
+        return "\n".join([*_table(self), *_field_lines(self), *_matrix_lines(self)])
 
 
 def critical_multiple(level: float, tests: int, dof: Floats | float) -> Floats:
@@ -252,9 +246,8 @@ def node_patches(points: Floats, patches: int) -> Ints:
     return label
 
 
-def _table(link: Link, length: str) -> list[str]:
-    factor = unit_factor(length)
-    C, error = link.compliance * factor, link.standard_error * factor
+def _table(link: Link) -> list[str]:
+    C, error = link.compliance * UNIT_FACTOR, link.standard_error * UNIT_FACTOR
     zero = link.insignificant
     diagonal = [(i, i) for i in range(6)]
     pairs = diagonal + [
@@ -268,7 +261,7 @@ def _table(link: Link, length: str) -> list[str]:
             relative = abs(error[i, j] / C[i, j])
         mark = "  zero within the test" if zero[i, j] else ""
         numbers = f"{C[i, j]:>13.5e} {error[i, j]:>11.1e} {relative:>8.1e}"
-        lines.append(f"k{i + 1}{j + 1:<4} {numbers}  {unit_name(i, j, length)}{mark}")
+        lines.append(f"k{i + 1}{j + 1:<4} {numbers}  {unit_name(i, j)}{mark}")
     names = [f"k{i + 1}{j + 1}" for i, j in pairs if zero[i, j] and i != j]
     k = float(np.nanmin(link.multiple))
     lines.append(

@@ -59,7 +59,10 @@ def command(
         if cases is None or place is None:
             raise StiffmapError(f"{part}: a displacement field needs --cases FILE and --reference x,y,z")
         name = part.stem
-        link = identify_link(*_field(part, unit, nodes, wrenches), wrenches, reference=place)
+        points, displacements = read_field(part, unit, nodes)
+        if len(displacements) != len(wrenches):
+            raise StiffmapError(f"{part}: has {len(displacements)} load cases, --cases has {len(wrenches)}")
+        link = identify_link(points, displacements, wrenches, reference=place)
     else:
         mesher, made_of, name, centre = _part(
             part, unit, None if material is None else read_material(material)
@@ -92,13 +95,6 @@ def command(
         problem = str(error)
     data = {**as_data(link, found, file), "problem": problem}
     return Answer(data, [*told, problem or None], finding=bool(problem))
-
-
-def _field(path: Path, unit: str | None, nodes: Path | None, wrenches: Floats) -> tuple[Floats, Floats]:
-    points, displacements = read_field(path, unit, nodes)
-    if len(displacements) != len(wrenches):
-        raise StiffmapError(f"{path}: has {len(displacements)} load cases, --cases has {len(wrenches)}")
-    return points, displacements
 
 
 def _part(

@@ -1,9 +1,7 @@
 from __future__ import annotations
 
-from pathlib import Path
-
 from stiffmap.common.outputs import make_folder
-from stiffmap.experiment import Residual, residual
+from stiffmap.experiment import residual
 from stiffmap.identification.validity import beyond
 from stiffmap.solve.machine import load_machine
 from stiffmap.ui.cli import options
@@ -32,18 +30,14 @@ def command(
     declared = load_machine(machine)
     result = residual(declared, data, effect or (), threads=threads)
     if output is not None:
-        _write(result, rows, output)
+        from stiffmap.ui.plot.experiment import figures
+
+        result.write_table(make_folder(output) / "residual.csv")
+        pictures = ((f"{name}.png", figure) for name, figure in figures(result).items())
+        write_files(output, [("residual.json", result.as_plain(rows)), *pictures])
     far = beyond(declared, result.experiment)
     found, told = result.as_plain(rows), result.lines(rows)
     if far is not None:
         found["rows_beyond_calibration"] = int(far.sum())
         told.append(f"  beyond what the machine was calibrated by: {int(far.sum())} of {len(far)} rows")
     return Answer(found, told, finding=result.lack_of_fit < 1e-3)
-
-
-def _write(r: Residual, rows: int, output: Path) -> None:
-    from stiffmap.ui.plot.experiment import figures
-
-    r.write_table(make_folder(output) / "residual.csv")
-    pictures = ((f"{name}.png", figure) for name, figure in figures(r).items())
-    write_files(output, [("residual.json", r.as_plain(rows)), *pictures])

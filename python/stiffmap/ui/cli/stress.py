@@ -3,8 +3,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from rich.table import Table
-
 import stiffmap
 from stiffmap.solve.internal_wrenches import InternalWrenches
 from stiffmap.solve.status import Status
@@ -38,8 +36,13 @@ def command(
     data = {"machine": m.name, "status": status.name} | {
         n: getattr(result, n) for n in ("springs", "joints", "legs", "displacement")
     }
+    heads = ("spring", "fx, N", "fy, N", "fz, N", "mx, N m", "my, N m", "mz, N m")
+    rows = ([name, *(f"{v:.4f}" for v in w)] for name, w in result.springs.items())
     return Answer(
-        data, [f"status {status.name.lower()}", _table(result)], files, finding=status != Status.CONVERGED
+        data,
+        [f"status {status.name.lower()}", table("springs, in their own axes", heads, rows, left=("spring",))],
+        files,
+        finding=status != Status.CONVERGED,
     )
 
 
@@ -47,9 +50,3 @@ def _picture(result: InternalWrenches, name: str) -> Iterator[tuple[str, Any]]:
     from stiffmap.ui.plot import stress_figure
 
     yield "stress.png", stress_figure(result, f"{name}: internal wrenches")
-
-
-def _table(result: InternalWrenches) -> Table:
-    heads = ("spring", "fx, N", "fy, N", "fz, N", "mx, N m", "my, N m", "mz, N m")
-    rows = ([name, *(f"{v:.4f}" for v in w)] for name, w in result.springs.items())
-    return table("springs, in their own axes", heads, rows, left=("spring",))

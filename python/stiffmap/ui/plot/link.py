@@ -12,7 +12,7 @@ from mpl_toolkits.mplot3d import Axes3D
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from stiffmap.model.link.pipeline import PartLink
-from stiffmap.model.link.report import unit_factor, unit_name
+from stiffmap.model.link.report import UNIT_FACTOR, unit_name
 from stiffmap.model.link.result import Link
 from stiffmap.model.link.transport import Floats, Ints, standard_errors
 from stiffmap.ui.plot.style import BLUE, COLOURS, VERMILLION, new_figure, save, wrench_text
@@ -89,13 +89,13 @@ def _draw_shape(axes: Axes3D, part: PartLink, triangles: Ints, case: int) -> Non
 
 def _draw_entries(axes: Axes, link: Link, error: Floats) -> None:
     """Entries over sqrt(kii kjj) with 95 % bars; the diagonal's values and units in the labels."""
-    C, factor = link.compliance, unit_factor("mm")
+    C, factor = link.compliance, UNIT_FACTOR
     size = np.sqrt(np.abs(np.outer(np.diag(C), np.diag(C))))
     at = tuple(np.hstack([np.diag_indices(6), np.triu_indices(6, 1)]))
     labels, y = [], np.arange(len(at[0]))[::-1]
     value, bar, zero = (C / size)[at], (1.96 * error / size)[at], np.asarray(link.insignificant, bool)[at]
     for i, j, is_zero in zip(*at, zero, strict=True):
-        number = f"{C[i, j] * factor[i, j]:.3e} ± {error[i, j] * factor[i, j]:.0e} {unit_name(i, j, 'mm')}"
+        number = f"{C[i, j] * factor[i, j]:.3e} ± {error[i, j] * factor[i, j]:.0e} {unit_name(i, j)}"
         labels.append(f"k{i + 1}{j + 1} = {number}" + ("  (zero within the test)" if is_zero else ""))
     for chosen, colour in ((~zero, BLUE), (zero, GREY)):
         axes.errorbar(value[chosen], y[chosen], xerr=bar[chosen], fmt="o", color=colour, capsize=3)

@@ -119,11 +119,6 @@ ANCHOR = tuple(
 )
 
 
-def points(description: MachineDescription) -> list[Place]:
-    """The TCP and the named points, by their full names."""
-    return [(name, ()) for name in spring_points(description)]
-
-
 def with_spring(description: MachineDescription, placed: Placed) -> MachineDescription:
     """One more external spring, from the point to the anchor."""
     v = placed.values
@@ -182,7 +177,7 @@ EXTERNAL_SPRING = EffectType(
         Parameter("length", "m", 0.0, 100.0, None, 0.1, "free length", default=0.0),
         *ANCHOR,
     ),
-    places=points,
+    places=lambda description: [(name, ()) for name in spring_points(description)],
     apply=with_spring,
     signature=signature,
     pivot="the anchor",

@@ -12,14 +12,12 @@ from matplotlib.figure import Figure
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import percent
 from stiffmap.experiment.experiment import WRENCH, Floats
-from stiffmap.identification.diagnosis.report.findings import Effect
 from stiffmap.identification.diagnosis.report.result import Diagnosis
-from stiffmap.solve.compiled import Role
 from stiffmap.solve.machine import Machine
 from stiffmap.ui.plot.experiment import arrow_figure, kept, pose_means, trending, trends, vector_cases
 from stiffmap.ui.plot.loaded import loaded_figure
 from stiffmap.ui.plot.scene import dots, draw_skeleton, finish, on, scene_axes
-from stiffmap.ui.plot.skeleton import COINCIDENT, nodes_of, owners, standing
+from stiffmap.ui.plot.skeleton import element_links, nodes_of, standing
 from stiffmap.ui.plot.style import AFTER, BEFORE, MM, UM, new_figure
 
 CAPTIONS = {
@@ -270,29 +268,15 @@ def place_figure(d: Diagnosis) -> Figure:
     few = len(legs) < len(machine.legs)
     colours = {leg: "0.2" if few and leg in legs else GREY for leg in ("", *machine.legs)}
     draw_skeleton(ax, shape, colours, joints=False)
+    frames, _ = machine.compiled.frames(shape.coordinates)
     for e in d.effects:
-        points, pieces = lit(machine, shape.coordinates, e)
-        for ends in pieces:
-            ax.plot(*on(ax, ends), color=LIT, lw=4)
-        dots(ax, points if len(points) else shape.tcp[None], 90, color=LIT)
+        found = list(nodes_of(machine.compiled, e.element, e.legs))  # none of instruments and loads
+        for k in element_links(machine, e.element, e.legs):
+            ax.plot(*on(ax, shape.links[k]), color=LIT, lw=4)
+        dots(ax, frames[found] if found else shape.tcp, 90, color=LIT)
     finish(ax)
     ax.set_axis_off()
     legs_of = (f" of leg {', '.join(e.legs)}" if e.legs else "" for e in d.effects)
     names = (e.element.replace("actuator", "drive") + of for e, of in zip(d.effects, legs_of, strict=True))
     figure.suptitle("; ".join(names)[:80] or machine.name, fontsize=10)
     return figure
-
-
-def lit(machine: Machine, coordinates: Floats, e: Effect) -> tuple[Floats, list[Floats]]:
-    """Points (n, 3) and pieces (2, 3) of the element that an effect names; nothing for instruments and loads."""
-    core = machine.compiled
-    position, _ = core.frames(coordinates)
-    owner, found = owners(core), list(nodes_of(core, e.element, e.legs))
-    pieces = [
-        position[[parent, i]]
-        for i in found
-        for parent, c in (core.nodes[i],)
-        if core.names.roles[c] == Role.SPRING and parent > 0 and owner[i]
-        if np.linalg.norm(position[i] - position[parent]) > COINCIDENT
-    ]
-    return np.unique(np.round(position[found], 9), axis=0), pieces
