@@ -329,6 +329,17 @@ def test_columns_that_cannot_be_read_are_named(text: str, words: str, tmp_path: 
         ("A [deg],B [deg],C [deg]", "90,90,0", [[0, -1, 0], [0, 0, 1], [-1, 0, 0]]),
         ("qx,qy,qz,qw", "0,0,0.70710678,0.70710678", [[0, -1, 0], [1, 0, 0], [0, 0, 1]]),
         ("q1,q2,q3,q4", "0.70710678,0.70710678,0,0", [[1, 0, 0], [0, 0, -1], [0, 1, 0]]),
+        (
+            ",".join(f"r{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3)),
+            "0,0,1,1,0,0,0,1,0",
+            [[0, 0, 1], [1, 0, 0], [0, 1, 0]],
+        ),
+        (
+            ",".join(f"R_{i}{j}" for j in (0, 1, 2) for i in (0, 1, 2)),
+            "0,1,0,0,0,1,1,0,0",
+            [[0, 0, 1], [1, 0, 0], [0, 1, 0]],
+        ),
+        ("nx,ny,nz,ox,oy,oz,ax,ay,az", "0,1,0,0,0,1,1,0,0", [[0, 0, 1], [1, 0, 0], [0, 1, 0]]),
     ],
 )
 def test_orientations_of_controllers_are_against_the_base(
@@ -339,6 +350,21 @@ def test_orientations_of_controllers_are_against_the_base(
     turned = table.rotation(np.diag([1.0, -1.0, -1.0]))
     assert turned is not None and table.position.tolist() == [[0.001, 0.002, 0.003]]
     np.testing.assert_allclose(turned[0], rows, atol=1e-7)
+
+
+SCOPE = (
+    "Name\tscope\nStart\t1329\tMontag\n\nName\tX\tY\tZ\nSymbolComment\t\t\t\nData-Type\tREAL64\tREAL64\tREAL64\n"
+    "SampleTime[ms]\t2\t2\t2\nSymbolName\tM.a\tM.b\tM.c\nOffset\t0\t0\t0\nBitMask\t0xff\t0xff\t0xff\n"
+    "Unit\tcm (Length)\tcm (Length)\tcm (Length)\nUnit Offset\t0\t0\t0\n\n0\t5,05\t0\t70\n2\t0\t-2,025\t70\n"
+)
+
+
+@pytest.mark.parametrize("text", [SCOPE, SCOPE.replace("\t", ";")])
+def test_lines_of_a_scope_between_names_and_numbers_say_the_units(text: str, tmp_path: Path) -> None:
+    (tmp_path / "p.csv").write_text(text)
+    found = read_pose_table(tmp_path / "p.csv")
+    np.testing.assert_allclose(found.position, POINTS, atol=1e-15)
+    assert found.values["t"].tolist() == [0.0, 0.002]
 
 
 def test_numbers_of_columns_in_brackets_are_no_readings() -> None:

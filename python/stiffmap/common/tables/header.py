@@ -157,7 +157,7 @@ def stated_unit(above: Sequence[str], quantity: str) -> str:
 
 UNIT_LABEL = re.compile(r"(?i)[\w -]*(unit|einheit|unité|unidad)[\w ]*")
 """Before the units of all columns, as in ``Y_Unit_Label``."""
-NO_UNIT = ("", "-", "–", "—", "#", "1")  # in the place of a unit
+NO_UNIT = ("", "-", "–", "—", "#", "1", "None")  # in the place of a unit
 
 
 def _plain(cell: str) -> str:
@@ -173,6 +173,7 @@ def fits(cells: Sequence[str], width: int) -> bool:
 
 def _bare(cell: str) -> str:
     text = (match["text"] if (match := STATED.fullmatch(cell)) else "") or cell.strip()
+    text = re.sub(r"(?<=\S)\s+\([^()]*\)$", "", text)  # mm (Length)
     inside = re.fullmatch(r"\[(.*)\]|\(((?:[^()]|\([^()]*\))*)\)", text)
     return (inside[1] or inside[2] or "").strip() if inside else text
 
@@ -201,6 +202,16 @@ def _with_own_unit(name: str, unit: str) -> str:
     bare = _bare(unit)
     none = bare in NO_UNIT or UNIT_LABEL.fullmatch(unit) or split_unit(name)[1]
     return name if none or not (name or _is_unit(bare)) else with_unit(name, bare)
+
+
+def with_labels(names: Sequence[str], lines: Sequence[Sequence[str]]) -> list[str]:
+    """Names of columns below which a scope says more of each channel, a label before every line: their units; the first one counts
+    the time in the unit of its label."""
+    units = next((c for c in lines if UNIT_LABEL.fullmatch(c[0].strip()) and _units(c)), [])
+    out = [_with_own_unit(n, u) for n, u in zip_longest(names, units, fillvalue="")]
+    times = (split_unit(c[0])[1] for c in lines)
+    clock = next((u for u in times if u in (*TIMES, *SHORT_TIMES)), "")
+    return [with_unit("t", clock), *out[1:]] if clock else out
 
 
 def _needs_group(names: Sequence[str], group: Sequence[str], first: Sequence[str]) -> bool:
@@ -297,7 +308,7 @@ def split_unit(header: str) -> tuple[str, str]:
 FORCE = "force|kraft|last|load|effort|charge|forza|carico|fuerza|carga"
 MOMENT = "moment|torque|drehmoment|momento|couple"
 DEFLECTION = (
-    "defl|deflection|displ?\\.?|displacement|déplacement|flèche|verschiebung|verlagerung|verformung|durchbiegung|"
+    "defl|deflection|displ?\\.?|displacement|d[ée]placement|fl[èe]che|verschiebung|verlagerung|verformung|durchbiegung|"
     "spostamento|freccia|desplazamiento|deflexión|flecha"
 )
 OF_SOME = re.compile(f"(?i){DEFLECTION}|{FORCE}|{MOMENT}")
@@ -307,8 +318,8 @@ IN_SI = re.compile(
     r".*/joint_states/.*/position"
 )
 """Fields of logs that are in SI by their format: messages of ROS, and UR's RTDE."""
-COMMANDED = "target|cmd|nom|nominal|command|commanded|ref|desired|r?soll?"
-MEASURED = "act|actual|meas|measured|achieved|attained|r?ist|gemessen|mess"
+COMMANDED = "target|cmd|nom|nominal|command|commanded|ref|desired|begin|r?soll?"
+MEASURED = "act|actual|meas|measured|achieved|attained|end|r?ist|gemessen|mess?|mesur[ée]e?"
 PATTERNS: tuple[tuple[str, str], ...] = (
     ("id", r"#|id|nr\.?|no\.?|lfd\.? ?nr\.?|number|nummer|row|zeile|punkt|messpunkt|point|messpunkt nr\.?|point no\.?|punto"),
     ("temperature", r"t|temp|temperature|temperatur"),
@@ -318,7 +329,7 @@ PATTERNS: tuple[tuple[str, str], ...] = (
     *((f"f{a}", rf"f ?_?{a}|({FORCE})[ _.]?(in |en |f[ _]?)?{a}|{a} ?({FORCE})") for a in "xyz"),
     *((f"m{a}", rf"m ?_?{a}|({MOMENT})[ _.]?(in |en |m[ _]?)?{a}") for a in "xyz"),
     *((f"u_d{a}", rf"(u|±|sigma|std|uncertainty) ?_?d?{a}") for a in "xyz"),
-    *((f"d{a}", rf"(d|delta|δ|{DEFLECTION}|abweichung|error|dev|deviation|écart|(dial )?gau?ge|dial|indicator|(mess)?uhr|reading|auslenkung|weg|dehnung)[ _.]?(in |en |[dδ][ _]?)?{a}|{a} ?_?(dif|diff|difference|dev|deviation|err|error|abweichung)|{a}[ _-]?({DEFLECTION}|dial|gau?ge|uhr|reading)") for a in "xyz"),
+    *((f"d{a}", rf"(d|delta|δ|{DEFLECTION}|abweichung|error|dev|deviation|[ée]cart|(dial )?gau?ge|dial|indicator|(mess)?uhr|dti|clock|comparateur|comparatore|comparador|reading|auslenkung|weg|dehnung)[ _.]?(in |en |[dδ][ _]?)?{a}|{a} ?_?(dif|diff|difference|dev|deviation|err|error|abweichung)|{a}[ _-]?({DEFLECTION}|dial|gau?ge|uhr|reading)") for a in "xyz"),
     *((f"p{a}", rf"p_?{a}") for a in "xyz"),
     *((f"approach_{a}", rf"(approach|travel|anfahrt|anfahrrichtung|fahrrichtung)[ _.-]?(in |dir(ection)?[ _.-]?)?{a}") for a in "xyz"),
     ("ll", r"l|ll|(measured |gemessene )?(length|länge|laenge)|(draw[ -]?)?wire( ?length)?|(cable|string|ball-?bar|bar) ?length|seil(zug)?(länge)?|distance|abstand"),

@@ -25,7 +25,7 @@ from stiffmap.common.number_text import read_value
 from stiffmap.common.short import first_of
 from stiffmap.common.tables.header import IN_SI, meaning_of, split_unit
 from stiffmap.common.tables.lines import Spelling, is_finite
-from stiffmap.common.tables.orientation import orientation_of
+from stiffmap.common.tables.orientation import VECTOR, matrices_of, orientation_of
 from stiffmap.common.tables.sheet import Layout, read_sheet
 from stiffmap.common.tables.table import Table
 from stiffmap.common.units import FREQUENCIES, QUANTITIES, SHORT_TIMES, feed_unit, unit_of
@@ -242,7 +242,7 @@ class PoseTable(NamedTable):
     orientation: Floats | None = None
     """(n, 3, 3) against the base, as a controller has it; None where the table has no such columns."""
     turns: str = ""
-    """Its columns and how they turn, in words."""
+    """Against what, which columns and how they turn, in words."""
 
     @property
     def position(self) -> Floats:
@@ -263,10 +263,7 @@ class PoseTable(NamedTable):
         """(n, 3, 3) commanded orientations: those of a controller, or turned from `home` about base axes; None: as at home."""
         if not {"rx", "ry", "rz"} & set(self.values):
             return self.orientation
-        from scipy.spatial.transform import Rotation
-
-        turns: Floats = Rotation.from_rotvec(self.block(("rx", "ry", "rz"))).as_matrix()
-        return turns @ home
+        return np.asarray(matrices_of(self.block(("rx", "ry", "rz")), VECTOR) @ home)
 
 
 def read_pose_table(place: Path, *, at_home: Floats | None = None, known: Known = KNOWN) -> PoseTable:
@@ -280,14 +277,16 @@ def read_pose_table(place: Path, *, at_home: Floats | None = None, known: Known 
         header = (re.sub("(?i)^actual(?=_tcp_pose)", "target", h) for h in sheet.header)
         sheet = replace(sheet, header=tuple(header))
     found = orientation_of(sheet)
-    from_home = found.is_vector and not IN_SI.fullmatch(sheet.names[found.columns[0]])  # rx, ry, rz
+    from_home = found.turns == VECTOR and not IN_SI.fullmatch(sheet.names[found.columns[0]])  # rx, ry, rz
     columns = () if from_home else found.columns
     table = PoseTable(**vars(named(sheet, known, columns)))
     if columns:
         if {"rx", "ry", "rz"} & set(table.values):
             table.fail("orientations are given twice", sheet.header[columns[0]])
-        table.turns = f"{', '.join(sheet.header[i] for i in columns)}: {found.words}"
+        table.turns = f"against the base: {first_of([sheet.header[i] for i in columns], 4)}: {found.words}"
         table.orientation = found.matrices(sheet)
+    elif turned := [table.header[n] for n in ("rx", "ry", "rz") if n in table.values]:
+        table.turns = f"from home: {', '.join(turned)}: a rotation vector"
     missing = [c for c in "xyz" if c not in table.values]
     if missing and (at_home is None or len(missing) == 3):
         table.fail(

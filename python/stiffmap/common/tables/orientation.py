@@ -1,8 +1,8 @@
-"""Orientations as controllers and instruments write them: three angles, a rotation vector or a quaternion."""
+"""Orientations as controllers, instruments and programs write them: three angles, a rotation vector, a quaternion or a matrix."""
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -22,8 +22,13 @@ TURNS = (
 )  # fmt: skip
 """Names of three angles, how they turn, and that in words."""
 WXYZ = tuple(rf"(.*[./ ])?(q|quat(ernion)?|rot(ation)?|orientation)[ _./]?{a}" for a in "wxyz")
+MATRICES = (
+    *([rf"(r|rot(ation)?|m)[ _.]?{i + k}[ _,]?{j + k}" for i in range(3) for j in range(3)] for k in (1, 0)),
+    [f"{column}{row}" for row in "xyz" for column in "noa"],
+)
+"""Names of the entries of a matrix, row by row: r11 … r33, from 0, or its columns n, o, a."""
 ROUNDED = 0.01
-"""By how much digits of a table may change the length of a quaternion."""
+"""By how much digits of a table may change the length of a quaternion, or an entry of a matrix."""
 
 
 class Orientation(NamedTuple):
@@ -32,50 +37,67 @@ class Orientation(NamedTuple):
     columns: list[int]
     """None where there is no orientation."""
     turns: str
-    """How the angles turn, as scipy writes it, or `VECTOR`; nothing of a quaternion, w first."""
+    """How the angles turn, as scipy writes it, or `VECTOR`; nothing of a quaternion, w first, or of a matrix, row by row."""
     words: str
 
-    @property
-    def is_vector(self) -> bool:
-        """Whether it is a rotation vector."""
-        return self.turns == VECTOR
-
     def matrices(self, sheet: Table) -> Floats:
-        """(n, 3, 3) of quaternions, of a vector or of angles, degrees where no unit is given nor known. FileError for an empty cell."""
-        from scipy.spatial.transform import Rotation
-
+        """(n, 3, 3) of quaternions, matrices, a vector or angles, degrees where no unit is given nor known. FileError for an empty cell."""
         values = np.stack([sheet.numbers(i) for i in self.columns], axis=1)
-        first = sheet.header[self.columns[0]]
-        sheet.check(~np.isnan(values).any(axis=1), lambda _: f"{first} …: found an empty cell")
+        first = self.columns[0]
+        sheet.check(~np.isnan(values).any(axis=1), lambda _: f"{sheet.header[first]} …: found an empty cell")
         if not self.turns:
-            return np.asarray(Rotation.from_quat(values[:, [1, 2, 3, 0]]).as_matrix())
-        usual = "rad" if IN_SI.fullmatch(sheet.names[self.columns[0]]) else "deg"
+            return matrices_of(values)
+        usual = "rad" if IN_SI.fullmatch(sheet.names[first]) else "deg"
         units = (unit_of(sheet.unit(i) or usual, "angle") for i in self.columns)
-        sizes = [u.size for u in units if u]
-        if self.is_vector:
-            return np.asarray(Rotation.from_rotvec(sizes * values).as_matrix())
-        return np.asarray(Rotation.from_euler(self.turns, sizes * values).as_matrix())
+        return matrices_of(values * [u.size for u in units if u], self.turns)
 
 
-NONE = Orientation([], "", "")
+def matrices_of(values: Floats, turns: str = "") -> Floats:
+    """(n, 3, 3) of quaternions, w first, or matrices, row by row, or of what `turns` says, rad; the unit matrix where one is not finite."""
+    from scipy.spatial.transform import Rotation
+
+    good = np.isfinite(values).all(axis=1)
+    out, v = np.tile(np.eye(3), (len(values), 1, 1)), values[good]
+    if turns:
+        turned = Rotation.from_rotvec(v) if turns == VECTOR else Rotation.from_euler(turns, v)
+    else:
+        four = v.shape[1] == 4
+        turned = Rotation.from_quat(v[:, [1, 2, 3, 0]]) if four else Rotation.from_matrix(v.reshape(-1, 3, 3))
+    out[good] = turned.as_matrix()
+    return out
+
+
+def off_unit(values: Floats) -> Floats:
+    """(n,) how far quaternions or matrices are from length one or from a rotation; 0 where a number is not finite."""
+    if values.shape[1] == 4:
+        return np.asarray(np.nan_to_num(np.abs(np.linalg.norm(values, axis=1) - 1.0)))
+    r = values.reshape(-1, 3, 3)
+    off = np.abs(r @ r.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2))
+    return np.asarray(np.nan_to_num(np.where(np.linalg.det(r) < 0.0, 2.0, off)))
 
 
 def orientation_of(sheet: Table, taken: Collection[int] = ()) -> Orientation:
     """An orientation whose columns are none of the `taken` ones."""
     forms = [Orientation(quaternion(sheet), "", "quaternions, w first")]
+    forms += [Orientation(_all_of(sheet, MATRICES), "", "rotation matrices, row by row")]
     forms += [Orientation(_angles(sheet, names), turns, words) for names, turns, words in TURNS]
-    return next((f for f in forms if f.columns and not {*taken} & {*f.columns}), NONE)
+    return next((f for f in forms if f.columns and not {*taken} & {*f.columns}), Orientation([], "", ""))
 
 
 def quaternion(sheet: Table) -> list[int]:
     """Columns w x y z of quaternions, by their names (Motive: Rotation W, ROS: pose.orientation.w) and length of one, or none."""
     # q1 is a joint next to Q0 to Q3
     numbered = ([f"(?-i:{q}{k + i})" for i in range(4)] for k in (1, 0) for q in "qQ")
-    for names in (WXYZ, *numbered, ("q0", *WXYZ[1:])):
+    return _all_of(sheet, (WXYZ, *numbered, ("q0", *WXYZ[1:])))
+
+
+def _all_of(sheet: Table, ways: Iterable[Sequence[str]]) -> list[int]:
+    """Columns that have all names of one of the `ways`, and numbers of quaternions or rotation matrices; or none."""
+    for names in ways:
         at = [i for i in map(sheet.find, names) if i is not None and sheet.is_numeric(i)]
-        if len(at) == 4:
-            size = np.linalg.norm([sheet.numbers(i) for i in at], axis=0)
-            if np.nanmax(np.abs(size - 1.0), initial=0.0) < ROUNDED and not np.isnan(size).all():
+        if len(at) == len(names):
+            values = np.stack([sheet.numbers(i) for i in at], axis=1)
+            if np.isfinite(values).all(axis=1).any() and off_unit(values).max() < ROUNDED:
                 return at
     return []
 

@@ -22,6 +22,7 @@ from stiffmap.common.tables.header import (
     record_of,
     refuse_twice,
     split_unit,
+    with_labels,
     with_unit,
 )
 from stiffmap.common.tables.lines import (
@@ -120,6 +121,13 @@ def read_sheet(path: Path, sheet: str | None = None, layout: Layout = PLAIN) -> 
         more = begin if layout.strict or (begin and first) else way if first else rule
         raise FileError(f"no header line with rows of numbers below it was found{more}", file=str(path))
     number_, header = found
+    aside = [f"row {n}, of numbers above the header" for n, _ in begun[:-1] if not layout.strict]
+    every = blocks(chain([first], kept(rows, None if layout.strict else aside)))
+    opening = next(every)
+    labels = _labels(opening, header, layout, spelling.comma)
+    if labels:
+        header, opening = with_labels(header, [cells for _, cells in labels]), opening[len(labels) :]
+        aside += [f"row {n}, '{cells[0].strip()}', is no reading" for n, cells in labels if not layout.strict]
     names = _checked(header, str(path), number_)
     if not layout.repeated:
         way = " (names with blanks in them?)" if separator == " " else ""
@@ -128,9 +136,10 @@ def read_sheet(path: Path, sheet: str | None = None, layout: Layout = PLAIN) -> 
         refuse_twice(names, str(path), number_, way)
     width = len(names)
     said = [*header, *(c.strip() for _, cells in above for c in cells)]
-    aside = [f"row {n}, of numbers above the header" for n, _ in begun[:-1] if not layout.strict]
-    every = blocks(chain([first], kept(rows, None if layout.strict else aside)))
-    clear = (_data(b, first, header, said, spelling, aside, layout, str(path)) for b in every)
+    means = MEAN.fullmatch(opening[0][1][-1].strip()) is not None
+    clear = (
+        _data(b, means, header, said, spelling, aside, layout, str(path)) for b in chain([opening], every)
+    )
     data = even(chain.from_iterable(clear), width, str(path), separator, None if layout.strict else aside)
     cells_of, lines_ = packed(data, width)
     columns = list(cells_of)
@@ -301,16 +310,16 @@ def _all_readings(rows: Sequence[Line]) -> bool:
     )
 
 
-def _labels(rows: Sequence[Line], header: Sequence[str], layout: Layout, comma: bool) -> set[int]:
+def _labels(rows: Sequence[Line], header: Sequence[str], layout: Layout, comma: bool) -> list[Line]:
     """First lines that begin with a word, where all others begin with a number: channels or sensors below the names of columns,
     of which some are known, but not the first."""
     knows = [layout.known(split_unit(h)[0]) for h in header]
     if knows[0] or not any(knows):
-        return set()
-    begins = [(n, "".join(cells[:1]).strip()) for n, cells in rows]
-    lines = {n for n, _ in takewhile(lambda b: not (re.search(r"\d", b[1]) or is_nothing(b[1])), begins)}
-    numbers = [is_finite(c, Spelling(comma)) for n, c in begins if n not in lines]
-    return lines if numbers and all(numbers) else set()
+        return []
+    begins = ["".join(cells[:1]).strip() for _, cells in rows]
+    words = [*takewhile(lambda c: not (re.search(r"\d", c) or is_nothing(c)), begins)]
+    numbers = [is_finite(c, Spelling(comma)) for c in begins[len(words) :]]
+    return [*rows[: len(words)]] if numbers and all(numbers) else []
 
 
 def _plain_numbers(cells: Sequence[str]) -> bool:
@@ -324,7 +333,7 @@ def _plain_numbers(cells: Sequence[str]) -> bool:
 
 def _data(
     rows: Sequence[Line],
-    begun: Line,
+    means: bool,
     header: Sequence[str],
     names: Sequence[str],
     spelling: Spelling,
@@ -334,17 +343,15 @@ def _data(
 ) -> Iterator[Line]:
     """Rows of readings: without rows of means, headers that are repeated and remarks, of which `aside` says so.
 
-    `names`: all that stands above the rows.
+    `names`: all that stands above the rows; `means`: whether the first one ends with a word for a mean.
     """
-    labels = _labels(rows, header, layout, spelling.comma) if rows[0] is begun else set[int]()
-    if not labels and _all_readings(rows):
+    if _all_readings(rows):
         yield from rows
         return
-    means = MEAN.fullmatch(begun[1][-1].strip())
     for n, cells in rows:
         first = next(c.strip() for c in cells if c.strip())
         last = cells[-1].strip()
-        if n in labels or (STATISTICS.fullmatch(first) and number(first, spelling) is None):
+        if STATISTICS.fullmatch(first) and number(first, spelling) is None:
             aside.append(f"row {n}, '{first}', is no reading")
         elif MEAN.fullmatch(last) and not means and len(cells) == len(header):
             aside.append(f"row {n}, '{last}', is no reading")

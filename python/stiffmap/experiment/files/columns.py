@@ -10,18 +10,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from stiffmap.common.errors import FileError
+from stiffmap.common.tables.orientation import VECTOR, matrices_of, off_unit
 from stiffmap.common.tables.table import Table
 from stiffmap.experiment.channels import Channel
-from stiffmap.experiment.experiment import BRANCHES, Floats, Integers, Mask
+from stiffmap.experiment.experiment import BRANCHES, Floats, Integers
 from stiffmap.experiment.files import fields
 from stiffmap.experiment.files.schema import ExperimentFile, NoiseModel, OrientationModel
 from stiffmap.experiment.files.table import Units
 from stiffmap.experiment.readings import kind_of
 
-UNIT_LENGTH, ORTHONORMAL = 1e-3, 1e-4
+UNIT = {fields.QUATERNION: (1e-3, "a quaternion of length 1"), fields.MATRIX: (1e-4, "a rotation matrix")}
 """How far a quaternion's length, or a matrix from a rotation, may be off: printed digits, no more."""
 
 
@@ -59,18 +59,13 @@ def seen_rotation(model: ExperimentFile, table: Table) -> Floats | None:
     names = next((g for g in (fields.SEEN_TURNED, fields.SEEN_QUATERNION) if table.one_of(g)), None)
     if names is None:
         return None
-    values = table.block(names, blank=True, missing=None)
-    good = np.asarray(np.isfinite(values).all(axis=1))[:, None]
-    if names is fields.SEEN_QUATERNION:
-        filled = np.where(good, values, [0.0, 0.0, 0.0, 1.0])
-        unit = np.abs(np.linalg.norm(filled, axis=1) - 1.0) <= 1e-2
+    turns = "" if names is fields.SEEN_QUATERNION else model.target_orientation
+    values = table.block(names if turns else [*names[3:], *names[:3]], blank=True, missing=None)
+    if not turns:
+        unit = off_unit(values) <= 1e-2
         table.check(unit, lambda _: "columns 'pqx' to 'pqw': expected a quaternion of length 1, x y z w")
-        turned = Rotation.from_quat(filled)
-    else:
-        filled = np.where(good, values, 0.0)
-        word = model.target_orientation
-        turned = Rotation.from_rotvec(filled) if word == "rotvec" else Rotation.from_euler(word, filled)
-    return np.where(good[:, :, None], turned.as_matrix(), np.nan)
+    good = np.asarray(np.isfinite(values).all(axis=1))[:, None, None]
+    return np.where(good, matrices_of(values, turns), np.nan)
 
 
 def rotations(table: Table, model: OrientationModel) -> tuple[Floats | None, Floats | None]:
@@ -94,46 +89,19 @@ def _orientation(table: Table, model: OrientationModel, second: bool) -> Floats 
     # a turn about one axis may leave out the others
     missing = 0.0 if form is fields.VECTOR else None
     cells = table.block([names[c] for c in form], blank=second, missing=missing)
-    empty: Mask = np.asarray(~np.isfinite(cells).all(axis=1))
-    if form in (fields.QUATERNION, fields.MATRIX):
-        out = (_quaternions if form is fields.QUATERNION else _matrices)(table, cells, empty)
-        out[empty] = np.eye(3)
-        return np.ascontiguousarray(out)
-    angles = np.nan_to_num(cells)
+    if form in UNIT:
+        most, what = UNIT[form]
+        off = off_unit(cells)
+        table.check(off <= most, lambda i: f"column '{names[form[0]]}': expected {what}; off by {off[i]:.2g}")
+        return matrices_of(cells)
     if form is fields.VECTOR:
-        turned = Rotation.from_rotvec(angles)
-    else:
-        if model.euler is None:
-            table.fail(
-                f"column '{names[form[0]]}': Euler angles need their convention: orientation: {{euler: XYZ}} for turns "
-                "about x, the turned y, the twice turned z; {euler: xyz} for turns about fixed axes"
-            )
-        angles[empty] = 0.0
-        turned = Rotation.from_euler(model.euler, angles)
-    return np.ascontiguousarray(turned.as_matrix())
-
-
-def _quaternions(table: Table, cells: Floats, empty: Mask) -> Floats:
-    length = np.linalg.norm(cells, axis=1)
-    table.check(
-        empty | (np.abs(length - 1.0) < UNIT_LENGTH),
-        lambda i: f"column 'qw': expected a quaternion of length 1, found {length[i]:.6g}",
-    )
-    cells = np.where(empty[:, None], [1.0, 0.0, 0.0, 0.0], cells)
-    return np.asarray(Rotation.from_quat(cells[:, [1, 2, 3, 0]]).as_matrix())
-
-
-def _matrices(table: Table, cells: Floats, empty: Mask) -> Floats:
-    r = np.where(empty[:, None], np.eye(3).reshape(-1), cells).reshape(-1, 3, 3)
-    off = np.abs(r @ r.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2))
-    table.check(
-        (off <= ORTHONORMAL) & (np.linalg.det(r) >= 0.0),
-        lambda i: (
-            f"column 'r11': expected a rotation matrix, found one that is off by {off[i]:.2g} "
-            f"(determinant {np.linalg.det(r[i]):.3g})"
-        ),
-    )
-    return np.asarray(Rotation.from_matrix(r).as_matrix())
+        return matrices_of(np.nan_to_num(cells), VECTOR)
+    if model.euler is None:
+        table.fail(
+            f"column '{names[form[0]]}': Euler angles need their convention: orientation: {{euler: XYZ}} for turns "
+            "about x, the turned y, the twice turned z; {euler: xyz} for turns about fixed axes"
+        )
+    return matrices_of(cells, model.euler)
 
 
 def gravities(model: ExperimentFile, table: Table) -> tuple[tuple[float, float, float] | None, Floats | None]:

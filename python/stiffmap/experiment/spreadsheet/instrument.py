@@ -15,6 +15,7 @@ from stiffmap.common.yaml_text import read
 from stiffmap.experiment.files.fields import READ, SEEN, quantity_of
 from stiffmap.experiment.poses.handeye import own_frame
 from stiffmap.experiment.spreadsheet.answers import Meant
+from stiffmap.experiment.spreadsheet.guess import guess
 
 FOLDER = Path(__file__).parent / "instruments"
 KEYS = {"title", "quantity", "columns", "measured", "circle", "units"}
@@ -92,13 +93,11 @@ def as_readings(m: Meant, instrument: Instrument) -> set[str]:
             index = bare if m.sheet.find(other, (bare,)) is not None else None
         if index is not None:
             chosen[meaning] = [m.sheet.header[index]]
-            if meaning in instrument.units and not m.sheet.unit(index):
-                units[meaning] = instrument.units[meaning]
-    said = m.guessed
+    said = guess(m.sheet.header, chosen | m.chosen)
     seen = any(c.meaning in SEEN for c in said)
     for c in said:
         unit = instrument.units.get(READ.get(c.meaning, c.meaning))
-        if unit and not c.unit and (seen or c.meaning in m.chosen):
+        if unit and not c.unit:
             units[c.meaning] = unit
     at: dict[str, tuple[int, int]] = {}
     for reading, pattern in ({} if seen else instrument.measured).items():

@@ -6,6 +6,7 @@ from __future__ import annotations
 import re
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.short import first_of
@@ -31,9 +32,9 @@ DIRECTION = re.compile(
 )
 WAY = re.compile(r"([+-]?)\s*([xyz])|([xyz])\s*([+-])", re.IGNORECASE)
 STATES = {
-    "before": re.compile(r"\b((unloaded|after unloading)( again)?|no[ -]load|without load|before( loading)?|unbelastet|ohne last|vorher|leer|entlastet|initial|zero|pre|vor)\b", re.I),
-    "loaded": re.compile(r"\b(loaded|with load|under load|belastet|mit last|unter last)\b", re.I),
-    "after": re.compile(r"\b(after( loading)?|nachher|final|post|nach)\b", re.I),
+    "before": re.compile(r"\b((unloaded|after unloading)( again)?|no[ -]load|without load|before( loading)?|unbelastet|ohne last|vorher|leer|entlastet|initial|zero|pre|vor|avant|sans (charge|effort)|prima|antes)\b", re.I),
+    "loaded": re.compile(r"\b(loaded|with load|under load|belastet|mit last|unter last|(en|sous) charge)\b", re.I),
+    "after": re.compile(r"\b(after( loading)?|nachher|final|post|nach|apr[eè]s|dopo|despu[eé]s)\b", re.I),
 }  # fmt: skip
 """A gauge that was read ``before``, ``loaded`` and ``after`` was read without the load after it, too."""
 TARGET = re.compile(
@@ -210,7 +211,7 @@ def _hung(m: Meant) -> None:
 def _turns(m: Meant, taken: set[int]) -> None:
     """An orientation that stands with X Y Z."""
     meanings = {c.meaning: c.index for c in m.guessed}
-    columns, turns, words = orientation_of(m.sheet, taken)
+    columns, turns, words = found = orientation_of(m.sheet, taken)
     behind = min(columns, default=0) == meanings.get("z", -1) + 1
     seen = set(SEEN) <= set(meanings) and not (behind and set(POSE) <= set(meanings))
     position = SEEN if seen else POSE
@@ -230,11 +231,17 @@ def _turns(m: Meant, taken: set[int]) -> None:
         if said or not others or columns[0] != meanings[position[2]] + 1:
             return
     headers = [m.sheet.header[i] for i in columns]
-    shown = ", ".join(map(repr, headers))
+    shown = first_of([*map(repr, headers)], 4)
     if seen and not set(AXES[3:]) <= set(m.noise):
         m.chosen["note"] = [*m.chosen.get("note", ()), *headers]
         m.said.append(f"{shown} are not used; as the orientation seen they need --noise rx=… ry=… rz=…")
         return
+    if len(columns) > len(QUATERNION):
+        turned = Rotation.from_matrix(found.matrices(m.sheet)).as_quat()[:, [3, 0, 1, 2]]
+        headers = [f"{c} of {headers[0]} …" for c in QUATERNION]
+        for name, values in zip(headers, turned.T, strict=True):
+            m.sheet = m.sheet.with_column(name, values)
+        columns = [m.sheet.header.index(name) for name in headers]
     for i, header, meaning in zip(columns, headers, of_seen if seen else of_pose, strict=True):
         m.chosen[meaning] = [header]
         taken.add(i)

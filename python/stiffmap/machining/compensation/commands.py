@@ -75,7 +75,7 @@ class Commands:
     ids: tuple[str, ...] = ()
     """Of the rows, as a file of poses names them; else 1, 2 …"""
     turns: str = ""
-    """Columns of a file that are orientations against the base, and how they turn, in words."""
+    """Columns of a file that are orientations, against what and how they turn, in words."""
 
     @property
     def ok(self) -> NDArray[np.bool_]:

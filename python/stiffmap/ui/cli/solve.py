@@ -150,7 +150,7 @@ def _rows(table: PoseTable, s: Solution, words: list[str]) -> Iterator[str | Tab
         out.add_row(*where, *(["-"] * 4 if not np.isfinite(sizes[i]) else moved), word)
     yield out
     if table.turns:
-        yield f"orientation against the base: {table.turns}"
+        yield f"orientation {table.turns}"
     if len(table) > SHOWN:
         yield f"{len(table) - SHOWN} more rows (-o answers.csv writes all)"
     if np.isfinite(sizes).any():

@@ -243,6 +243,7 @@ TURNS = {
     "qw,qx,qy,qz": TURN.as_quat()[[3, 0, 1, 2]],
     "qx,qy,qz,qw": TURN.as_quat(),
     "Q1,Q2,Q3,Q4": TURN.as_quat()[[3, 0, 1, 2]],
+    ",".join(f"r{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3)): TURN.as_matrix().ravel(),
 }
 
 

@@ -69,6 +69,25 @@ def test_quaternions_are_no_rotations(names: str, fixed: bool, tmp_path: Path) -
     assert {"qw", "qx", "qy", "qz"} <= {*head}
 
 
+@pytest.mark.parametrize(
+    "names",
+    [
+        "Begin {0};End {0};Écart {0}",
+        "{0} nom;{0} mes;Ecart {0}",
+        "{0} nominal;{0} mesuré;Comparateur {0}",
+        "{0};Comparateur {0} avant;Comparateur {0} après",
+        "{0};Clock {0} prima;Clock {0} dopo",
+    ],
+)
+def test_words_of_other_programs_and_languages(names: str, tmp_path: Path) -> None:
+    heads = [h for a in "XYZ" for h in names.format(a).split(";")]
+    cells = "0;-41;-41" if "nom" in names or "Begin" in names else "0;2;-39"
+    text = f"{';'.join(f'{h} [µm]' for h in heads)}\n" + f"{';'.join([cells] * 3)}\n" * 2
+    e = made(tmp_path, text, constants=LOAD).experiment
+    np.testing.assert_allclose(e.reading[0, :3], -41e-6)
+    np.testing.assert_allclose(e.position, 0.0)
+
+
 @pytest.mark.parametrize("names", ["q_{}", "joint{}", "target_q_{}", "actual_q_{}"])
 @pytest.mark.parametrize("first", [0, 1])
 def test_joints_are_counted_from_where_they_begin(names: str, first: int, tmp_path: Path) -> None:
