@@ -144,9 +144,7 @@ def _commands(found: compensation.Commands, output: Path | None) -> dict[str, ob
     if output is not None:
         found.write(output)
     lost = [found.ids[i] for i in np.flatnonzero(~found.ok)]
-    told: dict[str, object] = (
-        {f"orientation {a}": t for a, t in [found.turns.split(": ", 1)] if t} if found.turns else {}
-    )
+    told: dict[str, object] = {"orientation": found.turns} if found.turns else {}
     if found.beyond is not None:
         far = [found.ids[i] for i in np.flatnonzero(found.beyond)]
         told[BEYOND] = first_of(far) or "none"
