@@ -56,7 +56,8 @@ class Written:
     held_out: HeldOut | None
     """None where there are not two groups of readings, or time is over."""
     promise: tuple[float, float] | None
-    """By how much a reading of another pose will differ, m or rad, and its standard uncertainty; None of the declared machine."""
+    """By how much a reading of another pose will differ, m or rad, and its standard uncertainty; None of a declared machine whose
+    poses were not held out."""
     listed: Mask
     """(n,) rows that stand alone: no measure of a prediction."""
     difference: Floats
@@ -100,8 +101,8 @@ def written(
     if best := models.get(which):
         machine, there, prediction = machine_of(best), best.experiment, best.prediction
         promise = promised(best)
-        if held is not None and held.by == "poses":
-            promise = borne_out(promise, held.after.size[0], len(np.unique(e.groups)))
+    if held is not None and held.by == "poses":
+        promise = borne_out(promise, held.after.size[0], len(np.unique(e.groups)))
     problems = [LinearProblem.of(of, sigma, p, ~listed) for of, p in ((e, declared), (there, prediction))]
     difference = e.reading - declared, there.reading - prediction
     before, after = (r - nuisance_part(p, r) for p, r in zip(problems, difference, strict=True))
@@ -184,11 +185,12 @@ def _best(left: dict[str, Floats], wanted: str, sigma: Floats, pose: Integers) -
     return best if worse.mean() > worse.std() / np.sqrt(len(worse)) else wanted
 
 
-def borne_out(promise: tuple[float, float], left: float, poses: int) -> tuple[float, float]:
+def borne_out(promise: tuple[float, float] | None, left: float, poses: int) -> tuple[float, float]:
     """A promise and its standard uncertainty after so many poses were predicted by the others, with what that left (rms): the model's
-    word counts as much as `WORD` poses do."""
-    size = float(np.sqrt((WORD * promise[0] ** 2 + poses * left**2) / (WORD + poses)))
-    return size, size / float(np.sqrt(2.0 * (WORD + poses)))
+    word counts as much as `WORD` poses do, if it has one."""
+    word, said = (WORD, promise[0]) if promise else (0, 0.0)
+    size = float(np.sqrt((word * said**2 + poses * left**2) / (word + poses)))
+    return size, size / float(np.sqrt(2.0 * (word + poses)))
 
 
 def promised(found: Corrected) -> tuple[float, float]:
@@ -244,10 +246,10 @@ def lack_of_fit(left: Floats, heavy: bool, fitted: int, known_by: int) -> float:
 def vouched(predictor: Predictor, made: Written, said: str) -> Machine:
     """The machine that is handed over; its file says what it has from which experiment (`said`), what the readings that do not stand
     alone covered, and by how much its prediction of others is off."""
-    if made.which == DECLARED:
+    if made.which == DECLARED and made.promise is None:
         return predictor.machine
     e, d = predictor.experiment, made.machine.description
-    source = f"{d.source} {said}".strip()
+    source = d.source if made.which == DECLARED else f"{d.source} {said}".strip()
     declared = None if d.declared is None else replace(d.declared, source=source)
     valid = covered(predictor.machine, e, ~made.listed)
     error, u = made.promise or (np.nan, np.nan)

@@ -23,6 +23,7 @@ from stiffmap.identification.inference.shares import WideGroup, tolerance_word
 from stiffmap.identification.numbers import Tolerances, Unknown, unknowns
 from stiffmap.identification.numbers.sensitivity import bends, predicted, sensitivity, sensitivity_at
 from stiffmap.model.with_errors import edited
+from stiffmap.solve.validity import Validity
 from stiffmap.ui.cli.app import main
 
 MACHINES = ("linear-delta", "ur10", "orthoglide-revised")
@@ -62,8 +63,11 @@ def test_a_perfect_machine_is_as_declared(name: str) -> None:
     machine, data, _ = drawn(name, 5, size=0.0)
     c = calibrate(machine, data)
     assert c.verdict == "as declared" and c.which == "declared"
-    assert c.machine.description == machine.description
+    assert replace(c.machine.description, extra=()) == machine.description
     assert c.held_out is not None and c.held_out.after == c.held_out.before
+    valid = Validity.of_machine(c.machine)
+    assert valid is not None and valid.poses == len(np.unique(data.groups))
+    assert valid.error == pytest.approx(c.held_out.after.size[0])
 
 
 def test_one_beyond_tolerance_is_named() -> None:

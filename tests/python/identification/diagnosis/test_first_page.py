@@ -6,16 +6,17 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
+from matplotlib.colors import same_color
 from matplotlib.quiver import Quiver
+from numpy.typing import NDArray
 
 import stiffmap as sm
 from stiffmap.experiment import random_plan, simulate
 from stiffmap.identification.diagnosis import Diagnosis
 from stiffmap.model.description import AppliedEffect
-from stiffmap.solve.kinematics import inverse_kinematics
 from stiffmap.ui.plot.experiment import drivers_of, trending
 from stiffmap.ui.report.diagnosis.page import html
-from stiffmap.ui.report.diagnosis.pictures import figures, lit, vectors
+from stiffmap.ui.report.diagnosis.pictures import LIT, figures, place_figure, vectors
 
 RECORD = (
     ("operator", "M. Weber"),
@@ -45,25 +46,27 @@ def planar() -> Diagnosis:
     return diagnosed("five-bar", "compliance", "motor", "left", "scale", "2.15")
 
 
+def lit(d: Diagnosis) -> NDArray[np.float64]:
+    """(n, 2) mm: the dots in the colour of a place that is named."""
+    (ax,) = place_figure(d).axes
+    found = [c for c in ax.collections if same_color(c.get_facecolor()[0], LIT)]
+    return np.vstack([np.asarray(c.get_offsets()) for c in found])
+
+
 def test_the_named_motor_is_lit() -> None:
     d = planar()
     (effect,) = d.effects
-    machine = d.declared
-    k = inverse_kinematics(machine, machine.description.home.p)
-    points, pieces = lit(machine, k.coordinates, effect)
-    np.testing.assert_allclose(points, [[-0.15, 0.0, 0.0]], atol=1e-9)
-    assert pieces == []
-    both = np.vstack(
-        [lit(machine, k.coordinates, replace(effect, legs=(leg,)))[0] for leg in ("left", "right")]
-    )
-    np.testing.assert_allclose(both[:, 0], [-0.15, 0.15], atol=1e-9)
+    np.testing.assert_allclose(lit(d), [[-150.0, 0.0]], atol=1e-6)
+    right = replace(effect, legs=("right",))
+    np.testing.assert_allclose(lit(replace(d, effects=[right])), [[150.0, 0.0]], atol=1e-6)
 
 
 def test_an_instrument_is_no_part_of_the_machine() -> None:
+    """Its place is the tool."""
     d = planar()
-    k = inverse_kinematics(d.declared, d.declared.description.home.p)
-    points, pieces = lit(d.declared, k.coordinates, replace(d.effects[0], element="instrument", legs=()))
-    assert len(points) == 0 and pieces == []
+    instrument = replace(d.effects[0], element="instrument", legs=())
+    tool = 1e3 * d.declared.description.home.p[:2]
+    np.testing.assert_allclose(lit(replace(d, effects=[instrument])), [tool], atol=1e-6)
 
 
 def test_arrows_of_planar_readings_stay_in_their_plane_and_on_the_canvas() -> None:

@@ -206,6 +206,7 @@ def test_a_promise_goes_from_the_model_to_what_the_poses_show() -> None:
     assert few[0] == 1.0 and many[0] == pytest.approx(2.0, rel=1e-3)
     size, u = machines.borne_out((1.0, 0.2), 2.0, machines.WORD)
     assert size == pytest.approx(np.sqrt(2.5)) and u == pytest.approx(size / np.sqrt(40.0))
+    assert machines.borne_out(None, 2.0, 8) == (2.0, 0.5)
 
 
 def test_a_turn_that_changes_nothing_is_not_determined() -> None:

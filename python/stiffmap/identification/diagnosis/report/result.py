@@ -200,7 +200,7 @@ def _more(d: Diagnosis) -> list[str]:
 def _promise(d: Diagnosis) -> str:
     """What a reading at a pose that was not read will differ by from the machine that is handed over."""
     v = Validity.of_machine(d.machine)
-    if d.which == "declared" or v is None or v.error is None:
+    if v is None or v.error is None:
         return ""
     return f"; machine.yaml ({d.which}) promises {with_uncertainty(1e3 * v.error, 1e3 * v.error_u)} m{v.unit}"
 
