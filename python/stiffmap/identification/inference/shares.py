@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from stiffmap.common.number_text import percents
 from stiffmap.experiment.experiment import Floats
-from stiffmap.identification.inference.amplitudes import OFF, Fit, evaluated, fitted, noise_part
+from stiffmap.identification.inference.amplitudes import OFF, Fit, fitted, noise_part
 from stiffmap.identification.inference.columns import Columns
 from stiffmap.identification.inference.constants import ODDS, STANDS_OUT
 from stiffmap.identification.inference.parts import GAPS, NOISE, Part
@@ -87,9 +87,10 @@ def too_wide(fit: Fit, named: Sequence[Unknown] = ()) -> tuple[WideGroup, ...]:
         t = float(fit.t[1 + k])
         if p.kind != "number" or t <= max(0.0, OFF) or (p.name == SAG and named_sag):
             continue
-        other = fit.t.copy()
-        other[1 + k] = 0.0
-        if fit.score - evaluated(fit.columns, fit.parts, other, fit.weights).score > np.log(ODDS):
+        assert p.factor is not None
+        as_stated = replace(c, zero=c.zero + p.factor @ p.factor.T)
+        others = [q for q in fit.parts if q is not p]
+        if fit.score - fitted(as_stated, others, fit.amplitudes, fit.weights).score > np.log(ODDS):
             out.append(WideGroup(p.name, float(np.exp(0.5 * t))))
     return tuple(out)
 
