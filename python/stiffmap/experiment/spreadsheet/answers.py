@@ -22,6 +22,11 @@ SI = {q: unit for unit, q in QUANTITIES.items()}
 USUAL = {"length": "mm", "force": "N", "moment": "N*m", "angle": "deg", "temperature": "degC"}
 
 
+def _are_radians(angles: Floats) -> bool:
+    """Whether angles are no more than a turn in radians, and not whole numbers."""
+    return not (np.abs(angles) > 2.0 * np.pi).any() and bool((angles % 1.0 > 0.0).any())
+
+
 class Question(StiffmapError):
     """What cannot be guessed. `kind`: ``column`` or ``unit``; `meaning`: of which column of an experiment."""
 
@@ -135,6 +140,8 @@ class Meant(Answers):
             return found
         name, last = self.sheet.names[column], names[-1]
         usual = "um" if last in READINGS and quantity == "length" else USUAL[quantity]
+        if quantity == "angle" and _are_radians(self.sheet.numbers(column)):
+            usual = "rad"
         way = f"write it in the header, as in '{name} [{usual}]', or say --unit {last}={usual}"
         if not text:
             why = f" has no unit: {way} (--unit {quantity}={usual}: of every {quantity} without one)"

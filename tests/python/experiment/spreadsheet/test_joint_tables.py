@@ -271,6 +271,7 @@ def test_measured_positions_are_places_and_named_once(
         ("q1 [deg],q2 [deg],q3 [deg],q4 [deg],q5 [deg],dx [mm]", [], "which column commands arm.wrist_3? Say --map"),
         ("q1 [deg],q2 [deg],q3 [deg],q4 [deg],q5 [deg],q6 [deg],m,n,o", [], "Say --map px='HEADER' (py, pz) for measured positions"),
         ("q1,q2,q3,q4,q5,q6,dx [mm]", [], "(arm.base) has no unit: write it in the header, as in 'q1 [deg]', or say --unit joints=deg"),
+        ("q1,q2,q3,q4,q5,q6,dx [mm]", [], "as in 'q1 [rad]', or say --unit joints=rad (--unit angle=rad"),
         ("q1,q2,q3,q4,q5,q6,dx [mm]", ["--unit", "joints=mm"], "(arm.base): the unit 'mm' is not one of this quantity; those of angle are"),
         ("q1 [deg],q2 [deg],q3 [deg],q4 [deg],q5 [deg],q6 [deg],x,y,z", [], "if an instrument read them, say --map px='x'"),
         ("q1 [deg],q2 [deg],q3 [deg],q4 [deg],q5 [deg],q6 [deg],dx [mm]", ["--map", "arm.wrist=q6"], "no drive 'arm.wrist'"),
@@ -280,7 +281,8 @@ def test_measured_positions_are_places_and_named_once(
 def test_what_is_not_clear_is_asked(
     head: str, more: list[str], asked: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    file = write(tmp_path, "t.csv", head + "\n" + ",".join(["1"] * (head.count(",") + 1)) + "\n")
+    turn = "-1.57" if "rad" in asked else "1"
+    file = write(tmp_path, "t.csv", head + "\n" + ",".join([turn] * (head.count(",") + 1)) + "\n")
     assert main(["experiment", "new", file, "--machine", "ur10", "-o", str(tmp_path / "e"), *more]) == 2
     assert asked in " ".join(capsys.readouterr().err.split())
 
