@@ -26,6 +26,8 @@ class Part:
     """``number``, ``field``, ``pose``, ``time``, ``travel``, ``effect``."""
     factor: Floats | None = None
     full: Floats | None = None
+    most: float = np.inf
+    """Largest ln variance."""
 
     def times(self, values: Floats) -> Floats:
         """(m,) product with values (m,)."""
@@ -33,12 +35,6 @@ class Part:
             return np.asarray(self.factor @ (self.factor.T @ values))
         assert self.full is not None
         return np.asarray(self.full @ values)
-
-    @property
-    def most(self) -> float:
-        """Largest ln variance: what carries over in time is noise, if not of what is stated; else it takes whatever is smooth in a
-        series that was read in order, and effects are judged by what they change from one reading to the next."""
-        return WIDEST if self.kind == "time" else np.inf
 
     @property
     def sd(self) -> float:
@@ -66,7 +62,10 @@ class Parts:
         shared = c.numbers[:, ~np.array(apart, dtype=bool)]
         alone = [p for p, i in zip(self.numbers, c.groups.values(), strict=True) if apart[i[0]]]
         self.together = (Part(ALL_NUMBERS, "number", shared), *alone) if c.unknowns else ()
-        self.gaps = tuple(Part(name, kind, full=k) for kind, name, k in c.gaps)
+        # what carries over in time is noise, if not of what is stated; else it takes whatever is smooth in a series that was read in
+        # order, and effects are judged by what they change from one reading to the next
+        most = {"time": WIDEST}
+        self.gaps = tuple(Part(name, kind, None, k, most.get(kind, np.inf)) for kind, name, k in c.gaps)
         self.travel = tuple(Part(name, "travel", f) for name, f, _ in c.travel)
 
 

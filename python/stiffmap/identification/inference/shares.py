@@ -9,7 +9,7 @@ import numpy as np
 
 from stiffmap.common.number_text import percents
 from stiffmap.experiment.experiment import Floats
-from stiffmap.identification.inference.amplitudes import OFF, Fit, fitted, noise_part
+from stiffmap.identification.inference.amplitudes import Fit, fitted, noise_part
 from stiffmap.identification.inference.columns import Columns
 from stiffmap.identification.inference.constants import ODDS, STANDS_OUT
 from stiffmap.identification.inference.parts import GAPS, NOISE, Part
@@ -85,11 +85,13 @@ def too_wide(fit: Fit, named: Sequence[Unknown] = ()) -> tuple[WideGroup, ...]:
     named_sag = any(u.group == SAG for u in named)  # no tolerance of a maker's
     for k, p in enumerate(fit.parts):
         t = float(fit.t[1 + k])
-        if p.kind != "number" or t <= max(0.0, OFF) or (p.name == SAG and named_sag):
+        if p.kind != "number" or t <= 0.0 or (p.name == SAG and named_sag):
             continue
         assert p.factor is not None
         as_stated = replace(c, zero=c.zero + p.factor @ p.factor.T)
-        others = [q for q in fit.parts if q is not p]
+        most = {q: max(0.0, float(x)) for q, x in zip(fit.parts, fit.t[1:], strict=True)}
+        # noise, and all that nobody can name, may be instead, but no other numbers that are farther off
+        others = [replace(q, most=most[q]) if q.kind == "number" else q for q in fit.parts if q is not p]
         if fit.score - fitted(as_stated, others, fit.amplitudes, fit.weights).score > np.log(ODDS):
             out.append(WideGroup(p.name, float(np.exp(0.5 * t))))
     return tuple(out)

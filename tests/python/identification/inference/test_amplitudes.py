@@ -209,7 +209,7 @@ def test_shares_are_those_of_the_readings_that_do_not_stand_alone():
 def test_what_carries_over_in_time_is_bounded_and_all_else_is_best_next_to_it():
     rng = np.random.default_rng(2)
     c, (numbers, gap, effect) = columns(rng), parts(rng)
-    some = (numbers, replace(gap, name="wander", kind="time"), effect)
+    some = (numbers, replace(gap, name="wander", kind="time", most=WIDEST), effect)
     truth = np.array([0.0, -30.0, 9.0, 5.0])
     drawn = np.linalg.cholesky(dense(c, some, truth, np.ones(READINGS))) @ rng.normal(size=len(c))
     c = columns(np.random.default_rng(2), drawn)
