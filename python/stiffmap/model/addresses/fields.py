@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,6 +22,7 @@ POWERS = {1: "", 2: "²", 3: "³"}
 UNBOUNDED = DeclaredNumber("")
 
 
+@cache
 def unit_text(d: Dimension, time: int = 0) -> str:
     """``N·m/rad``; dimensionless: empty."""
     if d in SHORT:

@@ -73,7 +73,9 @@ def joint_of(named: Mapping[str, Joint], coordinate: str) -> Joint | None:
 
 def find(description: MachineDescription, full: str) -> list[Element]:
     """The elements of a full name: a body and a point may share theirs with another sort of element."""
-    return [element for name, element in all_elements(description) if name == full]
+    chain = full.partition(".")[0]
+    elements = dict(chains(description)).get(chain, ())
+    return [element for name, element in walk(elements, chain) if name == full]
 
 
 def offset_before(elements: Sequence[Element], k: int) -> int | None:

@@ -84,7 +84,9 @@ def _written(path: Path, content: Any) -> Path:
         return path
     from stiffmap.ui.plot import save
 
-    return save(content, path)
+    save(content, path)
+    content.set_layout_engine("none")  # as it is there now: a page draws it again
+    return path
 
 
 def table(

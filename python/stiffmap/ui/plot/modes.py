@@ -36,13 +36,12 @@ def mode_figure(machine: Machine, position: ArrayLike, *, modes: int = 3, **opti
 def mode_frames(
     machine: Machine, position: ArrayLike, *, modes: int = 3, count: int = FRAMES, **options: object
 ) -> Iterator[Figure]:
-    """Frames of an animation, one whole swing and back: the same figure each time, to be drawn before the next.
+    """Frames of a swing from one end to the other: the same figure each time, to be drawn before the next.
 
-    As `mode_figure`; `count` frames from one end of the swing to the other.
+    As `mode_figure`; `count` frames.
     """
     scene = _Scene(machine, position, modes, options)
-    there = np.linspace(-np.pi / 2, np.pi / 2, count)
-    for phase in (*there, *there[-2:0:-1]):
+    for phase in np.linspace(-np.pi / 2, np.pi / 2, count):
         scene.swing(phase)
         yield scene.figure
         scene.figure.set_layout_engine("none")  # as the first frame has it

@@ -62,12 +62,13 @@ def inline(picture: Figure | bytes) -> str:
 
 
 def animation(frames: Iterable[Figure], dpi: int = 80) -> bytes:
-    """GIF that repeats; each frame is drawn before the next one is asked for."""
+    """GIF that goes through its frames, back, and on; each frame is drawn before the next one is asked for."""
     images = [
         Image.open(BytesIO(_png(figure, dpi))).convert("P", palette=Image.Palette.ADAPTIVE)
         for figure in frames
     ]
     buffer = BytesIO()
+    images += images[-2:0:-1]
     images[0].save(
         buffer, format="GIF", save_all=True, append_images=images[1:], duration=PAUSE, loop=0, optimize=True
     )

@@ -27,7 +27,7 @@ GLIDE = "orthoglide-revised"
 
 
 def lobes(scheduler: Any) -> dict[str, Any]:
-    speed, depth = np.linspace(200, 900, 40), np.linspace(1e-4, 4e-3, 6)
+    speed, depth = np.linspace(200, 900, 12), np.linspace(1e-4, 4e-3, 4)
     ds = sm.stability_lobes(GLIDE, "slot", speeds=speed, depths=depth, scheduler=scheduler)
     return {"multiplier": ds.multiplier.values, "limit": ds.limit.values}
 

@@ -11,7 +11,7 @@ import stiffmap as sm
 from stiffmap.machining.milling import mill_job, sizes
 from stiffmap.ui.cli import main
 
-JOB = ["washbasin", "--process", "trimming", "--at", "50,50,0", "--step", "5"]
+JOB = ["washbasin", "--process", "trimming", "--at", "50,50,0", "--step"]
 
 
 def test_program_of_the_corrected_machine_on_the_true_one() -> None:
@@ -82,7 +82,7 @@ def test_from_readings_to_the_part_with_play(tmp_path: Path, capsys: pytest.Capt
     capsys.readouterr()
     said = {}
     for name, machine in (("declared", "orthoglide-revised"), ("diagnosed", str(result / "machine.yaml"))):
-        main(["mill", machine, *JOB, "--true", str(true), "--json"])
+        main(["mill", machine, *JOB, "5", "--true", str(true), "--json"])
         said[name] = json.loads(capsys.readouterr().out)
     assert said["declared"]["true_error_normal_after_mm"]["rms"] > 0.02
     assert (
@@ -104,7 +104,7 @@ def test_from_readings_to_the_part(tmp_path: Path, capsys: pytest.CaptureFixture
     capsys.readouterr()
     said = {}
     for name, machine in (("declared", "orthoglide-revised"), ("diagnosed", str(result / "machine.yaml"))):
-        main(["mill", machine, *JOB, "--true", str(true), "--json"])
+        main(["mill", machine, *JOB, "20", "--true", str(true), "--json"])
         said[name] = json.loads(capsys.readouterr().out)
     before = said["declared"]["true_error_normal_mm"]["largest"]
     assert before > 0.25

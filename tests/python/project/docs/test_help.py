@@ -90,8 +90,8 @@ def make_workshop(at: Path) -> Path:
             machine.save(at / name)
         write_text(at / "arm.urdf", ROBOT)
         sm.import_urdf(at / "arm.urdf").save(at / "calibrated_arm.yaml")
-    shutil.copytree(SERVO, at / "experiments/servo")
-    shutil.copytree(SERVO, at / "dial_gauges")
+    for name in ("experiments/servo", "dial_gauges"):
+        simulate("orthoglide-revised", name, "--effect", "compliance actuator z scale=2")
     shutil.copytree(SERVO.parent, at / "measured")
     simulate("linear-delta", "experiments/heights", "--quantity", "position")
     simulate("ur10", "experiments/tracker", "--quantity", "position")

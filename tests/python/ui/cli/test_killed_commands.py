@@ -6,14 +6,17 @@ Run as a program (name of a command, folder) this file does it in processes of i
 
 from __future__ import annotations
 
+import importlib
 import json
 import os
 import shlex
 import signal
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
 
+import matplotlib
 import pytest
 
 ROOT = Path(__file__).parents[4]
@@ -24,7 +27,7 @@ machine: orthoglide-revised
 variables: {carriage: {low: 1, high: 9}}
 numbers: {"templates.leg.body[carriage].mass": carriage}
 objectives: [mass]
-search: {population: 4, generations: 2, seed: 4, nodes: 2}
+search: {population: 4, generations: 1, seed: 4, nodes: 2}
 """
 BAR = "units: {length: mm}\npart: {shape: bar, length: 300, width: 30, height: 30}\nmaterial: steel\n"
 COMMANDS = {
@@ -49,6 +52,7 @@ def test_killed_or_twice_at_once_nothing_is_half_written(name: str, tmp_path: Pa
     for package in {"link": ["skfem", "gmsh"], "optimize": ["pymoo"]}.get(name, []):
         pytest.importorskip(package)
     alone = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "XDG_CACHE_HOME": str(tmp_path / "cache")}
+    alone |= {"MPLCONFIGDIR": matplotlib.get_cachedir()}  # its list of fonts takes seconds
     done = subprocess.run(
         [sys.executable, "-B", __file__, name, str(tmp_path / "work")],
         check=False, capture_output=True, text=True, env=alone,
@@ -79,6 +83,7 @@ def _started(arguments: list[str], kill_at: int | None = None) -> int:
     code = main(arguments)
     if kill_at is None and code != 2:  # the one of two that was refused wrote nothing
         Path("../count").write_text(str(count))
+        Path("../modules").write_text("\n".join(sys.modules))
     os._exit(code)
 
 
@@ -135,6 +140,9 @@ def _tried(name: str, folder: Path) -> None:
     assert code in (0, 1) and set(codes) <= {code, 2}, codes
     complete = {n: _lines(p) for n, p in _files().items() if n not in given}
     count = int(Path("../count").read_text())
+    for module in Path("../modules").read_text().split():  # here once, not in each process
+        with suppress(Exception):
+            importlib.import_module(module)
     assert complete and count, "the command wrote nothing"
     assert all(_whole(Path(n), lines) for n, lines in complete.items())
     for name_ in complete:

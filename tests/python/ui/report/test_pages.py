@@ -25,11 +25,18 @@ def test_an_effect_is_said_as_one_says_it() -> None:
     assert measured(12.34e-6, 11.0e-6, 13.7e-6, "m") == "12.3 ± 0.7 µm"
 
 
+@pytest.fixture(scope="module")
+def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The report of a diagnosis with a date, and beside it what it was made of."""
+    path = tmp_path_factory.mktemp("report") / "r.html"
+    path.with_name("data.csv").write_text("x", encoding="utf-8")
+    soft_drive().report(path, date="14 March 2025", inputs=[path.with_name("data.csv")])
+    return path
+
+
 @pytest.mark.parametrize("width", [500, 794, 1200])  # a phone, A4, a screen
-def test_the_report_of_a_diagnosis(width: int, tmp_path: Path) -> None:
-    (tmp_path / "data.csv").write_text("x", encoding="utf-8")
-    soft_drive().report(tmp_path / "r.html", date="14 March 2025", inputs=[tmp_path / "data.csv"])
-    assert look(tmp_path / "r.html", tmp_path, width) == {"wide": 0, "lost": 0, "console": 0}
+def test_the_report_of_a_diagnosis(width: int, report: Path, tmp_path: Path) -> None:
+    assert look(report, tmp_path, width) == {"wide": 0, "lost": 0, "console": 0}
 
 
 def test_measures_as_a_page_with_their_pictures(tmp_path: Path) -> None:
@@ -64,11 +71,8 @@ def test_pictures_say_which_machine_is_handed_over(which: str) -> None:
     assert f"machine.yaml ({which})" in [ax.get_title() for ax in maps(d).axes]
 
 
-def test_the_report_says_what_a_workshop_signs(tmp_path: Path) -> None:
-    (tmp_path / "data.csv").write_text("x", encoding="utf-8")
-    d = soft_drive()
-    d.report(tmp_path / "r.html", date="14 March 2025", inputs=[tmp_path / "data.csv"])
-    text = (tmp_path / "r.html").read_text(encoding="utf-8")
+def test_the_report_says_what_a_workshop_signs(report: Path, tmp_path: Path) -> None:
+    text = report.read_text(encoding="utf-8")
     order = [
         "The drive of leg z is 2.15 times as soft as in your file",
         "What to do next",
@@ -86,11 +90,8 @@ def test_the_report_says_what_a_workshop_signs(tmp_path: Path) -> None:
     assert "0.301" in text
     assert "µm/N" in text
     assert "://" not in text
-    d.report(tmp_path / "again.html", date="14 March 2025", inputs=[tmp_path / "data.csv"])
-    assert (tmp_path / "again.html").read_text(encoding="utf-8") == text  # no clock of its own
-    assert "date</td><td>not given" in str(_with_no_date(d, tmp_path))
-
-
-def _with_no_date(d: sm.Diagnosis, folder: Path) -> str:
-    d.report(folder / "plain.html")
-    return (folder / "plain.html").read_text(encoding="utf-8")
+    soft_drive().report(tmp_path / "plain.html", inputs=[report.with_name("data.csv")])
+    plain = (tmp_path / "plain.html").read_text(encoding="utf-8")
+    assert "date</td><td>not given" in plain
+    for with_date, without in zip(text.splitlines(), plain.splitlines(), strict=True):
+        assert with_date == without or "14 March 2025" in with_date  # no clock of its own

@@ -25,72 +25,69 @@ UNNAMED = """() => [...document.querySelectorAll("input:not([type=hidden]), text
 """Visible fields and buttons without a name for screen readers."""
 
 
-def test_drag_probe_and_colours_equal_solve(browser: Any) -> None:
+def test_drag_probe_and_colours_equal_solve(shown: tuple[View, Any]) -> None:
     machine = sm.load_machine("orthoglide-revised")
-    with View(model_of(machine, force=(200.0, 0.0, -100.0))) as view:
-        page = opened(browser, view)
-        camera = client_of(view).camera
-        camera.position = (0.6, -0.8, 0.9)  # this moves what is looked at as well
-        camera.look_at = (0.05, 0.05, 0.0)
-        # the gizmo is dragged with the mouse by the handle of its z axis
-        length = 0.14 * view._viewer.scene.extent
-        a, b = ((0, 0, z) for z in (0.8 * length, 0.8 * length + 0.1))
-        assert pulled(view, page, a, b, lambda: view.state.position[2] > 0.05), view.state.position
-        x, y, z = view.state.position
-        assert abs(x) < 1e-9 and abs(y) < 1e-9 and 0.05 < z < 0.2
-        assert view._viewer.worker.idle(60)
-        # what the page says is what is solved
-        d = 1e6 * np.linalg.norm(machine.solve((x, y, z), view.state.wrench).displacement[:3])
-        page.get_by_text(f"{d:.1f} µm").first.wait_for()
-        # the probe: a click on the plane
-        spot = (-0.13, -0.13, z)  # clear of the gizmo
-        probe = page.get_by_role("textbox", name="Probe")
-        assert works(
-            page,
-            lambda: page.mouse.click(*on_screen(view, page, spot)),
-            lambda: probe.input_value().startswith("probe at"),
-        )
-        found = re.match(r"probe at \((.*), (.*), (.*)\) mm: (.*) µm", probe.input_value())
-        assert found is not None
-        at = [1e-3 * float(v) for v in found.groups()[:3]]
-        assert np.linalg.norm(np.array(at) - spot) < 0.01
-        there = 1e6 * np.linalg.norm(
-            machine.solve(view._viewer.probe.point, view.state.wrench).displacement[:3]
-        )
-        assert found[4] == f"{there:.5g}"
-        # the colours on the screen are those of the values
-        plane = view._viewer._plane
-        low, high = plane.range
-        page.wait_for_timeout(1500)
-        image = pixels(page)
-        seen = []
-        for px in ((-0.1, 0.05), (-0.15, -0.1), (0.1, 0.22), (0.2, 0.2), (0.25, 0.1), (-0.15, 0.25)):
-            value = 1e6 * np.linalg.norm(machine.solve((*px, z), view.state.wrench).displacement[:3])
-            want = table()[round((value - low) / (high - low) * 255)].astype(int)
-            u, v = (round(c) for c in on_screen(view, page, (*px, z)))
-            near = image[v - 3 : v + 4, u - 3 : u + 4].reshape(-1, 3)
-            seen.append(np.abs(near - want).max(axis=1).min() <= 4)
-        assert sum(seen) >= 3, seen  # a link may stand before the others
+    view, page = shown
+    view.set(force=(200.0, 0.0, -100.0))
+    camera = client_of(view).camera
+    camera.position = (0.6, -0.8, 0.9)  # this moves what is looked at as well
+    camera.look_at = (0.05, 0.05, 0.0)
+    # the gizmo is dragged with the mouse by the handle of its z axis
+    length = 0.14 * view._viewer.scene.extent
+    a, b = ((0, 0, z) for z in (0.8 * length, 0.8 * length + 0.1))
+    assert pulled(view, page, a, b, lambda: view.state.position[2] > 0.05), view.state.position
+    x, y, z = view.state.position
+    assert abs(x) < 1e-9 and abs(y) < 1e-9 and 0.05 < z < 0.2
+    assert view._viewer.worker.idle(60)
+    # what the page says is what is solved
+    d = 1e6 * np.linalg.norm(machine.solve((x, y, z), view.state.wrench).displacement[:3])
+    page.get_by_text(f"{d:.1f} µm").first.wait_for()
+    # the probe: a click on the plane
+    spot = (-0.13, -0.13, z)  # clear of the gizmo
+    probe = page.get_by_role("textbox", name="Probe")
+    assert works(
+        page,
+        lambda: page.mouse.click(*on_screen(view, page, spot)),
+        lambda: probe.input_value().startswith("probe at"),
+    )
+    found = re.match(r"probe at \((.*), (.*), (.*)\) mm: (.*) µm", probe.input_value())
+    assert found is not None
+    at = [1e-3 * float(v) for v in found.groups()[:3]]
+    assert np.linalg.norm(np.array(at) - spot) < 0.01
+    there = 1e6 * np.linalg.norm(machine.solve(view._viewer.probe.point, view.state.wrench).displacement[:3])
+    assert found[4] == f"{there:.5g}"
+    # the colours on the screen are those of the values
+    plane = view._viewer._plane
+    low, high = plane.range
+    page.wait_for_timeout(1500)
+    image = pixels(page)
+    seen = []
+    for px in ((-0.1, 0.05), (-0.15, -0.1), (0.1, 0.22), (0.2, 0.2), (0.25, 0.1), (-0.15, 0.25)):
+        value = 1e6 * np.linalg.norm(machine.solve((*px, z), view.state.wrench).displacement[:3])
+        want = table()[round((value - low) / (high - low) * 255)].astype(int)
+        u, v = (round(c) for c in on_screen(view, page, (*px, z)))
+        near = image[v - 3 : v + 4, u - 3 : u + 4].reshape(-1, 3)
+        seen.append(np.abs(near - want).max(axis=1).min() <= 4)
+    assert sum(seen) >= 3, seen  # a link may stand before the others
 
 
-def test_typed_numbers_undo_and_what_is_refused(browser: Any) -> None:
+def test_typed_numbers_undo_and_what_is_refused(shown: tuple[View, Any]) -> None:
     machine = sm.load_machine("orthoglide-revised")
-    with View(model_of(machine)) as view:
-        page = opened(browser, view)
-        box = page.get_by_role("textbox", name="Force, N, z")
-        box.fill("-450")
-        box.press("Enter")
-        assert until(lambda: view.state.force == (0.0, 0.0, -450.0)), view.state.force
-        d = 1e6 * np.linalg.norm(machine.solve(view.state.position, view.state.wrench).displacement[:3])
-        page.get_by_text(f"{d:.1f} µm").first.wait_for()
-        tool = page.get_by_role("textbox", name="Tool, mm, x")
-        tool.fill("9000")
-        tool.press("Enter")
-        page.get_by_role("alert").get_by_text("cannot reach (9000").wait_for()
-        assert view.state.position == (0.0, 0.0, 0.0)
-        assert until(lambda: tool.input_value() == "0")  # the panel shows what holds
-        page.get_by_role("button", name="Undo").click()
-        assert until(lambda: view.state.force == (0.0, 0.0, -300.0))
+    view, page = shown
+    box = page.get_by_role("textbox", name="Force, N, z")
+    box.fill("-450")
+    box.press("Enter")
+    assert until(lambda: view.state.force == (0.0, 0.0, -450.0)), view.state.force
+    d = 1e6 * np.linalg.norm(machine.solve(view.state.position, view.state.wrench).displacement[:3])
+    page.get_by_text(f"{d:.1f} µm").first.wait_for()
+    tool = page.get_by_role("textbox", name="Tool, mm, x")
+    tool.fill("9000")
+    tool.press("Enter")
+    page.get_by_role("alert").get_by_text("cannot reach (9000").wait_for()
+    assert view.state.position == (0.0, 0.0, 0.0)
+    assert until(lambda: tool.input_value() == "0")  # the panel shows what holds
+    page.get_by_role("button", name="Undo").click()
+    assert until(lambda: view.state.force == (0.0, 0.0, -300.0))
 
 
 FIELDS: dict[str, list[tuple[str, str, Callable[[View], float], float]]] = {
@@ -190,21 +187,20 @@ def test_the_page_opens_without_a_network(browser: Any, tmp_path: Path) -> None:
     assert [u for u in browser.asked if not u.startswith(("file:", "data:", "blob:"))] == []
 
 
-def test_controls_have_names_and_take_the_keyboard(browser: Any) -> None:
-    with View(model_of(sm.load_machine("orthoglide-revised"))) as view:
-        page = opened(browser, view)
-        page.get_by_role("tab", name="Tool and load").focus()
-        page.keyboard.press("ArrowRight")
-        assert page.get_by_role("tab", name="Map").get_attribute("aria-selected") == "true"
-        page.get_by_role("status").first.wait_for()
-        page.get_by_role("img", name=re.compile("deflection under this load")).wait_for()
-        page.keyboard.press("ArrowLeft")
-        assert page.get_by_role("slider", name="Size of the force, N").count() == 1
-        assert until(lambda: not page.evaluate(UNNAMED)), page.evaluate(UNNAMED)
-        for name in ("Undo", "Reset", "Round magnification"):
-            assert page.get_by_role("button", name=name, exact=True).count() == 1
-        page.keyboard.press("ArrowRight")
-        isolines = page.get_by_role("checkbox", name="Isolines")
-        isolines.focus()
-        page.keyboard.press("Space")
-        assert until(lambda: not view._viewer.controls.isolines.value)
+def test_controls_have_names_and_take_the_keyboard(shown: tuple[View, Any]) -> None:
+    view, page = shown
+    page.get_by_role("tab", name="Tool and load").focus()
+    page.keyboard.press("ArrowRight")
+    assert page.get_by_role("tab", name="Map").get_attribute("aria-selected") == "true"
+    page.get_by_role("status").first.wait_for()
+    page.get_by_role("img", name=re.compile("deflection under this load")).wait_for()
+    page.keyboard.press("ArrowLeft")
+    assert page.get_by_role("slider", name="Size of the force, N").count() == 1
+    assert until(lambda: not page.evaluate(UNNAMED)), page.evaluate(UNNAMED)
+    for name in ("Undo", "Reset", "Round magnification"):
+        assert page.get_by_role("button", name=name, exact=True).count() == 1
+    page.keyboard.press("ArrowRight")
+    isolines = page.get_by_role("checkbox", name="Isolines")
+    isolines.focus()
+    page.keyboard.press("Space")
+    assert until(lambda: not view._viewer.controls.isolines.value)

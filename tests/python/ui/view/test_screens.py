@@ -23,18 +23,18 @@ SIZES = [(1024, 600), (390, 844)]
 
 
 @pytest.mark.parametrize(("width", "height"), SIZES)
-def test_the_panel_does_not_hide_the_tool(browser: Any, width: int, height: int) -> None:
-    with View(model_of(sm.load_machine("orthoglide-revised"))) as view:
-        page = opened(browser, view, width, height)
-        if width < 576:
-            page.get_by_role("button", name="Expand panel Legend").wait_for()
-        else:
-            page.get_by_text("travel of the drives").wait_for()
-            page.get_by_text("the force by the arrows at its tail").wait_for()
-        panel = page.get_by_role("tab", name="Tool and load").bounding_box()
-        assert panel["x"] + panel["width"] <= width and panel["y"] + panel["height"] <= height
-        for point in (view.state.position, view._viewer.scene.force_handle.position):
-            assert page.evaluate(ON_CANVAS, on_screen(view, page, point))
+def test_the_panel_does_not_hide_the_tool(width: int, height: int, shown: tuple[View, Any]) -> None:
+    view, page = shown
+    page.set_viewport_size({"width": width, "height": height})
+    if width < 576:
+        page.get_by_role("button", name="Expand panel Legend").wait_for()
+    else:
+        page.get_by_text("travel of the drives").wait_for()
+        page.get_by_text("the force by the arrows at its tail").wait_for()
+    panel = page.get_by_role("tab", name="Tool and load").bounding_box()
+    assert panel["x"] + panel["width"] <= width and panel["y"] + panel["height"] <= height
+    for point in (view.state.position, view._viewer.scene.force_handle.position):
+        assert page.evaluate(ON_CANVAS, on_screen(view, page, point))
 
 
 def test_what_a_page_says_stands_below_its_scene_on_a_narrow_screen(browser: Any, tmp_path: Path) -> None:
@@ -96,18 +96,18 @@ def test_the_force_is_dragged_by_its_tail_with_the_mouse(browser: Any) -> None:
         assert until(lambda: view.state.force == before)
 
 
-def test_the_probe_follows_the_mouse(browser: Any) -> None:
-    with View(model_of(sm.load_machine("orthoglide-revised"))) as view:
-        page, probe = opened(browser, view), view._viewer.probe
-        assert view._viewer.worker.idle(60)
-        first, last = (0.1, 0.25, 0.0), (0.25, 0.15, 0.0)
-        assert works(
-            page, lambda: page.mouse.click(*on_screen(view, page, first)), lambda: probe.point is not None
-        )
-        camera = np.array(client_of(view).camera.position)
-        page.wait_for_timeout(2000)
-        pull(page, on_screen(view, page, first), on_screen(view, page, last))
-        assert until(lambda: np.linalg.norm(probe.point - last) < 0.01), probe.point
-        np.testing.assert_allclose(client_of(view).camera.position, camera)  # the view stays
-        said = page.get_by_role("textbox", name="Probe").input_value
-        assert until(lambda: said() == probe_text(view._viewer.now(), list(probe.point)))
+def test_the_probe_follows_the_mouse(shown: tuple[View, Any]) -> None:
+    view, page = shown
+    probe = view._viewer.probe
+    assert view._viewer.worker.idle(60)
+    first, last = (0.1, 0.25, 0.0), (0.25, 0.15, 0.0)
+    assert works(
+        page, lambda: page.mouse.click(*on_screen(view, page, first)), lambda: probe.point is not None
+    )
+    camera = np.array(client_of(view).camera.position)
+    page.wait_for_timeout(2000)
+    pull(page, on_screen(view, page, first), on_screen(view, page, last))
+    assert until(lambda: np.linalg.norm(probe.point - last) < 0.01), probe.point
+    np.testing.assert_allclose(client_of(view).camera.position, camera)  # the view stays
+    said = page.get_by_role("textbox", name="Probe").input_value
+    assert until(lambda: said() == probe_text(view._viewer.now(), list(probe.point)))
