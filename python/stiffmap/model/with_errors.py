@@ -65,11 +65,7 @@ def _sequence(elements: Elements, path: str, of: Mapping[str, Mapping[str, objec
             frame = _pose(change)
             turned = about(home_position(e), frame.r)
             out.append(as_built(f"{e.name}_frame", Pose.of(turned.p + frame.p, frame.r)))
-        for what, by in change.items():
-            kinds, change_of = CHANGES.get(what, ((), None))
-            if change_of is not None and isinstance(e, kinds):  # a body may have its joint's name
-                e = change_of(e, by)
-        out.append(e)
+        out.append(_changed(e, change))
     last = of.get(f"{path}.{END}")
     if last is not None and path != "base" and "." not in path:
         out.append(as_built(f"{path}_{END}", _pose(last)))
@@ -79,6 +75,14 @@ def _sequence(elements: Elements, path: str, of: Mapping[str, Mapping[str, objec
 def _pose(change: Mapping[str, object]) -> Pose:
     t, r = (np.array([change.get(k, 0.0) for k in part]) for part in (TASK[:3], TASK[3:]))
     return Pose.of(t, Rotation.from_rotvec(r).as_matrix())
+
+
+def _changed(e: Element, change: Mapping[str, object]) -> Element:
+    for what, by in change.items():
+        kinds, change_of = CHANGES.get(what, ((), None))
+        if change_of is not None and isinstance(e, kinds):  # a body may have its joint's name
+            e = change_of(e, by)
+    return e
 
 
 def _with_error(e: Joint, error: CommandError) -> Element:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import xarray as xr
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.machining.milling.equilibrium import Equilibrium
@@ -26,15 +26,20 @@ def along(job: Setting, made: Run) -> xr.Variable:
     return xr.Variable("point", out)
 
 
+def flags_along(job: Setting, made: Run) -> NDArray[np.uint32]:
+    """Flags of a run at the points of the job: all that its points between them have."""
+    edges = (job.points.way[1:] + job.points.way[:-1]) / 2
+    out = np.zeros(len(job), np.uint32)
+    np.bitwise_or.at(out, np.searchsorted(edges, made.job.points.way), made.state.flags)
+    return out
+
+
 def dataset_of(
     job: Setting, before: Equilibrium, command: Floats, left: Floats, after: Run, mirrored: Equilibrium
 ) -> xr.Dataset:
     normal = job.across(before.error)
     tolerance = job.process.tolerance
     xyz = ("point", "axis")
-    edges = (job.points.way[1:] + job.points.way[:-1]) / 2
-    flags_after = np.zeros(len(job), np.uint32)  # at each point all that the run's points between have
-    np.bitwise_or.at(flags_after, np.searchsorted(edges, after.job.points.way), after.state.flags)
     ds = xr.Dataset(
         {
             "wanted": (xyz, job.position),
@@ -53,7 +58,7 @@ def dataset_of(
             "speed": (("point", "actuator"), drive_speeds(job)),
             "status": ("point", before.status),
             "flags": ("point", before.flags),
-            "flags_after": ("point", flags_after),
+            "flags_after": ("point", flags_along(job, after)),
             "wall": ("point", job.engaged.wall),
             "width": ("point", job.width(np.zeros(len(job)))),
             "feed": ("point", job.feed),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -51,12 +50,12 @@ def redundancy(
     job: Setting,
     turns: int = 72,
     *,
-    fastest: float = FASTEST,
+    fastest: float | None = FASTEST,
     scheduler: object = None,
 ) -> Redundancy:
     """Turns (m,) rad that make the largest error smallest, and of these the smallest sum of squares.
 
-    turns: number of the grid over a full turn. fastest: rad/s of the turn. Reach, joint
+    turns: number of the grid over a full turn. fastest: rad/s of the turn, None: no limit of its own. Reach, joint
     limits and the drives' speeds hold between neighbouring points. scheduler: address of a dask scheduler, or a
     `distributed.Client`, whose workers take the turns, with the same answer. Raises StiffmapError where no sequence holds the path.
     """
@@ -71,18 +70,7 @@ def redundancy(
         errors, drives = zip(*hands.in_order(float(angle) for angle in grid), strict=True)
     error, joints = np.stack(errors, axis=1), np.stack(drives, axis=1)
     time = np.linalg.norm(np.diff(job.position, axis=0), axis=1) / job.feed[1:]
-    most = fastest_drives(job.machine)
-    apart = np.abs(grid - grid[:, None])
-    apart = np.minimum(apart, 2 * np.pi - apart)
-
-    def free(k: int) -> NDArray[np.bool_]:
-        """(turns, turns) which turns of point k may be followed by which of the next."""
-        if time[k] <= 0:  # both ends of a joint: the arm stands still
-            return np.eye(turns, dtype=bool)
-        move = np.abs(joints[k + 1][None] - joints[k][:, None])
-        ok = (move <= np.minimum(most * time[k] + 1e-9, ON_ANOTHER_BRANCH)).all(axis=2)
-        return np.asarray(ok & (apart <= fastest * time[k] + 1e-9))
-
+    free = Steps(joints, time, fastest_drives(job.machine), grid, fastest)
     stage = np.abs(error)
     # first the least largest error, then the least sum of squares among the sequences that keep it
     top = best_sequence(stage, free, largest=True)
@@ -107,15 +95,37 @@ def _turned(job: Setting, angle: float) -> tuple[Floats, Floats]:
     return wall_errors(turned), drives
 
 
-def best_sequence(
-    stage: Floats, free: Callable[[int], NDArray[np.bool_]], *, largest: bool
-) -> list[int] | None:
+@dataclass(frozen=True, eq=False)
+class Steps:
+    """Which turn may follow which."""
+
+    joints: Floats
+    time: Floats
+    """(m - 1,) s."""
+    most: Floats
+    grid: Floats
+    fastest: float | None
+
+    def allowed(self, k: int) -> NDArray[np.bool_]:
+        """(turns, turns) bool from those of point k to those of the next."""
+        move = np.abs(self.joints[k + 1][None] - self.joints[k][:, None])
+        if self.time[k] <= 0:  # both ends of a joint: the arm stands still
+            return np.eye(len(self.grid), dtype=bool)
+        ok = (move <= np.minimum(self.most * self.time[k] + 1e-9, ON_ANOTHER_BRANCH)).all(axis=2)
+        if self.fastest is not None:
+            turn = np.abs(self.grid[None] - self.grid[:, None])
+            turn = np.minimum(turn, 2 * np.pi - turn)
+            ok = ok & (turn <= self.fastest * self.time[k] + 1e-9)
+        return np.asarray(ok)
+
+
+def best_sequence(stage: Floats, free: Steps, *, largest: bool) -> list[int] | None:
     """Turns, one for each point, with the least largest or the least sum of stage (m, turns); None where there are none."""
     m = len(stage)
     cost = stage[0].copy()
     came = np.zeros((m, stage.shape[1]), dtype=int)
     for k in range(m - 1):
-        through = np.where(free(k), cost[:, None], np.inf)
+        through = np.where(free.allowed(k), cost[:, None], np.inf)
         came[k + 1] = np.argmin(through, axis=0)
         before = through.min(axis=0)
         cost = np.maximum(before, stage[k + 1]) if largest else before + stage[k + 1]

@@ -49,16 +49,7 @@ def register(effect: EffectType) -> EffectType:
     """
     if effect.kind in _library():
         raise StiffmapError(f"effect {effect.kind!r}: the library has a kind of that name")
-    unknown = [n for n in (*effect.needs, *effect.better_with) if n not in RECORDS]
-    if unknown:
-        raise StiffmapError(f"effect {effect.kind!r}: needs {unknown[0]!r}; known: {', '.join(RECORDS)}")
-    if effect.apply is None and not (effect.load or effect.reading or effect.drive):
-        raise StiffmapError(f"effect {effect.kind!r}: give one of apply, load, reading, drive")
-    for p in effect.parameters:
-        if not p.lower <= (p.lower if p.null is None else p.null) <= p.upper or not p.scale > 0:
-            raise StiffmapError(
-                f"effect {effect.kind!r}: {p.name}: expected lower ≤ null ≤ upper and a positive scale"
-            )
+    _check(effect)
     _known()[effect.kind] = effect
     return effect
 
@@ -79,6 +70,19 @@ def load_effects(path: str | PathLike[str]) -> tuple[EffectType, ...]:
     if not found:
         raise FileError("defines no effect: expected EFFECT = EffectType(...)", file=str(path))
     return tuple(register(e) for e in found)
+
+
+def _check(effect: EffectType) -> None:
+    unknown = [n for n in (*effect.needs, *effect.better_with) if n not in RECORDS]
+    if unknown:
+        raise StiffmapError(f"effect {effect.kind!r}: needs {unknown[0]!r}; known: {', '.join(RECORDS)}")
+    if effect.apply is None and not (effect.load or effect.reading or effect.drive):
+        raise StiffmapError(f"effect {effect.kind!r}: give one of apply, load, reading, drive")
+    for p in effect.parameters:
+        if not p.lower <= (p.lower if p.null is None else p.null) <= p.upper or not p.scale > 0:
+            raise StiffmapError(
+                f"effect {effect.kind!r}: {p.name}: expected lower ≤ null ≤ upper and a positive scale"
+            )
 
 
 SYNONYMS = {

@@ -181,12 +181,17 @@ def load_link(name: str, context: Context) -> Matrix6:
     link = read_link(path)
     _check(link.compliance, "compliance", context)
     context.gathered.notes[f"{context.full}/link"] = name
+    _keep_covariance(name, link.covariance, context)
+    return as_rows(link.compliance)
+
+
+def _keep_covariance(name: str, covariance: NDArray[np.float64], context: Context) -> None:
+    """Springs of one link file share its error, so its covariance is kept once."""
     upper = np.ravel_multi_index(np.triu_indices(6), (6, 6))
-    rows = link.covariance[np.ix_(upper, upper)]
-    if np.any(rows):  # the springs of one file share its error: one covariance for all
+    rows = covariance[np.ix_(upper, upper)]
+    if np.any(rows):
         use = LinkUse(as_rows(rows))
         context.gathered.links.setdefault(name, use).springs.append(context.full)
-    return as_rows(link.compliance)
 
 
 SYMMETRY_TOLERANCE = 1e-12

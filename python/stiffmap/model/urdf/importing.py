@@ -55,14 +55,7 @@ def import_urdf(
     model = read_urdf(given_path(urdf, "urdf", "a URDF file"))
     side = read_sidecar(None if sidecar is None else given_path(sidecar, "sidecar", "a YAML file"))
     file = str(urdf) if sidecar is None else fspath(sidecar)
-    for key in ("name_mot", "joint_name", "home", "actuators", "springs"):
-        sort, known = ("link", model.links) if key == "springs" else ("joint", model.joints)
-        for name in getattr(side, key):
-            if name not in known:
-                near = suggestion(name, known)
-                raise FileError(f"no {sort} '{name}' in {model.file}{near}", file=file, key=key)
-            if sort == "joint" and model.joints[name].kind == "fixed":
-                raise FileError(f"joint '{name}' is fixed", file=file, key=key)
+    _check_names(model, side, file)
     end, choice = _tip(model, side, tip, file)
     motors = _motors(model, side, end, file)
     ways = [end, *(model.link(f, "closed_loop", file) for pair in side.closed_loop for f in pair)]
@@ -81,18 +74,34 @@ def import_urdf(
         title=f"{model.name}, imported",
         source=f"imported from {Path(urdf).name}" + (f" with {Path(file).name}" if sidecar else "") + f" to {end}",
     )  # fmt: skip
-    try:
-        description_text(description)
-    except FileError as error:
-        raise FileError(error.reason, file=model.file, key=error.key) from None
-    except StiffmapError as error:
-        raise FileError(str(error), file=model.file) from None
+    _check_file(description, model.file)
     for doubt in doubts(model):
         warnings.warn(f"{model.file}: {doubt}", stacklevel=frames_of_this_package())
     left_out = tuple(n for n in model.links if model.body_of(n) not in {*chains.heads, model.root})
     heavy = {chains.carrier(n) for n, body in model.links.items() if body}
     massless = tuple(n for n in model.links if n in chains.heads - heavy)
     return Imported(description, left_out, tuple(sorted(motors - set(side.actuators))), end, massless, choice)
+
+
+def _check_file(description: MachineDescription, file: str) -> None:
+    """FileError, about the URDF, for a machine that could be made but not saved."""
+    try:
+        description_text(description)
+    except FileError as error:
+        raise FileError(error.reason, file=file, key=error.key) from None
+    except StiffmapError as error:
+        raise FileError(str(error), file=file) from None
+
+
+def _check_names(model: UrdfModel, side: Sidecar, file: str) -> None:
+    for key in ("name_mot", "joint_name", "home", "actuators", "springs"):
+        sort, known = ("link", model.links) if key == "springs" else ("joint", model.joints)
+        for name in getattr(side, key):
+            if name not in known:
+                near = suggestion(name, known)
+                raise FileError(f"no {sort} '{name}' in {model.file}{near}", file=file, key=key)
+            if sort == "joint" and model.joints[name].kind == "fixed":
+                raise FileError(f"joint '{name}' is fixed", file=file, key=key)
 
 
 def _tip(model: UrdfModel, side: Sidecar, tip: str | None, file: str) -> tuple[str, str]:

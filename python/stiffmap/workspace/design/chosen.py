@@ -201,12 +201,7 @@ def measured(found: ParetoSet, place: Path, nodes: int = 21, draws: int = DRAWS)
     for name, i in found.chosen().items():
         x, judged = refine(design, found.x[i], _weights(design, name), keep=name == "compromise")
         file = place / f"{name}.yaml"
-        data = dict(design.data(x))
-        data["name"] = f"{design.model.name}-{name}"
-        values = ", ".join(f"{k} = {v:.5g}" for k, v in design.names(x).items())
-        text = yaml.safe_dump(data, sort_keys=False, allow_unicode=True, width=110)
-        head = f"# Written by stiffmap optimize ({design.model.name}): {values}"
-        write_text(file, f"{head}\n{text}")
+        write_machine(design, x, name, file)
         chosen[name] = ChosenDesign(
             found.judged[i], x, judged, robustness(design, x, draws=draws), full(file)
         )
@@ -218,3 +213,13 @@ def _weights(design: DesignProblem, name: str) -> Floats:
     if name == "compromise":
         return np.ones(len(objectives))
     return np.array([1.0 if name == f"best-{n}" else SLIGHT for n in objectives])
+
+
+def write_machine(design: DesignProblem, x: Floats, name: str, file: Path) -> None:
+    """The machine file of a vector of variables."""
+    data = dict(design.data(x))
+    data["name"] = f"{design.model.name}-{name}"
+    values = ", ".join(f"{k} = {v:.5g}" for k, v in design.names(x).items())
+    text = yaml.safe_dump(data, sort_keys=False, allow_unicode=True, width=110)
+    head = f"# Written by stiffmap optimize ({design.model.name}): {values}"
+    write_text(file, f"{head}\n{text}")

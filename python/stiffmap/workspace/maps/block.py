@@ -6,11 +6,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from stiffmap.common.broadcasting import Floats, whole_number
 from stiffmap.common.tasks import workers
 from stiffmap.solve.kinematics import inverse_kinematics
 from stiffmap.solve.solution import Solution
+from stiffmap.solve.validity import Validity
 from stiffmap.workspace.maps.extremes import ALL, TurningForce, direction, even_angles
 from stiffmap.workspace.maps.loading import Loading, deflections, norm, without_failed
 from stiffmap.workspace.maps.plan import BEYOND, MapPlan, blocks_of
@@ -22,14 +24,7 @@ def solve_block(plan: MapPlan, rows: slice) -> dict[str, np.ndarray]:
     position = plan.positions(rows)
     out = _loads(plan, position)
     if plan.validity is not None:
-        machine = plan.loading.machine
-        r = plan.loading.options.rotation
-        turns = None if r is None else np.broadcast_to(np.asarray(r, dtype=float), (len(position), 3, 3))
-        at = inverse_kinematics(machine, position, turns).coordinates
-        each = [
-            plan.validity.outside(machine, at, np.broadcast_to(w, (len(position), 6))) for w in plan.wrenches
-        ]
-        out[BEYOND] = np.stack(each, axis=-1).astype(np.uint8)
+        out[BEYOND] = _beyond(plan, plan.validity, position)
     if plan.uncertain is not None:
         out |= load_deviations(plan, plan.uncertain, position)
     if plan.turning:
@@ -66,6 +61,16 @@ def _loads(plan: MapPlan, position: Floats) -> dict[str, np.ndarray]:
     if plan.compliance:
         out["compliance"] = without_failed(s.compliance, s.status)
     return out
+
+
+def _beyond(plan: MapPlan, covered: Validity, position: Floats) -> NDArray[np.uint8]:
+    """(poses, cases)."""
+    machine = plan.loading.machine
+    r = plan.loading.options.rotation
+    turns = None if r is None else np.broadcast_to(np.asarray(r, dtype=float), (len(position), 3, 3))
+    at = inverse_kinematics(machine, position, turns).coordinates
+    each = [covered.outside(machine, at, np.broadcast_to(w, (len(position), 6))) for w in plan.wrenches]
+    return np.stack(each, axis=-1).astype(np.uint8)
 
 
 def load_deviations(plan: MapPlan, uncertain: Uncertain, position: Floats) -> dict[str, np.ndarray]:

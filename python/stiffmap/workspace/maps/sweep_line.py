@@ -64,17 +64,7 @@ def sweep(
     if forces is None or control != "force":
         if forces is not None:
             raise StiffmapError(f"forces: not with control {control!r}, which finds them; give a limit (m)")
-        one_of(control, CONTROLS, "control")
-        if limit is None or not np.isfinite(real_number(limit, "limit")) or limit == 0:
-            raise refused(
-                "limit", f"a number other than 0 ({UNITS[control]} for control {control!r})", repr(limit)
-            )
-        whole_number(steps, "steps", 1, what="a positive number")
-        if loading.options.load_type != "dead":
-            raise StiffmapError(
-                f"load_type: a path needs a conservative force, 'dead'; got {loading.options.load_type!r}"
-            )
-        reach = float(limit)
+        reach = check_control(control, limit, steps, loading.options.load_type, cross)
         return load_path(loading, p, u, control, reach, steps, cross)
     if limit is not None or cross:
         raise StiffmapError(f"{'cross' if limit is None else 'limit'}: not together with forces")
@@ -148,6 +138,19 @@ def _crossing_end(cross: int, critical: list[Critical], points: Sequence[object]
         if at_once > 1:
             return f"not followed: {at_once} modes at once, no single branch"
     return end
+
+
+def check_control(control: str, limit: float | None, steps: int, load_type: object, cross: int) -> float:
+    """The limit as a number; StiffmapError where the options do not fit together."""
+    one_of(control, CONTROLS, "control")
+    if limit is None or not np.isfinite(real_number(limit, "limit")) or limit == 0:
+        raise refused(
+            "limit", f"a number other than 0 ({UNITS[control]} for control {control!r})", repr(limit)
+        )
+    whole_number(steps, "steps", 1, what="a positive number")
+    if load_type != "dead":
+        raise StiffmapError(f"load_type: a path needs a conservative force, 'dead'; got {load_type!r}")
+    return float(limit)
 
 
 BRANCH = meaning("1", "0: from the unloaded machine; 1: the branch that crosses it")

@@ -77,21 +77,7 @@ def read_responses(path: str | PathLike[str]) -> list[MeasuredResponse]:
         universal = p.suffix.lower() in UNIVERSAL or MARK.search(p.read_bytes())
         found = _universal(p) if universal and p.suffix.lower() not in TABLES else _tables(p)
         for one in found:
-            c, where = one.coherence, f"response {one.name}" if one.name else "response"
-            frequency_axis(one.frequency, where)
-            bad = np.flatnonzero(np.isfinite(c) & ((c < 0) | (c > 1 + 1e-9)))
-            if bad.size:
-                k = int(bad[0])
-                raise StiffmapError(f"{where}: expected a coherence from 0 to 1; point {k + 1} has {c[k]:g}")
-            if _gains_energy(one.frequency, one.receptance):
-                what = "expected a phase that falls over the peak, found one that rises: turn its sign"
-                raise StiffmapError(f"{where}: {what}")
-            known = c[np.isfinite(c)]
-            if known.size > 2 and (known >= 1).all():
-                raise StiffmapError(
-                    f"{where}: the coherence is 1 at every frequency, as that of one hit without averages is; it is no measure of "
-                    "noise: leave the column out, or average several hits"
-                )
+            _check(one)
     except StiffmapError as problem:
         if type(problem) is not StiffmapError:  # it says its file already, or what is not installed
             raise
@@ -405,3 +391,21 @@ def _ends(s: DataSet) -> tuple[str, str]:
         return f"{s.get(prefix + '_node', 0)} {WAYS.get(int(s.get(prefix + '_dir', 0)), '')}".strip()
 
     return end("rsp"), end("ref")
+
+
+def _check(one: MeasuredResponse) -> None:
+    c, where = one.coherence, f"response {one.name}" if one.name else "response"
+    frequency_axis(one.frequency, where)
+    bad = np.flatnonzero(np.isfinite(c) & ((c < 0) | (c > 1 + 1e-9)))
+    if bad.size:
+        k = int(bad[0])
+        raise StiffmapError(f"{where}: expected a coherence from 0 to 1; point {k + 1} has {c[k]:g}")
+    if _gains_energy(one.frequency, one.receptance):
+        what = "expected a phase that falls over the peak, found one that rises: turn its sign"
+        raise StiffmapError(f"{where}: {what}")
+    known = c[np.isfinite(c)]
+    if known.size > 2 and (known >= 1).all():
+        raise StiffmapError(
+            f"{where}: the coherence is 1 at every frequency, as that of one hit without averages is; it is no measure of "
+            "noise: leave the column out, or average several hits"
+        )

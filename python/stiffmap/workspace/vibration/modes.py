@@ -170,10 +170,7 @@ def tip_modes(
             "or leave the moment out"
         )
     static = machine.solve(poses, loads, rotation=turns, point=point, gravity=gravity, threads=threads)
-    b = np.nan_to_num(out["tip"])
-    rest = np.where(static.ok[:, None, None], static.compliance, np.nan) - b @ b.transpose(0, 2, 1)
-    take = np.isfinite(rest).all(axis=(1, 2)) & (out["unsymmetric"] <= SYMMETRIC)
-    out["rest"][take] = rest[take]
+    _statically(out, np.where(static.ok[:, None, None], static.compliance, np.nan))
     most = int(np.isfinite(out["square"]).sum(axis=1).max(initial=0))
     square = out["square"][:, :most]
     viscous = out["viscous"][:, :most, :most].copy()
@@ -183,12 +180,7 @@ def tip_modes(
         shape, square, out["tip"][:, :, :most], viscous, out["loss"][:, :most, :most], out["rest"],
         out["unsymmetric"], out["status"], out["flags"], declared,
     )  # fmt: skip
-    ok = np.isfinite(found.rest[:, 0, 0])
-    for a in (found.square, found.tip, found.viscous, found.loss):
-        part = a[ok]
-        part[~np.isfinite(part)] = 0.0
-        a[ok] = part
-    return found
+    return _padded(found)
 
 
 def _count(machine: Machine, damping: Damping, modes: int | None) -> int:
@@ -198,3 +190,21 @@ def _count(machine: Machine, damping: Damping, modes: int | None) -> int:
         return min(size, whole_number(modes, "modes", 1))
     damped = int(np.count_nonzero((damping.viscous > 0) | (damping.loss > 0)))
     return max(1, min(size, 6 * len(machine.compiled.bodies) + damped))
+
+
+def _statically(out: dict[str, Floats], compliance: Floats) -> None:
+    """What is not in the modes is the loaded compliance without theirs: the same number at 0 Hz as in statics."""
+    b = np.nan_to_num(out["tip"])
+    rest = compliance - b @ b.transpose(0, 2, 1)
+    take = np.isfinite(rest).all(axis=(1, 2)) & (out["unsymmetric"] <= SYMMETRIC)
+    out["rest"][take] = rest[take]
+
+
+def _padded(found: TipModes) -> TipModes:
+    """Modes beyond a pose's own are nothing, not unknown, so that sums over modes hold at every pose that has an answer."""
+    ok = np.isfinite(found.rest[:, 0, 0])
+    for a in (found.square, found.tip, found.viscous, found.loss):
+        part = a[ok]
+        part[~np.isfinite(part)] = 0.0
+        a[ok] = part
+    return found

@@ -57,7 +57,7 @@ def arm_job() -> Setting:
 
 
 def turning(scheduler: Any) -> dict[str, Any]:
-    found = redundancy(arm_job(), 12, fastest=np.inf, scheduler=scheduler)
+    found = redundancy(arm_job(), 12, fastest=None, scheduler=scheduler)
     return {"angle": found.angle, "error": found.error, "joints": found.joints}
 
 

@@ -17,7 +17,7 @@ from stiffmap.machining.milling.choices import choices, other_side, part_lies
 from stiffmap.machining.milling.equilibrium import Plant, equilibrium
 from stiffmap.machining.milling.limits import drive_speeds, fastest
 from stiffmap.machining.milling.placement import PlacementSearch, placements
-from stiffmap.machining.milling.redundancy import best_sequence, redundancy
+from stiffmap.machining.milling.redundancy import Steps, best_sequence, redundancy
 from stiffmap.machining.milling.setting import Setting, setting
 from stiffmap.machining.milling.speed import best_feeds
 from stiffmap.machining.toolpath import outline, path_of, sampled
@@ -33,10 +33,13 @@ PROCESS = sm.load_process("trimming")
 @pytest.mark.parametrize("largest", [True, False])
 def test_dynamic_programming_is_exhaustive_search(seed: int, largest: bool) -> None:
     rng = np.random.default_rng(seed)
-    m, a = 5, 6
+    m, a, n = 5, 6, 3
     stage = rng.uniform(0, 1, (m, a))
     stage[rng.uniform(size=(m, a)) < 0.15] = np.inf
-    allowed = rng.uniform(size=(m - 1, a, a)) < 0.4
+    joints = np.cumsum(rng.normal(0, 0.2, (m, a, n)), axis=0)
+    grid = -np.pi + 2 * np.pi * np.arange(a) / a
+    steps = Steps(joints, np.full(m - 1, 0.1), np.array([3.0, 4.0, np.inf]), grid, 25.0)
+    allowed = [steps.allowed(k) for k in range(m - 1)]
 
     def cost(path: tuple[int, ...]) -> float:
         if not all(allowed[k][path[k], path[k + 1]] for k in range(m - 1)):
@@ -45,7 +48,7 @@ def test_dynamic_programming_is_exhaustive_search(seed: int, largest: bool) -> N
         return float(max(values) if largest else sum(values))
 
     best = min(cost(p) for p in product(range(a), repeat=m))
-    found = best_sequence(stage, lambda k: allowed[k], largest=largest)
+    found = best_sequence(stage, steps, largest=largest)
     if not np.isfinite(best):
         assert found is None
     else:
@@ -90,7 +93,7 @@ def arm_job(step: float = 0.02) -> Setting:
 
 def test_an_arm_turns_about_its_tool() -> None:
     job = arm_job()
-    found = redundancy(job, 24, fastest=np.inf)
+    found = redundancy(job, 24, fastest=None)
     error = np.abs(found.error).max()
     assert error <= found.fixed.min() * (1 + 1e-9)
     e = equilibrium(Plant(job), job.position)
@@ -117,7 +120,7 @@ def test_a_spindle_in_line_with_the_last_joint_stays_as_at_home() -> None:
     )
     assert found.idle
     assert found.angle == pytest.approx(0.0, abs=1e-12)
-    assert not redundancy(arm_job(0.1), 8, fastest=np.inf).idle
+    assert not redundancy(arm_job(0.1), 8, fastest=None).idle
 
 
 def test_placement_beats_the_naive_one_and_holds_the_path() -> None:

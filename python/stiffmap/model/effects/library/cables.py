@@ -13,6 +13,12 @@ from stiffmap.model.effects.library.geometry import components
 from stiffmap.model.effects.sites import at_sites, cables, each, led_cables
 from stiffmap.model.effects.types import EffectType, Parameter, Placed
 
+
+def stretched(e: Cable, placed: Placed) -> Elements:
+    """The real cable yields that many times as much as the one that lengths are commanded for."""
+    return (replace(e, stretch=e.stretch * placed.values["scale"]),)
+
+
 CABLE_STRETCH = EffectType(
     kind="cable_stretch",
     title="elasticity of a cable",
@@ -21,9 +27,14 @@ CABLE_STRETCH = EffectType(
         "still commanded for the declared one, so that its pretension changes as well."
     ),
     parameters=(Parameter("scale", "1", 0.05, 50.0, 1.0, 0.1, "of the compliance", plausible=(0.3, 5.0)),),
-    **each(cables, lambda e, placed: (replace(e, stretch=e.stretch * placed.values["scale"]),)),
+    **each(cables, stretched),
     compared=("soft", "stiff"),
 )
+
+
+def rubbing(e: Cable, placed: Placed) -> Elements:
+    """The lead between winch and guide has another tension than the free length, and stretches as it asks."""
+    return (replace(e, lead_tension=e.lead_tension * (1.0 - placed.values["share"])),)
 
 
 GUIDE_FRICTION = EffectType(
@@ -35,10 +46,7 @@ GUIDE_FRICTION = EffectType(
         "stands still is a share of 1 - e^(-mu angle)."
     ),
     parameters=(Parameter("share", "1", -1.0, 1.0, 0.0, 0.05, "of the tension", plausible=(-0.3, 0.3)),),
-    **each(
-        led_cables,
-        lambda e, placed: (replace(e, lead_tension=e.lead_tension * (1.0 - placed.values["share"])),),
-    ),
+    **each(led_cables, rubbing),
 )
 
 

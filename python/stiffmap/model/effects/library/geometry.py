@@ -14,7 +14,7 @@ from stiffmap.model.description import Joint, MachineDescription, Offset, Pose
 from stiffmap.model.description.tree import Elements
 from stiffmap.model.effects.edit import built, change_sites, edit_chains, fresh, splice
 from stiffmap.model.effects.sites import at, at_sites, each, joints, per_leg
-from stiffmap.model.effects.types import EffectType, Parameter, Placed
+from stiffmap.model.effects.types import EffectType, Parameter, Place, Placed
 
 AXES = "xyz"
 
@@ -67,6 +67,11 @@ def home_position(joint: Joint) -> NDArray[np.float64]:
     return np.array(joint.axes[0]) * joint.home[0] if slides else np.zeros(3)
 
 
+def tilted(e: Joint, placed: Placed) -> Elements:
+    """A rotation about the joint's home position, before the joint."""
+    return (built(f"{e.name}_tilt", about(home_position(e), rotation_of(placed.values))), e)
+
+
 TILT = EffectType(
     kind="tilt",
     title="tilt of a guide or joint with what it carries",
@@ -75,10 +80,7 @@ TILT = EffectType(
         "about the carriage's home position. The same for any joint about its own frame."
     ),
     **rotations("rotation"),
-    **each(
-        joints,
-        lambda e, placed: (built(f"{e.name}_tilt", about(home_position(e), rotation_of(placed.values))), e),
-    ),
+    **each(joints, tilted),
     pivot="home position of the carriage; origin of a revolute joint",
     frame="local axes before the joint; about x, then the turned y, then the twice turned z",
     moves="the joint and all that it carries, up to the platform",
@@ -138,6 +140,11 @@ LEG_TILT = EffectType(
 )
 
 
+def joints_and_ends(description: MachineDescription) -> list[Place]:
+    """Joints, and the two ends of each leg."""
+    return at_sites(joints)(description) + per_leg("base")(description) + per_leg("platform")(description)
+
+
 def displaced(description: MachineDescription, placed: Placed) -> MachineDescription:
     """An offset before the joint, at the leg's beginning, or (reversed) at its end."""
     error, name = translation_of(placed.values), f"{placed.element}_position_offset"
@@ -164,9 +171,7 @@ POSITION_OFFSET = EffectType(
         "axis."
     ),
     **translations("displacement"),
-    places=lambda description: (
-        at_sites(joints)(description) + per_leg("base")(description) + per_leg("platform")(description)
-    ),
+    places=joints_and_ends,
     apply=displaced,
     frame="axes of the frame before the joint at its zero; base axes; platform axes",
     moves="the joint and all that it carries, up to the platform; nothing turns",

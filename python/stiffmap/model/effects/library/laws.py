@@ -117,6 +117,11 @@ CUBIC = Parameter(
 )  # fmt: skip
 
 
+def hardened(old: Law, placed: Placed) -> Law:
+    """force = a/c + cubic a^3."""
+    return Law(linear(old).stiffness, cubic=placed.values["cubic"])
+
+
 HARDENING = EffectType(
     kind="hardening",
     title="spring that stiffens with load",
@@ -125,7 +130,7 @@ HARDENING = EffectType(
         "an uncoupled direction of a link spring (element `foot.k22`)."
     ),
     parameters=(CUBIC,),
-    **on_law(lambda old, placed: Law(linear(old).stiffness, cubic=placed.values["cubic"])),
+    **on_law(hardened),
     excludes=("hardening", "dead_zone", "friction", "position_dependent_compliance", "tabulated"),
 )
 

@@ -25,6 +25,11 @@ def longer(e: Element, error: float = 0.0, strain: float = 0.0) -> Offset:
     return shifted(e, (error / np.linalg.norm(nominal) + strain) * nominal)
 
 
+def with_error(e: Element, placed: Placed) -> Elements:
+    """Offsets along their own direction."""
+    return (longer(e, placed.values["error"]),)
+
+
 LENGTH = EffectType(
     kind="length",
     title="length of a link",
@@ -34,7 +39,7 @@ LENGTH = EffectType(
         "that is its length."
     ),
     parameters=(Parameter("error", "m", -0.1, 0.1, 0.0, 1e-4, "added to the declared length"),),
-    **each(lengths, lambda e, placed: (longer(e, placed.values["error"]),)),
+    **each(lengths, with_error),
     pivot="the link's near end",
     frame="direction of the link",
     moves="all behind the link; nothing turns",
@@ -108,6 +113,11 @@ def on_branches(
     return each(named(match), block)
 
 
+def has_rods(e: Element) -> bool:
+    """Whether it is a parallelogram whose bars have a length."""
+    return isinstance(e, Block) and stands_apart(e) and all(_rod(b) is not None for b in e.branches)
+
+
 def _rod(b: Branch) -> int | None:
     found = [i for at in links(b.elements).values() for i in at]
     springs = [e for e in b.elements if isinstance(e, Spring)]
@@ -131,10 +141,7 @@ LENGTH_DIFFERENCE = EffectType(
         "half; their mean is as declared (its error is `length`)."
     ),
     parameters=(Parameter("difference", "m", -0.1, 0.1, 0.0, 1e-4, "second rod minus first rod"),),
-    **on_branches(
-        unequal,
-        lambda e: isinstance(e, Block) and stands_apart(e) and all(_rod(b) is not None for b in e.branches),
-    ),
+    **on_branches(unequal, has_rods),
     pivot="near end of each rod",
     frame="direction of the rods",
     moves="all behind each rod; the block's end turns with the two rods",

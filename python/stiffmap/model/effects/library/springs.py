@@ -111,6 +111,11 @@ def insert(
     return edit_legs(description, placed.legs, placed.element, edit)
 
 
+def bars(elements: Elements) -> dict[str, tuple[int, ...]]:
+    """The pins at both ends of a link."""
+    return {name: at for name, at in pins(elements).items() if name in springs(elements)}
+
+
 def with_springs(description: MachineDescription, placed: Placed) -> MachineDescription:
     """An isotropic spring at each pin."""
     spring = Spring("compliance", compliance=isotropic(placed))
@@ -126,10 +131,7 @@ JOINT_COMPLIANCE = EffectType(
         "alone; one link of several in a block is named with its branch (`low.bar`)."
     ),
     parameters=PARAMETERS,
-    places=at_sites(
-        pins,
-        apart=lambda elements: {name: at for name, at in pins(elements).items() if name in springs(elements)},
-    ),
+    places=at_sites(pins, apart=bars),
     apply=with_springs,
     pivot="centre of the joint",
     frame="axes of the link (isotropic)",
