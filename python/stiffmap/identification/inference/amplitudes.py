@@ -272,14 +272,14 @@ def _gradient(fit: Fit, along: Floats) -> Floats:
         squares = np.sum(fit.white(np.hstack(list(short.values()))) ** 2, axis=0)
         ends = np.cumsum([f.shape[1] for f in short.values()])
         trace[list(short)] = [x.sum() for x in np.split(squares, ends[:-1])]
-    whole = {k: p.full for k, p in on.items() if p.full is not None}
-    given = len(fit.columns) - float(variance[list(short)] @ trace[list(short)])
+    whole, zero = {k: p.full for k, p in on.items() if p.full is not None}, 0.0
     if whole or fit.columns.zero.any():
         inverse = np.asarray(dpotri(fit.root, lower=1)[0])  # its lower half; zero above the diagonal
-        for k, full in {0: fit.columns.zero, **whole}.items():
-            trace[k] = 2.0 * np.vdot(inverse.T, full) - np.diag(inverse) @ np.diag(full)
-            given -= trace[k] * (variance[k] if k else 1.0)
-    trace[0] = given / variance[0]
+        diagonal = np.diag(inverse)
+        for k, full in whole.items():
+            trace[k] = 2.0 * np.vdot(inverse.T, full) - diagonal @ np.diag(full)
+        zero = 2.0 * np.vdot(inverse.T, fit.columns.zero) - diagonal @ np.diag(fit.columns.zero)
+    trace[0] = (len(fit.columns) - zero - variance[1:] @ trace[1:]) / variance[0]
     centre, sd = _prior(fit)
     slope = along.T @ fit.solved - variance * trace
     return np.asarray(0.5 * slope - (fit.t - centre) / sd**2)

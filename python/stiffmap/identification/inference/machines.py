@@ -23,6 +23,7 @@ from stiffmap.identification.inference.names import Inferred, of_noise_alone
 from stiffmap.identification.inference.readings import readings
 from stiffmap.identification.validity import covered
 from stiffmap.solve.machine import Machine
+from stiffmap.solve.validity import Validity
 
 SET_ASIDE = (DEGREES + 1.0) / (DEGREES + GROSS**2)
 """Weight below which a reading counts in no measure: that of one beyond `GROSS` times the noise."""
@@ -246,7 +247,10 @@ def lack_of_fit(left: Floats, heavy: bool, fitted: int, known_by: int) -> float:
 def vouched(predictor: Predictor, made: Written, said: str) -> Machine:
     """The machine that is handed over; its file says what it has from which experiment (`said`), what the readings that do not stand
     alone covered, and by how much its prediction of others is off."""
-    if made.which == DECLARED and made.promise is None:
+    own = Validity.of_machine(predictor.machine)
+    if made.which == DECLARED and (
+        made.promise is None or own is not None
+    ):  # keeps what other readings covered
         return predictor.machine
     e, d = predictor.experiment, made.machine.description
     source = d.source if made.which == DECLARED else f"{d.source} {said}".strip()

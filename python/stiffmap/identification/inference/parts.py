@@ -64,8 +64,9 @@ class Parts:
         self.together = (Part(ALL_NUMBERS, "number", shared), *alone) if c.unknowns else ()
         # what carries over in time is noise, if not of what is stated; else it takes whatever is smooth in a series that was read in
         # order, and effects are judged by what they change from one reading to the next
-        most = {"time": WIDEST}
-        self.gaps = tuple(Part(name, kind, None, k, most.get(kind, np.inf)) for kind, name, k in c.gaps)
+        self.gaps = tuple(
+            Part(name, kind, full=k, most=WIDEST if kind == "time" else np.inf) for kind, name, k in c.gaps
+        )
         self.travel = tuple(Part(name, "travel", f) for name, f, _ in c.travel)
 
 

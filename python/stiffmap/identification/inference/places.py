@@ -59,9 +59,8 @@ class Place:
         shapes `side_by_side` along them."""
         factors = side_by_side(self.shapes)
         some = whole = factors.reshape(len(factors), -1)
-        if whole.shape[1] > len(
-            whole
-        ):  # as many sums of them as can be apart, drawn at random, span the same
+        if whole.shape[1] > len(whole):
+            # as many sums of them as can be apart, drawn at random, span the same
             some = whole @ np.random.default_rng(0).normal(size=whole.shape[::-1])
         u, r, _ = qr(some, mode="economic", pivoting=True)
         size = np.abs(np.diag(r))

@@ -83,16 +83,19 @@ def too_wide(fit: Fit, named: Sequence[Unknown] = ()) -> tuple[WideGroup, ...]:
     if own:
         fit = fitted(c, (*fit.parts, *own), fit.amplitudes, fit.weights)
     named_sag = any(u.group == SAG for u in named)  # no tolerance of a maker's
+    # noise, and all that nobody can name, may be instead, but no other numbers that are farther off
+    bounded = [
+        replace(p, most=max(0.0, float(t))) if p.kind == "number" else p
+        for p, t in zip(fit.parts, fit.t[1:], strict=True)
+    ]
     for k, p in enumerate(fit.parts):
         t = float(fit.t[1 + k])
         if p.kind != "number" or t <= 0.0 or (p.name == SAG and named_sag):
             continue
         assert p.factor is not None
         as_stated = replace(c, zero=c.zero + p.factor @ p.factor.T)
-        most = {q: max(0.0, float(x)) for q, x in zip(fit.parts, fit.t[1:], strict=True)}
-        # noise, and all that nobody can name, may be instead, but no other numbers that are farther off
-        others = [replace(q, most=most[q]) if q.kind == "number" else q for q in fit.parts if q is not p]
-        if fit.score - fitted(as_stated, others, fit.amplitudes, fit.weights).score > np.log(ODDS):
+        others = fitted(as_stated, bounded[:k] + bounded[k + 1 :], fit.amplitudes, fit.weights)
+        if fit.score - others.score > np.log(ODDS):
             out.append(WideGroup(p.name, float(np.exp(0.5 * t))))
     return tuple(out)
 

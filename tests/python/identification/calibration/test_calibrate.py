@@ -68,6 +68,11 @@ def test_a_perfect_machine_is_as_declared(name: str) -> None:
     valid = Validity.of_machine(c.machine)
     assert valid is not None and valid.poses == len(np.unique(data.groups))
     assert valid.error == pytest.approx(c.held_out.after.size[0])
+    few = data.rows(data.groups < 12)
+    again = calibrate(c.machine, few)
+    assert (
+        again.which == "declared" and Validity.of_machine(again.machine) == valid
+    )  # not what 12 poses cover
 
 
 def test_one_beyond_tolerance_is_named() -> None:
