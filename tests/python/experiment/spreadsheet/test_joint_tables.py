@@ -16,6 +16,7 @@ from stiffmap.common.tables.sheet import read_sheet
 from stiffmap.experiment import Predictor
 from stiffmap.experiment.noise.whitening import LinearProblem, nuisance_part
 from stiffmap.experiment.spreadsheet import dh
+from stiffmap.experiment.spreadsheet.answers import _are_radians
 from stiffmap.experiment.spreadsheet.dh import arm, read_dh
 from stiffmap.model.description import Joint
 from stiffmap.ui.cli import main
@@ -263,6 +264,13 @@ def test_measured_positions_are_places_and_named_once(
     assert "'px of m [mm]': px, mm" in told
     e = sm.load_experiment(out)
     assert e.seen is not None and e.seen[0] == pytest.approx([80 * 0.0254, 0.254, -20 * 0.0254])
+
+
+@pytest.mark.parametrize(
+    ("angles", "radians"), [([-1.57, np.nan], True), ([0.5, 7.5], False), ([1.0, 2.0], False)]
+)
+def test_fractions_of_a_turn_look_like_radians(angles: list[float], radians: bool) -> None:
+    assert _are_radians(np.array(angles)) == radians
 
 
 @pytest.mark.parametrize(
