@@ -42,7 +42,7 @@ from stiffmap.identification.inference.machines import (
 from stiffmap.identification.inference.names import Inferred, put_instead, with_travel
 from stiffmap.identification.inference.parts import GAPS, NOISE
 from stiffmap.identification.inference.readings import Readings, readings
-from stiffmap.identification.inference.shares import gap_of, shares, tolerance_word, too_wide
+from stiffmap.identification.inference.shares import from_row_to_row, gap_of, shares, tolerance_word, too_wide
 from stiffmap.identification.inference.verdict import NOISIER, Named, Verdict, judged, not_as_stated
 
 UNFITTED = "more than noise stays at the best fit"
@@ -258,12 +258,17 @@ def _rest(columns: Columns, fit: Fit, v: Verdict, each: dict[str, float], gap: F
 
 
 def _first(fit: Fit, v: Verdict, stated: bool) -> list[str]:
-    """What must be known of the noise before anything else."""
+    """What must be known of the noise, and of the order of the readings, before anything else."""
     out = not_as_stated(v.noise, "is stated" if stated else "repeats or steps show")
     if fit.heavy:
         out.append("some readings lie far from the others and count less")
     if v.time:
         out.append(f"the noise of a reading carries over to the following ones ({v.time})")
+    if v.rest and from_row_to_row(fit):
+        out.append(
+            "what is left goes on from row to row: if rows stand in the order in which they were read, add a column `order` "
+            "and diagnose again"
+        )
     return out
 
 

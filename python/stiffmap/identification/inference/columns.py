@@ -6,7 +6,7 @@ integrated out with a flat prior is gone from everything that follows.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -74,10 +74,14 @@ class Columns:
         """(m, m) covariance along the free directions of noise of weights (N,), its upper half; zero below the diagonal."""
         return np.asarray(dsyrk(1.0, self.free / np.sqrt(weights)[:, None], trans=1, lower=1).T)
 
+    @property
+    def points(self) -> ReadingPoints:
+        """The readings, as kernels take them."""
+        return ReadingPoints(self.rows, self.channel, self.sigma)
+
     def scale_of(self, kernel: Kernel) -> float:
         """Variance of a kernel in a part of mean variance one."""
-        points = ReadingPoints(self.rows, self.channel, self.sigma)
-        size = float(np.sum(self.free * (kernel.between(points, points) @ self.free)))
+        size = float(np.sum(self.free * (kernel.between(self.points, self.points) @ self.free)))
         return len(self) / size if size > 0.0 else 0.0
 
     @staticmethod
@@ -175,10 +179,6 @@ def columns(
     seen = np.linalg.norm(numbers, axis=0) > NULL
     points = ReadingPoints(rows, channel, noise)
     common = free.T @ zeros(e, points)
-    found = tuple(
-        (k.kind, k.name, free.T @ k.between(points, points) @ free)
-        for k in gaps(predictor.machine, e, points)
-    )
     return Columns(
         e,
         rows,
@@ -191,11 +191,19 @@ def columns(
         tuple(u for u, k in zip(s.unknowns, seen, strict=True) if k),
         numbers[:, seen],
         use,
-        tuple((kind, name, k * len(k) / np.trace(k)) for kind, name, k in found if np.trace(k) > NULL),
+        along(gaps(predictor.machine, e, points), points, free),
         places(plan, free, noise, use, predictor.machine.description),
         tuple(_along_travel(predictor, s, index, noise, free)),
         repeated(within, mean),
     )
+
+
+def along(
+    kernels: Iterable[Kernel], points: ReadingPoints, free: Floats
+) -> tuple[tuple[str, str, Floats], ...]:
+    """Kind, name and covariance along the free directions, of mean variance one, of the kernels that show there."""
+    found = ((k.kind, k.name, free.T @ k.between(points, points) @ free) for k in kernels)
+    return tuple((kind, name, k * len(k) / np.trace(k)) for kind, name, k in found if np.trace(k) > NULL)
 
 
 def across(taken: Floats) -> Floats:

@@ -73,10 +73,15 @@ def gaps(machine: Machine, e: Experiment, points: ReadingPoints) -> Iterator[Ker
     yield from shared(e, points)
     when = e.hours if e.hours is not None else e.order
     if when is not None:
-        longest = max((float(np.ptp(when[e.runs == k])) for k in np.unique(e.runs)), default=0.0)
-        t = when / (longest or 1.0)  # in shares of the longest session
-        for length in SESSIONS:
-            yield _wander(f"{WANDER} over {length:g} session", t / length, e.runs)
+        yield from wandering(e, when)
+
+
+def wandering(e: Experiment, when: Floats) -> Iterator[Kernel]:
+    """What carries over from one reading to the next by times (n,)."""
+    longest = max((float(np.ptp(when[e.runs == k])) for k in np.unique(e.runs)), default=0.0)
+    t = when / (longest or 1.0)  # in shares of the longest session
+    for length in SESSIONS:
+        yield _wander(f"{WANDER} over {length:g} session", t / length, e.runs)
 
 
 def _field(name: str, here: Mask, x: Floats, load: Floats | None) -> Kernel:

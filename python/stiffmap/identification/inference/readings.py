@@ -140,7 +140,7 @@ def readings(
     rows, channel = rows[kept], channel[kept]
     own = sigma[rows, channel]
     points = ReadingPoints(rows, channel, own)
-    some = ReadingPoints(columns.rows, columns.channel, columns.sigma)
+    some = columns.points
     amplitude = {p.name: float(np.exp(t)) for p, t in fit.on}
     kernels = [
         (k, amplitude[k.name] * scale)

@@ -10,9 +10,10 @@ import numpy as np
 from stiffmap.common.number_text import percents
 from stiffmap.experiment.experiment import Floats
 from stiffmap.identification.inference.amplitudes import Fit, fitted, noise_part
-from stiffmap.identification.inference.columns import Columns
+from stiffmap.identification.inference.columns import Columns, along
 from stiffmap.identification.inference.constants import ODDS, STANDS_OUT
-from stiffmap.identification.inference.parts import GAPS, NOISE, Part
+from stiffmap.identification.inference.kernels import wandering
+from stiffmap.identification.inference.parts import GAPS, NOISE, Part, Parts
 from stiffmap.identification.numbers.unknowns import SAG, Unknown
 
 LEAST = 0.005
@@ -98,6 +99,17 @@ def too_wide(fit: Fit, named: Sequence[Unknown] = ()) -> tuple[WideGroup, ...]:
         if fit.score - others.score > np.log(ODDS):
             out.append(WideGroup(p.name, float(np.exp(0.5 * t))))
     return tuple(out)
+
+
+def from_row_to_row(fit: Fit) -> bool:
+    """Whether more than noise goes on from row to row of an experiment of which nobody says in which order it was read."""
+    c, e = fit.columns, fit.columns.experiment
+    if e.hours is not None or e.order is not None:
+        return False
+    found = along(wandering(e, np.arange(float(len(e)))), c.points, c.free)
+    over = Parts(replace(c, gaps=found)).gaps
+    more = fitted(c, (*fit.parts, *over), fit.amplitudes, fit.weights)
+    return more.score - fit.score > float(np.log(ODDS))
 
 
 def tolerance_word(beyond: str, wide: Sequence[WideGroup]) -> str:

@@ -117,6 +117,7 @@ SYNONYMS = {
     "preload": ("pretension", "Vorspannung"),
     "hardening": ("stiffening", "progressive spring", "progressiv"),
     "drift": ("creep of the zero", "wandering", "Drift"),
+    "frame_jump": ("tracker was moved", "bumped", "stationing", "Umstellung", "Stoß"),
     "frame_offset": ("instrument frame", "registration", "Ausrichtung"),
     "sensor_gain": ("calibration factor", "scale of the sensor", "Kalibrierfaktor"),
     "load_gain": ("force sensor calibration", "wrong force", "Kraftsensor"),

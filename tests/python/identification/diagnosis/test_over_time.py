@@ -75,3 +75,30 @@ def test_a_true_fault_stands_beside_creep() -> None:
     assert ("lead_error", "actuator", ("x",)) in named or (
         d.calibration is not None and any("x.actuator" in b.name for b in d.calibration.beyond)
     ), (d.verdict, named, d.refused)
+
+
+def jumped(after: int = 24) -> tuple[sm.Machine, Experiment]:
+    """Sixty poses; the instrument was moved by four standard deviations after some of them."""
+    machine, e = session("none")
+    shift = np.where(np.arange(60)[:, None] >= after, 4.0 * e.sigma[0, 0] * CREEP, 0.0)
+    return machine, e.with_readings(e.reading + np.hstack([shift, np.zeros((60, e.reading.shape[1] - 3))]))
+
+
+def test_an_instrument_that_was_moved_is_named_with_the_reading_since_when() -> None:
+    machine, e = jumped()
+    d = sm.diagnose(machine, e)
+    assert [x.kind for x in d.effects] == ["frame_jump"]
+    found = d.effects[0].parameters
+    assert found["since"][0] == pytest.approx(24.0, abs=1.0)
+    for axis, true in zip("xyz", 4.0 * e.sigma[0, 0] * CREEP, strict=True):
+        _, low, high, _ = found[axis]
+        assert low < true < high
+    assert d.held_out is not None and d.held_out.after.rms < 0.7 * d.held_out.before.rms
+
+
+@pytest.mark.parametrize("in_order", [True, False])
+def test_rows_that_go_on_from_each_other_ask_for_their_order(in_order: bool) -> None:
+    machine, e = jumped()
+    rows = np.arange(60) if in_order else np.random.default_rng(1).permutation(60)
+    d = sm.diagnose(machine, replace(e, order=None).rows(rows), cross_validate=False)
+    assert any("add a column `order`" in line for line in d.limitations) == in_order

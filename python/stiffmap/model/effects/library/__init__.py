@@ -10,6 +10,6 @@ PRECEDENCE = {
     "joint_compliance": 230, "joint_clearance": 240, "joint_friction": 250, "base_compliance": 260,
     "tool_compliance": 270, "preload": 280, "gravity": 290, "payload": 300, "cable_mass": 305,
     "external_spring": 310, "load_direction": 320, "load_offset": 325, "load_gain": 330, "sensor_gain": 340, "sensor_axes": 350,
-    "frame_offset": 360, "drift": 370, "servo_share": 380,
+    "frame_offset": 360, "drift": 370, "frame_jump": 375, "servo_share": 380,
 }  # fmt: skip
 """Order in which kinds are listed, and the lower one named of two that readings cannot distinguish; those not here are last."""

@@ -56,6 +56,8 @@ LEAD_ERROR = EffectType(
 
 SHORTEST = 2e-3
 PER_WIDTH = 2.5  # periods tried per resolvable frequency
+IN_STEP = 0.85
+"""Mean of the waves' pointers over the poses from which on these stand in steps of a period."""
 WAVE = (
     Parameter("amplitude", "m", 0.0, 0.01, 0.0, 1e-5, "half of peak to peak", angular="rad"),
     Parameter("period", "m", 1e-5, 10.0, None, 0.01, "travel after which the error repeats", angular="rad"),
@@ -97,11 +99,16 @@ def signature(probe: Probe, tried: Tried) -> Iterator[Signature]:
 
 
 def frequencies(reach: float, travel: Floats) -> Floats:
-    """From half a period in the travel up to what the number of poses can hold apart."""
+    """From half a period in the travel up to what the number of poses can hold apart; where these stand in equal steps, to half a
+    period in each: shorter ones show what longer ones do."""
     if reach <= 0.0:
         return np.zeros(0)
-    highest = min(1.0 / SHORTEST, len(np.unique(np.round(travel, 9))) * 1.5 / reach)
-    return np.arange(0.5 / reach, highest, 1.0 / (PER_WIDTH * reach))
+    once = np.unique(np.round(travel, 9))
+    highest = min(1.0 / SHORTEST, len(once) * 1.5 / reach)
+    tried = np.arange(0.5 / reach, 2.0 * highest, 1.0 / (PER_WIDTH * reach))
+    alike = np.abs(np.mean(np.exp(2j * np.pi * np.outer(tried, once)), axis=1)) > IN_STEP
+    repeats = tried[alike & (tried > 0.75 / reach)]
+    return np.asarray(tried[tried < min([highest, *0.5 * (repeats[:1] + 1.0 / reach)])])
 
 
 def _offset(probe: Probe, element: str, leg: str) -> Floats:

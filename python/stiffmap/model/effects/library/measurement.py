@@ -9,7 +9,7 @@ of a pose; joints and distances are read by other instruments.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.description import AppliedEffect
-from stiffmap.model.effects.evidence import Plan, Reading
+from stiffmap.model.effects.evidence import Plan, Probe, Reading, Signature, Tried
 from stiffmap.model.effects.library.geometry import AXES, components, rotation_of, rotations, translation_of
 from stiffmap.model.effects.sites import at, at_sites, elastic_drives
 from stiffmap.model.effects.types import EffectType, Option, Parameter
@@ -207,6 +207,59 @@ DRIFT = EffectType(
     options=(Option("per", ("order", "hour"), "what the drift goes with"),),
     needs=("order",),
     reading=added(drift),
+)
+
+
+SINCE = Parameter(
+    "since",
+    "1",
+    0.0,
+    1e9,
+    None,
+    1.0,
+    "order of the first reading that has it; between two, that share of it in the first",
+)
+
+
+def jump(plan: Plan, term: AppliedEffect) -> Floats:
+    """(n, 6) the shift of the instrument's frame in all readings since one."""
+    values = dict(term.parameters)
+    return np.outer(since(plan, values["since"]), [*translation_of(values, ""), 0.0, 0.0, 0.0])
+
+
+def since(plan: Plan, first: float) -> Floats:
+    """(n,) 1 for readings from an order on and 0 for those before, straight from one reading to the next.
+
+    StiffmapError where the experiment has no order.
+    """
+    if plan.order is None:
+        raise StiffmapError(f"{plan.name}: a jump since a reading needs a column 'order'")
+    orders, number = np.unique(plan.order, return_inverse=True)
+    return np.clip(number.reshape(-1) - np.interp(first, orders, np.arange(len(orders))) + 1.0, 0.0, 1.0)
+
+
+def jumps(probe: Probe, tried: Tried) -> Iterator[Signature]:
+    """Since every reading but the first."""
+    first, *others = np.unique(np.asarray(probe.plan.order))
+    linear = [((p.name, p.scale), ("since", float(first))) for p in tried.parameters if p.null is not None]
+    changes = [probe.change(AppliedEffect("frame_jump", "sensor", (), given)) for given in linear]
+    for order in others:
+        after = since(probe.plan, float(order))[:, None, None]
+        yield Signature({"since": float(order)}, np.stack(changes, axis=-1) * after)
+
+
+FRAME_JUMP = EffectType(
+    **measured("frame_jump", "sensor", FRAME[:3]) | {"parameters": (*FRAME[:3], SINCE)},
+    title="jump of the instrument's frame",
+    doc=(
+        "The instrument, its target or the machine's base was moved between two readings: positions of the order `since` and "
+        "later read as shifted by x, y, z. Named as set-ups of their own (column `setup`) they have frames of their own."
+    ),
+    frame="base axes",
+    needs=("order",),
+    reading=added(jump),
+    signature=jumps,
+    hidden=lambda plan: plan.quantity != "position",
 )
 
 
