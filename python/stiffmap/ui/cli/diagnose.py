@@ -7,6 +7,7 @@ from pathlib import Path
 
 import typer
 
+from stiffmap.common.outputs import write_text
 from stiffmap.identification.diagnosis import Diagnosis, diagnose
 from stiffmap.identification.diagnosis.report.sentences import next_step
 from stiffmap.identification.numbers import Tolerances
@@ -57,8 +58,10 @@ def command(
 
 def write(result: Diagnosis, folder: Path, date: str | None = None, inputs: Sequence[Path] = ()) -> None:
     """All files of a diagnosis; raises `FileError` where the folder cannot be written."""
+    from stiffmap.ui.report.diagnosis.page import html
     from stiffmap.ui.report.diagnosis.pictures import figures
 
-    pictures = ((f"{name}.png", figure) for name, figure in figures(result).items())
+    made = figures(result)
+    pictures = ((f"{name}.png", figure) for name, figure in made.items())
     write_files(folder, [("diagnosis.json", result.as_plain()), ("machine.yaml", result.machine), *pictures])
-    result.report(folder / "report.html", date=date, inputs=inputs)
+    write_text(folder / "report.html", html(result, made, date=date, inputs=inputs))

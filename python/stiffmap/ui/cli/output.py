@@ -85,7 +85,7 @@ def _written(path: Path, content: Any) -> Path:
     from stiffmap.ui.plot import save
 
     save(content, path)
-    content.set_layout_engine("none")  # as it is there now: a page draws it again
+    content.set_layout_engine(None)  # as it is there now: a page draws it again, once
     return path
 
 

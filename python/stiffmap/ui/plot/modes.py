@@ -44,7 +44,7 @@ def mode_frames(
     for phase in np.linspace(-np.pi / 2, np.pi / 2, count):
         scene.swing(phase)
         yield scene.figure
-        scene.figure.set_layout_engine("none")  # as the first frame has it
+        scene.figure.set_layout_engine(None)  # as the first frame has it
 
 
 class _Scene:

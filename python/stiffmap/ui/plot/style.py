@@ -50,6 +50,14 @@ def paper_style() -> AbstractContextManager[None]:
 class Picture(Figure):
     """A figure that a notebook shows, whether pyplot is loaded or not."""
 
+    def draw(self, renderer: RendererBase) -> None:
+        """Where matplotlib wants the layout alone and draws nothing, nothing but the layout is computed."""
+        engine = self.get_layout_engine() if self.axes and "open_group" in vars(renderer) else None
+        if engine is not None:
+            engine.execute(self)
+        else:
+            super().draw(renderer)
+
     def _repr_png_(self) -> bytes:
         out = BytesIO()
         canvas: Any = FigureCanvasAgg(self)

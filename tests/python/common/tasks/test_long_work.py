@@ -27,16 +27,16 @@ GLIDE = "orthoglide-revised"
 
 
 def lobes(scheduler: Any) -> dict[str, Any]:
-    speed, depth = np.linspace(200, 900, 12), np.linspace(1e-4, 4e-3, 4)
+    speed, depth = np.linspace(200, 900, 6), np.linspace(1e-4, 4e-3, 3)
     ds = sm.stability_lobes(GLIDE, "slot", speeds=speed, depths=depth, scheduler=scheduler)
     return {"multiplier": ds.multiplier.values, "limit": ds.limit.values}
 
 
 def vibration(scheduler: Any) -> dict[str, Any]:
     p = np.stack(
-        np.meshgrid(*[np.linspace(-0.1, 0.2, n) for n in (5, 5, 4)], indexing="ij"), axis=-1
+        np.meshgrid(*[np.linspace(-0.1, 0.2, n) for n in (4, 4, 3)], indexing="ij"), axis=-1
     ).reshape(-1, 3)
-    with patch.object(workspace_of_chatter, "BLOCK", 40):  # three tasks
+    with patch.object(workspace_of_chatter, "BLOCK", 18):  # three tasks
         ds = sm.vibration_map(GLIDE, p, "slot", frequencies=np.geomspace(20, 400, 8), scheduler=scheduler)
     return {name: v.values for name, v in ds.data_vars.items()}
 
@@ -68,7 +68,7 @@ def box(scheduler: Any) -> dict[str, Any]:
 
 
 def workspace(scheduler: Any) -> dict[str, Any]:
-    found = sm.workspace_volume(GLIDE, transmission=(0.5, 2.0), cells=14, prove=8000, scheduler=scheduler)
+    found = sm.workspace_volume(GLIDE, transmission=(0.5, 2.0), cells=10, prove=4000, scheduler=scheduler)
     assert found.proven > 0
     return {"volume": found.volume, "proven": found.proven}
 

@@ -57,7 +57,10 @@ def test_an_answer_does_not_depend_on_its_pictures(tmp_path: Path, monkeypatch: 
         raise StiffmapError("singular")
 
     monkeypatch.setattr(pictures, "loaded", fails)
+    made: list[object] = []  # for the files and the page, once
+    monkeypatch.setattr(pictures, "before_after", lambda d: made.append(d) or fails(d))
     write(d, tmp_path)
+    assert made == [d]
     assert {"machine.yaml", "report.html", "diagnosis.json", "loaded.png"} <= {
         p.name for p in tmp_path.iterdir()
     }

@@ -181,16 +181,20 @@ def time_domain(modes, p, speed, depth, steps, periods=60):
     own = 2 * np.pi * modes.frequency
     h, still = T / steps, modes.rest[:2]
 
-    def force(part, bare, before):
-        """Of the displacement without the part that follows at once, and of the last pass; part of a tooth period."""
+    @cache
+    def gain(part):
+        """Force over the displacement without the part that follows at once, less that of the last pass; of a tooth period."""
         A = np.zeros((3, 2))
-        for at in 2 * np.pi / n * (part % 1 + np.arange(n)):
+        for at in 2 * np.pi / n * (part + np.arange(n)):
             if p.cut.side == "slot" and at <= np.pi:
                 s, c = np.sin(at), np.cos(at)
                 t, r, a = law.Ktc, law.Krc, law.Kac
                 A += np.outer([-t * c - r * s, t * s - r * c, a], [s, c])
         A = depth[:, None, None] * A
-        F = np.linalg.solve(np.eye(3) - A @ still, (A @ (bare - before)[..., None]))[..., 0]
+        return np.linalg.solve(np.eye(3) - A @ still, A)
+
+    def force(part, bare, before):
+        F = (gain(part % 1) @ (bare - before)[..., None])[..., 0]
         return F, bare + F @ still.T
 
     def rate(q, v, F):

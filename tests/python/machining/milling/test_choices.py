@@ -218,7 +218,10 @@ def test_the_other_way_round() -> None:
 
 
 @pytest.mark.parametrize("name", ["slot", "trimming"])
-def test_a_built_in_outline_is_run_at_the_speeds_of_its_process(name: str) -> None:
+def test_a_built_in_outline_is_run_at_the_speeds_of_its_process(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("stiffmap.machining.milling.job.path_stability", lambda _: "not asked here")
     process = sm.load_process(name)
     found = mill_job(sm.load_machine("orthoglide-revised"), "circle", process, at=(0.05, 0.05, 0), step=0.05)
     assert found.job.faster == pytest.approx(1.0)

@@ -19,6 +19,7 @@ from stiffmap.common.outputs import one_command, write_text
 from stiffmap.ui.cli import main
 from stiffmap.ui.cli.app import load
 from stiffmap.ui.cli.commands import COMMANDS
+from stiffmap.workspace.design.chosen import measured
 
 ROOT = Path(__file__).parents[4]
 SHIPPED = ROOT / "python/stiffmap"
@@ -202,6 +203,12 @@ def test_examples_run(
     if name == "bench":
         for size in ("GRID", "REFERENCE_GRID", "MANY"):
             monkeypatch.setattr(f"stiffmap.ui.cli.bench.{size}", 3)
+    if (
+        name == "optimize"
+    ):  # what refines and measures a design takes as many rounds, draws and nodes as it is given
+        for number, few in {"ROUNDS": 1, "RADII": (0.1,)}.items():
+            monkeypatch.setattr(f"stiffmap.workspace.design.judging.{number}", few)
+        monkeypatch.setattr(measured, "__defaults__", (3, 2))
     if name == "view":  # serves until it is interrupted
         opening = pytest.importorskip("stiffmap.ui.view.open", reason="needs the extra [view]")
         monkeypatch.setattr(opening.View, "wait", opening.View.close)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from io import BytesIO
 
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import QuadMesh
 from matplotlib.figure import Figure
@@ -16,6 +18,7 @@ import stiffmap as sm
 from stiffmap import plot
 from stiffmap.ui.cli.map import planes as in_metres
 from stiffmap.ui.plot.error_maps import shares
+from stiffmap.ui.plot.style import Picture
 
 FORCE = {"Fx": [300.0, 0, 0, 0, 0, 0]}
 
@@ -73,6 +76,22 @@ def pictures() -> Iterator[tuple[str, Figure]]:
 
 def test_nothing_is_cut() -> None:
     assert {name: found for name, figure in pictures() if (found := cut(figure))} == {}
+
+
+def test_a_picture_is_what_matplotlib_draws_drawn_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn: list[Axes] = []
+    usual = Axes.draw
+    monkeypatch.setattr(Axes, "draw", lambda self, renderer: (drawn.append(self), usual(self, renderer)))
+
+    def saved(kind: type[Figure]) -> bytes:
+        figure, out = kind(figsize=(3, 2), layout="constrained"), BytesIO()
+        figure.subplots().set(ylabel="deflection, µm", xlabel="x, mm", ylim=(0, 1e7))
+        figure.savefig(out, dpi=150)
+        return out.getvalue()
+
+    picture = saved(Picture)
+    assert len(drawn) == 1
+    assert picture == saved(Figure)
 
 
 @pytest.mark.parametrize("plane", ["xy", "xz", "yz"])

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from stiffmap.common.fingerprints import digest
 from stiffmap.common.number_text import length_text, length_unit, place_text, vector_text
@@ -35,12 +36,18 @@ def write_report(
     write_text(path, html(d, date=date, inputs=inputs))
 
 
-def html(d: Diagnosis, *, date: str | None = None, inputs: Iterable[str | PathLike[str]] = ()) -> str:
-    """The report as text."""
+def html(
+    d: Diagnosis,
+    made: Mapping[str, Figure] | None = None,
+    *,
+    date: str | None = None,
+    inputs: Iterable[str | PathLike[str]] = (),
+) -> str:
+    """The report as text, with its figures where they are `made`."""
     from stiffmap.ui.report.diagnosis.pictures import CAPTIONS, figures
     from stiffmap.ui.report.sheet import inline, provenance, render
 
-    pictures = {n: {"caption": CAPTIONS[n], "data": inline(f)} for n, f in figures(d).items()}
+    pictures = {n: {"caption": CAPTIONS[n], "data": inline(f)} for n, f in (made or figures(d)).items()}
     return render(
         "diagnosis.html",
         machine=d.declared.name,
