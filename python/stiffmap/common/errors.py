@@ -38,6 +38,10 @@ class MissingColumnError(FileError):
     """A table lacks a column that it needs."""
 
 
+class NoTableError(FileError):
+    """A text, or a sheet of a workbook, that holds no table."""
+
+
 class FileErrors(FileError):
     """Several problems of one file, one line each and the first twenty of them; ``problems`` holds all, the
     other attributes are those of the first."""

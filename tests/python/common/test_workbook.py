@@ -74,3 +74,21 @@ def test_a_header_reaches_as_far_as_the_rows_below_it(last: int, tmp_path: Path)
     book.save(tmp_path / "merged.xlsx")
     lines = [cells for _, cells in workbook_lines(tmp_path / "merged.xlsx", None)[1]()]
     assert lines[0] == ["x [mm]", "dx [mm]", *[""] * (last - 2)]
+
+
+def test_covers_and_charts_before_the_table(tmp_path):
+    openpyxl = pytest.importorskip("openpyxl")
+    from openpyxl.chart import LineChart, Reference
+
+    from stiffmap.common.tables.sheet import read_sheet
+
+    book = openpyxl.Workbook()
+    book.active["A1"] = "Protocol"
+    page = book.create_sheet("Data")
+    for row in (["x [mm]", "y [mm]"], [1, 2], [3, 4]):
+        page.append(row)
+    chart = LineChart()
+    chart.add_data(Reference(page, min_col=1, min_row=1, max_row=3))
+    book.create_chartsheet("Chart", 0).add_chart(chart)
+    book.save(tmp_path / "b.xlsx")
+    assert list(read_sheet(tmp_path / "b.xlsx").numbers(1)) == [2, 4]

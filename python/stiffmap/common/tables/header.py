@@ -321,7 +321,7 @@ IN_SI = re.compile(
 COMMANDED = "target|cmd|nom|nominal|command|commanded|ref|desired|begin|r?soll?"
 MEASURED = "act|actual|meas|measured|achieved|attained|end|r?ist|gemessen|mess?|mesur[ée]e?"
 PATTERNS: tuple[tuple[str, str], ...] = (
-    ("id", r"#|id|nr\.?|no\.?|lfd\.? ?nr\.?|number|nummer|row|zeile|punkt|messpunkt|point|messpunkt nr\.?|point no\.?|punto"),
+    ("id", r"#|id|nr\.?|no\.?|lfd\.? ?nr\.?|number|nummer|row|zeile|punkt|messpunkt|point|(mess)?punkt[ -]?nr\.?|point no\.?|punto"),
     ("temperature", r"t|temp|temperature|temperatur"),
     ("order", r"order|reihenfolge|sequence"),
     ("setup", r"set-?up|aufbau|aufspannung"),

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from stiffmap.common.errors import FileError
+from stiffmap.common.errors import FileError, NoTableError
 from stiffmap.common.number_text import LARGEST
 from stiffmap.common.tables.cells import Cells, blocks, filled, packed
 from stiffmap.common.tables.header import (
@@ -40,6 +40,7 @@ from stiffmap.common.tables.lines import (
     parted,
 )
 from stiffmap.common.tables.table import Table
+from stiffmap.common.tables.workbook import WORKBOOKS, sheet_names
 from stiffmap.common.units import SHORT_TIMES, TIMES, unit_of
 
 STATISTICS = re.compile(
@@ -86,12 +87,21 @@ PLAIN = Layout()
 
 
 def read_sheet(path: Path, sheet: str | None = None, layout: Layout = PLAIN) -> Table:
-    """Cells of an Excel workbook (its first sheet, or the named one) or of a text table.
+    """Cells of an Excel workbook (its first sheet that holds a table, or the named one) or of a text table.
 
     Text: separators ; tab | , blanks and decimal points or commas are found out, UTF-8, UTF-16 and Latin-1 are read.
     Comment lines are skipped; the header is the line before the first row of mostly numbers. Raises FileError, also where
     several tables are on a sheet and `layout` does not say which.
     """
+    if sheet or path.suffix.lower() not in WORKBOOKS:
+        return _read(path, sheet, layout)
+    for name in (names := sheet_names(path)):
+        with suppress(NoTableError):
+            return _read(path, name, layout)
+    return _read(path, names[0], layout)
+
+
+def _read(path: Path, sheet: str | None, layout: Layout) -> Table:
     page, lines, separator = lines_of(path, sheet)
     for units in (False, True):  # cells such as 12.5 µm only where no row is plain: 100 N may head a column
         cells_only = (c for _, c in kept(lines()))
@@ -111,7 +121,7 @@ def read_sheet(path: Path, sheet: str | None = None, layout: Layout = PLAIN) -> 
         rows, above, begun, found = _begun(lambda: turned, spelling, layout, str(path))
     first = begun[-1] if begun else None
     if first is None and not above:
-        raise FileError(f"the {'sheet' if page else 'file'} is empty", file=str(path))
+        raise NoTableError(f"the {'sheet' if page else 'file'} is empty", file=str(path))
     if first is not None and (layout.header or (found is None and layout.numbered)):
         found = first[0], _names(first[1], layout.header, str(path), first[0])
     if first is None or found is None:
@@ -119,7 +129,7 @@ def read_sheet(path: Path, sheet: str | None = None, layout: Layout = PLAIN) -> 
         begin = f"; expected its names of columns, such as {layout.names}" if layout.names else ""
         rule = "; a row of numbers has two or more, each alone in its cell, in half of its cells or more"
         more = begin if layout.strict or (begin and first) else way if first else rule
-        raise FileError(f"no header line with rows of numbers below it was found{more}", file=str(path))
+        raise NoTableError(f"no header line with rows of numbers below it was found{more}", file=str(path))
     number_, header = found
     aside = [f"row {n}, of numbers above the header" for n, _ in begun[:-1] if not layout.strict]
     every = blocks(chain([first], kept(rows, None if layout.strict else aside)))

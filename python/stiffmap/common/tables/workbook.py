@@ -67,7 +67,7 @@ def _by_openpyxl(path: Path, sheet: str | None) -> tuple[list[str], list[tuple[i
         from openpyxl import load_workbook
     computes = any(FORMULA.search(part) for part in _parts(path, "sheet"))
     book = load_workbook(path, data_only=True, read_only=True)
-    names = book.sheetnames
+    names = [page.title for page in book.worksheets]  # not those that are charts
     page = _chosen(names, sheet, path)
     lines = [] if page is None else _lines(_rows(book[page]), path)
     if computes and page is not None:
@@ -117,8 +117,6 @@ def _chosen(names: list[str], sheet: str | None, path: Path) -> str | None:
 
 
 def _rows(page: Any) -> Iterable[Sequence[object]]:
-    if not hasattr(page, "iter_rows"):
-        raise ValueError("the sheet is a chart")
     page.reset_dimensions()  # what the file says of them may be wrong; each row is then as long as its last cell
     return page.iter_rows(values_only=True)  # type: ignore[no-any-return]
 

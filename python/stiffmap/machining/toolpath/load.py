@@ -70,6 +70,9 @@ COLUMNS = {
     **dict.fromkeys("xyz", "m"), "feed": "m/s", "spindle": "rad/s", **dict.fromkeys("ijk", ""), "turn": "rad",
 }  # fmt: skip
 USUAL = {**{a: f"{a}_mm" for a in "xyz"}, "feed": "feed_mm_min", "spindle": "spindle_rpm", "turn": "turn_deg"}
+ALIASES = {"s": "spindle", "drehzahl": "spindle"} | dict.fromkeys(
+    ("f", "feedrate", "feed_rate", "vorschub"), "feed"
+)
 
 
 def read_points(path: Path) -> Toolpath:
@@ -77,9 +80,7 @@ def read_points(path: Path) -> Toolpath:
 
     Raises FileError naming the column or the line.
     """
-    t = read_named(
-        path, Known(COLUMNS, USUAL, {"f": "feed", "vorschub": "feed", "s": "spindle", "drehzahl": "spindle"})
-    )
+    t = read_named(path, Known(COLUMNS, USUAL, ALIASES))
     n = len(t.lines)
     if n < 2:
         t.fail("expected a line of names and two or more points")

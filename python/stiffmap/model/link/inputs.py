@@ -15,7 +15,7 @@ from stiffmap.common.yaml_text import read
 from stiffmap.model.files.report import validated
 from stiffmap.model.files.schema.base import FileModel
 from stiffmap.model.link.gmshmesh import UNITS
-from stiffmap.model.link.readers import known_columns
+from stiffmap.model.link.readers import cases_rise, known_columns
 from stiffmap.model.link.shapes import Bar, Foot, ForkBar, HollowBar, Length
 from stiffmap.model.link.solve import Material
 from stiffmap.model.link.transport import Floats
@@ -122,14 +122,7 @@ def read_cases(path: str | Path) -> Floats:
             file=table.file,
             line=table.top,
         )
-    at = table.find(r"(load[^a-z]?)?case|lc|id|nr\.?|no\.?|name|number")
-    cells = [*table.columns[at]] if at is not None else []
-    cases = [
-        re.fullmatch(r"(?i)(?:lc|lf|(?:load ?)?case|step)?[ _-]*(\d+)(?:[.,]0*)?", c.strip()) for c in cells
-    ]
-    if at is not None and all(cases):
-        falls = np.diff([int(c[1]) for c in cases if c], prepend=-1) <= 0
-        table.check(~falls, lambda i: f"'{table.header[at]}': expected cases in the order of the field")
+    cases_rise(table, r"(load[^a-z]?)?case|lc|id|nr\.?|no\.?|name|number")
     return np.stack([found[c][0] for c in WRENCH], axis=-1)
 
 

@@ -19,25 +19,32 @@ from stiffmap.model.link.gmshmesh import UNITS
 from stiffmap.model.link.transport import Floats, Ints
 
 Rows = tuple[Ints, Floats]
-FIELDS = (".csv", ".dat", ".frd", ".lis", ".rpt", ".txt", ".vtk", ".vtu")
-_ABAQUS = r"NODE\s+(?:FOOT-\s+)?(?:U\.)?U1\s+(?:U\.)?U2\s+(?:U\.)?U3\b.*\n\s*(?:NOTE|LABEL)\b"
-"""Above rows of a .dat (NODE PRINT) and of a field report, .rpt."""
+Nodes = dict[int, list[float]]
+FIELDS = (".csv", ".dat", ".f06", ".frd", ".lis", ".pch", ".rpt", ".txt", ".vtk", ".vtu")
+_HEAD = re.compile(
+    r"^\s*(?:(displacements)\s*\(.*|(?:D I S P L A C E M E N T +V E C T O R\s+POINT ID\.\s+TYPE|NODE)\s+(?:FOOT-\s+)?(\S.*)(?:\n\s*(?:NOTE|LABEL)\b.*)?|"
+    r"\$DISPLACEMENTS.*\n\$REAL.*(?:\n\$.*)*)$", re.MULTILINE | re.IGNORECASE,
+)  # fmt: skip
+"""Above rows of nodes, with the names of their columns: CalculiX, Abaqus and Ansys, Nastran; its punch files have none."""
+_MOVED = re.compile(r"(?i)(?:U[.-])?(?:[UD]([XYZ])|[UT]([123])(?!\d))")
+_CASE = re.compile(rf"{_MOVED.pattern}(?:[ _]?(?:lc|case)?[ _]?(\d+))?(?![^\W_])")
+_WORDS = re.compile(r"(?m)^(?:\s*[A-Za-z*$]|[01] {3,}[A-Z]{2})")  # a page of Nastran begins with 0 or 1
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[Ee][-+]?\d+)?")
 _FORTRAN = re.compile(r"(?<=[\d.])(?:[Dd](?=[-+\d])|(?=[-+]\d+(?![\d.])))")
 """Where an E belongs: 1.0D-05, and 1.0-105, which Fortran writes with three digits. In -1.0-2.0 two numbers touch."""
 
 
-def read_csv_field(path: str | Path) -> tuple[Floats, Floats]:
-    """Points (n, 3) m and displacements (cases, n, 3) m of a CSV with units in its header.
+def read_csv_field(path: str | Path, unit: str | None = None) -> tuple[Floats, Floats]:
+    """Points (n, 3) m and displacements (cases, n, 3) m of a CSV with units in its header, else in `unit`.
 
-    Columns ``node, x [mm], y [mm], z [mm]`` and then ``ux [mm], uy [mm], uz [mm]`` once per load case.
+    Columns ``node, x [mm], y [mm], z [mm]`` and then ``ux [mm], uy [mm], uz [mm]`` once per load case, next to or below each other.
 
     Raises:
         StiffmapError: no such file, a column or its unit missing, cells that are not numbers.
     """
     axes = ("x", "y", "z", "ux", "uy", "uz")
     table, found = known_columns(
-        path, {"node": ("", "node")} | {axis: ("m", f"{axis} [mm]") for axis in axes}
+        path, {"node": ("", "node")} | {axis: ("m", f"{axis} [mm]") for axis in axes}, unit
     )
     counts = {axis: len(columns) for axis, columns in found.items()}
     if any(counts[a] != 1 for a in "xyz") or {counts["ux"], counts["uy"], counts["uz"]} - {counts["ux"] or 1}:
@@ -49,62 +56,71 @@ def read_csv_field(path: str | Path) -> tuple[Floats, Floats]:
     fields = np.stack([np.array(found[a]) for a in ("ux", "uy", "uz")], axis=-1)
     rows: dict[int, list[float]] = {}
     nodes = found["node"][0] if found["node"] else np.zeros(0)
+    n = len({*nodes.tolist()}) if len(fields) == 1 else 0
+    blocks = np.column_stack([nodes, points]).reshape(-1, n, 4) if n and len(nodes) % n == 0 else nodes[:0]
+    if (blocks[1:] == blocks[:1]).all() and len(blocks) > 1:
+        cases_rise(table, r"(load[^a-z]?|sub)?case|lc|step", repeated=True)
+        nodes, points, fields = nodes[:n], points[:n], fields.reshape(-1, n, 3)
     for node, point, moved in zip(nodes, points, fields.swapaxes(0, 1), strict=False):
         _put(path, rows, int(node), [*point.tolist(), *moved.ravel().tolist()])
     return points, fields
 
 
+def cases_rise(table: Table, names: str, repeated: bool = False) -> None:
+    """FileError where a column of such a name numbers load cases, and they do not rise."""
+    at = table.find(names)
+    number = re.compile(r"(?i)(?:lc|lf|(?:load ?)?case|step)?[ _-]*(\d+)(?:[.,]0*)?")
+    cases = [number.fullmatch(c.strip()) for c in (table.columns[at] if at is not None else ())]
+    if at is not None and all(cases):
+        falls = np.diff([int(c[1]) for c in cases if c], prepend=-1) < (not repeated)
+        table.check(~falls, lambda i: f"'{table.header[at]}': expected cases in the order of the field")
+
+
 def known_columns(
-    path: str | Path, units: Mapping[str, tuple[str, str]]
+    path: str | Path, units: Mapping[str, tuple[str, str]], unit: str | None = None
 ) -> tuple[Table, dict[str, list[Floats]]]:
     """The table, and the numbers (SI) of each column that has one of these names, each with its SI unit and how it is
-    usually written; other columns are left alone. Raises FileError."""
+    usually written, in `unit` where it names none; other columns are left alone. Raises FileError."""
     refuse_folder(path, "a table")
     if not Path(path).is_file():
         raise FileError("no such file", file=str(path))
     layout = Layout(lambda name: name.lower() in units, strict=True, repeated=True)
     sheet = read_sheet(Path(path), None, layout)
-    cases = [re.match(r"(?i)(u[xyz])[ _]?(\d+)(?![^\W_])", h) for h in sheet.header]  # ux1
-    names = [m[1] + h[m.end() :] if m else h for m, h in zip(cases, sheet.header, strict=True)]
+    cases = [_CASE.match(h) for h in sheet.header]
+    names = [f"u{m[1] or 'xyz'[int(m[2]) - 1]}{h[m.end() :]}" if m else h for m, h in zip(cases, sheet.header, strict=True)]  # fmt: skip
+    names = [re.sub(r"(?i)^(node|knoten)[ _]?(label|number|id|n[or]\.?|nummer)?$", "node", n) for n in names]
     names = [re.sub(r"(?i)^(u?[xyz])_m$", r"\1 [m]", n) for n in names]  # x as measured is no column here
-    order = sorted(range(len(names)), key=lambda i: int(m[2]) if (m := cases[i]) else 0)
+    order = sorted(range(len(names)), key=lambda i: int(m[3] or 0) if (m := cases[i]) else 0)
     header = tuple(names[i] for i in order)
     sheet = replace(sheet, header=header, columns=tuple(sheet.columns[i] for i in order))
     found: dict[str, list[Floats]] = {name: [] for name in units}
     for head, cells, name in zip(sheet.header, sheet.columns, map(str.lower, sheet.names), strict=True):
         if name in units:
-            known = Known({name: units[name][0]}, {name: units[name][1]}, {})
+            known = Known({name: units[name][0]}, {name: units[name][1]}, {}, assumed={name: unit or ""})
             found[name].append(named(replace(sheet, header=(head,), columns=(cells,)), known).values[name])
     return sheet, found
 
 
-def read_dat(path: str | Path) -> Rows:
-    """Node numbers (n,) and displacements (cases, n, 3), in the deck's unit, of a .dat of CalculiX or Abaqus."""
-    return _listed(path, rf"displacements\s*\(|{_ABAQUS}", columns=(4, 7))
-
-
-def read_ansys(path: str | Path) -> Rows:
-    """Node numbers and displacements, in the deck's unit, of Ansys PRNSOL listings (``NODE UX UY UZ``, rotations behind) and
-    of field reports of Abaqus."""
-    if turned := re.search(
-        r"RESULTS ARE IN (?!(THE )?GLOBAL COORDINATE|COORDINATE SYSTEM +0\b).*", text_of(Path(path))
-    ):
-        raise StiffmapError(f"{path}: expected results in the global system (RSYS,0), found: {turned[0]}")
-    return _listed(path, rf"NODE\s+UX\s+UY\s+UZ|{_ABAQUS}", columns=(4, 5, 7))
-
-
-def _listed(path: str | Path, head: str, columns: tuple[int, ...] = (4,)) -> Rows:
-    """Rows of nodes below each line that begins with `head`, up to the next line of words."""
+def read_listing(path: str | Path) -> Rows:
+    """Node numbers (n,) and displacements (cases, n, 3), in the deck's unit, below each line of names of a listing: .dat of CalculiX or
+    Abaqus, field reports of Abaqus, PRNSOL of Ansys, .f06 and .pch of Nastran; magnitudes and rotations are left out."""
     text = text_of(Path(path))
+    if turned := re.search(r"RESULTS ARE IN (?!(THE )?GLOBAL COORDINATE|COORDINATE SYSTEM +0\b).*", text):
+        raise StiffmapError(f"{path}: expected results in the global system (RSYS,0), found: {turned[0]}")
     if len(parts := {*re.findall(r"at nodes for (part: .*\S)", text)}) > 1:
         raise StiffmapError(
             f"{path}: expected nodes of one part, which numbers its own; found {', '.join(sorted(parts))}"
         )
-    blocks = re.split(rf"^\s*(?:{head}).*$", text, flags=re.MULTILINE | re.IGNORECASE)[1:]
     # One load case may be printed in several pages or sets of nodes; each repeats the header, not the load step.
     cases: list[dict[int, list[float]]] = []
-    for block in blocks:
-        rows = _node_rows(path, re.split(r"^\s*[A-Za-z*]", block, flags=re.MULTILINE)[0], columns)
+    for head in _HEAD.finditer(text):
+        names = (head[2] or ("UX UY UZ" if head[1] else "T1 T2 T3 line")).upper().split()
+        moved = [i for i, name in enumerate(names) if _MOVED.fullmatch(name)]
+        if len(moved) != 3:
+            continue
+        rows = _node_rows(
+            path, _WORDS.split(text[head.end() :], maxsplit=1)[0], (len(names) + 1, 7), moved[0]
+        )
         if cases and not cases[-1].keys() & rows.keys():
             cases[-1].update(rows)
         else:
@@ -170,7 +186,7 @@ def read_field(
     """Points (n, 3) m and displacements (cases, n, 3) m of any of the formats, by suffix.
 
     Args:
-        path: .csv (units in the header), .dat, .frd, .vtk, .vtu, or .lis/.txt from Ansys, .rpt/.txt from Abaqus.
+        path: .csv, .dat, .frd, .vtk, .vtu, or .lis/.txt from Ansys, .rpt/.txt from Abaqus, .f06/.pch from Nastran.
         unit: length unit of a file that does not carry it.
         nodes: coordinates for .dat and listings, which hold numbers only: rows "node x y z", in the unit that their
             header names, else in `unit`.
@@ -180,7 +196,7 @@ def read_field(
     """
     suffix = Path(path).suffix.lower()
     if suffix == ".csv":
-        return read_csv_field(path)
+        return read_csv_field(path, unit)
     if suffix not in FIELDS:
         raise StiffmapError(f"{path}: expected {', '.join(FIELDS)}, got {suffix!r}")
     if unit not in UNITS:
@@ -188,7 +204,7 @@ def read_field(
     if suffix in {".frd", ".vtk", ".vtu"}:
         points, fields = read_frd(path) if suffix == ".frd" else read_vtk(path)
         return UNITS[unit] * points, UNITS[unit] * fields
-    numbers, fields = read_dat(path) if suffix == ".dat" else read_ansys(path)
+    numbers, fields = read_listing(path)
     if nodes is None:
         raise StiffmapError(f"{path}: it holds node numbers only; give the coordinates with --nodes")
     given = re.sub(r"^\*\*.*$", "", text_of(Path(nodes)), flags=re.MULTILINE)
@@ -230,17 +246,17 @@ def _unit_above(path: str | Path, text: str, other: str) -> str:
     return min(found, default=other)
 
 
-def _node_rows(path: str | Path, text: str, columns: tuple[int, ...] = (4,)) -> dict[int, list[float]]:
-    """Rows "node a b c": the first three numbers behind an integer. Columns may touch: 12-1.0E-03-2.0E-04."""
-    rows: dict[int, list[float]] = {}
+def _node_rows(path: str | Path, text: str, columns: tuple[int, ...] = (4,), first: int = 0) -> Nodes:
+    """Rows "node a b c": three numbers from the first on behind an integer. Columns may touch: 12-1.0E-03-2.0E-04."""
+    rows: Nodes = {}
     for line in _FORTRAN.sub("E", text).splitlines():
-        head = re.match(r"\s*(\d+)(?:[\s,;]+|(?=-\d*\.))([^\s,;].*)", line)
+        head = re.match(r"\s*(\d+)(?:\s+G\s+|[\s,;]+|(?=-\d*\.))([^\s,;].*)", line)
         if not head:
             continue
         cells = _NUMBER.findall(head[2])
-        if len(cells) + 1 not in columns or re.search(r"[A-CF-Za-cf-z]", line):
+        if len(cells) + 1 not in columns or re.search(r"[A-CF-Za-cf-z]", head[2]):
             raise StiffmapError(f"{path}: expected a node and three numbers, found {line.strip()[:60]}")
-        _put(path, rows, int(head[1]), [number_in(c) for c in cells[:3]])
+        _put(path, rows, int(head[1]), [number_in(c) for c in cells[first : first + 3]])
     return rows
 
 
@@ -252,7 +268,7 @@ def _put(path: str | Path, rows: dict[int, list[float]], node: int, values: list
 def _same_nodes(path: str | Path, cases: list[dict[int, list[float]]]) -> Rows:
     if not cases or not cases[0]:
         raise StiffmapError(
-            f"{path}: expected nodal displacements, found none: 'displacements (' heads them in a .dat, NODE UX UY UZ in an Ansys listing, Node U.U1 U.U2 U.U3 in a report of Abaqus; a table with units in its header is a .csv"
+            f"{path}: expected nodal displacements, found none: 'displacements (' heads them in a .dat, NODE UX UY UZ in an Ansys listing, Node U.U1 U.U2 U.U3 in a report of Abaqus, $DISPLACEMENTS in a .pch; a table with units in its header is a .csv"
         )
     numbers = sorted(cases[0])
     for k, case in enumerate(cases):

@@ -18,7 +18,7 @@ from scipy.sparse.linalg import splu
 
 from stiffmap.common.errors import StiffmapError, needed
 from stiffmap.model.link.mesh import SolidMesh, face_area_centre, face_loads, face_mass
-from stiffmap.model.link.readers import read_dat
+from stiffmap.model.link.readers import read_listing
 from stiffmap.model.link.rigidfit import design_matrix
 from stiffmap.model.link.transport import Floats, Ints
 
@@ -209,7 +209,7 @@ def solve_ccx(mesh: SolidMesh, material: Material, setup: Setup, wrenches: Float
             more = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
             first = errors[0] if errors else "no message"
             raise StiffmapError(f"ccx stopped (code {done.returncode}): {first}{more}")
-        numbers, fields = read_dat(job.with_suffix(".dat"))
+        numbers, fields = read_listing(job.with_suffix(".dat"))
     if len(fields) != len(wrenches) or len(numbers) < len(mesh.nodes):
         raise StiffmapError(f"ccx: not converged, {len(fields)} of {len(wrenches)} load cases solved")
     keep = numbers <= len(mesh.nodes)

@@ -20,8 +20,6 @@ from stiffmap.common.units import FREQUENCIES
 from stiffmap.workspace.vibration.response import Complex, frequency_axis
 from stiffmap.workspace.vibration.response_units import ResponseUnit, response_unit
 
-PREFIX = re.compile(r"((frf|tf|h[12]?(\(f\))?|\w+/\w+|dyn(amic|amische|\.)?)[_/])+(?=.)")
-"""Before the part of a response, as in ``H1 Ch2/Ch1 Real [m/N]``."""
 LEVEL = re.compile(r"(?i)db(?: ?re[fl]?[.:]?)? ?([\d.]+(?:e-?\d+)?)? ?(.*)")
 MEANT = {
     "accelerance": (2, 1), "inertance": (2, 1), "mobility": (1, 1), "receptance": (0, 1), "compliance": (0, 1), "nachgiebigkeit": (0, 1),
@@ -32,16 +30,28 @@ COLUMNS = Known(
     {**dict.fromkeys(("frequency", "real", "imag", "magnitude", "coherence"), ""), "phase": "rad", "response": WORD},
     {"frequency": "frequency_Hz", **{n: f"{n}_m/N" for n in ("real", "imag", "magnitude")}, "phase": "phase_deg"},
     {
-        **dict.fromkeys(("freq", "f", "hz", "frequenz", "linear"), "frequency"), **dict.fromkeys(("coh", "kohärenz"), "coherence"),
+        **dict.fromkeys(("freq", "freq.", "f", "hz", "frequenz", "linear", "n", "drehzahl", "speed", "rotational_speed", "omega", "ω", "kreisfrequenz", "angular_frequency"), "frequency"), **dict.fromkeys(("coh", "kohärenz"), "coherence"),
         **dict.fromkeys(("phase_angle", "arg(h)", "arg_h"), "phase"), **dict.fromkeys(("h", "frf", "h1", "h2", "h(f)", "complex"), "response"),
-        **dict.fromkeys(("n", "drehzahl", "speed", "rotational_speed", "omega", "ω", "kreisfrequenz", "angular_frequency"), "frequency"),
         **dict.fromkeys(("re", "re(h)", "re(frf)", "real_part", "realteil"), "real"),
-        **dict.fromkeys(("im", "im(h)", "im(frf)", "imaginary", "imaginary_part", "imag_part", "imaginärteil"), "imag"),
+        **dict.fromkeys(("im", "im(h)", "im(frf)", "imaginary", "imaginary_part", "imag_part", "imaginärteil", "imaginär"), "imag"),
         **dict.fromkeys(("mag", "amplitude", "|h|", "|frf|", "betrag", "gain", *MEANT), "magnitude"),
     },
-    lambda name, unit: ("frequency", unit) if unit.lower() in FREQUENCIES else ("imag" if any((response_unit(unit) or ())[1:]) else "phase", unit) if not name else (PREFIX.sub("", name).removesuffix("_db"), f"dB {unit}" if name.endswith("_db") else unit),
+    lambda name, unit: _meant(name, unit),
 )  # fmt: skip
 FORMS = (("real", "imag"), ("magnitude", "phase"))
+
+
+def _meant(name: str, unit: str) -> tuple[str, str]:
+    """A unit alone, or of frequencies, says what it is of; a name ends with what is known, as in ``H1 Ch2/Ch1 Real``."""
+    if (alone := unit or name).lower() in FREQUENCIES:
+        return "frequency", alone
+    if not name:
+        return "imag" if any((response_unit(unit) or ())[1:]) else "phase", unit
+    name, unit = (name[:-3], f"dB {unit}") if name.endswith("_db") else (name, unit)
+    ends = (name[m.end() :] for m in re.finditer("^|[_/]", name))
+    return next((e for e in ends if COLUMNS.has(e)), name), unit
+
+
 EXAMPLES = "m/N, mm/N, um/N, m/s/N, m/s2/N, g/N and the like, N/m, N/um"
 HEAD = "frequency_Hz, real_UNIT, imag_UNIT (or magnitude_UNIT, phase_deg) and, where there is one, coherence"
 
@@ -124,7 +134,7 @@ def _table(t: NamedTable, name: str) -> MeasuredResponse:
 
 def _in_form(t: NamedTable, form: tuple[str, str], frequency: Floats) -> Complex:
     """(frequencies,) m/N, by the two columns of a form."""
-    polar, unit = form == FORMS[1], (written := t.units.get(form[0], ""))
+    polar, unit = form == FORMS[1], t.units.get(form[0], "")
     if polar and (level := LEVEL.fullmatch(unit)):
         unit = level[2] or t.fail("expected what 0 dB is, as in [dB re 1 m/N]", "magnitude")
         t.values["magnitude"] = float(level[1] or 1) * 10 ** (t.values["magnitude"] / 20)
@@ -137,11 +147,9 @@ def _in_form(t: NamedTable, form: tuple[str, str], frequency: Floats) -> Complex
     kind, power = (None, 1) if known is None else _kind(known)
     if known is None or kind is None or (not polar and t.units["imag"] != unit):
         t.fail(f"expected the columns {HEAD}, UNIT one of {EXAMPLES}; found {', '.join(t.header.values())}")
-    name = PREFIX.sub(
-        "", re.sub(r"[\W_]+", "_", t.header.get(form[0], "").replace(written, "").lower()).strip("_")
-    )
-    if MEANT.get(name, (kind, power)) != (kind, power):
-        t.fail(f"expected a unit of {name.replace('_', ' ')}; found {unit}", form[0])
+    words = re.sub(r"[\W_]+", "_", t.header.get(form[0], "").lower())
+    if wrong := [n for n, meant in MEANT.items() if n in words and meant != (kind, power)]:
+        t.fail(f"expected a unit of {wrong[0].replace('_', ' ')}; found {unit}", form[0])
     a, b = (t.values[n] for n in form)
     if polar:
         steps = np.abs(np.diff(b, prepend=b[:1])) <= 2 * np.pi + 0.01

@@ -43,7 +43,7 @@ UNITS = {
     "deg": ResponseUnit(math.pi / 180),
 }  # fmt: skip
 SPELLINGS = {
-    "µ": "u", "μ": "u", "·": "*", "×": "*", ".": "*", "²": "^2", "⁻¹": "^-1", "⁻²": "^-2", "**": "^", "inch": "in",
+    "µ": "u", "μ": "u", "·": "*", "×": "*", ".": "*", "²": "^2", "⁻¹": "^-1", "⁻²": "^-2", "**": "^", "inch": "in", "_per_": "/", " per ": "/",
 }  # fmt: skip
 UNREADABLE = "\ufffd"  # what a reader of UTF-8 makes of µ and ² in another encoding
 LONGEST = 80  # characters

@@ -16,7 +16,7 @@ from stiffmap.model.link import load_link
 from stiffmap.model.link.gmshmesh import gmsh_session, mesh_file
 from stiffmap.model.link.identify import identify_link
 from stiffmap.model.link.mesh import checked_mesh
-from stiffmap.model.link.readers import read_dat, read_field
+from stiffmap.model.link.readers import read_field, read_listing
 from stiffmap.model.link.solve import Material, Setup, ccx_input, has_ccx, solve_ccx, solve_skfem
 from stiffmap.ui.cli import main
 
@@ -264,7 +264,7 @@ def test_frd_of_a_calculix_run_is_read(tmp_path):
     (tmp_path / "t.inp").write_text(deck)
     subprocess.run(["ccx", "t"], cwd=tmp_path, capture_output=True, check=True)
     points, u = read_field(tmp_path / "t.frd", "m")
-    _, printed = read_dat(tmp_path / "t.dat")
+    _, printed = read_listing(tmp_path / "t.dat")
     assert points == pytest.approx(mesh.nodes, abs=1e-6)
     assert u.shape == (6, 10, 3)
     assert u == pytest.approx(printed, abs=2e-5 * np.abs(printed).max())

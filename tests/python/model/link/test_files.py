@@ -12,7 +12,7 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.model.link import LinkFile, load_link, save_link
 from stiffmap.model.link.identify import identify_link
 from stiffmap.model.link.inputs import read_cases, read_material, read_part
-from stiffmap.model.link.readers import read_ansys, read_dat, read_field, read_frd
+from stiffmap.model.link.readers import read_field, read_frd, read_listing
 
 POINTS, U = noisy_field(n=10)
 
@@ -73,7 +73,7 @@ def test_dat_frd_and_ansys_hold_the_same_field(tmp_path):
     (tmp_path / "nodes.txt").write_text(
         "\n".join(f"{i + 1} {x} {y} {z}" for i, (x, y, z) in enumerate(POINTS))
     )
-    for numbers, fields in (read_dat(tmp_path / "a.dat"), read_ansys(tmp_path / "a.lis")):
+    for numbers, fields in (read_listing(tmp_path / "a.dat"), read_listing(tmp_path / "a.lis")):
         assert numbers.tolist() == list(range(1, 11))
         assert fields == pytest.approx(U[:2], rel=1e-5)
     p, fields = read_frd(tmp_path / "a.frd")
@@ -610,3 +610,45 @@ def test_no_link_file_is_written_that_cannot_be_read(tmp_path):
     ):
         save_link(LinkFile(C, np.zeros((36, 36)), np.zeros(3), {}), tmp_path / "link.yaml")
     assert not (tmp_path / "link.yaml").exists()
+
+
+def nastran(head, row):
+    return "".join(head(k) + "".join(map(row, range(1, len(u) + 1), u)) for k, u in enumerate(U[:2], 1))
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("a.rpt", nastran(lambda k: "\n  Node  U.Magnitude  U.U1  U.U2  U.U3\n  Label  @Loc 1  @Loc 1  @Loc 1  @Loc 1\n-----\n",
+                          lambda n, u: f"{n:6d}  9.E+00 {u[0]:.6E} {u[1]:.6E} {u[2]:.6E}\n")),
+        ("a.pch", nastran(lambda k: f"$DISPLACEMENTS   4\n$REAL OUTPUT   5\n$SUBCASE ID = {k}   6\n",
+                          lambda n, u: f"{n:10d}       G  {u[0]:18.6E}{u[1]:18.6E}{u[2]:18.6E}{7:8d}\n-CONT-   0.0  0.0  0.0   8\n")),
+        ("a.f06", nastran(lambda k: "1    BAR\n0      SUBCASE\n     D I S P L A C E M E N T   V E C T O R\n \n  POINT ID.   TYPE   T1  T2  T3  R1  R2  R3\n",
+                          lambda n, u: f"{n:10d}      G   {u[0]:.6E} {u[1]:.6E} {u[2]:.6E} 0.0 0.0 0.0\n")),
+    ],
+)  # fmt: skip
+def test_listings_by_the_names_of_their_columns(tmp_path, name, text):
+    _, fields = read_listing(write(tmp_path, name, text + "1    NEXT\n"))
+    np.testing.assert_allclose(fields, U[:2], rtol=1e-5)
+
+
+def test_forces_of_constraint_are_no_displacements(tmp_path):
+    head = (
+        "  F O R C E S   O F   C O N S T R A I N T\n\n  POINT ID.   TYPE   T1  T2  T3\n  7  G  1.0 2.0 3.0\n"
+    )
+    with pytest.raises(StiffmapError, match="expected nodal displacements, found none"):
+        read_listing(write(tmp_path, "a.f06", head))
+
+
+@pytest.mark.parametrize(
+    "names", ["U1 {0},U2 {0},U3 {0}", "DX {0},DY {0},DZ {0}", "Ux LC1 {0},Uy LC1 {0},Uz LC1 {0}"]
+)
+@pytest.mark.parametrize("unit", ["[mm]", ""])
+def test_cases_below_each_other_by_any_names(tmp_path, names, unit):
+    head = f"Load case,Node Label,X {unit},Y {unit},Z {unit},{names.format(unit)}\n"
+    rows = [f"{k},{n},{n},0,1,{10 * k + n},0,0\n" for k in (1, 2) for n in (1, 2, 3)]
+    points, fields = read_field(write(tmp_path, "f.csv", head + "".join(rows)), "mm")
+    np.testing.assert_allclose(points[:, 0], [1e-3, 2e-3, 3e-3])
+    np.testing.assert_allclose(fields[:, :, 0], [[11e-3, 12e-3, 13e-3], [21e-3, 22e-3, 23e-3]])
+    with pytest.raises(StiffmapError, match="expected cases in the order of the field"):
+        read_field(write(tmp_path, "g.csv", head + "".join(rows[3:] + rows[:3])), "mm")

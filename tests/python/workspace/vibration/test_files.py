@@ -571,3 +571,15 @@ def test_one_coherence_of_two_responses_is_of_neither(tmp_path):
     (tmp_path / "r.csv").write_text(f"{H1};Coherence\n5;1;0;1;0;1\n6;1;0;1;0;1\n")
     with pytest.raises(StiffmapError, match="Coherence: expected a coherence of each of 2 responses"):
         read_responses(tmp_path / "r.csv")
+
+
+@pytest.mark.parametrize(
+    "head",
+    ["Freq.,Accelerance Real (1/kg),Accelerance Imag (1/kg)", "Hz,H1 X Real [m/s2/N],H1 X Imaginär [m/s2/N]", "Freq_Hz,Re_m/s2_per_N,Im_m/s2_per_N"],
+)  # fmt: skip
+def test_a_name_ends_with_its_part(head, tmp_path):
+    path = tmp_path / "r.csv"
+    head = head.replace("Freq.", "Freq. [Hz]")
+    path.write_text(f"{head}\n10,1,2\n20,3,4\n30,5,6\n", encoding="utf-8")
+    (one,) = read_responses(path)
+    np.testing.assert_allclose(one.receptance[1], (3 + 4j) / (40j * np.pi) ** 2)

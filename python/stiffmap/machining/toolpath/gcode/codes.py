@@ -43,7 +43,7 @@ GROUPS_M = {
     **dict.fromkeys((7.0, 8.0, 9.0), "coolant"), **dict.fromkeys((48.0, 49.0), "override"), 6.0: "tool",
 }  # fmt: skip
 REFUSED_G = {
-    54.1: "offsets beyond G59 (write G54)", 154.0: "offsets beyond G59 (write G54)", 70.0: "Siemens's inches (write G20)", 71.0: "Siemens's mm (write G21)", 5.2: "NURBS", 10.0: "tables set by the program", 16.0: "polar coordinates", 28.1: "reference points set by the program",
+    54.1: "offsets beyond G59 (write G54)", 154.0: "offsets beyond G59 (write G54)", **dict.fromkeys((70.0, 700.0), "Siemens's inches (write G20)"), **dict.fromkeys((71.0, 710.0), "Siemens's mm (write G21)"), 5.2: "NURBS", 10.0: "tables set by the program", 16.0: "polar coordinates", 28.1: "reference points set by the program",
     30.1: "reference points set by the program", 33.0: "threads", 38.2: "probing", 41.0: "cutter radius compensation (write the path of the centre, G40)",
     42.0: "cutter radius compensation (write the path of the centre, G40)", 92.0: "offsets set by the program",
     51.0: "scaling", 51.1: "mirror images", 52.0: "offsets set by the program", 65.0: "macros", 66.0: "macros",
