@@ -239,7 +239,7 @@ class _Wanted:
         if m.columns:
             dialogue.asked(m, ask, partial(seated, m))
             dialogue.asked(m, ask, same)
-            as_seen(m, self.difference)
+            as_seen(m, self.difference, self.wrote is not None)
         elif self.wrote is not None:
             if less := as_readings(m, self.wrote):
                 compared(m, self.difference, measured, self.deflection, less)

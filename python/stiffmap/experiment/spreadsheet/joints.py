@@ -14,7 +14,7 @@ from stiffmap.common.tables.header import with_unit
 from stiffmap.common.tables.orientation import quaternion
 from stiffmap.common.units import Unit, unit_of
 from stiffmap.experiment.channels import AXES
-from stiffmap.experiment.files.fields import SEEN
+from stiffmap.experiment.files.fields import POSE, SEEN
 from stiffmap.experiment.spreadsheet.answers import Meant
 from stiffmap.experiment.spreadsheet.guess import READINGS, Column, guess
 from stiffmap.solve.machine import Machine
@@ -163,19 +163,22 @@ def _unit(m: Meant, index: int, name: str, slides: bool) -> Unit:
     return m.unit(index, *names, quantity=quantity)
 
 
-def as_seen(m: Meant, difference: str) -> None:
+def as_seen(m: Meant, difference: str, by_instrument: bool) -> None:
     """What was read as places in the instrument's own frame, where the table has them: frame, and place of the reflector on the
     tool, are then unknown.
 
     Places are columns `px py pz`, or, where nothing else is a reading, `X meas`; or targets and differences side by side; `x y z`
-    alone with joints are asked for.
+    alone with joints are asked for, unless an instrument is named that wrote them.
     """
     header = m.sheet.header
     columns = m.guessed
     if not any(k.meaning in READINGS and k.meaning not in AXES[3:] for k in columns):
-        for k in columns:
-            if k.meaning == "note" and (found := re.fullmatch(MEASURED, k.name.lower())):
-                m.chosen[f"p{found[1]}"] = [header[k.index]]
+        notes = [(k, re.fullmatch(MEASURED, k.name.lower())) for k in columns if k.meaning == "note"]
+        places = {seen[1]: k for k, seen in notes if seen}
+        for a, k in (
+            places or {k.meaning: k for k in columns if by_instrument and k.meaning in POSE}
+        ).items():
+            m.chosen[f"p{a}"] = [header[k.index]]
     if wide := [f"'{header[k.index]}'" for k in m.guessed if k.meaning in SEEN and k.repeat]:
         raise StiffmapError(
             f"{m.sheet.file}: expected one place in each row; found {', '.join(wide)}: write the places of several targets, or repeats, "

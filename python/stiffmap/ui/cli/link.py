@@ -25,7 +25,7 @@ from stiffmap.ui.cli.output import Answer
 
 
 def command(
-    part: Path = argument("beam.yaml, .step, .msh, or a field: .csv .dat .frd .vtu .lis .rpt"),
+    part: Path = argument("beam.yaml, .step, .msh, or a field: .csv .dat .f06 .frd .lis .pch .rpt .vtu"),
     fixed: str = option("Face that is held; a+b joins faces.", "fixed"),
     loaded: str = option("Face that carries the load and the spring.", "loaded"),
     material: str | None = option("A name (steel, aluminium, ...) or 70GPa,0.33."),
@@ -33,7 +33,9 @@ def command(
     reference: str | None = option("x,y,z of the spring in mm; else the face's centre."),
     size: float | None = option("Edge length of the elements in mm."),
     unit: str | None = option("Length unit of a file that does not carry it."),
-    nodes: Path | None = option("Coordinates for .dat, .lis and .rpt: node x y z."),
+    nodes: Path | None = option(
+        "Coordinates for files of node numbers (.dat, .f06, .lis, .pch, .rpt): node x y z."
+    ),
     solver: str = option("auto, ccx or skfem.", "auto"),
     quick: bool = flag("One mesh, one boundary: no share of these.", "--quick"),
     support: str = option(

@@ -57,6 +57,15 @@ def test_names_of_reflectors_are_targets(
     assert f"'{column}' names the target that was read" in out
 
 
+def test_a_tracker_that_is_named_read_the_places_next_to_joints(tmp_path: Path) -> None:
+    text, (by_map, named) = arm_sheet("Target", ("N1", "N2")), (tmp_path / "map", tmp_path / "tracker")
+    by_map.mkdir(), named.mkdir()
+    one = made(by_map, text, *SEEN, machine="dh")
+    other = made(named, text, "--instrument", "tracker", *SEEN[6:], machine="dh")
+    assert one is not None and other is not None and other.quantity == "position"
+    np.testing.assert_array_equal(one.reading, other.reading)
+
+
 def test_what_names_no_target_stays_a_note(tmp_path: Path) -> None:
     for column, names in (("Remark", ("a", "b")), ("Target", ("1.25", "2.5"))):
         e = made(tmp_path / names[0], arm_sheet(column, names), *SEEN, machine="dh")

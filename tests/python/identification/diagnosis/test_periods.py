@@ -8,6 +8,7 @@ import pytest
 import stiffmap as sm
 from stiffmap.experiment import Predictor, random_plan
 from stiffmap.model.description import AppliedEffect
+from stiffmap.model.effects.library.commands import frequencies
 
 
 def diagnosed(
@@ -45,3 +46,17 @@ def test_every_wave_of_a_drive_is_found_and_nothing_else(
         for name, true in (("amplitude", amplitude), ("period", period)):
             value, low, high, _ = e.parameters[name]
             assert abs(value - true) < high - low, f"{name} {value} [{low}, {high}]"
+
+
+@pytest.mark.parametrize("number", [6, 11, 40])
+def test_poses_in_equal_steps_show_no_wave_shorter_than_two_steps(number: int) -> None:
+    step = 0.07
+    equal, rng = step * np.arange(number), np.random.default_rng(number)
+    apart = np.sort(rng.uniform(0.0, equal[-1], number))
+    found = {name: frequencies(float(np.ptp(u)), u) for name, u in (("equal", equal), ("apart", apart))}
+    assert 1.0 / found["equal"].max() == pytest.approx(2.0 * step, rel=0.2)
+    assert 1.0 / found["apart"].max() < step
+    # a shorter one is a longer one there, and is not elsewhere
+    for u, alike in ((equal, True), (apart, False)):
+        short, long = (np.exp(2j * np.pi * f * u) for f in (0.8 / step, 0.2 / step))
+        assert (np.abs(short @ long) / number > 0.99) == alike

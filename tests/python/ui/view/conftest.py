@@ -18,7 +18,7 @@ FLAGS = (
 )  # fmt: skip
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
     """A browser with a fresh profile and no network but this computer; skips where there is none."""
     pytest.importorskip("viser", reason="viser is not installed (pip install stiffmap[view])")
@@ -51,7 +51,7 @@ def browser(chromium: Any) -> Iterator[Any]:
         page.close()
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def drawn(chromium: Any) -> Iterator[tuple[Any, Any]]:
     """A view and its page, which takes seconds to draw its first picture."""
     from stiffmap.ui.view.open import View, model_of

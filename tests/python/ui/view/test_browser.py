@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.python.ui.view.pages import client_of, on_screen, pixels, pulled, until, works
+from tests.python.ui.view.pages import client_of, on_screen, opened, pixels, pulled, until, works
 
 import stiffmap as sm
 from stiffmap.ui.cli import main
@@ -120,26 +120,27 @@ def close_to(found: Callable[[], float], wanted: float) -> bool:
     return found() == pytest.approx(wanted, rel=1e-6)
 
 
-def test_decimals_are_taken_and_shown_in_every_field(shown: tuple[View, Any]) -> None:
-    view, page = shown
-    for tab, fields in FIELDS.items():
-        page.get_by_role("tab", name=tab).click()
-        for name, text, value, wanted in fields:
-            box = page.get_by_role("textbox", name=name)
-            box.fill(text)
-            box.press("Enter")
-            near = partial(close_to, lambda v=value: v(view), wanted)
-            typed = partial(close_to, lambda b=box: float(b.input_value()), float(text))
-            assert until(near, 10), (name, value(view))
-            assert until(typed, 10), (name, box.input_value())
-    page.get_by_role("tab", name="Numbers").click()
-    page.get_by_role("button", name="All as in the file").click()
-    own = next(iter(view._viewer.controls.numbers.all.values()))
-    typed = page.get_by_role("textbox", name="Value, SI")
-    assert until(lambda: float(typed.input_value()) == pytest.approx(own, rel=1e-9)), (
-        own,
-        typed.input_value(),
-    )
+def test_decimals_are_taken_and_shown_in_every_field(browser: Any) -> None:
+    with View(model_of(sm.load_machine("orthoglide-revised"))) as view:
+        page = opened(browser, view)
+        for tab, fields in FIELDS.items():
+            page.get_by_role("tab", name=tab).click()
+            for name, text, value, wanted in fields:
+                box = page.get_by_role("textbox", name=name)
+                box.fill(text)
+                box.press("Enter")
+                near = partial(close_to, lambda v=value: v(view), wanted)
+                shown = partial(close_to, lambda b=box: float(b.input_value()), float(text))
+                assert until(near, 10), (name, value(view))
+                assert until(shown, 10), (name, box.input_value())
+        page.get_by_role("tab", name="Numbers").click()
+        page.get_by_role("button", name="All as in the file").click()
+        own = next(iter(view._viewer.controls.numbers.all.values()))
+        shown = page.get_by_role("textbox", name="Value, SI")
+        assert until(lambda: float(shown.input_value()) == pytest.approx(own, rel=1e-9)), (
+            own,
+            shown.input_value(),
+        )
 
 
 def test_every_field_of_a_number_has_decimals() -> None:
