@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
@@ -179,7 +180,12 @@ def as_seen(m: Meant, difference: str, by_instrument: bool) -> None:
             places or {k.meaning: k for k in columns if by_instrument and k.meaning in POSE}
         ).items():
             m.chosen[f"p{a}"] = [header[k.index]]
-    if wide := [f"'{header[k.index]}'" for k in m.guessed if k.meaning in SEEN and k.repeat]:
+    wide = [f"'{header[k.index]}'" for k in m.guessed if k.meaning in SEEN and k.repeat]
+    if not any(k.meaning in SEEN for k in m.guessed):  # N1x, N1y, N1z, N2x …
+        axes = [(k, re.fullmatch(r"(?i)(.+?)[ _.-]?[xyz]", k.name)) for k in columns if k.meaning == "note"]
+        of = Counter(found[1] for _, found in axes if found)
+        wide += [f"'{header[k.index]}'" for k, found in axes if found and of[found[1]] == 3 and len(of) > 1]
+    if wide:
         raise StiffmapError(
             f"{m.sheet.file}: expected one place in each row; found {', '.join(wide)}: write the places of several targets, or repeats, "
             "in rows one below the other, with a column 'Target' that names the target"

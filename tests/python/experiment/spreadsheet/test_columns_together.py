@@ -434,15 +434,22 @@ def test_a_lone_reading_without_load_is_not_dropped_in_silence(
     assert "'gauge unloaded [mm]' is in no reading" in capsys.readouterr().out
 
 
+@pytest.mark.parametrize(
+    ("places", "found", "more"),
+    [
+        ("X1,Y1,Z1,X2,Y2,Z2", "'X1', 'Y1'", ("--map", "px=X1|X2", "--map", "py=Y1|Y2", "--map", "pz=Z1|Z2", "--unit", "length=mm")),
+        ("N1x [mm],N1y [mm],N1z [mm],N2x [mm],N2y [mm],N2z [mm]", "'N1x [mm]', 'N1y [mm]'", ()),
+        ("SMR 1 X,SMR 1 Y,SMR 1 Z,SMR 2 X,SMR 2 Y,SMR 2 Z", "'SMR 1 X', 'SMR 1 Y'", ("--instrument", "tracker")),
+    ],
+)  # fmt: skip
 def test_places_side_by_side_are_refused_with_the_way(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    places: str, found: str, more: tuple[str, ...], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     joints = "J1 [deg],J2 [deg],J3 [deg],J4 [deg],J5 [deg],J6 [deg]"
-    text = f"{joints},X1,Y1,Z1,X2,Y2,Z2\n10,-20,30,40,50,60,1,2,3,4,5,6\n40,-30,20,10,20,30,7,8,9,10,11,12\n"
-    more = ("--map", "px=X1|X2", "--map", "py=Y1|Y2", "--map", "pz=Z1|Z2", "--unit", "length=mm")
+    text = f"{joints},{places}\n10,-20,30,40,50,60,1,2,3,4,5,6\n40,-30,20,10,20,30,7,8,9,10,11,12\n"
     assert made(tmp_path, text, *more, machine="dh") is None
     err = capsys.readouterr().err
-    assert "expected one place in each row; found 'X1', 'Y1'" in err and "a column 'Target'" in err
+    assert f"expected one place in each row; found {found}" in err and "a column 'Target'" in err
 
 
 def test_a_deviation_in_another_unit_names_the_file(
