@@ -164,6 +164,15 @@ def _unit(m: Meant, index: int, name: str, slides: bool) -> Unit:
     return m.unit(index, *names, quantity=quantity)
 
 
+def _several(columns: Sequence[Column]) -> list[Column]:
+    """Places of several targets, or repeats, in one row: X1 … Z2, or N1x … N2z where nothing else is a place."""
+    if seen := [k for k in columns if k.meaning in SEEN]:
+        return [k for k in seen if k.repeat]
+    axes = [(k, re.fullmatch(r"(?i)(.+?)[ _.-]?[xyz]", k.name)) for k in columns if k.meaning == "note"]
+    targets = Counter(found[1] for _, found in axes if found)
+    return [k for k, found in axes if found and targets[found[1]] == 3 and len(targets) > 1]
+
+
 def as_seen(m: Meant, difference: str, by_instrument: bool) -> None:
     """What was read as places in the instrument's own frame, where the table has them: frame, and place of the reflector on the
     tool, are then unknown.
@@ -180,11 +189,7 @@ def as_seen(m: Meant, difference: str, by_instrument: bool) -> None:
             places or {k.meaning: k for k in columns if by_instrument and k.meaning in POSE}
         ).items():
             m.chosen[f"p{a}"] = [header[k.index]]
-    wide = [f"'{header[k.index]}'" for k in m.guessed if k.meaning in SEEN and k.repeat]
-    if not any(k.meaning in SEEN for k in m.guessed):  # N1x, N1y, N1z, N2x …
-        axes = [(k, re.fullmatch(r"(?i)(.+?)[ _.-]?[xyz]", k.name)) for k in columns if k.meaning == "note"]
-        of = Counter(found[1] for _, found in axes if found)
-        wide += [f"'{header[k.index]}'" for k, found in axes if found and of[found[1]] == 3 and len(of) > 1]
+    wide = [f"'{header[k.index]}'" for k in _several(m.guessed)]
     if wide:
         raise StiffmapError(
             f"{m.sheet.file}: expected one place in each row; found {', '.join(wide)}: write the places of several targets, or repeats, "
