@@ -20,7 +20,7 @@ from stiffmap.identification.candidates.candidates import Candidate, candidates
 from stiffmap.identification.clock import Clock
 from stiffmap.model.description import AppliedEffect
 from stiffmap.model.effects import Parameter, get, kinds
-from stiffmap.model.effects.evidence import Periods, Tried, signatures_on_a_grid
+from stiffmap.model.effects.evidence import Many, Tried, signatures_on_a_grid
 
 Shape = tuple[tuple[str, float], ...]
 Start = Callable[[Floats], Mapping[str, float]]
@@ -39,22 +39,16 @@ Key = tuple[Candidate, Parameter]
 
 
 @dataclass(frozen=True, eq=False)
-class Wave:
-    """Sine and cosine of one of many periods: columns that are made where they are asked for, never kept."""
+class OneOf:
+    """Columns at one of many values that are tried alike."""
 
-    periods: Periods
+    many: Many
     number: int
     index: Index
 
     def lines(self, use: Integers | slice) -> Floats:
-        """(2, N) columns of some of the readings."""
-        rows, channel = self.index[0][use], self.index[1][use]
-        out = np.zeros((2, len(rows)))
-        turn = 2.0 * np.pi * self.periods.frequencies[self.number]
-        for travel, change in zip(self.periods.travels, self.periods.changes, strict=True):
-            angle, slope = turn * travel[rows], change[rows, channel]
-            out += slope * np.stack([np.sin(angle), np.cos(angle)])
-        return out
+        """(p, N) columns of some of the readings."""
+        return self.many.columns(self.number, self.index[0][use], self.index[1][use])
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +68,7 @@ class Variant:
     """
 
     candidate: Candidate
-    columns: Floats | Wave
+    columns: Floats | OneOf
     sign: Floats
     shape: Shape = ()
     start: Start | None = None
@@ -82,7 +76,7 @@ class Variant:
 
     def lines(self, use: Integers | slice = EVERY) -> Floats:
         """(p, N) the columns, one per line, of some of the readings, else of all."""
-        return self.columns.lines(use) if isinstance(self.columns, Wave) else self.columns[:, use]
+        return self.columns.lines(use) if isinstance(self.columns, OneOf) else self.columns[:, use]
 
 
 def variants(
@@ -96,12 +90,12 @@ def variants(
     solved, last, finite = np.isfinite(base), None, False
     for s in (get(candidate.kind).signature or signatures_on_a_grid)(PlanProbe(predictor, base), tried):
         shape = tuple(s.values.items())
-        if s.period is not None:
-            periods, k = s.period
-            if periods is not last:  # once for all of its frequencies
-                last, finite = periods, all(np.isfinite(c[solved]).all() for c in periods.changes)
-            columns: Floats | Wave | None = Wave(periods, k, index) if finite else None
-            sign = np.full(2, float(s.grows))
+        if s.one_of is not None:
+            many, k = s.one_of
+            if many is not last:  # once for all of its values
+                last, finite = many, all(np.isfinite(c[solved]).all() for c in many.changes)
+            columns: Floats | OneOf | None = OneOf(many, k, index) if finite else None
+            sign = np.full(many.size, float(s.grows))
         elif s.columns is not None:
             columns, sign = lines_of(s.columns, base, index), np.full(s.columns.shape[-1], float(s.grows))
         else:

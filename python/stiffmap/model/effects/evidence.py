@@ -148,17 +148,65 @@ class Tried:
     """Those that a fit may move, with the units and bounds of the place."""
 
 
+Integers = NDArray[np.intp]
+
+
+class Many(Protocol):
+    """An effect at many values of a parameter without a null: columns that are made where they are asked for, never kept."""
+
+    @property
+    def changes(self) -> Sequence[Floats]:
+        """(n, c) changes of the readings, of which columns are made."""
+
+    @property
+    def size(self) -> int:
+        """Columns at each value."""
+
+    def columns(self, k: int, rows: Integers, channel: Integers) -> Floats:
+        """(size, N) change of N readings at the k-th value."""
+
+
 @dataclass(frozen=True, eq=False)
 class Periods:
-    """Signatures of one effect at many frequencies: sine and cosine of 2π f u, u a coordinate of each row, times a change
-    of its readings; the sum over several such coordinates."""
+    """At many frequencies: sine and cosine of 2π f u, u a coordinate of each row, times a change of its readings; the sum over
+    several such coordinates."""
 
     travels: Sequence[Floats]
     """(n,) coordinates u, m or rad."""
     changes: Sequence[Floats]
-    """(n, c) change of the readings with each of them."""
+    """With each of them."""
     frequencies: Floats
     """(F,) equally spaced, 1/m or 1/rad."""
+    size: int = 2
+
+    def columns(self, k: int, rows: Integers, channel: Integers) -> Floats:
+        """(2, N)."""
+        out = np.zeros((2, len(rows)))
+        turn = 2.0 * np.pi * self.frequencies[k]
+        for travel, change in zip(self.travels, self.changes, strict=True):
+            angle, slope = turn * travel[rows], change[rows, channel]
+            out += slope * np.stack([np.sin(angle), np.cos(angle)])
+        return out
+
+
+@dataclass(frozen=True, eq=False)
+class Onsets:
+    """From many rows on: changes that readings of some number and later have."""
+
+    changes: Sequence[Floats]
+    number: Integers
+    """(n,) of each row."""
+    first: Integers
+    """(F,)."""
+
+    @property
+    def size(self) -> int:
+        """One column for each change."""
+        return len(self.changes)
+
+    def columns(self, k: int, rows: Integers, channel: Integers) -> Floats:
+        """(size, N)."""
+        return np.where(self.number[rows] < self.first[k], 0.0, [c[rows, channel] for c in self.changes])
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,9 +225,8 @@ class Signature:
         Whether strengths can only be positive.
     most
         Largest strength that a machine can have.
-    period
-        In place of columns: all periods that are tried alike, and the number of this one. They are not written out
-        where rows are many.
+    one_of
+        In place of columns: all values that are tried alike, and the number of this one.
     """
 
     values: Mapping[str, float]
@@ -187,7 +234,7 @@ class Signature:
     start: Callable[[Floats], Mapping[str, float]] | None = None
     grows: bool = False
     most: float = np.inf
-    period: tuple[Periods, int] | None = None
+    one_of: tuple[Many, int] | None = None
 
 
 Load = Callable[[Floats, Plan, AppliedEffect], Floats]

@@ -15,7 +15,7 @@ def command(
     base: str | None = option(
         "Process file or shipped name: tool, cut and speed that no column has.", None, "--process"
     ),
-    sheet: str | None = option("Sheet of a workbook; the first where none is named."),
+    sheet: str | None = option("Sheet of a workbook; the first with a table where none is named."),
     output: Path | None = written("Process file, for mill, lobes, map and so on."),
 ) -> Answer:
     """Coefficients of the cutting force from a dynamometer's table.

@@ -51,7 +51,7 @@ class Picture(Figure):
     """A figure that a notebook shows, whether pyplot is loaded or not."""
 
     def draw(self, renderer: RendererBase) -> None:
-        """Where matplotlib wants the layout alone and draws nothing, nothing but the layout is computed."""
+        """Where matplotlib wants the layout alone, for which it puts what draws nothing on the renderer itself, only that is computed."""
         engine = self.get_layout_engine() if self.axes and "open_group" in vars(renderer) else None
         if engine is not None:
             engine.execute(self)

@@ -95,7 +95,7 @@ def signature(probe: Probe, tried: Tried) -> Iterator[Signature]:
     tried_ones = frequencies(reach, next(iter(travel.values())))
     periods = Periods(list(travel.values()), [each[g] for g in legs], tried_ones)
     for k, frequency in enumerate(tried_ones):
-        yield Signature({"period": 1.0 / frequency}, None, start, period=(periods, k))
+        yield Signature({"period": 1.0 / frequency}, None, start, one_of=(periods, k))
 
 
 def frequencies(reach: float, travel: Floats) -> Floats:

@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.description import AppliedEffect
-from stiffmap.model.effects.evidence import Plan, Probe, Reading, Signature, Tried
+from stiffmap.model.effects.evidence import Onsets, Plan, Probe, Reading, Signature, Tried
 from stiffmap.model.effects.library.geometry import AXES, components, rotation_of, rotations, translation_of
 from stiffmap.model.effects.sites import at, at_sites, elastic_drives
 from stiffmap.model.effects.types import EffectType, Option, Parameter
@@ -210,6 +210,8 @@ DRIFT = EffectType(
 )
 
 
+MOST_JUMPS = 1000
+"""Effort only: of more readings than are compared."""
 SINCE = Parameter(
     "since",
     "1",
@@ -239,13 +241,17 @@ def since(plan: Plan, first: float) -> Floats:
 
 
 def jumps(probe: Probe, tried: Tried) -> Iterator[Signature]:
-    """Since every reading but the first."""
-    first, *others = np.unique(np.asarray(probe.plan.order))
-    linear = [((p.name, p.scale), ("since", float(first))) for p in tried.parameters if p.null is not None]
+    """Since every reading but the first, or since `MOST_JUMPS` of them."""
+    orders, number = np.unique(np.asarray(probe.plan.order), return_inverse=True)
+    linear = [
+        ((p.name, p.scale), ("since", float(orders[0]))) for p in tried.parameters if p.null is not None
+    ]
     changes = [probe.change(AppliedEffect("frame_jump", "sensor", (), given)) for given in linear]
-    for order in others:
-        after = since(probe.plan, float(order))[:, None, None]
-        yield Signature({"since": float(order)}, np.stack(changes, axis=-1) * after)
+    last = len(orders) - 1
+    first = np.linspace(1, last, min(last, MOST_JUMPS)).round().astype(np.intp)
+    steps = Onsets(changes, number.reshape(-1), first)
+    for k, order in enumerate(orders[first]):
+        yield Signature({"since": float(order)}, one_of=(steps, k))
 
 
 FRAME_JUMP = EffectType(
