@@ -215,8 +215,8 @@ MOST_JUMPS = 1000
 SINCE = Parameter(
     "since",
     "1",
-    0.0,
-    1e9,
+    -1e12,
+    1e12,
     None,
     1.0,
     "order of the first reading that has it; between two, that share of it in the first",
