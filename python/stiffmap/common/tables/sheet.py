@@ -93,12 +93,14 @@ def read_sheet(path: Path, sheet: str | None = None, layout: Layout = PLAIN) -> 
     Comment lines are skipped; the header is the line before the first row of mostly numbers. Raises FileError, also where
     several tables are on a sheet and `layout` does not say which.
     """
-    if sheet or path.suffix.lower() not in WORKBOOKS:
+    try:
         return _read(path, sheet, layout)
-    for name in (names := sheet_names(path)):
-        with suppress(NoTableError):
-            return _read(path, name, layout)
-    return _read(path, names[0], layout)
+    except NoTableError:
+        others = [] if sheet or path.suffix.lower() not in WORKBOOKS else sheet_names(path)[1:]
+        for name in others:
+            with suppress(NoTableError):
+                return _read(path, name, layout)
+        raise
 
 
 def _read(path: Path, sheet: str | None, layout: Layout) -> Table:

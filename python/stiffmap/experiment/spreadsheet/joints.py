@@ -185,12 +185,11 @@ def as_seen(m: Meant, difference: str, by_instrument: bool) -> None:
     if not any(k.meaning in READINGS and k.meaning not in AXES[3:] for k in columns):
         notes = [(k, re.fullmatch(MEASURED, k.name.lower())) for k in columns if k.meaning == "note"]
         places = {seen[1]: k for k, seen in notes if seen}
-        for a, k in (
-            places or {k.meaning: k for k in columns if by_instrument and k.meaning in POSE}
-        ).items():
+        if by_instrument and not places:
+            places = {k.meaning: k for k in columns if k.meaning in POSE}
+        for a, k in places.items():
             m.chosen[f"p{a}"] = [header[k.index]]
-    wide = [f"'{header[k.index]}'" for k in _several(m.guessed)]
-    if wide:
+    if wide := [f"'{header[k.index]}'" for k in _several(m.guessed)]:
         raise StiffmapError(
             f"{m.sheet.file}: expected one place in each row; found {', '.join(wide)}: write the places of several targets, or repeats, "
             "in rows one below the other, with a column 'Target' that names the target"

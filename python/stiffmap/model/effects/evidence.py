@@ -191,13 +191,13 @@ class Periods:
 
 @dataclass(frozen=True, eq=False)
 class Onsets:
-    """From many rows on: changes that readings of some number and later have."""
+    """Since many readings: changes that those of an order and later have."""
 
     changes: Sequence[Floats]
-    number: Integers
-    """(n,) of each row."""
-    first: Integers
-    """(F,)."""
+    order: Floats
+    """(n,)."""
+    first: Floats
+    """(F,) orders."""
 
     @property
     def size(self) -> int:
@@ -206,7 +206,7 @@ class Onsets:
 
     def columns(self, k: int, rows: Integers, channel: Integers) -> Floats:
         """(size, N)."""
-        return np.where(self.number[rows] < self.first[k], 0.0, [c[rows, channel] for c in self.changes])
+        return np.where(self.order[rows] < self.first[k], 0.0, [c[rows, channel] for c in self.changes])
 
 
 @dataclass(frozen=True, eq=False)

@@ -118,9 +118,9 @@ def read_listing(path: str | Path) -> Rows:
         moved = [i for i, name in enumerate(names) if _MOVED.fullmatch(name)]
         if len(moved) != 3:
             continue
-        rows = _node_rows(
-            path, _WORDS.split(text[head.end() :], maxsplit=1)[0], (len(names) + 1, 7), moved[0]
-        )
+        words = _WORDS.search(text, head.end())
+        listed = text[head.end() : words.start() if words else None]
+        rows = _node_rows(path, listed, (len(names) + 1, 7), moved[0])
         if cases and not cases[-1].keys() & rows.keys():
             cases[-1].update(rows)
         else:

@@ -40,6 +40,29 @@ def test_a_clock_that_is_missing_is_said(orthoglide: sm.Machine, plan: Experimen
         Predictor(orthoglide, replace(plan, hours=None))((drift("hour"),))
 
 
+def jump(since: float) -> AppliedEffect:
+    return AppliedEffect("frame_jump", "sensor", (), (("x", 2e-6), ("z", -1e-6), ("since", since)))
+
+
+@pytest.mark.parametrize(
+    ("since", "has"),
+    [(3.0, [0, 0, 0, 1, 1, 1]), (3.25, [0, 0, 0, 0.75, 1, 1]), (9.0, [0] * 6), (-2.0, [1] * 6)],
+)
+def test_a_jump_is_in_the_reading_since_when_and_all_later_ones(
+    orthoglide: sm.Machine, plan: Experiment, since: float, has: list[float]
+) -> None:
+    """Whatever other readings there are."""
+    for rows in (np.arange(6), np.array([0, 1, 2, 4]), np.array([5, 3, 0])):
+        predictor = Predictor(orthoglide, plan.rows(rows))
+        moved = predictor((jump(since),)) - predictor(())
+        np.testing.assert_allclose(moved[:, :3], np.outer(has, [2e-6, 0.0, -1e-6])[rows], atol=1e-15)
+
+
+def test_a_jump_without_an_order_is_refused(orthoglide: sm.Machine, plan: Experiment) -> None:
+    with pytest.raises(sm.StiffmapError, match="a jump since a reading needs a column 'order'"):
+        Predictor(orthoglide, replace(plan, order=None))((jump(3.0),))
+
+
 def test_hours_are_kept_in_files(plan: Experiment, tmp_path: Path) -> None:
     noisy = replace(plan, reading=np.where(plan.read, 1e-5, np.nan))
     save_experiment(noisy, tmp_path / "twin")

@@ -183,16 +183,21 @@ FRAME_OFFSET = EffectType(
 )
 
 
+def recorded(plan: Plan, column: str, what: str) -> Floats:
+    """(n,) order or hours. StiffmapError where the experiment, which `what` needs it of, has no such column."""
+    found: Floats | None = getattr(plan, column)
+    if found is None:
+        raise StiffmapError(f"{plan.name}: {what} needs a column '{column}'")
+    return found
+
+
 def drift(plan: Plan, term: AppliedEffect) -> Floats:
     """(n, 6) proportional to the order of measurement or to the hours, zero at the first reading.
 
     StiffmapError where the experiment has no such column.
     """
     per = str(dict(term.options).get("per", "order"))
-    column = "hours" if per == "hour" else "order"
-    clock = plan.hours if per == "hour" else plan.order
-    if clock is None:
-        raise StiffmapError(f"{plan.name}: drift per {per} needs a column '{column}'")
+    clock = recorded(plan, "hours" if per == "hour" else "order", f"drift per {per}")
     rate = np.concatenate([translation_of(dict(term.parameters), ""), np.zeros(3)])
     return np.asarray((clock - clock.min())[:, None] * rate)
 
@@ -219,39 +224,31 @@ SINCE = Parameter(
     1e12,
     None,
     1.0,
-    "order of the first reading that has it; between two, that share of it in the first",
+    "order of the first reading that has it, all of it but for the fraction",
 )
 
 
 def jump(plan: Plan, term: AppliedEffect) -> Floats:
-    """(n, 6) the shift of the instrument's frame in all readings since one."""
+    """(n, 6) the shift of the instrument's frame in all readings of an order and later. StiffmapError where there is no order."""
     values = dict(term.parameters)
-    return np.outer(since(plan, values["since"]), [*translation_of(values, ""), 0.0, 0.0, 0.0])
-
-
-def since(plan: Plan, first: float) -> Floats:
-    """(n,) 1 for readings from an order on and 0 for those before, straight from one reading to the next.
-
-    StiffmapError where the experiment has no order.
-    """
-    if plan.order is None:
-        raise StiffmapError(f"{plan.name}: a jump since a reading needs a column 'order'")
-    orders, number = np.unique(plan.order, return_inverse=True)
-    return np.clip(number.reshape(-1) - np.interp(first, orders, np.arange(len(orders))) + 1.0, 0.0, 1.0)
+    has = np.clip(_order(plan) - values["since"] + 1.0, 0.0, 1.0)
+    return np.outer(has, [*translation_of(values, ""), 0.0, 0.0, 0.0])
 
 
 def jumps(probe: Probe, tried: Tried) -> Iterator[Signature]:
     """Since every reading but the first, or since `MOST_JUMPS` of them."""
-    orders, number = np.unique(np.asarray(probe.plan.order), return_inverse=True)
-    linear = [
-        ((p.name, p.scale), ("since", float(orders[0]))) for p in tried.parameters if p.null is not None
-    ]
+    order = _order(probe.plan)
+    first, *others = np.unique(order)
+    linear = [((p.name, p.scale), ("since", float(first))) for p in tried.parameters if p.null is not None]
     changes = [probe.change(AppliedEffect("frame_jump", "sensor", (), given)) for given in linear]
-    last = len(orders) - 1
-    first = np.linspace(1, last, min(last, MOST_JUMPS)).round().astype(np.intp)
-    steps = Onsets(changes, number.reshape(-1), first)
-    for k, order in enumerate(orders[first]):
-        yield Signature({"since": float(order)}, one_of=(steps, k))
+    tried_ones = np.linspace(0, len(others) - 1, min(len(others), MOST_JUMPS)).round().astype(np.intp)
+    onsets = Onsets(changes, order, np.array(others)[tried_ones])
+    for k, since in enumerate(onsets.first):
+        yield Signature({"since": float(since)}, one_of=(onsets, k))
+
+
+def _order(plan: Plan) -> Floats:
+    return recorded(plan, "order", "a jump since a reading")
 
 
 FRAME_JUMP = EffectType(
