@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import NoReturn
+from typing import NoReturn, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,6 +18,8 @@ from stiffmap.common.outputs import unguarded
 from stiffmap.common.tables.cells import Cells
 from stiffmap.common.tables.header import split_unit
 from stiffmap.common.tables.lines import Spelling, number, with_points
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -79,6 +81,15 @@ class Table:
         """The table and one column of numbers (rows,) more, empty where they are NaN."""
         cells = ["" if v != v else repr(v) for v in np.asarray(values, dtype=float).tolist()]
         return self.with_cells(name, (c.replace(".", ",") for c in cells) if self.decimal_comma else cells)
+
+    def repeated(self, times: int) -> Table:
+        """Every row so often, one below the other."""
+
+        def each(values: Iterable[T]) -> list[T]:
+            return [v for v in values for _ in range(times)]
+
+        columns = tuple(Cells.of(each(c)) for c in self.columns)
+        return replace(self, columns=columns, lines=each(self.lines))
 
     def with_points(self, column: int) -> Cells:
         """A column of numbers as text, with decimal points."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
@@ -36,6 +35,12 @@ MOST_DEGREES = 7200.0
 DIFFERENCES = ("actual-minus-target", "target-minus-actual")
 UNITS = ("mm", "um", "m", "in", "mil")
 """In which differences may be."""
+SIDE_BY_SIDE = r"(?i)(.+?)[ _.-]?([xyz])|([xyz])[ _.-]?(\d+)"
+"""A place's coordinate, next to those of other places."""
+COUNTED = r"[ _.-]*(\d+|\b[a-zA-Z])$"
+"""How names of targets differ."""
+TOUCH, RIGID = 3e-3, 0.01
+"""m, within which no two targets are; share of their distance by which it may differ from pose to pose."""
 EXACT = 1e-9
 """m, by which numbers differ that are the same."""
 NO_DIFFERENCE = "{}: --difference: no column is a difference; say --map dx='HEADER' where one is"
@@ -164,13 +169,40 @@ def _unit(m: Meant, index: int, name: str, slides: bool) -> Unit:
     return m.unit(index, *names, quantity=quantity)
 
 
-def _several(columns: Sequence[Column]) -> list[Column]:
-    """Places of several targets, or repeats, in one row: X1 … Z2, or N1x … N2z where nothing else is a place."""
-    if seen := [k for k in columns if k.meaning in SEEN]:
-        return [k for k in seen if k.repeat]
-    axes = [(k, re.fullmatch(r"(?i)(.+?)[ _.-]?[xyz]", k.name)) for k in columns if k.meaning == "note"]
-    targets = Counter(found[1] for _, found in axes if found)
-    return [k for k, found in axes if found and targets[found[1]] == 3 and len(targets) > 1]
+def _below_each_other(m: Meant) -> None:
+    """Places side by side, X1 … Z2, or N1x … N2z where nothing else is a place, in rows below each other: of several targets, or
+    repeats where they coincide. StiffmapError where their names or distances are not those of targets on one tool."""
+    groups: dict[str, dict[str, int]] = {}
+    seen = any(k.meaning in SEEN for k in m.guessed)
+    for k in m.guessed:
+        part = re.fullmatch(SIDE_BY_SIDE, k.name) if k.meaning == "note" and not seen else None
+        if k.meaning in SEEN and k.repeat:
+            groups.setdefault(str(k.repeat), {})[k.meaning[-1]] = k.index
+        elif part:
+            groups.setdefault(part[1] or part[4], {})[(part[2] or part[3]).lower()] = k.index
+    groups = {name: at for name, at in groups.items() if len(at) == len(POSE)}
+    if len(groups) < 2:
+        return
+    places = np.stack([m.metres([at[a] for a in POSE], SEEN) for at in groups.values()], axis=1)
+    apart = np.linalg.norm(places[:, 1:] - places[:, :1], axis=2)
+    usual = np.nanmedian(apart, axis=0)
+    if (
+        len({re.sub(COUNTED, "", name) for name in groups}) > 1
+        or (np.nanmedian(np.abs(apart - usual), axis=0) > RIGID * usual + TOUCH).any()
+    ):
+        found = ", ".join(f"'{m.sheet.header[i]}'" for at in groups.values() for i in at.values())
+        raise StiffmapError(
+            f"{m.sheet.file}: expected one place in each row, or those of targets on one tool, numbered and always as far apart; "
+            f"found {found}: say --map px='HEADER' --map py='HEADER' --map pz='HEADER'"
+        )
+    m.sheet = m.sheet.repeated(len(groups))
+    for meaning, values in zip(SEEN, places.reshape(-1, len(SEEN)).T, strict=True):
+        m.add(f"{meaning} of all", "mm", np.round(1e3 * values, 9), meaning)
+    what = "repeats"
+    if (usual > TOUCH).any():
+        m.sheet = m.sheet.with_cells("target of all", [*groups] * (len(m.sheet) // len(groups)))
+        m.chosen["target"], what = ["target of all"], "each a target with a place of its own on the tool"
+    m.said.append(f"places side by side are taken below each other: {', '.join(groups)}, {what}")
 
 
 def as_seen(m: Meant, difference: str, by_instrument: bool) -> None:
@@ -189,11 +221,7 @@ def as_seen(m: Meant, difference: str, by_instrument: bool) -> None:
             places = {k.meaning: k for k in columns if k.meaning in POSE}
         for a, k in places.items():
             m.chosen[f"p{a}"] = [header[k.index]]
-    if wide := [f"'{header[k.index]}'" for k in _several(m.guessed)]:
-        raise StiffmapError(
-            f"{m.sheet.file}: expected one place in each row; found {', '.join(wide)}: write the places of several targets, or repeats, "
-            "in rows one below the other, with a column 'Target' that names the target"
-        )
+    _below_each_other(m)
     of = {k.meaning: k for k in m.guessed if k.repeat == 0}
     if difference != DIFFERENCES[0] and ({*SEEN, "ll"} & {*of}):
         raise StiffmapError(NO_DIFFERENCE.format(m.sheet.file))

@@ -434,22 +434,47 @@ def test_a_lone_reading_without_load_is_not_dropped_in_silence(
     assert "'gauge unloaded [mm]' is in no reading" in capsys.readouterr().out
 
 
+SIDE_BY_SIDE = (
+    "J1 [deg],J2 [deg],J3 [deg],J4 [deg],J5 [deg],J6 [deg],{}\n10,-20,30,40,50,60,{}\n40,-30,20,10,20,30,{}\n"
+)
+TRACKER = ("--instrument", "tracker", "--unit", "length=mm")
+
+
 @pytest.mark.parametrize(
-    ("places", "found", "more"),
+    ("places", "one", "other", "targets"),
     [
-        ("X1,Y1,Z1,X2,Y2,Z2", "'X1', 'Y1'", ("--map", "px=X1|X2", "--map", "py=Y1|Y2", "--map", "pz=Z1|Z2", "--unit", "length=mm")),
-        ("N1x [mm],N1y [mm],N1z [mm],N2x [mm],N2y [mm],N2z [mm]", "'N1x [mm]', 'N1y [mm]'", ()),
-        ("SMR 1 X,SMR 1 Y,SMR 1 Z,SMR 2 X,SMR 2 Y,SMR 2 Z", "'SMR 1 X', 'SMR 1 Y'", ("--instrument", "tracker")),
+        ("N1x [mm],N1y [mm],N1z [mm],N2x [mm],N2y [mm],N2z [mm]", "1,2,3,41,2,3", "7,8,9,7,48,9", ["N1", "N2"] * 2),
+        ("SMR a X,SMR a Y,SMR a Z,SMR b X,SMR b Y,SMR b Z", "1,2,3,41,2,3", ",,,7,48,9", ["SMR a", "SMR b", "SMR b"]),
+        ("X1,Y1,Z1,X2,Y2,Z2,X3,Y3,Z3", "1,2,3,41,2,3,1,2,50", "7,8,9,7,48,9,54,8,9", ["1", "2", "3"] * 2),
+        ("px1,py1,pz1,px2,py2,pz2", "1,2,3,1.1,2,3", "7,8,9,7,8.1,9", None),
     ],
 )  # fmt: skip
-def test_places_side_by_side_are_refused_with_the_way(
-    places: str, found: str, more: tuple[str, ...], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+def test_places_side_by_side_are_taken_below_each_other(
+    places: str, one: str, other: str, targets: list[str] | None, tmp_path: Path
 ) -> None:
-    joints = "J1 [deg],J2 [deg],J3 [deg],J4 [deg],J5 [deg],J6 [deg]"
-    text = f"{joints},{places}\n10,-20,30,40,50,60,1,2,3,4,5,6\n40,-30,20,10,20,30,7,8,9,10,11,12\n"
-    assert made(tmp_path, text, *more, machine="dh") is None
+    e = made(tmp_path, SIDE_BY_SIDE.format(places, one, other), *TRACKER, machine="dh")
+    rows = np.genfromtxt(tmp_path / "e" / "data.csv", names=True, delimiter=",", dtype=None, encoding=None)
+    wanted = np.array([float(v) for v in f"{one},{other}".split(",") if v]).reshape(
+        -1, 3
+    )  # what was not read has no row
+    np.testing.assert_array_equal(np.stack([rows[s] for s in ("px", "py", "pz")], axis=1), wanted)
+    assert rows["q1"].tolist() == sorted(rows["q1"])
+    assert e is not None and (list(e.target) if "target" in rows.dtype.names else None) == targets
+
+
+@pytest.mark.parametrize(
+    ("places", "one", "other"),
+    [
+        ("Front x,Front y,Front z,Controller x,Controller y,Controller z", "1,2,3,41,2,3", "7,8,9,7,48,9"),
+        ("N1x,N1y,N1z,N2x,N2y,N2z", "1,2,3,41,2,3", "7,8,9,7,98,9"),
+    ],
+)
+def test_places_side_by_side_of_other_points_are_refused_with_the_way(
+    places: str, one: str, other: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert made(tmp_path, SIDE_BY_SIDE.format(places, one, other), *TRACKER, machine="dh") is None
     err = capsys.readouterr().err
-    assert f"expected one place in each row; found {found}" in err and "a column 'Target'" in err
+    assert "sheet.csv: expected one place in each row" in err and "--map px='HEADER'" in err
 
 
 def test_a_deviation_in_another_unit_names_the_file(
