@@ -21,6 +21,7 @@ from stiffmap.ui.cli.output import Answer
 MM = 1e3
 WORSE = "worse: these commands would enlarge the error of these readings; the file does not hold where they were taken"
 BETTER = "better"
+LOST, NOTHING = "rows without an answer", "none"
 BEYOND = "rows beyond what the machine was calibrated by"
 
 LINE, LOADS = {"through", "zero", "format", "output"}, {"effect", "force", "gravity"}
@@ -55,7 +56,7 @@ def command(
 
     The machine is the corrected one: what its controller believes, with the effects that a diagnosis found. Weight,
     load, play and friction on the side of the approach are in the commands; --urdf and --dh hold what geometry can.
-    Exit codes: 1 where --check finds that compensation would make the error larger, 2 bad input.
+    Exit codes: 1 where a row has no answer, or --check finds that compensation would make the error larger, 2 bad input.
 
     Examples:
       [cyan]stiffmap compensate corrected.yaml poses.csv -o commands.csv[/cyan]
@@ -98,7 +99,8 @@ def command(
             out |= _commands(compensation.compensate(m, poses, wrench=load, gravity=pull), output)
         out |= {} if check is None else _checked(m, check)
     lines = (f"{key}: {value}" for key, value in out.items())
-    return Answer(out, lines, finding=out.get("verdict") == WORSE)
+    lost = out.get(LOST, NOTHING) != NOTHING
+    return Answer(out, lines, finding=lost or out.get("verdict") == WORSE)
 
 
 def _checked(m: Machine, folder: Path) -> dict[str, object]:
@@ -147,13 +149,13 @@ def _commands(found: compensation.Commands, output: Path | None) -> dict[str, ob
     told: dict[str, object] = {"orientation": found.turns} if found.turns else {}
     if found.beyond is not None:
         far = [found.ids[i] for i in np.flatnonzero(found.beyond)]
-        told[BEYOND] = first_of(far) or "none"
+        told[BEYOND] = first_of(far) or NOTHING
     return told | {
         "rows": len(found.ids),
         "corrected components": " ".join(found.components),
         "rms error at declared commands, mm": round(MM * found.rms(found.before), 6),
         "rms error at compensated commands, mm": round(MM * found.rms(found.after), 9),
-        "rows without an answer": ", ".join(lost) or "none",
+        LOST: first_of(lost) or NOTHING,
     }
 
 

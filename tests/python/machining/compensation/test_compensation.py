@@ -280,3 +280,12 @@ def test_the_whole_loop_from_the_command_line(tmp_path: Path, capsys: pytest.Cap
     wanted = np.array([[0.05, 0.0, 0.02], [-0.08, 0.06, 0.0]])
     error = commanded + real.solve(commanded).displacement[:, :3] - wanted
     assert np.abs(error).max() < 5e-6 < 0.1 * np.abs(real.solve(wanted).displacement[:, :3]).max()
+
+
+@pytest.mark.parametrize(("rows", "lost"), [("9000,0,0", "1"), ("0,0,0\n9000,0,0\n9100,0,0", "2, 3")])
+def test_a_row_without_an_answer_is_a_finding(
+    rows: str, lost: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "poses.csv").write_text(f"x,y,z\n{rows}\n")
+    assert main(["compensate", "orthoglide-revised", str(tmp_path / "poses.csv")]) == 1
+    assert f"rows without an answer: {lost}\n" in capsys.readouterr().out
