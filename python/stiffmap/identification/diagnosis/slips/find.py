@@ -22,7 +22,7 @@ from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.identification.candidates.sensitivity import CandidatePlan, Variant
 from stiffmap.identification.diagnosis.slips.axes import Hypothesis, Slip, gauges, loads, moved, shifts, steps
 from stiffmap.identification.diagnosis.slips.factors import factors
-from stiffmap.identification.inference.places import Shape, shape_of
+from stiffmap.identification.inference.places import Shape, shape_of, side_by_side
 from stiffmap.model.effects import get
 
 MOST, LEFT = 0.5, 0.1
@@ -33,6 +33,8 @@ BETTER = 0.5
 """Share of what the best part of the machine leaves that a mistake may leave."""
 PAIRED = 24
 """Parts of the machine, those that take most alone, with which each other one is tried; effort only."""
+DUST = 1e-13
+"""Of the length of a direction, squared: parts that differ by less show the same."""
 SAME = 0.1
 """Relative difference of what two mistakes leave below which the readings do not distinguish them."""
 KEPT = 2.0
@@ -69,9 +71,22 @@ class Screen:
 
     def left_by_two(self, residual: Floats) -> float:
         """Chi-square that the best two parts together leave of a residual (N,)."""
+        best, of = self.left(residual), float(residual @ residual)
         parts = np.argsort(-self._gains(residual))
-        pairs = ((a, b) for k, a in enumerate(parts[:PAIRED]) for b in parts[k + 1 :])
-        return min([self.left(residual), *(self._left_by(residual, *two) for two in pairs)])
+        factor = side_by_side([self.shapes[k] for k in parts])
+        _, count, rank = factor.shape
+        flat = factor.reshape(len(residual), -1)
+        gram = (flat.T @ flat).reshape(count, rank, count, rank).swapaxes(1, 2)
+        both = np.stack(np.triu_indices(min(PAIRED, count), 1, count), axis=1)
+        of_two = gram[both[:, :, None], both[:, None, :]].swapaxes(2, 3).reshape(-1, 2 * rank, 2 * rank)
+        along = (flat.T @ residual).reshape(count, rank)[both].reshape(-1, 2 * rank)
+        held = of_two + DUST * len(residual) * np.eye(2 * rank)
+        taken = np.sum(along * np.linalg.solve(held, along[..., None])[..., 0], axis=-1)
+        for k in np.argsort(-taken):
+            if of - taken[k] >= best:  # whatever their bounds
+                break
+            best = min(best, self._left_by(residual, *parts[both[k]]))
+        return best
 
     def _gains(self, residual: Floats) -> Floats:
         """What each part takes from chi-square, whatever its bounds."""
