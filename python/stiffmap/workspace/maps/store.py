@@ -73,8 +73,6 @@ def _both(old: object, new: object) -> str:
     return "differs" if max(map(len, texts)) > LONG else f"was {texts[0]}, is {texts[1]}"
 
 
-BLOCKS_PER_FLUSH = 32
-"""Blocks that a power cut may cost; writing back after each would take a third of the time."""
 UNREADABLE = (OSError, ValueError, TypeError, SyntaxError, TokenError)
 """What numpy raises for a damaged array: its header is Python's text."""
 
@@ -84,27 +82,20 @@ class Store:
 
     def __init__(self, arrays: dict[str, np.ndarray], done: NDArray[np.bool_]) -> None:
         self.arrays, self.done = arrays, done
-        self._waiting: list[slice] = []
 
-    def put(self, rows: slice, block: dict[str, np.ndarray]) -> None:
-        """Keep a block."""
-        for name, values in block.items():
+    def put(self, rows: slice, values: dict[str, np.ndarray]) -> None:
+        """Keep some rows; they count as done only once their values are on the disk."""
+        for name, new in values.items():
             target = self.arrays[name][rows]
-            target[...] = values.reshape(target.shape)
-        self._waiting.append(rows)
-        if len(self._waiting) >= BLOCKS_PER_FLUSH:
-            self.flush()
+            target[...] = new.reshape(target.shape)
+            _flush(self.arrays[name])
+        self.done[rows] = True
+        _flush(self.done)
 
-    def flush(self) -> None:
-        """Rows count as done only once their values are on the disk."""
-        mapped = [a for a in self.arrays.values() if isinstance(a, np.memmap)]
-        for array in mapped:
-            array.flush()
-        for rows in self._waiting:
-            self.done[rows] = True
-        if isinstance(self.done, np.memmap):
-            self.done.flush()
-        self._waiting.clear()
+
+def _flush(array: np.ndarray) -> None:
+    if isinstance(array, np.memmap):
+        array.flush()
 
 
 def memory_store(plan: MapPlan) -> Store:
@@ -155,20 +146,20 @@ class ZarrMap:
 
     def __init__(self, plan: MapPlan, folder: Path) -> None:
         self.plan, self.folder = plan, folder
-        self.done: NDArray[np.bool_] = np.zeros(len(plan.tiles), dtype=bool)
+        self.done: NDArray[np.bool_] = np.zeros(plan.rows, dtype=bool)
 
-    def put(self, index: int, values: dict[str, np.ndarray]) -> None:
+    def put(self, tile: slice, values: dict[str, np.ndarray]) -> None:
         """Write a tile's chunks. FileError where the disk refuses."""
-        plane, y = self.plan.place(index)
-        kept = f"; {int(self.done.sum())} of {len(self.done)} tiles are kept, resume=True (--resume) goes on with them"
+        done = [bool(self.done[rows].all()) for rows in self.plan.tiles]
+        kept = f"; {sum(done)} of {len(done)} tiles are kept, resume=True (--resume) goes on with them"
         with onto_disk(self.folder, kept):
             for name, array in values.items():
-                self._arrays[name][plane, y] = array
-        self.done[index] = True
+                self._arrays[name][self.plan.place(tile)] = array
+        self.done[tile] = True
 
-    def chunk(self, name: str, index: int) -> Path:
+    def chunk(self, name: str, tile: slice) -> Path:
         """File of a variable's chunk."""
-        plane, y = self.plan.place(index)
+        plane, y = self.plan.place(tile)
         tail = ["0"] * (1 + len(self._arrays[name].shape) - 3)
         return self.folder.joinpath(name, "c", str(plane), str(y.start // self.plan.tile_height), *tail)
 
@@ -212,12 +203,12 @@ class ZarrMap:
                 shutil.copyfile(path, target)
         for scrap in self.folder.rglob("*.partial"):  # chunks that zarr had not put in their place
             scrap.unlink()
-        for index in range(len(self.done)):
-            chunks = {n: self.chunk(n, index) for n in self._arrays}
-            self.done[index] = all(path.exists() for path in chunks.values())
-            for name, path in chunks.items() if self.done[index] else ():
+        for tile in self.plan.tiles:
+            chunks = {n: self.chunk(n, tile) for n in self._arrays}
+            self.done[tile] = there = all(path.exists() for path in chunks.values())
+            for name, path in chunks.items() if there else ():
                 try:
-                    self._arrays[name][self.plan.place(index)]
+                    self._arrays[name][self.plan.place(tile)]
                 except Exception as error:  # whatever zarr meets in it
                     raise FileError(
                         f"is damaged: {error}; delete this chunk, and resume=True (--resume) computes it again",

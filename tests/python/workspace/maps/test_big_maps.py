@@ -75,9 +75,9 @@ JOB = """
     from stiffmap.workspace.maps.store import ZarrMap
     plan.TILE_POSES = 24
     real = ZarrMap.put
-    def slow(self, index, values):
-        print(index, flush=True)
-        real(self, index, values)
+    def slow(self, tile, values):
+        print(tile, flush=True)
+        real(self, tile, values)
         time.sleep(0.02)
     ZarrMap.put = slow
     axis = np.linspace(-0.2, 0.3, 12)
@@ -118,10 +118,10 @@ class PowerCut(Exception):
 def half_done(machine: sm.Machine, out: Path, monkeypatch: pytest.MonkeyPatch, tiles_kept: int = 4) -> Path:
     real, left = ZarrMap.put, iter(range(tiles_kept))
 
-    def put(self: ZarrMap, index: int, values: dict[str, Any]) -> None:
+    def put(self: ZarrMap, tile: slice, values: dict[str, Any]) -> None:
         if next(left, None) is None:
             raise PowerCut
-        real(self, index, values)
+        real(self, tile, values)
 
     with monkeypatch.context() as patch:
         patch.setattr(ZarrMap, "put", put)
@@ -227,11 +227,11 @@ def test_two_jobs_on_one_output_are_told_apart(
 ) -> None:
     real = ZarrMap.put
 
-    def put(self: ZarrMap, index: int, values: dict[str, Any]) -> None:
-        if index == 1:
+    def put(self: ZarrMap, tile: slice, values: dict[str, Any]) -> None:
+        if self.done.any():
             with pytest.raises(sm.StiffmapError, match="is being written by another job"):
                 sm.error_map(machine, **CALL, out=tmp_path / "m.zarr", resume=True)
-        real(self, index, values)
+        real(self, tile, values)
 
     monkeypatch.setattr(ZarrMap, "put", put)
     sm.error_map(machine, **CALL, out=tmp_path / "m.zarr").close()
@@ -276,12 +276,12 @@ def test_a_cluster_that_loses_workers_gives_the_same_bytes(
 ) -> None:
     real, killed = ZarrMap.put, []
 
-    def put(self: ZarrMap, index: int, values: dict[str, Any]) -> None:
+    def put(self: ZarrMap, tile: slice, values: dict[str, Any]) -> None:
         if not killed:
             killed.extend(list(cluster.run(os.getpid).values())[:lost])
             for process in killed:
                 os.kill(process, signal.SIGKILL)
-        real(self, index, values)
+        real(self, tile, values)
 
     monkeypatch.setattr(ZarrMap, "put", put)
     sm.error_map(machine, **CALL, out=tmp_path / "m.zarr", scheduler=cluster.scheduler.address).close()
