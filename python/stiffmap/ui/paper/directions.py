@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 
 import numpy as np
 
-from stiffmap.model.description import Element, Joint, Spring
 from stiffmap.solve.machine import Machine
 from stiffmap.ui.paper.results import POINTS, Results
 from stiffmap.ui.paper.statement import Statement, by_point, judge, of_section_5_3, rounds_to
@@ -147,33 +145,17 @@ def _axis(angle: float) -> str:
     return f"{angle % 180:.1f}/{angle % 180 - 180:.1f} deg"
 
 
-SCALES = ((0, 1), (1, 0), (0, 0), (1, 1), (10, 1), (1, 10), (0, 10))
-"""Factors on the compliances of foot and actuator, 0 is rigid."""
+RIGID = 1e-3  # times the declared compliance: to all digits shown, rigid
+SCALES = ((RIGID, 1), (1, RIGID), (RIGID, RIGID), (1, 1), (10, 1), (1, 10), (RIGID, 10))
+"""Factors on the compliances of foot and actuator."""
 
 
 def ratio_range(machine: Machine, position: Sequence[float]) -> tuple[float, float]:
     """Least and largest max/min deflection in the xy plane (zero load) over the variants."""
     ratios = []
     for foot, actuator in SCALES:
-        c = varied(machine, foot, actuator).solve(position).compliance[:2, :2]
-        size = np.linalg.svd(c, compute_uv=False)
+        varied = machine.with_effect("compliance", element="foot", scale=foot)
+        varied = varied.with_effect("compliance", element="actuator", scale=actuator)
+        size = np.linalg.svd(varied.solve(position).compliance[:2, :2], compute_uv=False)
         ratios.append(float(size[0] / size[1]))
     return min(ratios), max(ratios)
-
-
-def varied(machine: Machine, foot: float, actuator: float) -> Machine:
-    """The machine with foot and actuator compliances multiplied."""
-    legs = tuple(
-        replace(leg, elements=tuple(_varied(e, foot, actuator) for e in leg.elements))
-        for leg in machine.description.legs
-    )
-    return Machine(replace(machine.description, legs=legs))
-
-
-def _varied(e: Element, foot: float, actuator: float) -> Element:
-    if isinstance(e, Spring) and e.name == "foot" and e.compliance is not None:
-        return replace(e, compliance=tuple(tuple(foot * v for v in row) for row in e.compliance))
-    if isinstance(e, Joint) and e.actuated and e.law is not None:
-        law = replace(e.law, stiffness=e.law.stiffness / actuator) if actuator else None
-        return replace(e, law=law)
-    return e

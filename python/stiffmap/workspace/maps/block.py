@@ -133,6 +133,7 @@ def deviation(j: Floats, d: Floats, parts: tuple[int, ...], covariance: Floats) 
 
 
 POSES_AT_ONCE = 1024
+PART = 8192  # poses at least that are kept at once, which a power cut may cost
 
 
 def solve_rows(plan: MapPlan, rows: slice, poses: int = POSES_AT_ONCE) -> dict[str, np.ndarray]:
@@ -155,7 +156,7 @@ class Work:
     def parts(self, plan: MapPlan) -> list[slice]:
         """All rows, in parts that are kept as soon as they are solved."""
         if self.scheduler is None:
-            return blocks_of(slice(0, plan.rows), plan.x.size, self.poses)
+            return blocks_of(slice(0, plan.rows), plan.x.size, max(self.poses, PART))
         return plan.tiles
 
     def solved(self, plan: MapPlan, parts: Sequence[slice]) -> Iterator[tuple[int, dict[str, np.ndarray]]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -22,7 +23,7 @@ from stiffmap.workspace.maps.block import POSES_AT_ONCE, Work, solve_block, work
 from stiffmap.workspace.maps.files import is_zarr, onto_disk, partial_folder, read_dataset, write_dataset
 from stiffmap.workspace.maps.loading import track
 from stiffmap.workspace.maps.plan import MapPlan, blocks_of, map_plan
-from stiffmap.workspace.maps.store import Store, folder_store, memory_store, open_zarr_map
+from stiffmap.workspace.maps.store import Store, ZarrMap, folder_store, memory_store, open_zarr_map
 
 OTHER_FORMATS = (".csv", ".json", ".ods", ".parquet", ".txt", ".xlsx", ".yaml")
 
@@ -106,7 +107,7 @@ def error_map(
         if resume:
             raise StiffmapError("resume: nothing is kept without out=, next to which an interrupted run lies")
         store = memory_store(plan)
-        _fill(plan, store, work, progress)
+        _fill(plan, store, work.parts(plan), work, progress)
         ds = plan.dataset(store.arrays)
         hint_metres(machine, np.r_[plan.x, plan.y, plan.z], bool((ds.status == Status.UNREACHABLE).all()))
         return ds
@@ -121,14 +122,13 @@ def error_map(
     return read_dataset(target)
 
 
-def _fill(plan: MapPlan, store: Store, work: Work, progress: bool | None) -> None:
-    """Solve the rows that are not done."""
-    missing = [rows for rows in work.parts(plan) if not store.done[rows].all()]
-    try:
-        for number, values in track(work.solved(plan, missing), len(missing), "map", progress):
-            store.put(missing[number], values)
-    finally:
-        store.flush()
+def _fill(
+    plan: MapPlan, store: Store | ZarrMap, parts: Sequence[slice], work: Work, progress: bool | None
+) -> None:
+    """Solve the parts that are not done."""
+    missing = [rows for rows in parts if not store.done[rows].all()]
+    for number, values in track(work.solved(plan, missing), len(missing), "map", progress):
+        store.put(missing[number], values)
 
 
 def _to_netcdf(plan: MapPlan, out: Path, resume: bool, work: Work, progress: bool | None) -> None:
@@ -136,17 +136,14 @@ def _to_netcdf(plan: MapPlan, out: Path, resume: bool, work: Work, progress: boo
     with onto_disk(out, f"; a map of {plan.rows * plan.x.size} poses"):
         store = folder_store(plan, folder, resume)
     needs_space(out, sum(a.nbytes for a in store.arrays.values()), "the finished map")
-    _fill(plan, store, work, progress)
+    _fill(plan, store, work.parts(plan), work, progress)
     write_dataset(plan.dataset(store.arrays), out)
     shutil.rmtree(folder)
 
 
 def _to_zarr(plan: MapPlan, out: Path, resume: bool, work: Work, progress: bool | None) -> None:
     store = open_zarr_map(plan, partial_folder(out), resume)
-    missing = np.flatnonzero(~store.done).tolist()
-    parts = [plan.tiles[i] for i in missing]
-    for number, values in track(work.solved(plan, parts), len(parts), "map", progress):
-        store.put(missing[number], values)
+    _fill(plan, store, plan.tiles, work, progress)
     store.finish(out)
 
 

@@ -140,9 +140,8 @@ class MapPlan:
         planes = [slice(first, first + self.y.size) for first in range(0, self.rows, self.y.size)]
         return [tile for plane in planes for tile in blocks_of(plane, 1, self.tile_height)]
 
-    def place(self, tile: int) -> tuple[int, slice]:
-        """Plane and rows of it (indices of z and y)."""
-        rows = self.tiles[tile]
+    def place(self, rows: slice) -> tuple[int, slice]:
+        """Plane of a tile, and its rows there (indices of z and y)."""
         plane, first = divmod(rows.start, self.y.size)
         return plane, slice(first, first + rows.stop - rows.start)
 

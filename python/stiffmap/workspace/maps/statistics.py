@@ -71,8 +71,8 @@ def map_statistics(
     counts = np.zeros((plan.z.size, len(plan.wrenches), len(Status)), dtype=np.int64)
     for index, values in track(work.solved(plan, plan.tiles), len(plan.tiles), "map", progress):
         for name, one in found.items():
-            one.add(index, values[name])
-        plane, _ = plan.place(index)
+            one.add(plan.tiles[index], values[name])
+        plane, _ = plan.place(plan.tiles[index])
         status = values["status"].reshape(-1, len(plan.wrenches))
         counts[plane] += np.stack([(status == s).sum(0) for s in Status], axis=-1)
     out: dict[str, object] = {}
@@ -100,9 +100,9 @@ class _Deflection:
         self.within = np.zeros((nz, ny, cases))
         self.histograms = [[Histogram() for _ in range(cases)] for _ in range(nz)]
 
-    def add(self, index: int, values: Floats) -> None:
+    def add(self, tile: slice, values: Floats) -> None:
         """Values (rows, x[, case]) of a tile."""
-        plane, y = self.plan.place(index)
+        plane, y = self.plan.place(tile)
         a = values.reshape(y.stop - y.start, self.plan.x.size, self.cases)
         self.column[y] = np.fmax(self.column[y], a)
         widths = cells(self.plan.x)

@@ -1,22 +1,21 @@
 """Where a map grows: in memory, in a folder of plain arrays that an interrupted run leaves behind, or in a Zarr folder, a chunk of every
 variable per tile, which survives being killed.
 
-While a Zarr map grows, its folder is called ``NAME.zarr.partial`` and holds a journal next to the arrays: a line for each tile whose
-chunks are complete, with their checksums. The finished folder holds the map alone, so that its bytes don't depend on interruptions,
-threads or the order of the tiles.
+While a Zarr map grows, its folder is called ``NAME.zarr.partial``. A tile is done where all of its chunks are there, each of which
+holds its checksum; zarr puts a chunk in its place when it is whole. The finished folder's bytes don't depend on interruptions, threads
+or the order of the tiles.
 """
 
 from __future__ import annotations
 
 import json
 import shutil
-import tempfile
-import zlib
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from functools import cached_property, partial, reduce
 from operator import getitem
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from tokenize import TokenError
 from typing import Any
 
@@ -27,7 +26,7 @@ from numpy.typing import NDArray
 
 from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.json_text import parse_json
-from stiffmap.common.outputs import add_lines, mapped_array, put_folder, write_text
+from stiffmap.common.outputs import mapped_array, put_folder, write_text
 from stiffmap.workspace.maps.files import onto_disk, write_zarr, zarr_package
 from stiffmap.workspace.maps.plan import MapPlan
 
@@ -74,8 +73,6 @@ def _both(old: object, new: object) -> str:
     return "differs" if max(map(len, texts)) > LONG else f"was {texts[0]}, is {texts[1]}"
 
 
-BLOCKS_PER_FLUSH = 32
-"""Blocks that a power cut may cost; writing back after each would take a third of the time."""
 UNREADABLE = (OSError, ValueError, TypeError, SyntaxError, TokenError)
 """What numpy raises for a damaged array: its header is Python's text."""
 
@@ -85,27 +82,20 @@ class Store:
 
     def __init__(self, arrays: dict[str, np.ndarray], done: NDArray[np.bool_]) -> None:
         self.arrays, self.done = arrays, done
-        self._waiting: list[slice] = []
 
-    def put(self, rows: slice, block: dict[str, np.ndarray]) -> None:
-        """Keep a block."""
-        for name, values in block.items():
+    def put(self, rows: slice, values: dict[str, np.ndarray]) -> None:
+        """Keep some rows; they count as done only once their values are on the disk."""
+        for name, new in values.items():
             target = self.arrays[name][rows]
-            target[...] = values.reshape(target.shape)
-        self._waiting.append(rows)
-        if len(self._waiting) >= BLOCKS_PER_FLUSH:
-            self.flush()
+            target[...] = new.reshape(target.shape)
+            _flush(self.arrays[name])
+        self.done[rows] = True
+        _flush(self.done)
 
-    def flush(self) -> None:
-        """Rows count as done only once their values are on the disk."""
-        mapped = [a for a in self.arrays.values() if isinstance(a, np.memmap)]
-        for array in mapped:
-            array.flush()
-        for rows in self._waiting:
-            self.done[rows] = True
-        if isinstance(self.done, np.memmap):
-            self.done.flush()
-        self._waiting.clear()
+
+def _flush(array: np.ndarray) -> None:
+    if isinstance(array, np.memmap):
+        array.flush()
 
 
 def memory_store(plan: MapPlan) -> Store:
@@ -147,7 +137,7 @@ def _kept(folder: Path, name: str, dtype: str, shape: tuple[int, ...]) -> np.nda
     )
 
 
-JOURNAL = "journal.jsonl"
+GROUP = "zarr.json"
 FILL = {"u1": 255, "u4": 0, "f8": np.nan}
 
 
@@ -156,22 +146,20 @@ class ZarrMap:
 
     def __init__(self, plan: MapPlan, folder: Path) -> None:
         self.plan, self.folder = plan, folder
-        self.done: NDArray[np.bool_] = np.zeros(len(plan.tiles), dtype=bool)
+        self.done: NDArray[np.bool_] = np.zeros(plan.rows, dtype=bool)
 
-    def put(self, index: int, values: dict[str, np.ndarray]) -> None:
-        """Write a tile's chunks, then its line in the journal. FileError where the disk refuses."""
-        plane, y = self.plan.place(index)
-        kept = f"; {int(self.done.sum())} of {len(self.done)} tiles are kept, resume=True (--resume) goes on with them"
+    def put(self, tile: slice, values: dict[str, np.ndarray]) -> None:
+        """Write a tile's chunks. FileError where the disk refuses."""
+        done = [bool(self.done[rows].all()) for rows in self.plan.tiles]
+        kept = f"; {sum(done)} of {len(done)} tiles are kept, resume=True (--resume) goes on with them"
         with onto_disk(self.folder, kept):
             for name, array in values.items():
-                self._arrays[name][plane, y] = array
-            line = json.dumps({"tile": index, "crc": {n: crc(self.chunk(n, index)) for n in values}})
-            add_lines(self.folder / JOURNAL, [line], flushed=False)
-        self.done[index] = True
+                self._arrays[name][self.plan.place(tile)] = array
+        self.done[tile] = True
 
-    def chunk(self, name: str, index: int) -> Path:
+    def chunk(self, name: str, tile: slice) -> Path:
         """File of a variable's chunk."""
-        plane, y = self.plan.place(index)
+        plane, y = self.plan.place(tile)
         tail = ["0"] * (1 + len(self._arrays[name].shape) - 3)
         return self.folder.joinpath(name, "c", str(plane), str(y.start // self.plan.tile_height), *tail)
 
@@ -185,7 +173,6 @@ class ZarrMap:
 
     def finish(self, out: Path) -> None:
         """Put the complete map in its place."""
-        (self.folder / JOURNAL).unlink(missing_ok=True)
         put_folder(self.folder, out)
 
     def frame(self, folder: Path) -> None:
@@ -203,69 +190,42 @@ class ZarrMap:
                 attributes={k: a.tolist() if isinstance(a, np.ndarray) else a for k, a in v.attrs.items()},
             )  # fmt: skip
 
-    def recover(self) -> None:
-        """Take up what an earlier run left.
+    def recover(self, frame: Path) -> None:
+        """Take up what an earlier run left; metadata and coordinates that are damaged are those of the empty map again.
 
         StiffmapError where it belongs to another map, FileError for a chunk that is damaged.
         """
-        refuse_another_map(self.plan.attrs, self.folder / "zarr.json", "attributes")
-        self._mend_frame()
+        refuse_another_map(self.plan.attrs, self.folder / GROUP, "attributes")
+        for path in frame.rglob("*"):
+            target = self.folder / path.relative_to(frame)
+            if path.is_file() and not (target.is_file() and target.read_bytes() == path.read_bytes()):
+                target.parent.mkdir(parents=True, exist_ok=True)
+                shutil.copyfile(path, target)
         for scrap in self.folder.rglob("*.partial"):  # chunks that zarr had not put in their place
             scrap.unlink()
-        lines = (self.folder / JOURNAL).read_bytes().split(b"\n")[:-1]  # the last one may have been cut off
-        for number, line in enumerate(lines, 1):
-            index, checks = self._checksums(number, line)
-            for path, value in checks.items():
-                if path.exists() and crc(path) != value:
+        for tile in self.plan.tiles:
+            chunks = {n: self.chunk(n, tile) for n in self._arrays}
+            self.done[tile] = there = all(path.exists() for path in chunks.values())
+            for name, path in chunks.items() if there else ():
+                try:
+                    self._arrays[name][self.plan.place(tile)]
+                except Exception as error:  # whatever zarr meets in it
                     raise FileError(
-                        f"is damaged: expected checksum {value}, found {crc(path)}; delete this chunk, and "
-                        "resume=True (--resume) computes it again",
+                        f"is damaged: {error}; delete this chunk, and resume=True (--resume) computes it again",
                         file=str(path),
-                    )
-            self.done[index] = all(path.exists() for path in checks)
-
-    def _mend_frame(self) -> None:
-        """Metadata and coordinates follow from the plan: what is damaged is written again."""
-        with tempfile.TemporaryDirectory(dir=self.folder.parent, prefix=f"{self.folder.name}.") as place:
-            fresh = Path(place) / "frame"
-            self.frame(fresh)
-            for path in fresh.rglob("*"):
-                target = self.folder / path.relative_to(fresh)
-                if path.is_file() and not (target.is_file() and target.read_bytes() == path.read_bytes()):
-                    target.parent.mkdir(parents=True, exist_ok=True)
-                    shutil.copyfile(path, target)
-
-    def _checksums(self, number: int, line: bytes) -> tuple[int, dict[Path, int]]:
-        """Tile and checksums of its chunks by a line of the journal; FileError where this program did not write it."""
-        try:
-            entry = parse_json(line)
-            index, checks = entry["tile"], entry["crc"]
-            known = type(index) is int and 0 <= index < len(self.done) and isinstance(checks, dict)
-            if not known or set(checks) != {v.name for v in self.plan.variables}:
-                raise ValueError
-        except (KeyError, TypeError, ValueError) as error:
-            raise FileError(
-                "is damaged: expected a tile and the checksums of its chunks; delete this line, and resume=True "
-                "(--resume) computes its tile again",
-                file=str(self.folder / JOURNAL),
-                line=number,
-            ) from error
-        return index, {self.chunk(n, index): value for n, value in checks.items()}
-
-
-def crc(path: Path) -> int:
-    """Checksum of a file."""
-    return zlib.crc32(path.read_bytes())
+                    ) from error
 
 
 def open_zarr_map(plan: MapPlan, folder: Path, resume: bool) -> ZarrMap:
     """The unfinished map in `folder`, new or taken up."""
     zarr_package()
     out = ZarrMap(plan, folder)
-    with onto_disk(folder):
-        if resume and (folder / JOURNAL).exists():
-            out.recover()
+    with onto_disk(folder), TemporaryDirectory(dir=folder.parent, prefix=f"{folder.name}.") as place:
+        frame = Path(place) / "frame"
+        out.frame(frame)
+        if resume and (folder / GROUP).exists():
+            out.recover(frame)
         else:
-            out.frame(folder)
-            write_text(folder / JOURNAL, "")
+            shutil.rmtree(folder)
+            frame.rename(folder)
     return out

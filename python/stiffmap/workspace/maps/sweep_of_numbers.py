@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 
 import numpy as np
 import xarray as xr
@@ -13,15 +13,7 @@ from stiffmap.common.broadcasting import Floats, real_array, trailing
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.addresses import known_values, with_values
 from stiffmap.solve.compiled import Status
-from stiffmap.solve.labels import (
-    COMPLIANCE_UNITS,
-    COMPONENTS,
-    TWIST_UNITS,
-    WRENCH,
-    batch_dims,
-    meaning,
-    status_attrs,
-)
+from stiffmap.solve.labels import meaning
 from stiffmap.solve.machine import Machine, takes_machine
 from stiffmap.workspace.maps.inputs import axis
 from stiffmap.workspace.maps.loading import track
@@ -105,7 +97,7 @@ def design_sweep(
     if not cells:
         first = next(iter(problems.values()))
         raise StiffmapError(f"numbers: no machine can be made of them; the first: {first}")
-    return _dataset(machine, axes, cells, problems)
+    return _dataset(machine, axes, cells, problems, s.to_xarray())
 
 
 def _evaluated(evaluate: Evaluate | None, machine: Machine) -> dict[str, np.ndarray]:
@@ -128,26 +120,22 @@ def _dataset(
     axes: Mapping[str, Floats],
     cells: Mapping[tuple[int, ...], dict[str, np.ndarray]],
     problems: Mapping[tuple[int, ...], str],
+    like: xr.Dataset,
 ) -> xr.Dataset:
+    """What `design_sweep` describes; answers have the labels of one machine's, `like`."""
     shape = tuple(a.size for a in axes.values())
     dims = {address: address.replace("/", ".") for address in axes}
     outer = tuple(dims.values())
     first = next(iter(cells.values()))
-    poses = batch_dims(first["status"].ndim)
-    known: dict[str, tuple[Sequence[str], dict[str, object]]] = {
-        "displacement": ((*poses, "component"), meaning(TWIST_UNITS, "displacement")),
-        "deflection": (poses, meaning("m", "deflection")),
-        "compliance": ((*poses, "component", "wrench_component"), meaning(COMPLIANCE_UNITS, "compliance")),
-        "status": (poses, status_attrs("the pose")),
-    }
     data: dict[str, object] = {}
     for name, sample in first.items():
         fill = int(Status.UNREACHABLE) if name == "status" else np.nan
         values = np.full(shape + sample.shape, fill, dtype=sample.dtype)
         for index, cell in cells.items():
             values[index] = cell[name]
-        tail, attrs = known.get(name) or ([f"{name}_{i}" for i in range(sample.ndim)], meaning("", name))
-        data[name] = ((*outer, *tail), values, attrs)
+        numbered = xr.Variable([f"{name}_{i}" for i in range(sample.ndim)], sample, meaning("", name))
+        own = like.get(name, numbered)
+        data[name] = ((*outer, *own.dims), values, own.attrs)
     words = np.full(shape, "", dtype=object)
     for index, text in problems.items():
         words[index] = text
@@ -155,7 +143,7 @@ def _dataset(
     data["problem"] = (outer, words.astype(str), why)
     table = {str(a): str(u) for a, u in machine.numbers()["unit"].items()}
     coords = {dims[a]: (dims[a], v, {"address": a, "units": _unit(table, a)}) for a, v in axes.items()}
-    labels = {"component": list(COMPONENTS), "wrench_component": list(WRENCH)}
+    labels = {n: like[n] for n in ("component", "wrench_component")}
     return xr.Dataset(data, coords={**coords, **labels}, attrs={"machine": machine.name})
 
 

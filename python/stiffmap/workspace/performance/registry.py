@@ -14,7 +14,6 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.common.python_file import modules_of
 from stiffmap.common.tasks import workers
 from stiffmap.solve.machine import Machine
-from stiffmap.solve.solution import Solution
 from stiffmap.workspace.maps.inputs import box_nodes
 from stiffmap.workspace.performance import kinds
 from stiffmap.workspace.performance.motion.closing import (
@@ -94,11 +93,6 @@ class Case:
     @cached_property
     def kinematics(self) -> DriveKinematics:
         """At `positions`."""
-        if self.quick:
-            start = None if self.machine.fast else self.still.coordinates
-            return drive_kinematics(
-                self.machine, self.positions, self.rotation, start=start, threads=self.threads
-            )
         if self.scheduler is None:
             return _closed((self.machine, self.rotation, self.threads), self.positions)
         with workers(_closed, (self.machine, self.rotation, 1), scheduler=self.scheduler) as hands:
@@ -106,13 +100,6 @@ class Case:
             parts = hands.in_order(p[k : k + CHUNK] for k in range(0, len(p), CHUNK))
         names = [f.name for f in fields(DriveKinematics)]
         return DriveKinematics(**{n: np.concatenate([getattr(k, n) for k in parts]) for n in names})
-
-    @cached_property
-    def still(self) -> Solution:
-        """Unloaded equilibria with their compliance at `positions`, no gravity."""
-        return self.machine.solve(
-            self.positions, rotation=self.rotation, gravity=np.zeros(3), threads=self.threads
-        )
 
     @cached_property
     def factors(self) -> VelocityTransmission:

@@ -149,10 +149,10 @@ def _zarr_maps() -> tuple[Path, Path]:
     machine, call = _zarr_call()
     put, count = ZarrMap.put, iter(range(2))
 
-    def failing(self: ZarrMap, index: int, values: dict[str, Any]) -> None:
+    def failing(self: ZarrMap, tile: slice, values: dict[str, Any]) -> None:
         if next(count, None) is None:
             raise PowerCut
-        put(self, index, values)
+        put(self, tile, values)
 
     with _tiles_of_one_row():
         sm.error_map(*machine, **call, out=place / "m.zarr").close()

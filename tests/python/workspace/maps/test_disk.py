@@ -77,6 +77,7 @@ def interrupted_map(machine: sm.Machine, out: Path, monkeypatch: pytest.MonkeyPa
         return real(*given)  # type: ignore[arg-type]
 
     with monkeypatch.context() as patch:
+        patch.setattr(block, "PART", 3)
         patch.setattr(block, "solve_block", failing)
         with pytest.raises(Interrupted):
             sm.error_map(machine, **SAME, out=out, chunk=3)
@@ -93,6 +94,7 @@ def test_resume_takes_up_an_interrupted_run(
     solved: list[slice] = []
     real = block.solve_block
     with monkeypatch.context() as patch:
+        patch.setattr(block, "PART", 3)
         patch.setattr(block, "solve_block", lambda p, rows: (solved.append(rows), real(p, rows))[1])
         with sm.error_map(machine, **SAME, out=out, resume=True, chunk=3) as resumed:
             assert resumed.load().identical(ds)
@@ -146,7 +148,11 @@ def test_without_resume_it_starts_afresh(
         assert fresh.load().identical(ds)
 
 
-def test_streaming_keeps_memory_small(machine: sm.Machine, tmp_path: Path) -> None:
+def test_streaming_keeps_memory_small(
+    machine: sm.Machine, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(block, "PART", 15)
+
     def peak(rows: int) -> int:
         tracemalloc.start()
         y = np.linspace(-0.2, 0.3, rows)

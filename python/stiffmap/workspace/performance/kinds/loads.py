@@ -11,27 +11,22 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import vector_text
 from stiffmap.solve.budget import budget_where_stable, in_shares
 from stiffmap.solve.status import Status
-from stiffmap.workspace.maps.inputs import plane_axes
 from stiffmap.workspace.performance.limits.deflection import TURNS, worst_deflection
 from stiffmap.workspace.performance.motion.closing import drive_values
 from stiffmap.workspace.performance.motion.efforts import drive_efforts
 from stiffmap.workspace.performance.registry import Case, Found, Measure, over_poses
 
-SHARE = 0.8  # of the largest deflection by the unloaded compliance: nodes above it are loaded at once
-MARGIN = 1.1
-"""On the largest ratio seen of loaded to unloaded: nodes that may exceed the worst by it are loaded too."""
-
 
 def deflection(case: Case) -> Found:
-    """Over the box: a coarse grid of equilibria, then a search about its worst node."""
-    if case.quick:
-        return quick_deflection(case)
+    """Over the box: a coarse grid of equilibria, then a search about its worst node; among designs the grid alone, each force
+    along the direction in which the unloaded machine is weakest."""
     d = worst_deflection(
         case.machine, box=np.stack([case.low, case.high]), force=case.force, plane=case.plane,
-        nodes=case.coarse, turns=TURNS, rotation=case.rotation, gravity=case.gravity, threads=case.threads,
+        nodes=case.coarse, turns=0 if case.quick else TURNS, refine=not case.quick, rotation=case.rotation,
+        gravity=case.gravity, threads=case.threads,
     )  # fmt: skip
     note = f"under {case.force:.4g} N"
-    if np.isfinite(d.value):
+    if np.isfinite(d.value) and not case.quick:
         note += f" along {vector_text(d.direction, 3)}"
         wrench = np.append(case.force * d.direction, np.zeros(3))
         budget = budget_where_stable(
@@ -40,37 +35,6 @@ def deflection(case: Case) -> Found:
         note += f"; {in_shares({n: s for n, _, s in budget.ranked()})}" if budget is not None else ""
     found = over_poses(d.positions, d.values, "low", note, direction=d.direction)
     return replace(found, worst=d.value, worst_at=d.position)
-
-
-def quick_deflection(case: Case) -> Found:
-    """At the nodes, each force along the direction in which the unloaded machine is weakest: the loaded
-    equilibrium wherever the unloaded compliance does not rule out that it is the worst."""
-    axes = list(plane_axes(case.plane))
-    c = case.still.compliance[:, :3, :3]
-    if not (case.still.status == Status.CONVERGED).all():
-        return over_poses(case.positions, np.where(case.still.status == Status.CONVERGED, 0.0, np.nan), "low")
-    _, values, vectors = np.linalg.svd(c[:, axes][:, :, axes])
-    linear = case.force * values[:, 0]
-    loaded = np.full(len(linear), np.nan)
-    ratio = 1.0
-    for _ in range(len(linear)):
-        worst = np.nanmax(loaded, initial=0.0)
-        todo = np.isnan(loaded) & (linear * ratio * MARGIN >= max(worst, SHARE * linear.max()))
-        if not todo.any():
-            break
-        wrench = np.zeros((int(todo.sum()), 6))
-        wrench[:, axes] = case.force * vectors[todo, 0]
-        s = case.machine.solve(
-            case.positions[todo], wrench, rotation=case.rotation, gravity=case.gravity, stiffness=False,
-            threads=case.threads,
-        )  # fmt: skip
-        d = np.linalg.norm(s.displacement[:, axes], axis=1)
-        if not (s.status == Status.CONVERGED).all():
-            return over_poses(case.positions[todo], np.where(s.status == Status.CONVERGED, d, np.nan), "low")
-        loaded[todo] = d
-        ratio = max(ratio, float((d / linear[todo]).max()))
-    some = np.isfinite(loaded)
-    return over_poses(case.positions[some], loaded[some], "low", f"under {case.force:.4g} N")
 
 
 MOST, QUICK = 201, 25  # samples of a toolpath

@@ -4,9 +4,7 @@ workspace, and the first edge of the largest box of the required shape in it, eq
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.status import Status
 from stiffmap.workspace.maps.inputs import box_nodes
@@ -86,22 +84,12 @@ def frequency(case: Case) -> Found:
 
 def footprint(case: Case) -> Found:
     """Area in the base's xy plane of the frames of all bodies and joints."""
-    if case.quick:
-        k, corner = case.kinematics, _corners(case.positions)
-    else:
-        p = box_nodes(case.low, case.high, 2)
-        k = drive_kinematics(case.machine, p, case.rotation, threads=case.threads)
-        corner = _corners(p)
-    coordinates, status = k.coordinates[corner], k.status[corner]
-    if (status != Status.CONVERGED).any():
+    k = drive_kinematics(case.machine, box_nodes(case.low, case.high, 2), case.rotation, threads=case.threads)
+    if (k.status != Status.CONVERGED).any():
         return Found(float("nan"), note="a corner of the box is not within reach")
-    points = np.concatenate([case.machine.compiled.frames(x)[0][1:] for x in coordinates])
+    points = np.concatenate([case.machine.compiled.frames(x)[0][1:] for x in k.coordinates])
     size = np.ptp(points, axis=0)
     return Found(float(size[0] * size[1]), note=f"{1e3 * size[0]:.0f} x {1e3 * size[1]:.0f} mm")
-
-
-def _corners(p: Floats) -> NDArray[np.bool_]:
-    return np.asarray(((p == p.min(axis=0)) | (p == p.max(axis=0))).all(axis=1))
 
 
 MEASURES = (
