@@ -214,9 +214,9 @@ def _unit_reactions(
     steps = STEP * size * np.array([1.0, 1.0, 1.0, *[machine.compiled.length] * 3])
     wrenches = np.concatenate([load + np.diag(steps), load - np.diag(steps)])
     turned = machine.compiled.home_rotation if rotation is None else real_array(rotation, "rotation")
-    force = machine.compiled.reactions(
+    force = machine.compiled.core.reactions(
         np.tile(p, (12, 1)), np.tile(turned, (12, 1, 1)), wrenches, point=point, gravity=gravity, threads=1
-    )
+    )["force"]
     return np.asarray((force[:6] - force[6:]) / (2 * steps[:, None]))
 
 

@@ -85,7 +85,7 @@ def holding_wrench(
     d = trailing(displacement, (6,), "displacement", "displacements [dx dy dz rx ry rz] (m, rad)")
     one_of(point, machine.names.points, "point")
     shape = batch(p.shape[:-1], d.shape[:-1], r.shape[:-2])
-    out = machine.impose(
+    out = machine.core.clamp(
         rows(p, shape, (3,)),
         rows(r, shape, (3, 3)),
         rows(d, shape, (6,)),

@@ -69,7 +69,7 @@ def assembly_wrenches(
     )
     shape, p, r, w = loaded_poses(machine.compiled, position, wrench, rotation)
     gravity = machine.compiled.gravity(gravity)
-    force = machine.compiled.reactions(p, r, w, point=point, gravity=gravity, threads=thread_count(threads))
+    force = machine.compiled.core.reactions(p, r, w, point, gravity, thread_count(threads))["force"]
     force = force.reshape((*shape, force.shape[-1]))
     named = joints(machine.description)
     sprung = {n for n in s.joint_index if (joint := joint_of(named, n)) is not None and any(joint.laws)}

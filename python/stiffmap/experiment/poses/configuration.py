@@ -114,7 +114,7 @@ def positions_of(machine: Machine, plan: Experiment) -> Floats:
 @_once
 def _point(machine: Machine, plan: Experiment, name: str) -> Floats:
     found = coordinates_of(machine, plan)
-    at = machine.compiled.point_positions(name, np.ascontiguousarray(found))
+    at = machine.compiled.core.point_positions(name, np.ascontiguousarray(found))["position"]
     return np.where(np.asarray(np.isfinite(found).all(axis=1))[:, None], at, np.nan)
 
 

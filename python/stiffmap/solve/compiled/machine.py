@@ -24,6 +24,19 @@ class CompiledMachine:
 
     Calls take C-contiguous arrays with one leading axis of poses, SI, base axes; the public functions broadcast
     and check before they call. Immutable; may be shared by threads.
+
+    What needs no more than the mechanism is asked of `core`, which gives arrays by name (cpp/include/stiffmap/solve/poses.hpp).
+    ``kinematics``: closed coordinates and the drives' Jacobian of (n, 3) positions, from `start` (n, coordinates) near the answer, NaN
+    where none is known; not `patient`: a pose that straight continuation from home does not reach is out of reach; `only`: so is one
+    that its start does not lead to; `weights` (drives,) of what drives that outnumber the freedoms share (theory D10), (0,): their own.
+    ``enclose``: what holds over the cells (n, 3) centre, half lengths along the columns of axes (3, 3); `slopes`: 3 columns
+    (translations) or 6 (twists) of the coordinates' slopes; `watched`: frames whose motion is bounded. ``dynamics``: inverse dynamics at
+    (n, coordinates) that are closed, motions of the tcp (n, 6); `rates`, `accelerations`: (n, drives) where the tcp's motion leaves some
+    open, (0, drives): it decides them. ``modes``: the lowest at a point, damping between them, the flexibility of all others; `viscous`,
+    `loss`: (coordinates,); `closed`: (n, coordinates) closed at the poses; `whole`: of a tangent that is not symmetric as it is, with
+    the motion of all coordinates. ``clamp``: what keeps a point at (n, 6) displacements from its commanded poses. ``reactions``:
+    (n, coordinates) N or N·m of every spring, drive and locked coordinate, reference path. ``point_positions``: (n, 3) m of a named
+    point at (n, coordinates), nominal geometry.
     """
 
     def __init__(
@@ -31,12 +44,12 @@ class CompiledMachine:
     ) -> None:
         self.description = description
         self._start_nodes = start_nodes
-        self._mechanism: _core.Mechanism = build_mechanism(description, like._mechanism if like else None)
+        self.core: _core.Mechanism = build_mechanism(description, like.core if like else None)
 
     @cached_property
     def names(self) -> Names:
         """Names of everything in the mechanism."""
-        return names_of(self._mechanism)
+        return names_of(self.core)
 
     @cached_property
     def coupling(self) -> Floats:
@@ -62,7 +75,7 @@ class CompiledMachine:
                 np.ascontiguousarray(turn),
                 np.ascontiguousarray(axes).T,
             )
-            for first, turn, axes in self._mechanism.spun_balls
+            for first, turn, axes in self.core.spun_balls
         }
 
     @cached_property
@@ -73,11 +86,11 @@ class CompiledMachine:
             _core.kernel_level()
         except ValueError as error:  # the environment asks for instructions that there are not
             raise StiffmapError(str(error)) from None
-        return _core.FastPlan(self._mechanism, np.array(low), np.array(high), self._start_nodes)
+        return _core.FastPlan(self.core, np.array(low), np.array(high), self._start_nodes)
 
     @cached_property
     def _one(self) -> _core.OneCall:
-        return _core.OneCall(self._mechanism, self._plan, self.home_rotation, self.gravity())
+        return _core.OneCall(self.core, self._plan, self.home_rotation, self.gravity())
 
     @property
     def not_fast(self) -> str:
@@ -87,22 +100,22 @@ class CompiledMachine:
     @property
     def length(self) -> float:
         """Characteristic length, m."""
-        return self._mechanism.length
+        return self.core.length
 
     @property
     def stiffness(self) -> float:
         """Characteristic stiffness, N/m."""
-        return self._mechanism.stiffness
+        return self.core.stiffness
 
     @cached_property
     def nodes(self) -> tuple[tuple[int, int], ...]:
         """Parent and coordinate of each frame; -1: none."""
-        return tuple(self._mechanism.nodes)
+        return tuple(self.core.nodes)
 
     @cached_property
     def loops(self) -> tuple[tuple[str, str, int, int], ...]:
         """Block, branch, and the two frames that each loop closes."""
-        return tuple(self._mechanism.loops)
+        return tuple(self.core.loops)
 
     def gravity(self, given: ArrayLike | None = None) -> Floats:
         """(3,) m/s², base axes; the machine file's where nothing is given. StiffmapError for bad numbers."""
@@ -138,7 +151,7 @@ class CompiledMachine:
 
         closed: (n, coordinates) already closed at these poses, NaN out of reach; None: found by closure.
         """
-        return self._mechanism.solve(
+        return self.core.solve(
             self._plan if fast else None,  # type: ignore[arg-type]  # None: reference path
             position,
             rotation,
@@ -161,42 +174,18 @@ class CompiledMachine:
 
         start: (n, coordinates) on the assembly branch that is meant; None: that of home.
         """
-        return tuple(self._mechanism.closure(self._plan, position, rotation, start, threads).values())
+        return tuple(self.core.closure(self._plan, position, rotation, start, threads).values())
 
     def close_actuators(
         self, actuators: Floats, threads: int, start: Floats | None = None
     ) -> tuple[Any, ...]:
         """The same of (n, actuators) actuator coordinates, continued from home or from `start`."""
-        found = self._mechanism.closure(None, actuators, None, start, threads)  # type: ignore[arg-type]
+        found = self.core.closure(None, actuators, None, start, threads)  # type: ignore[arg-type]
         return tuple(found.values())
-
-    def point_positions(self, point: str, coordinates: Floats) -> Floats:
-        """(n, 3) m, base axes, of a named point at (n, coordinates), nominal geometry."""
-        return np.asarray(self._mechanism.point_positions(point, coordinates)["position"])
 
     def home_coordinates(self) -> Floats:
         """(coordinates,) at home."""
-        return np.asarray(self._mechanism.home_coordinates())
-
-    def impose(
-        self,
-        position: Floats,
-        rotation: Floats,
-        displacement: Floats,
-        *,
-        point: str,
-        gravity: Floats,
-        threads: int,
-    ) -> dict[str, Any]:
-        """Arrays by name: what keeps `point` at (n, 6) displacements from its commanded poses."""
-        return self._mechanism.clamp(position, rotation, displacement, point, gravity, threads)
-
-    def reactions(
-        self, position: Floats, rotation: Floats, wrench: Floats, *, point: str, gravity: Floats, threads: int
-    ) -> Floats:
-        """(n, coordinates) N or N·m of every spring, drive and locked coordinate, reference path."""
-        found = self._mechanism.reactions(position, rotation, wrench, point, gravity, threads)
-        return np.asarray(found["force"])
+        return np.asarray(self.core.home_coordinates())
 
     def path(
         self,
@@ -213,126 +202,31 @@ class CompiledMachine:
     ) -> tuple[Any, ...]:
         """Flags, the path of equilibria and the branch that crosses it: (end, points, critical points) each."""
         how = PATH_CONTROLS.index(control)
-        return _core.path(
-            self._mechanism, position, rotation, direction, point, gravity, how, limit, steps, cross
-        )
+        return _core.path(self.core, position, rotation, direction, point, gravity, how, limit, steps, cross)
 
     @cached_property
     def drives(self) -> tuple[int, ...]:
         """Index of each actuator's coordinate."""
-        return tuple(i for _, i in self._mechanism.actuators)
+        return tuple(i for _, i in self.core.actuators)
 
     @cached_property
     def bodies(self) -> tuple[tuple[str, int, float], ...]:
         """Name, frame and mass (kg) of each body."""
-        return tuple(self._mechanism.bodies)
+        return tuple(self.core.bodies)
 
     @cached_property
     def limits(self) -> tuple[tuple[float, float], ...]:
         """Lowest and highest value of each coordinate; 1e300 where there is no limit."""
-        return tuple(self._mechanism.limits)
-
-    def rates(
-        self,
-        position: Floats,
-        rotation: Floats,
-        start: Floats | None,
-        *,
-        weights: Floats,
-        patient: bool,
-        only: bool,
-        threads: int,
-    ) -> dict[str, Any]:
-        """Arrays by name: closed coordinates and the drives' Jacobian of (n, 3) positions.
-
-        weights: (drives,) of what drives that outnumber the freedoms share (theory D10); (0,): their own.
-
-        start: (n, coordinates) near the answer, NaN where none is known. Not patient: a pose that straight
-        continuation from home does not reach is out of reach. Only: so is one that its start does not lead to.
-        """
-        return self._mechanism.kinematics(position, rotation, start, weights, patient, only, threads)
-
-    @property
-    def not_enclosed(self) -> str:
-        """Why cells of positions cannot be enclosed; empty if they can."""
-        return self._mechanism.not_enclosed
-
-    def enclose(
-        self,
-        centre: Floats,
-        half: Floats,
-        axes: Floats,
-        rotation: Floats,
-        *,
-        start: Floats | None = None,
-        slopes: int,
-        watched: Sequence[int],
-        threads: int,
-    ) -> dict[str, Any]:
-        """Arrays by name: what holds over the cells (n, 3) centre, half lengths along the columns of axes (3, 3).
-
-        start: (n, coordinates) near those of the centres, NaN where none is known. slopes: 3 columns
-        (translations) or 6 (twists) of the coordinates' slopes. watched: frames whose motion is bounded.
-        """
-        return self._mechanism.enclose(centre, half, axes, rotation, start, slopes, list(watched), threads)
-
-    def dynamics(
-        self,
-        inertias: Floats,
-        coordinates: Floats,
-        twist: Floats,
-        twist_rate: Floats,
-        wrench: Floats,
-        gravity: Floats,
-        *,
-        rates: Floats,
-        accelerations: Floats,
-        weights: Floats,
-        threads: int,
-    ) -> dict[str, Any]:
-        """Arrays by name: inverse dynamics at (n, coordinates) that are closed, motions of the tcp (n, 6).
-
-        rates, accelerations: (n, drives) where the tcp's motion leaves some open; (0, drives): it decides them.
-        """
-        return self._mechanism.dynamics(
-            list(inertias), coordinates, twist, twist_rate, wrench, gravity, rates, accelerations, weights, threads,
-        )  # fmt: skip
+        return tuple(self.core.limits)
 
     @property
     def redundancy(self) -> int:
         """Motions of the drives that a commanded pose leaves open."""
-        return int(self._mechanism.redundancy)
-
-    def modes(
-        self,
-        inertias: Floats,
-        position: Floats,
-        rotation: Floats,
-        wrench: Floats,
-        *,
-        gravity: Floats,
-        count: int,
-        threads: int,
-        viscous: Floats | None = None,
-        loss: Floats | None = None,
-        closed: Floats | None = None,
-        point: str = "tcp",
-        whole: bool = False,
-    ) -> dict[str, Any]:
-        """Arrays by name: the lowest modes at a point, damping between them, the flexibility of all others.
-
-        viscous, loss: (coordinates,). closed: (n, coordinates) closed at the poses. whole: of a tangent that is not symmetric as it
-        is, with the motion of all coordinates.
-        """
-        none = np.zeros(len(self.names.coordinates))
-        return self._mechanism.modes(
-            list(inertias), none if viscous is None else viscous, none if loss is None else loss, position, rotation, wrench,
-            gravity, closed, point, count, whole, threads,
-        )  # fmt: skip
+        return int(self.core.redundancy)
 
     def frames(self, coordinates: Floats) -> tuple[Floats, Floats]:
         """(nodes, 3) m and (nodes, 3, 3): all frames at given coordinates, nominal geometry."""
-        found = self._mechanism.frames(coordinates)
+        found = self.core.frames(coordinates)
         return found["position"], found["rotation"]
 
 

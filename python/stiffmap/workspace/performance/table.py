@@ -186,7 +186,7 @@ def _rows(chosen: Sequence[Measure], case: Case, task: Requirements) -> tuple[Me
     """In the order given; measures of their own run in parallel to those that share kinematics."""
     machine = case.machine
     apart = [m for m in chosen if m.apart] if thread_count(case.threads) > 1 else []
-    _ = machine.fast, machine.compiled.not_enclosed  # made once, before two threads ask for it
+    _ = machine.fast, machine.compiled.core.not_enclosed  # made once, before two threads ask for it
     with ThreadPoolExecutor(1) as pool:
         later = {m.name: pool.submit(_row, m, case, task.bound(m.name)) for m in apart}
         rows = {m.name: _row(m, case, task.bound(m.name)) for m in chosen if m.name not in later}

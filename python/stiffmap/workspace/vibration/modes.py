@@ -157,10 +157,10 @@ def tip_modes(
     declared = damping_of(machine, damping)
     shape, poses, turns, loads = loaded_poses(compiled, position, wrench, rotation)
     cores = thread_count(threads)
-    out = compiled.modes(
-        inertias(machine), poses, turns, loads, viscous=declared.viscous, loss=declared.loss,
-        gravity=compiled.gravity(gravity), closed=compiled.close_poses(poses, turns, cores)[0], point=point,
-        count=_count(machine, declared, modes), threads=cores,
+    out = compiled.core.modes(
+        list(inertias(machine)), declared.viscous, declared.loss, poses, turns, loads, compiled.gravity(gravity),
+        closed=compiled.close_poses(poses, turns, cores)[0], point=point, count=_count(machine, declared, modes), whole=False,
+        threads=cores,
     )  # fmt: skip
     worst = float(np.nanmax(out["unsymmetric"], initial=0.0))
     if worst > SYMMETRIC and not symmetrise:

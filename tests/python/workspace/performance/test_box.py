@@ -45,8 +45,15 @@ def test_poses_of_an_enclosed_cell_lie_within_its_radii(name):
     axes, n = turned(rng), 12
     centre = rng.uniform(low + 0.1 * (high - low), high - 0.1 * (high - low), (n, 3))
     half = 0.008 * float((high - low).max()) * rng.uniform(0.3, 1, (n, 3))
-    e = machine.compiled.enclose(
-        centre, half, axes, machine.compiled.home_rotation, slopes=6 if six else 3, watched=(), threads=1
+    e = machine.compiled.core.enclose(
+        centre,
+        half,
+        axes,
+        machine.compiled.home_rotation,
+        start=None,
+        slopes=6 if six else 3,
+        watched=(),
+        threads=1,
     )
     assert e["enclosed"].all()
     d = rng.uniform(-1, 1, (n, 16, 3))
@@ -71,11 +78,12 @@ def test_a_cell_across_the_border_of_the_reach_is_not_enclosed():
     reached = drive_kinematics(machine, x, patient=False).status == sm.Status.CONVERGED
     last = x[int(np.argmin(reached)) - 1]
     assert reached[0] and not reached.all()
-    e = machine.compiled.enclose(
+    e = machine.compiled.core.enclose(
         last[None],
         np.full((1, 3), 0.02),
         np.eye(3),
         machine.compiled.home_rotation,
+        start=None,
         slopes=3,
         watched=(),
         threads=1,
@@ -204,8 +212,15 @@ def test_what_is_proven_of_bars_depends_on_no_thread():
     bars = Bounds(machine, clearance=0.07).bars
     p = np.random.default_rng(3).uniform(*machine.workspace, (30, 3))
     one, *more = (
-        machine.compiled.enclose(
-            p, np.full((30, 3), 5e-4), np.eye(3), np.eye(3), slopes=3, watched=bars.nodes, threads=n
+        machine.compiled.core.enclose(
+            p,
+            np.full((30, 3), 5e-4),
+            np.eye(3),
+            np.eye(3),
+            start=None,
+            slopes=3,
+            watched=bars.nodes,
+            threads=n,
         )["moved"]
         for n in (1, 2, 2, 2, 2)
     )

@@ -118,7 +118,7 @@ def enclose(bounds: Bounds, centre: Floats, half: Floats, axes: Floats) -> Prove
     watched = bounds.bars.nodes if bounds.clearance is not None else ()
     rotation = compiled.home_rotation if bounds.rotation is None else np.asarray(bounds.rotation, dtype=float)
     start = kernel_starts(bounds.machine, centre, bounds.rotation, bounds.threads)
-    e = compiled.enclose(
+    e = compiled.core.enclose(
         np.ascontiguousarray(centre), np.ascontiguousarray(half), axes, rotation, start=start,
         slopes=6 if wide else 3, watched=watched, threads=thread_count(bounds.threads),
     )  # fmt: skip

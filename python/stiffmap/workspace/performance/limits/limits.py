@@ -100,8 +100,8 @@ class Bounds:
         compiled, drives = self.machine.compiled, len(self.machine.actuators)
         if self.deflection is not None:
             return "a deflection has no bound between poses"
-        if compiled.not_enclosed:
-            return compiled.not_enclosed
+        if compiled.core.not_enclosed:
+            return compiled.core.not_enclosed
         if self.transmission is not None and (drives not in (3, 6) or self.machine.description.task != TASK):
             return "drives and commanded motions are not as many"
         return ""

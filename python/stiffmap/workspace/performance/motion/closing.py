@@ -158,7 +158,7 @@ def drive_kinematics(
     begin = None if start is None else rows(trailing(start, (size,), "start", "coordinates"), shape, (size,))
     if only_start and begin is None:
         raise StiffmapError("only_start: needs start, coordinates of neighbouring poses")
-    out = compiled.rates(
+    out = compiled.core.kinematics(
         flat_p, flat_r, begin, weights=drive_weights(machine, sharing), patient=patient, only=only_start,
         threads=thread_count(threads),
     )  # fmt: skip

@@ -104,8 +104,8 @@ def rigid_dynamics(
     rates = accelerations = np.zeros((0, len(machine.actuators)))
     if machine.compiled.redundancy and (np.any(twist) or np.any(twist_rate)):
         rates, accelerations = followed(machine, coordinates, twist, twist_rate, threads)
-    out: dict[str, Floats] = machine.compiled.dynamics(
-        inertias(machine), np.ascontiguousarray(coordinates), np.ascontiguousarray(twist),
+    out: dict[str, Floats] = machine.compiled.core.dynamics(
+        list(inertias(machine)), np.ascontiguousarray(coordinates), np.ascontiguousarray(twist),
         np.ascontiguousarray(twist_rate), np.ascontiguousarray(wrench), machine.compiled.gravity(gravity),
         rates=rates, accelerations=accelerations, weights=drive_weights(machine, sharing),
         threads=thread_count(threads),
@@ -173,9 +173,10 @@ def natural_frequencies(
     need_masses(machine, "a natural frequency")
     whole_number(modes, "modes", 1)
     shape, p, r, w = loaded_poses(machine.compiled, position, wrench, rotation)
-    out = machine.compiled.modes(
-        inertias(machine), p, r, w, count=modes, whole=True, gravity=machine.compiled.gravity(gravity),
-        threads=thread_count(threads),
+    undamped = np.zeros(len(machine.compiled.names.coordinates))
+    out = machine.compiled.core.modes(
+        list(inertias(machine)), undamped, undamped, p, r, w, machine.compiled.gravity(gravity), closed=None, point="tcp", count=modes,
+        whole=True, threads=thread_count(threads),
     )  # fmt: skip
     w0 = 1 / np.sqrt(out["square"])
     found = {k: out[k].reshape(shape + out[k].shape[1:]) for k in ("coordinates", "status", "flags")}

@@ -264,7 +264,7 @@ def followed(
 
     def joints_at(moved: Floats) -> Floats:
         turned = Rotation.from_rotvec(moved[:, 3:]).as_matrix() @ r
-        out = compiled.rates(
+        out = compiled.core.kinematics(
             p + moved[:, :3], turned, coordinates, weights=np.zeros(0), patient=False, only=True, threads=cores
         )  # fmt: skip
         return np.asarray(out["coordinates"][:, drives])
