@@ -169,9 +169,8 @@ def _unit(m: Meant, index: int, name: str, slides: bool) -> Unit:
     return m.unit(index, *names, quantity=quantity)
 
 
-def _below_each_other(m: Meant) -> None:
-    """Places side by side, X1 … Z2, or N1x … N2z where nothing else is a place, in rows below each other: of several targets, or
-    repeats where they coincide. StiffmapError where their names or distances are not those of targets on one tool."""
+def _side_by_side(m: Meant) -> dict[str, dict[str, int]]:
+    """Columns of places in one row, by their names and axes: X1 … Z2, or N1x … N2z where nothing else is a place."""
     groups: dict[str, dict[str, int]] = {}
     seen = any(k.meaning in SEEN for k in m.guessed)
     for k in m.guessed:
@@ -180,9 +179,13 @@ def _below_each_other(m: Meant) -> None:
             groups.setdefault(str(k.repeat), {})[k.meaning[-1]] = k.index
         elif part:
             groups.setdefault(part[1] or part[4], {})[(part[2] or part[3]).lower()] = k.index
-    groups = {name: at for name, at in groups.items() if len(at) == len(POSE)}
-    if len(groups) < 2:
-        return
+    whole = {name: at for name, at in groups.items() if len(at) == len(POSE)}
+    return whole if len(whole) > 1 else {}
+
+
+def _below_each_other(m: Meant, groups: Mapping[str, Mapping[str, int]]) -> None:
+    """Places side by side in rows below each other: of several targets, or repeats where they coincide. StiffmapError where their
+    names or distances are not those of targets on one tool."""
     places = np.stack([m.metres([at[a] for a in POSE], SEEN) for at in groups.values()], axis=1)
     apart = np.linalg.norm(places[:, 1:] - places[:, :1], axis=2)
     usual = np.nanmedian(apart, axis=0)
@@ -213,15 +216,16 @@ def as_seen(m: Meant, difference: str, by_instrument: bool) -> None:
     alone with joints are asked for, unless an instrument is named that wrote them.
     """
     header = m.sheet.header
-    columns = m.guessed
+    columns, groups = m.guessed, _side_by_side(m)
     if not any(k.meaning in READINGS and k.meaning not in AXES[3:] for k in columns):
         notes = [(k, re.fullmatch(MEASURED, k.name.lower())) for k in columns if k.meaning == "note"]
         places = {seen[1]: k for k, seen in notes if seen}
-        if by_instrument and not places:
+        if by_instrument and not places and not groups:
             places = {k.meaning: k for k in columns if k.meaning in POSE}
         for a, k in places.items():
             m.chosen[f"p{a}"] = [header[k.index]]
-    _below_each_other(m)
+    if groups:
+        _below_each_other(m, groups)
     of = {k.meaning: k for k in m.guessed if k.repeat == 0}
     if difference != DIFFERENCES[0] and ({*SEEN, "ll"} & {*of}):
         raise StiffmapError(NO_DIFFERENCE.format(m.sheet.file))
