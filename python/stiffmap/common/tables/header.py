@@ -318,8 +318,8 @@ IN_SI = re.compile(
     r".*/joint_states/.*/position"
 )
 """Fields of logs that are in SI by their format: messages of ROS, and UR's RTDE."""
-COMMANDED = "target|cmd|nom|nominal|command|commanded|ref|desired|begin|r?soll?"
-MEASURED = "act|actual|meas|measured|achieved|attained|end|r?ist|gemessen|mess?|mesur[ée]e?"
+COMMANDED = "target|cmd|nom|nominal|command|commanded|ref|desired|begin|r?soll?(?:wert)?"
+MEASURED = "act|actual|meas|measured|achieved|attained|end|r?ist(?:wert)?|gemessen|mess?|mesur[ée]e?"
 PATTERNS: tuple[tuple[str, str], ...] = (
     ("id", r"#|id|nr\.?|no\.?|lfd\.? ?nr\.?|number|nummer|row|zeile|punkt|messpunkt|point|(mess)?punkt[ -]?nr\.?|point no\.?|punto"),
     ("temperature", r"t|temp|temperature|temperatur"),

@@ -228,10 +228,10 @@ class _Wanted:
         m = Meant.of_sheet(form, self.given if kept is None else kept.below(self.given))
         if kept is not None:
             m.said.append(f"answers of an earlier sheet of this form are used: {dialogue.profile_file(form)}")
+        one_point_a_row(m)
         together(m, self.deflection)
         approached(m)
         commanded(m, self.drives, self.alone)
-        one_point_a_row(m)
         measured = (self.wrote or load_instrument("tracker")).measured
         without_lost(m, self.wrote.columns if self.wrote else {}, measured)
         same = partial(compared, m, self.difference, measured, self.deflection)

@@ -4,13 +4,14 @@ names of targets, and headers with a sign."""
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from stiffmap.common.errors import StiffmapError
 from stiffmap.common.short import first_of
-from stiffmap.common.tables.header import split_unit
+from stiffmap.common.tables.cells import Cells
+from stiffmap.common.tables.header import split_unit, with_unit
 from stiffmap.common.tables.orientation import orientation_of
 from stiffmap.common.tables.table import Table, column_letter
 from stiffmap.common.units import Unit, unit_of
@@ -70,14 +71,38 @@ def oriented(m: Meant) -> None:
 
 
 def one_point_a_row(m: Meant) -> None:
-    """StiffmapError where each row is one coordinate of a point, as reports of features are."""
-    if {*"xyz"} & {*map(guessed, m.sheet.names)}:
+    """Rows that are one coordinate of a point each, as in reports of features, as one row a point: columns whose cells differ within a
+    point get its axes behind their names. StiffmapError where the rows of a point are not together."""
+    if {*"xyz"} & {*map(guessed, m.sheet.names), *m.constants}:
         return
-    for header, cells in zip(m.sheet.header, m.sheet.columns, strict=True):
-        if all(c.lower() in ("x", "y", "z") for c in cells) and {"x", "y"} <= {*map(str.lower, cells)}:
-            raise StiffmapError(
-                f"{m.sheet.file}: column '{header}': each row is one coordinate of a point; write a row a point, with X, Y, Z side by side"
-            )
+    for at, column in enumerate(m.sheet.columns):
+        cells = [c.lower() for c in column]
+        axes = sorted({*cells})
+        if axes not in (["x", "y"], ["x", "y", "z"]):
+            continue
+        points = [cells[k : k + len(axes)] for k in range(0, len(cells), len(axes))]
+        good = np.repeat([sorted(p) == axes for p in points], len(axes))[: len(cells)]
+        if any(h.isdigit() for headers in m.chosen.values() for h in headers):
+            good[:] = False  # whose columns are those of the rows
+        what = f"column '{m.sheet.header[at]}': each row is one coordinate of a point; expected its rows {', '.join(axes)} together, and columns by name"
+        m.sheet.check(good, lambda _: what)  # noqa: B023
+        first = range(0, len(cells), len(axes))
+        columns: dict[str, Cells] = {}
+        for name, own in zip(m.sheet.header, map(list, m.sheet.columns), strict=True):
+            of_points = [[c for c in own[k : k + len(axes)] if c] for k in first]
+            if own == list(column):
+                continue
+            if all(len({*c}) <= 1 for c in of_points):
+                columns[name] = Cells.of(c[0] if c else "" for c in of_points)
+                continue
+            bare, unit = split_unit(name)
+            for axis in axes:
+                rows = (k + p.index(axis) for k, p in zip(first, points, strict=True))
+                columns[with_unit(f"{bare} {axis}", unit)] = Cells.of(own[k] for k in rows)
+        lines = [m.sheet.lines[k] for k in first]
+        m.sheet = replace(m.sheet, header=tuple(columns), columns=tuple(columns.values()), lines=lines)
+        m.said.append(f"rows of one coordinate each are taken together: {len(lines)} points")
+        return
 
 
 def _signs(m: Meant) -> None:

@@ -317,15 +317,40 @@ def test_remarks_that_are_readings_stay(words: tuple[str, str], tmp_path: Path) 
     truth(made(tmp_path, HEAD.replace("\n", ";Remark\n") + rows).experiment)
 
 
-@pytest.mark.parametrize(
-    "head", ["Feature;Axis;Nominal", "Punkt;Achse;Sollwert [mm]", "Name;Coordinate;Actual"]
+POINTS = (
+    "P1;X;100;100.012;1\n;Y;50;50.003;1\n;Z;-20;-20.009;1\nP2;z;10;10.02;1\n;x;-30;-30.01;1\n;y;40;40.03;1\n"
 )
-@pytest.mark.parametrize("columns", [None, {"x": "3", "y": "3", "z": "3"}])
-def test_a_coordinate_a_row_is_no_position(head: str, columns: dict[str, str] | None, tmp_path: Path) -> None:
-    rows = "P1;X;100;0.012\nP1;Y;50;0.003\nP1;Z;-20;0.009\n"
-    axis = head.split(";")[1]
-    with pytest.raises(StiffmapError, match=f"column '{axis}': each row is one coordinate"):
-        made(tmp_path, f"{head};dx [mm]\n{rows}", constants=LOAD, columns=columns)
+
+
+@pytest.mark.parametrize(
+    "head", ["Feature;Axis;Nominal [mm];Actual [mm]", "Punkt;Achse;Sollwert [mm];Istwert [mm]", "Name;Coordinate;Nom [mm];Meas [mm]"]
+)  # fmt: skip
+def test_rows_of_one_coordinate_each_are_points(head: str, tmp_path: Path) -> None:
+    e = made(tmp_path, f"{head};Tol\n{POINTS}", instrument="tracker").experiment
+    np.testing.assert_allclose(1e3 * e.position, [[100, 50, -20], [-30, 40, 10]])
+    np.testing.assert_allclose(
+        1e3 * e.reading[:, :3], [[0.012, 0.003, -0.009], [-0.01, 0.03, 0.02]], atol=1e-9
+    )
+
+
+@pytest.mark.parametrize(
+    ("rows", "more"),
+    [(POINTS, {"columns": {"x": "3", "y": "3", "z": "3"}}), (POINTS.replace(";Z;-20;-20.009;1\n", ""), {}), (POINTS.replace(";y", ";x"), {})],
+)  # fmt: skip
+def test_rows_of_one_coordinate_that_are_no_points_are_refused(
+    rows: str, more: dict[str, Any], tmp_path: Path
+) -> None:
+    with pytest.raises(StiffmapError, match=r"line 2|line 5") as found:
+        made(tmp_path, f"Name;Axis;Nominal [mm];Actual [mm];Tol\n{rows}", instrument="tracker", **more)
+    assert "column 'Axis': each row is one coordinate of a point; expected its rows x, y, z together" in str(
+        found.value
+    )
+
+
+def test_axes_of_loads_are_no_coordinates_of_points(tmp_path: Path) -> None:
+    text = "Load direction;Load [N];dx [um];dy [um];dz [um]\nX;100;50;1;2\nY;100;1;52;3\nZ;100;2;3;70\n"
+    e = made(tmp_path, text, constants={"x": 0.0, "y": 0.0, "z": 0.0}).experiment
+    np.testing.assert_allclose(e.wrench[:, :3], 100 * np.eye(3))
 
 
 @pytest.mark.parametrize("name", ["q{}", "joint_{}", "A{}"])
