@@ -25,7 +25,9 @@ class CompiledMachine:
     Calls take C-contiguous arrays with one leading axis of poses, SI, base axes; the public functions broadcast
     and check before they call. Immutable; may be shared by threads.
 
-    What needs no more than the mechanism is asked of `core`, which gives arrays by name (cpp/include/stiffmap/solve/poses.hpp).
+    What needs no more than the mechanism is asked of `core`: ``bodies``, name, frame and mass (kg) of each; ``limits``, lowest and
+    highest value of each coordinate, 1e300 where there is no limit; ``redundancy``, motions of the drives that a commanded pose leaves
+    open; and what gives arrays by name (cpp/include/stiffmap/solve/poses.hpp).
     ``kinematics``: closed coordinates and the drives' Jacobian of (n, 3) positions, from `start` (n, coordinates) near the answer, NaN
     where none is known; not `patient`: a pose that straight continuation from home does not reach is out of reach; `only`: so is one
     that its start does not lead to; `weights` (drives,) of what drives that outnumber the freedoms share (theory D10), (0,): their own.
@@ -208,21 +210,6 @@ class CompiledMachine:
     def drives(self) -> tuple[int, ...]:
         """Index of each actuator's coordinate."""
         return tuple(i for _, i in self.core.actuators)
-
-    @cached_property
-    def bodies(self) -> tuple[tuple[str, int, float], ...]:
-        """Name, frame and mass (kg) of each body."""
-        return tuple(self.core.bodies)
-
-    @cached_property
-    def limits(self) -> tuple[tuple[float, float], ...]:
-        """Lowest and highest value of each coordinate; 1e300 where there is no limit."""
-        return tuple(self.core.limits)
-
-    @property
-    def redundancy(self) -> int:
-        """Motions of the drives that a commanded pose leaves open."""
-        return int(self.core.redundancy)
 
     def frames(self, coordinates: Floats) -> tuple[Floats, Floats]:
         """(nodes, 3) m and (nodes, 3, 3): all frames at given coordinates, nominal geometry."""
