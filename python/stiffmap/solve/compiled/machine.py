@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
 
@@ -38,7 +37,8 @@ class CompiledMachine:
     `loss`: (coordinates,); `closed`: (n, coordinates) closed at the poses; `whole`: of a tangent that is not symmetric as it is, with
     the motion of all coordinates. ``clamp``: what keeps a point at (n, 6) displacements from its commanded poses. ``reactions``:
     (n, coordinates) N or N·m of every spring, drive and locked coordinate, reference path. ``point_positions``: (n, 3) m of a named
-    point at (n, coordinates), nominal geometry.
+    point at (n, coordinates), nominal geometry. ``solve``: equilibria of (n, 3) positions, (n or 1, 3, 3) rotations and (n or 1, load
+    points, 6) wrenches; `closed`: (n, coordinates) already closed at these poses, NaN out of reach, None: found by closure.
     """
 
     def __init__(
@@ -81,7 +81,8 @@ class CompiledMachine:
         }
 
     @cached_property
-    def _plan(self) -> _core.FastPlan:
+    def plan(self) -> _core.FastPlan:
+        """What the kernels prepare for the machine: with it the core solves and closes by the fast path, without by the reference path."""
         box = self.description.workspace
         low, high = box if box else ((1.0, 1.0, 1.0), (-1.0, -1.0, -1.0))
         try:
@@ -92,12 +93,12 @@ class CompiledMachine:
 
     @cached_property
     def _one(self) -> _core.OneCall:
-        return _core.OneCall(self.core, self._plan, self.home_rotation, self.gravity())
+        return _core.OneCall(self.core, self.plan, self.home_rotation, self.gravity())
 
     @property
     def not_fast(self) -> str:
         """What the machine lacks for the fast path; empty if nothing."""
-        return self._plan.missing
+        return self.plan.missing
 
     @property
     def length(self) -> float:
@@ -132,43 +133,6 @@ class CompiledMachine:
         """One pose under one wrench at the tcp by the kernels; None for inputs that are not plain numbers."""
         return self._one.solve(position, wrench)
 
-    def solve(
-        self,
-        position: Floats,
-        rotation: Floats,
-        wrench: Floats,
-        *,
-        load_points: Sequence[str],
-        load_types: Sequence[str],
-        read_points: Sequence[str],
-        gravity: Floats,
-        fast: bool,
-        load_steps: int,
-        threads: int,
-        stiffness: bool,
-        variants: Sequence[CompiledMachine] = (),
-        closed: Floats | None = None,
-    ) -> _core.Answer:
-        """Equilibria of (n, 3) positions, (n or 1, 3, 3) rotations and (n or 1, load points, 6) wrenches.
-
-        closed: (n, coordinates) already closed at these poses, NaN out of reach; None: found by closure.
-        """
-        return self.core.solve(
-            self._plan if fast else None,  # type: ignore[arg-type]  # None: reference path
-            position,
-            rotation,
-            wrench,
-            load_points,
-            [LOAD_TYPES[t] for t in load_types],
-            read_points,
-            gravity,
-            load_steps,
-            threads,
-            stiffness,
-            [v._plan for v in variants],
-            closed,
-        )
-
     def close_poses(
         self, position: Floats, rotation: Floats, threads: int, start: Floats | None = None
     ) -> tuple[Any, ...]:
@@ -176,7 +140,7 @@ class CompiledMachine:
 
         start: (n, coordinates) on the assembly branch that is meant; None: that of home.
         """
-        return tuple(self.core.closure(self._plan, position, rotation, start, threads).values())
+        return tuple(self.core.closure(self.plan, position, rotation, start, threads).values())
 
     def close_actuators(
         self, actuators: Floats, threads: int, start: Floats | None = None
