@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from inspect import signature
 from typing import NamedTuple
 
 import numpy as np
@@ -30,8 +31,13 @@ class Section(NamedTuple):
     about_height: float
 
 
-def tube_section(outer: float, inner: float = 0.0) -> Section:
-    """Circular tube of outer and inner diameter; solid without the inner one."""
+def round_section(diameter: float) -> Section:
+    """Solid circular section."""
+    return tube_section(diameter, 0.0)
+
+
+def tube_section(outer: float, inner: float) -> Section:
+    """Circular tube: outer and inner diameter."""
     second = math.pi * (outer**4 - inner**4) / 64
     return Section(math.pi * (outer**2 - inner**2) / 4, 2 * second, second, second)
 
@@ -41,7 +47,8 @@ SUM_OF_ODD_FIFTH_POWERS = 31 / 32 * 1.0369277551433699
 
 
 def rectangle_section(width: float, height: float) -> Section:
-    """Solid rectangle; the torsion series is summed to round-off."""
+    """Solid rectangle: width along the axis after the beam's (y of x, z of y, x of z), height along the other."""
+    # the torsion series is summed to round-off
     long, short = max(width, height), min(width, height)
     # tanh x = 1 - 2 / (e^2x + 1): what is summed falls by e^-2pi or more from term to term
     near_one = (2 / (math.exp(min(n * math.pi * long / short, 700.0)) + 1) / n**5 for n in range(1, 14, 2))
@@ -51,7 +58,7 @@ def rectangle_section(width: float, height: float) -> Section:
 
 
 def hollow_section(width: float, height: float, wall: float) -> Section:
-    """Rectangular tube; J by Bredt, so thin-walled."""
+    """Thin-walled rectangular tube (torsion by Bredt): outer width and height as for a rectangle."""
     w, h = width - 2 * wall, height - 2 * wall
     enclosed, around = (width - wall) * (height - wall), 2 * (width + height - 2 * wall)
     return Section(
@@ -83,12 +90,18 @@ def cantilever_compliance(
     return k
 
 
-SECTIONS: dict[str, tuple[tuple[str, ...], Callable[..., Section]]] = {
-    "round": (("diameter",), tube_section),
-    "tube": (("outer", "inner"), tube_section),
-    "rectangle": (("width", "height"), rectangle_section),
-    "hollow": (("width", "height", "wall"), hollow_section),
+SECTIONS: dict[str, Callable[..., Section]] = {
+    "round": round_section,
+    "tube": tube_section,
+    "rectangle": rectangle_section,
+    "hollow": hollow_section,
 }
+"""Section of the lengths (m) that a machine file gives under the names of the function's arguments."""
+
+
+def lengths(sort: str) -> tuple[str, ...]:
+    """Names of the lengths of a section of this sort."""
+    return tuple(signature(SECTIONS[sort]).parameters)
 
 
 def dimension(key: str) -> Dimension:
@@ -140,8 +153,7 @@ def number_fault(key: str, value: float) -> str:
 
 def section(sort: str, n: dict[str, float]) -> Section:
     """Section of this sort by the numbers of a beam."""
-    keys, of = SECTIONS[sort]
-    return of(*(n[f"{sort}.{key}"] for key in keys))
+    return SECTIONS[sort](*(n[f"{sort}.{key}"] for key in lengths(sort)))
 
 
 def section_fault(sort: str, n: dict[str, float]) -> str:

@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from stiffmap.common.broadcasting import Floats
-from stiffmap.common.units import DENSITY, MODULUS, UnitSystem
+from stiffmap.common.units import DENSITY, LENGTH, MODULUS, UnitSystem
 from stiffmap.common.yaml_text import read
-from stiffmap.model.description import Body, Cable, Joint, MachineDescription, Spring
-from stiffmap.model.description.tree import all_elements
+from stiffmap.model.description import Body, Cable, Joint, MachineDescription, Offset, Spring
+from stiffmap.model.description.tree import all_elements, chains, sequences
 from stiffmap.model.files.load import load_description
+from stiffmap.model.files.schema.base import NAMED
 from stiffmap.model.files.shipped import find
 from stiffmap.model.home import Gap, gap_text
 from stiffmap.solve.compiled import CompiledMachine, Status
@@ -114,7 +114,7 @@ def advice(machine: Machine, path: str | PathLike[str]) -> list[str]:
         *_limits(machine),
         *_trial(machine),
         *_numbers(machine, path),
-        *_rams(machine, path),
+        *_beams(machine),
     ]
 
 
@@ -217,60 +217,42 @@ def _numbers(machine: Machine, path: str | PathLike[str]) -> Iterator[str]:
             value = _plain(part.get(name)) if isinstance(part, dict) else None
             if value is not None and not least <= size * value <= most:
                 yield f"{key}.{name} = {value:g} {unit} is no solid (steel: {steel / size:.3g} {unit})"
-    for key, sequence in _sequences(data):
-        yield from _long_beams(key, sequence)
 
 
-def _long_beams(key: str, sequence: list[object]) -> Iterator[str]:
-    """Beams that are much longer than the offset before them, or nothing of it."""
-    span = None
-    for e in sequence:
-        if not isinstance(e, dict):
-            continue
-        if "offset" in e and isinstance(e.get("translation"), list):
-            numbers = [_plain(v) for v in e["translation"]]
-            span = None if None in numbers else float(np.linalg.norm(np.array(numbers, dtype=float)))
-        beam = e.get("beam")
-        length = _plain(beam.get("length")) if isinstance(beam, dict) else None
-        if length is not None and span and not 0.01 * span < length < 1.5 * span:
-            yield f"{key}: the beam of '{e.get('spring')}' is {length:g} long, the offset before it spans {span:g}"
-
-
-def _rams(machine: Machine, path: str | PathLike[str]) -> Iterator[str]:
-    """Beams of constant length that slide along themselves, where no passive joint keeps them from bending."""
-    description = machine.description
-    if any(isinstance(e, Joint) and not e.actuated for _, e in all_elements(description)):
-        return
-    for key, sequence in _sequences(read(find(path)).data):
-        slide: tuple[str, Floats] | None = None
-        for e in sequence:
-            if e.get("kind") == "prismatic":
-                axis = _along(e.get("axis"))
-                slide = None if axis is None else (str(e.get("actuator")), axis)
-            beam = e.get("beam")
-            if not isinstance(beam, dict) or slide is None or "stroke" in e:
+def _beams(machine: Machine) -> Iterator[str]:
+    """Beams that are much longer than the offset before them, or nothing of it; and those of constant length that slide along
+    themselves, where no passive joint keeps them from bending. Of legs with one template the first is named."""
+    d = machine.description.declared or machine.description
+    passive = any(isinstance(e, Joint) and not e.actuated for _, e in all_elements(d))
+    found: dict[str, str] = {}
+    for place, elements in [found for chain in chains(d) for found in sequences(chain[1], chain[0])]:
+        span, slide = 0.0, Joint("", "", ())
+        for e in elements:
+            if isinstance(e, Offset) and e.name not in ("frame", "attach"):
+                span = float(np.linalg.norm(e.nominal.p))
+            if isinstance(e, Joint) and e.kind == "prismatic":
+                slide = e
+            if not isinstance(e, Spring) or e.beam is None:
                 continue
-            ram = _along(beam.get("along", "x"))
-            if ram is not None and abs(ram @ slide[1]) > 0.99:
-                yield (
-                    f"{key}: '{slide[0]}' slides along the beam of '{e.get('spring')}', whose length stays "
-                    f"{_plain(beam.get('length')):g}: if it is a ram or column that gets longer, write "
-                    f"stroke: {{joint: {slide[0]}}}; if not, with rate: 0"
+            length = dict(e.beam.numbers)["length"]
+            shown = d.units.say(length, LENGTH)
+            if span and not 0.01 * span < length < 1.5 * span:
+                before = d.units.say(span, LENGTH)
+                found.setdefault(
+                    f"the beam of '{e.name}' is {shown} long, the offset before it spans {before}", place
                 )
-
-
-def _along(value: object) -> Floats | None:
-    """Unit vector of an axis as a file writes it."""
-    if isinstance(value, str) and value.strip("-") in tuple(NAMES):
-        named: Floats = np.eye(3)[NAMES.index(value[-1])]
-        return -named if value.startswith("-") else named
-    numbers = [_plain(v) for v in value] if isinstance(value, list) else []
-    if len(numbers) != 3 or None in numbers:
-        return None
-    vector: Floats = np.array(numbers, dtype=float)
-    size = float(np.linalg.norm(vector))
-    unit: Floats = vector / (size or 1.0)
-    return unit if size else None
+            if (
+                not passive
+                and slide.axes
+                and not e.stroke
+                and abs(np.dot(NAMED[e.beam.along], slide.axes[0])) > 0.99
+            ):
+                found.setdefault(
+                    f"'{slide.name}' slides along the beam of '{e.name}', whose length stays {shown}: if it is a ram or column that "
+                    f"gets longer, write stroke: {{joint: {slide.name}}}; if not, with rate: 0",
+                    place,
+                )
+    yield from (f"{place}: {text}" for text, place in found.items())
 
 
 def _plain(value: object) -> float | None:
@@ -284,10 +266,3 @@ def _walk(data: object, key: str) -> Iterator[tuple[str, object]]:
     inside = data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ()
     for name, value in inside:
         yield from _walk(value, f"{key}.{name}".strip("."))
-
-
-def _sequences(data: object) -> Iterator[tuple[str, list[Any]]]:
-    """Lists of mappings, such as those of elements."""
-    for key, value in _walk(data, ""):
-        if isinstance(value, list) and value and all(isinstance(v, dict) for v in value):
-            yield key, value

@@ -136,7 +136,7 @@ def why_not(machine: Machine, k: Kinematics) -> list[str]:
     """Of each pose: which limit it breaks, or that it cannot be reached; empty where it is good."""
     names = machine.compiled.names
     joints = [i for i, role in enumerate(names.roles) if role != Role.SPRING]
-    low, high = np.array(machine.compiled.limits).reshape(-1, 2)[joints].T
+    low, high = np.array(machine.compiled.core.limits).reshape(-1, 2)[joints].T
     coordinates = np.atleast_2d(k.coordinates)[:, joints]
     slack = SLACK * np.maximum(1.0, np.abs(coordinates))
     broken = (coordinates < low - slack) | (coordinates > high + slack)

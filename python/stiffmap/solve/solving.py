@@ -145,19 +145,19 @@ def _solve(
     steps = 0  # adaptive
     if not isinstance(o.load_steps, str) or o.load_steps != "auto":
         steps = whole_number(o.load_steps, "load_steps", 1, what="'auto' or a positive number")
-    answer = machine.solve(
+    answer = machine.core.solve(
+        machine.plan if o.method == "fast" else None,  # type: ignore[arg-type]  # None: reference path
         rows(p, shape, (3,)),
         rows(r, () if r.ndim == 2 else shape, (3, 3)),  # one for all
         _stacked([w, *extra.values()], shape),
         load_points=loaded,
-        load_types=types,
+        load_types=[LOAD_TYPES[t] for t in types],
         read_points=read,
         gravity=machine.gravity(o.gravity),
-        fast=o.method == "fast",
         load_steps=steps,
         threads=thread_count(o.threads),
-        stiffness=o.stiffness,
-        variants=variants,
+        full=o.stiffness,
+        variants=[v.plan for v in variants],
         closed=None
         if unloaded is None
         else rows(unloaded.coordinates, shape, unloaded.coordinates.shape[-1:]),

@@ -67,7 +67,7 @@ class Winch:
     def pull(self, state: State) -> tuple[float, Array, Array, Array]:
         """Tension, gradient (6,) and Hessian (6, 6) of its energy in the motion of its body, and where it holds it."""
         e, body = self.e, self.at.body
-        arm = state.r[body] @ (self.at.p + self.at.r @ (np.array(e.at) + np.array(e.at_error)))
+        arm = state.r[body] @ (self.at.p + self.at.r @ np.array(e.at))
         anchor = np.array(e.anchor) + np.array(e.anchor_error)
         length, u, bend = way(anchor, np.array(e.guide), e.radius, state.p[body] + arm)
         soft, steady = compliances(e)

@@ -55,14 +55,14 @@ CASES = {
         STARTER,
         "length: 500\n",
         "length: 0.5\n",
-        "the beam of 'bar' is 0.5 long, the offset before it spans 500",
+        "the beam of 'bar' is 0.5 mm long, the offset before it spans 500 mm",
     ),
     "mass": (STARTER, "mass: 6", "mass: 5000", "5000 kg is more than solid steel"),
     "beam": (
         STARTER,
         "length: 500\n",
         "length: 5000\n",
-        "the beam of 'bar' is 5000 long, the offset before it spans 500",
+        "the beam of 'bar' is 5000 mm long, the offset before it spans 500 mm",
     ),
     "box": (STARTER, "y: [320, 430]", "y: [320, 630]", "3 of 9 positions of the workspace cannot be reached"),
     "box in m": (

@@ -39,12 +39,12 @@ def joints(arm: Arm, coordinates: np.ndarray) -> np.ndarray:
 
 
 def test_the_machines_are_redundant(arm: Arm) -> None:
-    assert arm.machine.compiled.redundancy == len(arm.home) - len(arm.machine.description.task)
+    assert arm.machine.compiled.core.redundancy == len(arm.home) - len(arm.machine.description.task)
 
 
 def test_shipped_machines_are_not() -> None:
     for name in sm.machine_names():
-        assert sm.load_machine(name).compiled.redundancy == 0, name
+        assert sm.load_machine(name).compiled.core.redundancy == 0, name
 
 
 def test_joints_are_a_stationary_point_of_the_distance(arm: Arm) -> None:
@@ -164,7 +164,7 @@ def test_a_leg_in_a_plane_closes_in_the_lanes_too() -> None:
     m = sm.Machine(replace(d, legs=(replace(leg, elements=(*leg.elements, spring)),), task=task))
     p, r = poses(arm)
     fast, slow = (m.solve(p, WRENCH, rotation=r, method=way) for way in ("fast", "reference"))
-    assert m.compiled.redundancy == 1 and not slow.status.any() and not fast.status.any()
+    assert m.compiled.core.redundancy == 1 and not slow.status.any() and not fast.status.any()
     assert not (fast.flags & sm.Flag.REFERENCE_PATH).any()
     np.testing.assert_allclose(
         joints(arm, m.solve(p, np.zeros(6), rotation=r).coordinates),

@@ -26,16 +26,12 @@ from stiffmap.common.broadcasting import (
 from stiffmap.common.errors import StiffmapError
 from stiffmap.machining.process.description import EndMill, Process, own_arc, with_coefficients
 from stiffmap.machining.process.load import GivenProcess, as_process, spindle_rate
+from stiffmap.model.files.schema.base import NAMED
 from stiffmap.solve.compiled import multipliers
 from stiffmap.workspace.maps.inputs import unit
 from stiffmap.workspace.vibration.modes import TipModes
 
 ROW = "(frequency Hz, damping ratio, mass kg, direction)"
-WAYS = {
-    f"{sign}{axis}": one * way
-    for sign, one in (("", 1), ("-", -1))
-    for axis, way in zip("xyz", np.eye(3), strict=True)
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +111,7 @@ def _row(i: int, row: object) -> tuple[float, float, float, Floats]:
 
 
 def _direction(name: str, way: object) -> Floats:
-    v = np.array(WAYS.get(way, ())) if isinstance(way, str) else real_array(way, name, "a direction")
+    v = np.array(NAMED.get(way, ())) if isinstance(way, str) else real_array(way, name, "a direction")
     if v.shape == (2,):
         v = np.append(v, 0.0)
     if v.shape != (3,) or not np.isfinite(v).all() or not np.linalg.norm(v) > 0:

@@ -37,8 +37,6 @@ class Redundancy:
     """(turns,) m: largest error with one turn all along; infinite where it does not hold the path."""
     turns: Floats
     """(turns,) rad of the grid."""
-    joints: Floats
-    """(m, actuators) m, rad."""
 
     @property
     def idle(self) -> bool:
@@ -85,7 +83,7 @@ def redundancy(
     chosen = best_sequence(np.where(stage <= bound * (1 + SAME), cost, np.inf), free, largest=False)
     assert chosen is not None
     rows = np.arange(len(job))
-    return Redundancy(grid[chosen], error[rows, chosen], stage.max(axis=0), grid, joints[rows, chosen])
+    return Redundancy(grid[chosen], error[rows, chosen], stage.max(axis=0), grid)
 
 
 def _turned(job: Setting, angle: float) -> tuple[Floats, Floats]:

@@ -40,8 +40,6 @@ class Feeds:
     """s with the feed as it is."""
     held: NDArray[np.bool_]
     """(moves,) bool: the error stays within the tolerance, and the drives within their efforts."""
-    limited_by: tuple[str, ...]
-    """(moves,) tolerance, drive effort, drive speed, or fastest feed asked for."""
 
 
 def best_feeds(job: Setting, tolerance: float | None = None) -> Feeds:
@@ -76,17 +74,14 @@ def best_feeds(job: Setting, tolerance: float | None = None) -> Feeds:
     holds_low = exact(np.full(len(job), SLOWEST)) & strong(np.full(len(job), SLOWEST))
     feed = job.path.feed.copy()
     held = np.ones(len(job.path), bool)
-    why = ["does not cut"] * len(job.path)
     total = before = 0.0
     for i in np.unique(job.points.move):
         rows = np.flatnonzero(job.points.move == i)
-        at = rows[int(np.argmin(share[rows]))]
-        feed[i] = job.feed[rows].min() * share[at]
+        feed[i] = job.feed[rows].min() * share[rows].min()
         held[i] = bool(holds_low[rows].all())
-        why[i] = _limit(share[at], borne[at], top[at])
         total += job.path.length[i] / feed[i]
         before += job.path.length[i] / job.feed[rows].min()
-    return Feeds(feed, float(total), float(before), held, tuple(why))
+    return Feeds(feed, float(total), float(before), held)
 
 
 def _largest(good: Callable[[Floats], NDArray[np.bool_]], low: Floats, high: Floats) -> Floats:
@@ -98,15 +93,6 @@ def _largest(good: Callable[[Floats], NDArray[np.bool_]], low: Floats, high: Flo
         ok = good(middle)
         least, most = np.where(ok, middle, least), np.where(ok, most, middle)
     return np.where(whole, high, least)
-
-
-def _limit(share: float, borne: float, top: float) -> str:
-    """What keeps a move from being faster."""
-    if share < borne:
-        return "tolerance"
-    if borne < top:
-        return "drive effort"
-    return "drive speed" if top < FASTEST else "fastest feed asked for"
 
 
 PLACES, SPEEDS = 24, 61

@@ -172,8 +172,6 @@ class Cable(Joint):
     """Tension of the lead, of that of the free length: friction of the guide."""
     anchor_error: Vector = (0.0, 0.0, 0.0)
     """Real anchor minus the one that is believed in (m, base axes)."""
-    at_error: Vector = (0.0, 0.0, 0.0)
-    """The same of ``at`` (m, current frame)."""
 
 
 @dataclass(frozen=True)

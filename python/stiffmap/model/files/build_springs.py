@@ -137,7 +137,7 @@ def _material(beam: Beam, context: Context) -> MaterialModel | None:
 def _section(beam: Beam, context: Context) -> tuple[str, tuple[tuple[str, float], ...]]:
     """Which section a beam has, and its numbers."""
     sort = next(s for s in beams.SECTIONS if getattr(beam, s) is not None)
-    numbers = _read(getattr(beam, sort), beams.SECTIONS[sort][0], context, f"{sort}.")
+    numbers = _read(getattr(beam, sort), beams.lengths(sort), context, f"{sort}.")
     fault = beams.section_fault(sort, dict(numbers))
     if fault:
         context.at(sort).fail(fault)

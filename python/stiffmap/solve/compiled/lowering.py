@@ -108,7 +108,7 @@ def cable(full: str, e: Cable) -> _core.ExternalSpring:
         e.radius,
         np.array(e.guide),
         np.array(e.anchor_error),
-        np.array(e.at_error),
+        np.zeros(3),  # of its fixing point
         lower,
         upper,
         drive_numbers(e),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
 
@@ -25,7 +24,9 @@ class CompiledMachine:
     Calls take C-contiguous arrays with one leading axis of poses, SI, base axes; the public functions broadcast
     and check before they call. Immutable; may be shared by threads.
 
-    What needs no more than the mechanism is asked of `core`, which gives arrays by name (cpp/include/stiffmap/solve/poses.hpp).
+    What needs no more than the mechanism is asked of `core`: ``bodies``, name, frame and mass (kg) of each; ``limits``, lowest and
+    highest value of each coordinate, 1e300 where there is no limit; ``redundancy``, motions of the drives that a commanded pose leaves
+    open; and what gives arrays by name (cpp/include/stiffmap/solve/poses.hpp).
     ``kinematics``: closed coordinates and the drives' Jacobian of (n, 3) positions, from `start` (n, coordinates) near the answer, NaN
     where none is known; not `patient`: a pose that straight continuation from home does not reach is out of reach; `only`: so is one
     that its start does not lead to; `weights` (drives,) of what drives that outnumber the freedoms share (theory D10), (0,): their own.
@@ -36,7 +37,8 @@ class CompiledMachine:
     `loss`: (coordinates,); `closed`: (n, coordinates) closed at the poses; `whole`: of a tangent that is not symmetric as it is, with
     the motion of all coordinates. ``clamp``: what keeps a point at (n, 6) displacements from its commanded poses. ``reactions``:
     (n, coordinates) N or N·m of every spring, drive and locked coordinate, reference path. ``point_positions``: (n, 3) m of a named
-    point at (n, coordinates), nominal geometry.
+    point at (n, coordinates), nominal geometry. ``solve``: equilibria of (n, 3) positions, (n or 1, 3, 3) rotations and (n or 1, load
+    points, 6) wrenches; `closed`: (n, coordinates) already closed at these poses, NaN out of reach, None: found by closure.
     """
 
     def __init__(
@@ -79,7 +81,8 @@ class CompiledMachine:
         }
 
     @cached_property
-    def _plan(self) -> _core.FastPlan:
+    def plan(self) -> _core.FastPlan:
+        """What the kernels prepare for the machine: with it the core solves and closes by the fast path, without by the reference path."""
         box = self.description.workspace
         low, high = box if box else ((1.0, 1.0, 1.0), (-1.0, -1.0, -1.0))
         try:
@@ -90,12 +93,12 @@ class CompiledMachine:
 
     @cached_property
     def _one(self) -> _core.OneCall:
-        return _core.OneCall(self.core, self._plan, self.home_rotation, self.gravity())
+        return _core.OneCall(self.core, self.plan, self.home_rotation, self.gravity())
 
     @property
     def not_fast(self) -> str:
         """What the machine lacks for the fast path; empty if nothing."""
-        return self._plan.missing
+        return self.plan.missing
 
     @property
     def length(self) -> float:
@@ -130,43 +133,6 @@ class CompiledMachine:
         """One pose under one wrench at the tcp by the kernels; None for inputs that are not plain numbers."""
         return self._one.solve(position, wrench)
 
-    def solve(
-        self,
-        position: Floats,
-        rotation: Floats,
-        wrench: Floats,
-        *,
-        load_points: Sequence[str],
-        load_types: Sequence[str],
-        read_points: Sequence[str],
-        gravity: Floats,
-        fast: bool,
-        load_steps: int,
-        threads: int,
-        stiffness: bool,
-        variants: Sequence[CompiledMachine] = (),
-        closed: Floats | None = None,
-    ) -> _core.Answer:
-        """Equilibria of (n, 3) positions, (n or 1, 3, 3) rotations and (n or 1, load points, 6) wrenches.
-
-        closed: (n, coordinates) already closed at these poses, NaN out of reach; None: found by closure.
-        """
-        return self.core.solve(
-            self._plan if fast else None,  # type: ignore[arg-type]  # None: reference path
-            position,
-            rotation,
-            wrench,
-            load_points,
-            [LOAD_TYPES[t] for t in load_types],
-            read_points,
-            gravity,
-            load_steps,
-            threads,
-            stiffness,
-            [v._plan for v in variants],
-            closed,
-        )
-
     def close_poses(
         self, position: Floats, rotation: Floats, threads: int, start: Floats | None = None
     ) -> tuple[Any, ...]:
@@ -174,7 +140,7 @@ class CompiledMachine:
 
         start: (n, coordinates) on the assembly branch that is meant; None: that of home.
         """
-        return tuple(self.core.closure(self._plan, position, rotation, start, threads).values())
+        return tuple(self.core.closure(self.plan, position, rotation, start, threads).values())
 
     def close_actuators(
         self, actuators: Floats, threads: int, start: Floats | None = None
@@ -208,21 +174,6 @@ class CompiledMachine:
     def drives(self) -> tuple[int, ...]:
         """Index of each actuator's coordinate."""
         return tuple(i for _, i in self.core.actuators)
-
-    @cached_property
-    def bodies(self) -> tuple[tuple[str, int, float], ...]:
-        """Name, frame and mass (kg) of each body."""
-        return tuple(self.core.bodies)
-
-    @cached_property
-    def limits(self) -> tuple[tuple[float, float], ...]:
-        """Lowest and highest value of each coordinate; 1e300 where there is no limit."""
-        return tuple(self.core.limits)
-
-    @property
-    def redundancy(self) -> int:
-        """Motions of the drives that a commanded pose leaves open."""
-        return int(self.core.redundancy)
 
     def frames(self, coordinates: Floats) -> tuple[Floats, Floats]:
         """(nodes, 3) m and (nodes, 3, 3): all frames at given coordinates, nominal geometry."""

@@ -189,7 +189,7 @@ def _count(machine: Machine, damping: Damping, modes: int | None) -> int:
     if modes is not None:
         return min(size, whole_number(modes, "modes", 1))
     damped = int(np.count_nonzero((damping.viscous > 0) | (damping.loss > 0)))
-    return max(1, min(size, 6 * len(machine.compiled.bodies) + damped))
+    return max(1, min(size, 6 * len(machine.compiled.core.bodies) + damped))
 
 
 def _statically(out: dict[str, Floats], compliance: Floats) -> None:

@@ -110,7 +110,7 @@ def test_linear_delta_with_and_without_transmission_ends_within_its_work():
     assert free.poses <= 2 * 20_000 and free.edge > b.edge and free.edge_upper > free.edge
     p = np.random.default_rng(0).uniform(*free.corners, (500, 3))
     k = drive_kinematics(machine, p, patient=False)
-    low, high = np.array([machine.compiled.limits[i] for i in machine.compiled.drives]).T
+    low, high = np.array([machine.compiled.core.limits[i] for i in machine.compiled.drives]).T
     assert (k.status == sm.Status.CONVERGED).all()
     assert ((k.actuators >= low) & (k.actuators <= high)).all()
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, create_model, model_validator
 
 from stiffmap.model import beams
 from stiffmap.model.files.schema.base import FileModel, Name, Number, Pair, describe
@@ -78,36 +78,17 @@ class MaterialModel(FileModel):
 Along = Literal["x", "y", "z", "-x", "-y", "-z"]
 
 
-class Round(FileModel):
-    """Solid circular section."""
-
-    diameter: Number
-
-
-class Tube(FileModel):
-    """Circular tube."""
-
-    outer: Annotated[Number, Field(description="Outer diameter.")]
-    inner: Annotated[Number, Field(description="Inner diameter.")]
+def _section(sort: str) -> Any:
+    """Key of a section, a mapping with a key for each of its lengths."""
+    keys: dict[str, Any] = dict.fromkeys(beams.lengths(sort), (Number, ...))
+    words = beams.SECTIONS[sort].__doc__
+    return create_model(sort.capitalize(), __base__=FileModel, __doc__=words, **keys) | None, None
 
 
-class Rectangle(FileModel):
-    """Solid rectangle: width along the axis after the beam's (y of x, z of y, x of z), height along
-    the other."""
-
-    width: Number
-    height: Number
+_SECTIONS: dict[str, Any] = {sort: _section(sort) for sort in beams.SECTIONS}
 
 
-class Hollow(FileModel):
-    """Thin-walled rectangular tube: outer width and height as for a rectangle."""
-
-    width: Number
-    height: Number
-    wall: Number
-
-
-class Beam(FileModel):
+class Beam(create_model("Sections", __base__=FileModel, **_SECTIONS)):  # type: ignore[misc]
     """Euler-Bernoulli cantilever; the spring sits at its far end.
 
     A section (round, tube, rectangle, hollow) with a material, or the products EA, GJ and the two
@@ -117,10 +98,6 @@ class Beam(FileModel):
     length: Number
     along: Along = "x"
     material: MaterialModel | Name | None = None
-    round: Round | None = None
-    tube: Tube | None = None
-    rectangle: Rectangle | None = None
-    hollow: Hollow | None = None
     EA: Number | None = None
     GJ: Number | None = None
     EIx: Number | None = None

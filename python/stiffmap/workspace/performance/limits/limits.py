@@ -180,7 +180,7 @@ class Bounds:
         """Index, name, sign and most of that sign times the coordinate, of each end of a range that counts."""
         compiled, drives = self.machine.compiled, set(self.machine.compiled.drives)
         out = []
-        for i, (low, high) in enumerate(compiled.limits):
+        for i, (low, high) in enumerate(compiled.core.limits):
             if self.ranges if i in drives else self.joints:
                 name = f"{'range of' if i in drives else 'joint limit of'} {compiled.names.coordinates[i]}"
                 ends = ((1.0, high), (-1.0, -low))

@@ -222,7 +222,7 @@ def _between(machine: Machine, k: DriveKinematics, position: Floats, i: int) -> 
 def _crossed(machine: Machine, jacobian: Floats, together: NDArray[np.int32]) -> NDArray[np.bool_]:
     """(n,) where the drive Jacobian loses rank, or changes its orientation since the pose before; False where it is
     NaN."""
-    redundancy = machine.compiled.redundancy
+    redundancy = machine.compiled.core.redundancy
     ok = np.isfinite(jacobian).all(axis=(1, 2))
     out = np.zeros(len(jacobian), dtype=bool)
     if not ok.any():

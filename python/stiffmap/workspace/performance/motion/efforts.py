@@ -222,7 +222,7 @@ def force_transmission(
         bias = as_tensions(machine, h, k, still, most, sharing)
     with np.errstate(divide="ignore", invalid="ignore"):
         j = weighted(machine, k.jacobian, characteristic_length(machine, length), "all")
-        s, last = of_motions(k.together, singular_values(j), machine.compiled.redundancy)
+        s, last = of_motions(k.together, singular_values(j), machine.compiled.core.redundancy)
         least, largest = 1 / s[..., 0], 1 / last
     return ForceTransmission(least, largest, inner_radius(*found), section, bias, most, k.status)
 

@@ -36,7 +36,7 @@ def movers(compiled: CompiledMachine, node: int) -> Iterator[tuple[int, int]]:
 
 def total_mass(machine: Machine) -> float:
     """kg, all bodies that the machine file declares."""
-    return float(sum(mass for *_, mass in machine.compiled.bodies))
+    return float(sum(mass for *_, mass in machine.compiled.core.bodies))
 
 
 def moving_mass(machine: Machine) -> float:
@@ -44,7 +44,7 @@ def moving_mass(machine: Machine) -> float:
     compiled = machine.compiled
     roles = compiled.names.roles
     moving = (
-        m for _, n, m in compiled.bodies if any(roles[c] != Role.SPRING for _, c in movers(compiled, n))
+        m for _, n, m in compiled.core.bodies if any(roles[c] != Role.SPRING for _, c in movers(compiled, n))
     )
     return float(sum(moving))
 
@@ -52,13 +52,13 @@ def moving_mass(machine: Machine) -> float:
 def inertias(machine: Machine) -> Floats:
     """(bodies, 3, 3) kg·m² about the centres of mass, in the bodies' axes and the core's order."""
     found = {core_name(n): e for n, e in all_elements(machine.description) if isinstance(e, Body)}
-    bodies = [found[name].inertia for name, _, _ in machine.compiled.bodies]
+    bodies = [found[name].inertia for name, _, _ in machine.compiled.core.bodies]
     return np.array(bodies, dtype=float).reshape(-1, 3, 3)
 
 
 def need_masses(machine: Machine, what: str) -> None:
     """StiffmapError that names the bodies without mass, or says that there are none."""
-    bodies = machine.compiled.bodies
+    bodies = machine.compiled.core.bodies
     if not bodies:
         raise StiffmapError(
             f"{machine.name}: {what} needs masses, and the machine file declares no body; "
@@ -102,7 +102,7 @@ def rigid_dynamics(
 ) -> dict[str, Floats]:  # fmt: skip
     """The core's inverse dynamics at closed coordinates (n, coordinates) and tip motions (n, 6); see `drive_weights`."""
     rates = accelerations = np.zeros((0, len(machine.actuators)))
-    if machine.compiled.redundancy and (np.any(twist) or np.any(twist_rate)):
+    if machine.compiled.core.redundancy and (np.any(twist) or np.any(twist_rate)):
         rates, accelerations = followed(machine, coordinates, twist, twist_rate, threads)
     out: dict[str, Floats] = machine.compiled.core.dynamics(
         list(inertias(machine)), np.ascontiguousarray(coordinates), np.ascontiguousarray(twist),

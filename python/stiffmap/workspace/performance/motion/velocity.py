@@ -82,9 +82,9 @@ def transmission_of(
     size = characteristic_length(machine, length)
     j = weighted(machine, k.jacobian, size, part)
     driven = j * speeds
-    s, low = of_motions(k.together, singular_values(j), machine.compiled.redundancy)
+    s, low = of_motions(k.together, singular_values(j), machine.compiled.core.redundancy)
     high = s[..., 0]
-    if part == "translation" or (part == "all" and machine.compiled.redundancy):
+    if part == "translation" or (part == "all" and machine.compiled.core.redundancy):
         rank = 3 if part == "translation" else _rank(s)
         slowest = facets(driven, rank)[1].min(axis=-1, initial=np.inf)
         slowest = np.where(np.isinf(slowest), 0.0, slowest)  # no facets: some motion has no drive
@@ -183,8 +183,8 @@ def velocity_section(
     k = drive_kinematics(machine, position, rotation, threads=threads)
     speeds = drive_limits(machine, "speed", limits, "m/s or rad/s")
     j, axes = commanded_jacobian(machine, k), commanded_axes(machine, plane)
-    if machine.compiled.redundancy:
-        rank = _rank(of_motions(k.together, singular_values(j), machine.compiled.redundancy)[0])
+    if machine.compiled.core.redundancy:
+        rank = _rank(of_motions(k.together, singular_values(j), machine.compiled.core.redundancy)[0])
         rows, most = sides(j * speeds, rank)
         return section_polygon(rows[..., axes], most, k.status)
     return section_polygon(inverse_rows(j)[..., axes], speeds, k.status)
