@@ -58,7 +58,7 @@ def arm_job() -> Setting:
 
 def turning(scheduler: Any) -> dict[str, Any]:
     found = redundancy(arm_job(), 12, fastest=None, scheduler=scheduler)
-    return {"angle": found.angle, "error": found.error, "joints": found.joints}
+    return {"angle": found.angle, "error": found.error}
 
 
 def box(scheduler: Any) -> dict[str, Any]:
