@@ -73,6 +73,8 @@ class Screen:
         """Chi-square that the best two parts together leave of a residual (N,)."""
         best, of = self.left(residual), float(residual @ residual)
         parts = np.argsort(-self._gains(residual))
+        if len(parts) < 2:
+            return best
         factor = side_by_side([self.shapes[k] for k in parts])
         _, count, rank = factor.shape
         flat = factor.reshape(len(residual), -1)
