@@ -169,11 +169,11 @@ def _unit(m: Meant, index: int, name: str, slides: bool) -> Unit:
     return m.unit(index, *names, quantity=quantity)
 
 
-def _side_by_side(m: Meant) -> dict[str, dict[str, int]]:
-    """Columns of places in one row, by their names and axes: X1 … Z2, or N1x … N2z where nothing else is a place."""
+def _side_by_side(columns: Sequence[Column]) -> dict[str, dict[str, int]]:
+    """Places in one row, by their names and axes: X1 … Z2, or N1x … N2z where nothing else is a place."""
     groups: dict[str, dict[str, int]] = {}
-    seen = any(k.meaning in SEEN for k in m.guessed)
-    for k in m.guessed:
+    seen = any(k.meaning in SEEN for k in columns)
+    for k in columns:
         part = re.fullmatch(SIDE_BY_SIDE, k.name) if k.meaning == "note" and not seen else None
         if k.meaning in SEEN and k.repeat:
             groups.setdefault(str(k.repeat), {})[k.meaning[-1]] = k.index
@@ -216,7 +216,8 @@ def as_seen(m: Meant, difference: str, by_instrument: bool) -> None:
     alone with joints are asked for, unless an instrument is named that wrote them.
     """
     header = m.sheet.header
-    columns, groups = m.guessed, _side_by_side(m)
+    columns = m.guessed
+    places, groups = dict[str, Column](), _side_by_side(columns)
     if not any(k.meaning in READINGS and k.meaning not in AXES[3:] for k in columns):
         notes = [(k, re.fullmatch(MEASURED, k.name.lower())) for k in columns if k.meaning == "note"]
         places = {seen[1]: k for k, seen in notes if seen}
@@ -224,7 +225,7 @@ def as_seen(m: Meant, difference: str, by_instrument: bool) -> None:
             places = {k.meaning: k for k in columns if k.meaning in POSE}
         for a, k in places.items():
             m.chosen[f"p{a}"] = [header[k.index]]
-    if groups:
+    if groups and not places:
         _below_each_other(m, groups)
     of = {k.meaning: k for k in m.guessed if k.repeat == 0}
     if difference != DIFFERENCES[0] and ({*SEEN, "ll"} & {*of}):

@@ -86,23 +86,27 @@ def one_point_a_row(m: Meant) -> None:
             good[:] = False  # whose columns are those of the rows
         what = f"column '{m.sheet.header[at]}': each row is one coordinate of a point; expected its rows {', '.join(axes)} together, and columns by name"
         m.sheet.check(good, lambda _: what)  # noqa: B023
-        first = range(0, len(cells), len(axes))
-        columns: dict[str, Cells] = {}
-        for name, own in zip(m.sheet.header, map(list, m.sheet.columns), strict=True):
-            of_points = [[c for c in own[k : k + len(axes)] if c] for k in first]
-            if own == list(column):
-                continue
-            if all(len({*c}) <= 1 for c in of_points):
-                columns[name] = Cells.of(c[0] if c else "" for c in of_points)
-                continue
-            bare, unit = split_unit(name)
-            for axis in axes:
-                rows = (k + p.index(axis) for k, p in zip(first, points, strict=True))
-                columns[with_unit(f"{bare} {axis}", unit)] = Cells.of(own[k] for k in rows)
-        lines = [m.sheet.lines[k] for k in first]
-        m.sheet = replace(m.sheet, header=tuple(columns), columns=tuple(columns.values()), lines=lines)
-        m.said.append(f"rows of one coordinate each are taken together: {len(lines)} points")
+        m.sheet = _points(m.sheet, at, points)
+        m.said.append(f"rows of one coordinate each are taken together: {len(points)} points")
         return
+
+
+def _points(sheet: Table, at: int, points: list[list[str]]) -> Table:
+    """A row for each of the points, whose axes, in the order of their rows, are the cells of a column."""
+    size = len(points[0])
+    first = range(0, len(sheet), size)
+    columns: dict[str, Cells] = {}
+    for i, cells in enumerate(map(list, sheet.columns)):
+        own = [[c for c in cells[k : k + size] if c] for k in first]
+        name, unit = sheet.names[i], sheet.unit(i)
+        if i != at and all(len({*c}) <= 1 for c in own):
+            columns[sheet.header[i]] = Cells.of(c[0] if c else "" for c in own)
+        elif i != at:
+            for axis in sorted(points[0]):
+                rows = (k + p.index(axis) for k, p in zip(first, points, strict=True))
+                columns[with_unit(f"{name} {axis}", unit)] = Cells.of(cells[k] for k in rows)
+    lines = [sheet.lines[k] for k in first]
+    return replace(sheet, header=tuple(columns), columns=tuple(columns.values()), lines=lines)
 
 
 def _signs(m: Meant) -> None:

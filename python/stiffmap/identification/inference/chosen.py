@@ -15,7 +15,7 @@ from stiffmap.identification.inference.amplitudes import Fit
 from stiffmap.identification.inference.columns import Columns
 from stiffmap.identification.inference.constants import SIZES
 from stiffmap.identification.inference.parts import Part, gains, log_mean
-from stiffmap.identification.inference.places import Place, Shape, possible, side_by_side
+from stiffmap.identification.inference.places import Place, Shape, of_every_two, possible, side_by_side
 from stiffmap.model.description import AppliedEffect
 from stiffmap.model.effects import Parameter, get
 
@@ -54,14 +54,12 @@ def of_pairs(fit: Fit, shapes: Sequence[Shape]) -> Floats:
     """(s, s) gain of evidence by every two of some shapes together, mean over both sizes; nothing of one with itself."""
     factor = side_by_side(shapes)
     m, s, rank = factor.shape
-    white = fit.white(factor.reshape(m, -1))
-    gram = (white.T @ white).reshape(s, rank, s, rank).swapaxes(1, 2)
     z = (factor.reshape(m, -1).T @ fit.solved).reshape(s, rank)
     b2 = SIZES[::PAIR_STRIDE] ** 2
     root = np.sqrt(np.stack(np.meshgrid(b2, b2, indexing="ij"), axis=-1).reshape(-1, 2).repeat(rank, axis=1))
     first, second = np.tril_indices(s, -1)
     both = np.stack([first, second], axis=1)
-    of_two = gram[both[:, :, None], both[:, None, :]].swapaxes(2, 3).reshape(-1, 1, 2 * rank, 2 * rank)
+    of_two = of_every_two(fit.white(factor.reshape(m, -1)), rank, both)[:, None]
     inner = np.eye(2 * rank) + root[:, :, None] * of_two * root[:, None, :]
     scaled = root * z[both].reshape(-1, 1, 2 * rank)
     solved = np.linalg.solve(inner, scaled[..., None])[..., 0]

@@ -76,6 +76,12 @@ def side_by_side(shapes: Sequence[Shape]) -> Floats:
     return factors
 
 
+def of_every_two(columns: Floats, rank: int, both: Integers) -> Floats:
+    """(pairs, 2 p, 2 p) inner products of columns (m, shapes p), those of two shapes of p = `rank` columns each; `both` (pairs, 2)."""
+    gram = (columns.T @ columns).reshape(-1, rank, columns.shape[1] // rank, rank).swapaxes(1, 2)
+    return np.asarray(gram[both[:, :, None], both[:, None, :]].swapaxes(2, 3).reshape(-1, 2 * rank, 2 * rank))
+
+
 def places(
     plan: CandidatePlan, free: Floats, noise: Floats, use: Integers, description: MachineDescription
 ) -> tuple[Place, ...]:

@@ -447,6 +447,7 @@ TRACKER = ("--instrument", "tracker", "--unit", "length=mm")
         ("SMR a X,SMR a Y,SMR a Z,SMR b X,SMR b Y,SMR b Z", "1,2,3,41,2,3", ",,,7,48,9", ["SMR a", "SMR b", "SMR b"]),
         ("X1,Y1,Z1,X2,Y2,Z2,X3,Y3,Z3", "1,2,3,41,2,3,1,2,50", "7,8,9,7,48,9,54,8,9", ["1", "2", "3"] * 2),
         ("x,y,z,N1x,N1y,N1z,N2x,N2y,N2z", "5,5,5,1,2,3,41,2,3", "5,6,7,7,8,9,7,48,9", ["N1", "N2"] * 2),
+        ("A1x,A1y,A1z,A2x,A2y,A2z,x meas,y meas,z meas", "9,9,9,9,9,8,1,2,3", "9,9,9,9,9,8,7,8,9", None),
         ("px1,py1,pz1,px2,py2,pz2", "1,2,3,1.1,2,3", "7,8,9,7,8.1,9", None),
     ],
 )  # fmt: skip
@@ -455,7 +456,7 @@ def test_places_side_by_side_are_taken_below_each_other(
 ) -> None:
     e = made(tmp_path, SIDE_BY_SIDE.format(places, one, other), *TRACKER, machine="dh")
     rows = np.genfromtxt(tmp_path / "e" / "data.csv", names=True, delimiter=",", dtype=None, encoding=None)
-    known = 3 * places.startswith("x,y,z")  # what the controller says
+    known = {"x": 3, "A": 6}.get(places[0], 0)  # what the controller says
     read = [v for line in (one, other) for v in line.split(",")[known:] if v]  # what was not read has no row
     wanted = np.array(read, dtype=float).reshape(-1, 3)
     np.testing.assert_array_equal(np.stack([rows[s] for s in ("px", "py", "pz")], axis=1), wanted)

@@ -22,7 +22,7 @@ from stiffmap.experiment.prediction.predict import Predictor
 from stiffmap.identification.candidates.sensitivity import CandidatePlan, Variant
 from stiffmap.identification.diagnosis.slips.axes import Hypothesis, Slip, gauges, loads, moved, shifts, steps
 from stiffmap.identification.diagnosis.slips.factors import factors
-from stiffmap.identification.inference.places import Shape, shape_of, side_by_side
+from stiffmap.identification.inference.places import Shape, of_every_two, shape_of, side_by_side
 from stiffmap.model.effects import get
 
 MOST, LEFT = 0.5, 0.1
@@ -78,11 +78,9 @@ class Screen:
         factor = side_by_side([self.shapes[k] for k in parts])
         _, count, rank = factor.shape
         flat = factor.reshape(len(residual), -1)
-        gram = (flat.T @ flat).reshape(count, rank, count, rank).swapaxes(1, 2)
         both = np.stack(np.triu_indices(min(PAIRED, count), 1, count), axis=1)
-        of_two = gram[both[:, :, None], both[:, None, :]].swapaxes(2, 3).reshape(-1, 2 * rank, 2 * rank)
         along = (flat.T @ residual).reshape(count, rank)[both].reshape(-1, 2 * rank)
-        held = of_two + DUST * len(residual) * np.eye(2 * rank)
+        held = of_every_two(flat, rank, both) + DUST * len(residual) * np.eye(2 * rank)
         taken = np.sum(along * np.linalg.solve(held, along[..., None])[..., 0], axis=-1)
         for k in np.argsort(-taken):
             if of - taken[k] >= best:  # whatever their bounds
