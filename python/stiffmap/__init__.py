@@ -10,6 +10,7 @@ from stiffmap.common.from_above import PLACES
 from stiffmap.common.version import __version__
 
 if TYPE_CHECKING:
+    from stiffmap.common.tables.table_file import TableFile
     from stiffmap.experiment import Experiment, Residual, load_experiment
     from stiffmap.experiment.calls import residual, simulate
     from stiffmap.experiment.spreadsheet.from_table import experiment_from_table
@@ -74,6 +75,7 @@ PLACES |= {
 _HOME = {
     name: module
     for module, names in {
+        "stiffmap.common.tables.table_file": "TableFile",
         "stiffmap.experiment": "Experiment Residual load_experiment residual simulate",
         "stiffmap.experiment.spreadsheet.from_table": "experiment_from_table",
         "stiffmap.identification.calibration": "Calibration calibrate",
@@ -108,7 +110,7 @@ _HOME = {
 
 __all__ = [
     "Calibration", "Commands", "CuttingForce", "DeflectionBudget", "Diagnosis", "Experiment", "Flag",
-    "IdentifiedLaw", "Kinematics", "Machine", "Process", "Residual", "Solution", "Status", "StiffmapError",
+    "IdentifiedLaw", "Kinematics", "Machine", "Process", "Residual", "Solution", "Status", "StiffmapError", "TableFile",
     "__version__", "accuracy_transmission", "assembly_wrenches", "calibrate", "compensate", "cutting_force",
     "deflection_budget", "design_sweep", "diagnose", "drive_efforts", "error_map", "experiment_from_table", "floquet_multiplier",
     "force_transmission", "forward_kinematics", "frequency_response", "identify_link", "identify_process",

@@ -14,6 +14,7 @@ import re
 import warnings
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from os import PathLike
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -23,11 +24,12 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError, StiffmapError, frames_of_this_package, suggestion
 from stiffmap.common.number_text import read_value
 from stiffmap.common.short import first_of
-from stiffmap.common.tables.header import IN_SI, meaning_of, split_unit
+from stiffmap.common.tables.header import IN_SI, meaning_of, split_unit, stated_unit
 from stiffmap.common.tables.lines import Spelling, is_finite
 from stiffmap.common.tables.orientation import VECTOR, matrices_of, orientation_of
-from stiffmap.common.tables.sheet import Layout, read_sheet
+from stiffmap.common.tables.sheet import read_sheet
 from stiffmap.common.tables.table import Table
+from stiffmap.common.tables.table_file import layout_of, table_file, with_names, with_units
 from stiffmap.common.units import FREQUENCIES, QUANTITIES, SHORT_TIMES, feed_unit, unit_of
 
 SPELLED = {"s": SHORT_TIMES, "percent": {"%": 1.0, "-": 100.0, "1": 100.0}}
@@ -59,6 +61,8 @@ class Known:
     """Name -> unit of a column that names none; None: it must."""
     blank: bool = False
     """Whether cells may be empty, which are NaN then."""
+    options: bool = True
+    """Whether the command has --map, --unit, --header and --table."""
 
     def has(self, name: str) -> bool:
         """Whether a table may have a column of this name, without its unit."""
@@ -102,14 +106,22 @@ class NamedTable:
             self.fail(f"expected {expected}, found {value[wrong[0]]:.12g}", name, int(wrong[0]))
 
 
-def read_named(path: Path, known: Known, sheet: str | None = None) -> NamedTable:
-    """A text or a workbook. Raises FileError naming file, line and column, what was expected and what was found."""
-    return named(_sheet(path, known, sheet), known)
+def read_named(place: str | PathLike[str], known: Known) -> NamedTable:
+    """A text or a workbook, or a `TableFile`. Raises FileError naming file, line and column, what was expected and what was found."""
+    return named(_sheet(place, known), known)
 
 
-def _sheet(path: Path, known: Known, sheet: str | None = None, *, repeated: bool = False) -> Table:
+def _sheet(place: str | PathLike[str], known: Known, *, repeated: bool = False) -> Table:
+    file = table_file(place)
     names = ", ".join(known.usual.get(n, n) for n in known.units)
-    return read_sheet(path, sheet, Layout(known.has, strict=True, repeated=repeated, names=names))
+    layout = layout_of(file, known.has, strict=True, repeated=repeated, names=names, options=known.options)
+    table = read_sheet(Path(file), file.sheet, layout)
+
+    def meaning(header: str) -> tuple[str, str, str]:
+        name, unit = _name_of(header, known)
+        return name, unit, QUANTITIES.get(known.units.get(name, ""), "")
+
+    return with_units(file, with_names(file, table, lambda h: meaning(h)[0]), meaning)
 
 
 def sets_of(path: Path, known: Known, shared: str) -> list[NamedTable]:
@@ -167,22 +179,25 @@ def _joined(name: str) -> str:
     return re.sub(r"\s+", "_", name.lower())
 
 
-def _meaning(sheet: Table, column: int, known: Known, table: NamedTable) -> tuple[str, str, float]:
-    """Name of a column, nothing where no cell is a number, its unit as written, and the SI size of that."""
-    head = sheet.header[column]
+def _name_of(head: str, known: Known) -> tuple[str, str]:
+    """What a column is, its own name where it is nothing known, and its unit as written."""
     text, unit = split_unit(head)
-    name = _joined(text)
-    named_so = known.has(text) or meaning_of(text) in known.units
-    if not named_so and not re.search(r"[])]\s*$", head):  # x_per_tooth_mm, real_m/N
-        whole = re.sub(r"\s", "_", head)
+    name, meant = _joined(text), meaning_of(text)
+    if not known.has(text) and meant not in known.units and not re.search(r"[])]\s*$", head):
+        whole = re.sub(r"\s", "_", head)  # x_per_tooth_mm, real_m/N
         cuts = [m.start() for m in re.finditer("_", whole) if known.has(whole[: m.start()])]
         if cuts:
             name, unit = whole[: cuts[-1]].lower(), PER.sub(r"/\1", whole[cuts[-1] + 1 :])
             unit = {"N_m": "N*m"}.get(unit, unit)
     name, unit = known.renamed(name, unit)
     name = known.aliases.get(name, name)
-    if name not in known.units and meaning_of(text) in known.units:
-        name = meaning_of(text)
+    return meant if name not in known.units and meant in known.units else name, unit
+
+
+def _meaning(sheet: Table, column: int, known: Known, table: NamedTable) -> tuple[str, str, float]:
+    """Name of a column, nothing where no cell is a number, its unit as written, and the SI size of that."""
+    head = sheet.header[column]
+    name, unit = _name_of(head, known)
     usual = known.usual.get(name, name)
     if name not in known.units:
         spelling = Spelling(sheet.decimal_comma)
@@ -191,15 +206,18 @@ def _meaning(sheet: Table, column: int, known: Known, table: NamedTable) -> tupl
         ):
             return "", "", 1.0
         shown = ", ".join(known.usual.get(n, n) for n in known.units)
-        table.fail(f"unknown column '{head}'; known: {shown}, each with its unit, as in x [mm] or x_mm")
+        way = f"; say what it is, as in --map x='{head}', or leave it out: --map note='{head}'"
+        what = f"unknown column '{head}'; known: {shown}, each with its unit, as in x [mm] or x_mm"
+        table.fail(what + way if known.options else what)
     si = known.units[name]
     if si in ("", WORD):
         return name, unit, 1.0
     if not unit:
-        unit = si if IN_SI.fullmatch(text) else (known.assumed or {}).get(name, "")
+        unit = si if IN_SI.fullmatch(sheet.names[column]) else (known.assumed or {}).get(name, "")
     if not unit:
+        way = f" or say --unit {name}={_name_of(usual, known)[1]}" if known.options else ""
         table.fail(
-            f"the unit is missing: write {usual}; expected a unit such as in {usual}, found none", head
+            f"the unit is missing: write {usual}{way}; expected a unit such as in {usual}, found none", head
         )
     try:
         return name, unit, size_in(unit, si)
@@ -266,8 +284,10 @@ class PoseTable(NamedTable):
         return np.asarray(matrices_of(self.block(("rx", "ry", "rz")), VECTOR) @ home)
 
 
-def read_pose_table(place: Path, *, at_home: Floats | None = None, known: Known = KNOWN) -> PoseTable:
-    """The table of a CSV file, whose columns are the `known` ones and those of an orientation.
+def read_pose_table(
+    place: str | PathLike[str], *, at_home: Floats | None = None, known: Known = KNOWN
+) -> PoseTable:
+    """The table of a text, a workbook or a `TableFile`, whose columns are the `known` ones and those of an orientation.
 
     `at_home` (3,) m stands in for x, y or z that have no column, along which a planar machine is not commanded; None: all three
     are wanted. Raises FileError naming file, line, column, what was expected and what was found.
@@ -284,7 +304,8 @@ def read_pose_table(place: Path, *, at_home: Floats | None = None, known: Known 
         if {"rx", "ry", "rz"} & set(table.values):
             table.fail("orientations are given twice", sheet.header[columns[0]])
         table.turns = f"against the base: {first_of([sheet.header[i] for i in columns], 4)}: {found.words}"
-        table.orientation = found.matrices(sheet)
+        usual = table_file(place).units.get("angle") or stated_unit(sheet.above, "angle")
+        table.orientation = found.matrices(sheet, usual)
     elif turned := [table.header[n] for n in ("rx", "ry", "rz") if n in table.values]:
         table.turns = f"from home: {', '.join(turned)}: a rotation vector"
     missing = [c for c in "xyz" if c not in table.values]

@@ -40,14 +40,15 @@ class Orientation(NamedTuple):
     """How the angles turn, as scipy writes it, or `VECTOR`; nothing of a quaternion, w first, or of a matrix, row by row."""
     words: str
 
-    def matrices(self, sheet: Table) -> Floats:
-        """(n, 3, 3) of quaternions, matrices, a vector or angles, degrees where no unit is given nor known. FileError for an empty cell."""
+    def matrices(self, sheet: Table, usual: str = "") -> Floats:
+        """(n, 3, 3) of quaternions, matrices, a vector or angles, in the `usual` unit, else degrees, where none is given nor known.
+        FileError for an empty cell."""
         values = np.stack([sheet.numbers(i) for i in self.columns], axis=1)
         first = self.columns[0]
         sheet.check(~np.isnan(values).any(axis=1), lambda _: f"{sheet.header[first]} …: found an empty cell")
         if not self.turns:
             return matrices_of(values)
-        usual = "rad" if IN_SI.fullmatch(sheet.names[first]) else "deg"
+        usual = "rad" if IN_SI.fullmatch(sheet.names[first]) else usual or "deg"
         units = (unit_of(sheet.unit(i) or usual, "angle") for i in self.columns)
         return matrices_of(values * [u.size for u in units if u], self.turns)
 

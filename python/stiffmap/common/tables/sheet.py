@@ -59,7 +59,7 @@ MEAN = re.compile(
 TIMED = re.compile(r"(?i)(time|zeit|temps|t|x[ _]value|column)([ ._]?\d+)?")
 """Names of times, or none, before each channel of a scope."""
 ONE_TIME = "where it is the time of each channel, export all resampled to one"
-WAY = "--header id,x,y,z,dx,dy,dz (nothing between two commas for a column that is not used)"
+WAY = "--header id,x,y,z,dx,dy,dz or the like (nothing between two commas for a column that is not used)"
 LONGEST_HEADER, MOST_COLUMNS, MOST_ABOVE = 300, 1000, 50
 
 
@@ -76,11 +76,13 @@ class Layout:
     table: int | None = None
     """Which of several tables on a sheet, from 1."""
     strict: bool = False
-    """Whether all below the header are rows of numbers, with a cell for each column, in a command without --header and --table."""
+    """Whether all below the header are rows of numbers, with a cell for each column."""
     repeated: bool = False
     """Whether names may come again, as those of displacements do once per load case."""
     names: str = ""
     """Those that a header may have, for the message where there is none."""
+    options: bool = True
+    """Whether the command has --header and --table."""
 
 
 PLAIN = Layout()
@@ -127,10 +129,11 @@ def _read(path: Path, sheet: str | None, layout: Layout) -> Table:
     if first is not None and (layout.header or (found is None and layout.numbered)):
         found = first[0], _names(first[1], layout.header, str(path), first[0])
     if first is None or found is None:
-        way = f"; if the table has none, name its columns: {WAY}, or by their numbers, as in --map x=2"
-        begin = f"; expected its names of columns, such as {layout.names}" if layout.names else ""
-        rule = "; a row of numbers has two or more, each alone in its cell, in half of its cells or more"
-        more = begin if layout.strict or (begin and first) else way if first else rule
+        more = f"; expected its names of columns, such as {layout.names}" if layout.names else ""
+        if first and layout.options:
+            more += f"; if the table has none, name its columns: {WAY}, or by their numbers, as in --map x=2"
+        elif not layout.names:
+            more = "; a row of numbers has two or more, each alone in its cell, in half of its cells or more"
         raise NoTableError(f"no header line with rows of numbers below it was found{more}", file=str(path))
     number_, header = found
     aside = [f"row {n}, of numbers above the header" for n, _ in begun[:-1] if not layout.strict]
@@ -143,7 +146,7 @@ def _read(path: Path, sheet: str | None, layout: Layout) -> Table:
     names = _checked(header, str(path), number_)
     if not layout.repeated:
         way = " (names with blanks in them?)" if separator == " " else ""
-        way += "" if layout.strict or layout.names else f"; name the columns: {WAY}"
+        way += f"; name the columns: {WAY}" if layout.options else ""
         way += f"; {ONE_TIME}" if len({*names[::2]}) == 1 < len(names) - 2 else ""
         refuse_twice(names, str(path), number_, way)
     width = len(names)
@@ -369,7 +372,7 @@ def _data(
             aside.append(f"row {n}, '{last}', is no reading")
         elif not any(is_finite(c, spelling) for c in cells):
             if _begins_table(cells, names, len(header), spelling, layout):
-                way = "" if layout.strict else ": say --table 1 for the one above, --table 2 for this one"
+                way = ": say --table 1 for the one above, --table 2 for this one" if layout.options else ""
                 what = f"another table begins here{way}"
                 raise FileError(what, file=file, line=n)
             again = [c.strip() for c in cells[:2]] == list(header[:2])

@@ -14,9 +14,10 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.tables.header import IN_SI, stated_unit, with_unit
 from stiffmap.common.tables.table import Table, column_letter
+from stiffmap.common.tables.table_file import find_column
 from stiffmap.common.units import QUANTITIES, Unit, known, unit_of
 from stiffmap.experiment.files.fields import quantity_of
-from stiffmap.experiment.spreadsheet.guess import READINGS, Column, find_column, guess
+from stiffmap.experiment.spreadsheet.guess import READINGS, Column, guess
 
 SI = {q: unit for unit, q in QUANTITIES.items()}
 USUAL = {"length": "mm", "force": "N", "moment": "N*m", "angle": "deg", "temperature": "degC"}

@@ -67,7 +67,7 @@ TURNS = r"(r|dreh|turn|hinge|cont|0).*|d|c|"
 SLIDES = r"p(ris.*)?|t(rans.*)?|s(lid.*|chub.*)?|l(in.*)?|1(\.0*)?"
 IN_PI_RAD = re.compile(r"(?i)[*×x·]? *(pi|π) *\*? *(rad)?")
 """A unit of angles that are shares of π."""
-LAYOUT = Layout(names="joint, theta [deg], d [mm], a [mm], alpha [deg]")
+LAYOUT = Layout(names="joint, theta [deg], d [mm], a [mm], alpha [deg]", options=False)
 QUANTITIES = {"theta": "angle", "d": "length", "a": "length", "alpha": "angle"}
 LEG = "arm"
 STEP, TRIES = math.radians(30.0), 200

@@ -17,6 +17,7 @@ from stiffmap.common.short import short_repr
 from stiffmap.common.tables.header import RECORD
 from stiffmap.common.tables.sheet import Layout, read_sheet
 from stiffmap.common.tables.table import Table, column_letter
+from stiffmap.common.tables.table_file import TableFile, layout_of
 from stiffmap.common.tables.workbook import WORKBOOKS, sheet_names
 from stiffmap.common.units import SPELLINGS, known, unit_of
 from stiffmap.experiment.experiment import Experiment
@@ -134,10 +135,8 @@ def experiment_from_table(
     joints = None if dh is None else read_sheet(Path(dh), layout=LAYOUT)
     rows = None if joints is None else read_dh(joints, given.units, dh_convention)
     drives = drives if rows is None else {f"{LEG}.{r.name}": r.slides for r in rows}
-    numbered = any(h.strip("+-").isdigit() for many in chosen.values() for h in many)
-    layout = Layout(
-        lambda n: guessed(n) != "note" or bool(JOINT.fullmatch(n)), tuple(header), numbered, which
-    )
+    said = TableFile(file, columns or {}, units or {}, sheet, header, which)
+    layout = layout_of(said, lambda n: guessed(n) != "note" or bool(JOINT.fullmatch(n)))
 
     def declared_for(m: Meant) -> Machine:
         if rows is None or dh is None:

@@ -6,8 +6,8 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from stiffmap.common.errors import StiffmapError
 from stiffmap.common.tables.header import meaning_of, split_unit
+from stiffmap.common.tables.table_file import find_column
 from stiffmap.common.units import TIMES, unit_of
 from stiffmap.experiment.channels import AXES
 from stiffmap.experiment.experiment import WRENCH
@@ -87,18 +87,6 @@ def named_loads(columns: Sequence[Column], axis: str) -> list[Column]:
     word = re.compile(rf"(?i)(?<![a-z])({axis[0]}_?|{topic}[./]){axis[1]}(?![a-z])")
     notes = (c for c in columns if c.meaning == "note" and word.search(c.name))
     return [c for c in notes if not c.unit or unit_of(c.unit, sort)]
-
-
-def find_column(wanted: str, headers: Sequence[str]) -> int:
-    """Index of a column by its header, with or without its unit, by how that begins, or by its number from 1; StiffmapError."""
-    exact = [i for i, h in enumerate(headers) if wanted in (h, split_unit(h)[0])]
-    loose = [i for i, h in enumerate(headers) if h.lower().startswith(wanted.lower())]
-    found = exact or (loose if len(loose) == 1 else [])
-    if not found and wanted.isdigit() and 1 <= int(wanted) <= len(headers):
-        return int(wanted) - 1
-    if not found:
-        raise StiffmapError(f"--map: no column '{wanted}'; there are: {', '.join(headers)}")
-    return found[0]
 
 
 def guessed(name: str) -> str:

@@ -108,7 +108,7 @@ def load_taps(path: str | PathLike[str], machine: Machine | Source | None = None
     p, file = Path(path), str(path)
     if not p.is_file():
         raise FileError("no such table of tap tests", file=file)
-    t = read_named(p, KNOWN)
+    t = read_named(path, KNOWN)
     missing = [USUAL[c] for c in POSE if c not in t.values]
     if not {"frequency", "response"} & set(t.values):
         missing.append("frequency_Hz or response")

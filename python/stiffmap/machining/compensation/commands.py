@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from os import PathLike
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -133,7 +132,7 @@ def compensate(
         The corrected machine: as declared, with the effects that a diagnosis found. Its controller knows the
         declared geometry.
     position, rotation
-        (n, 3) m and (n, 3, 3) wanted tool poses; rotation None: as at home. Or a CSV file of poses (x, y, z in mm, and
+        (n, 3) m and (n, 3, 3) wanted tool poses; rotation None: as at home. Or a table of poses, its file or a `TableFile` (x, y, z in mm, and
         where wanted loads, approach, orientation as in every table of poses), whose own loads replace `wrench`.
     actuators
         (n, actuators) instead: wanted is the pose that the declared machine takes there, and the commands stay in
@@ -161,7 +160,7 @@ def compensate(
     one_of(point, machine.points, "point")
     if isinstance(position, (str, PathLike)):
         home, task = machine.description.home, machine.description.task
-        read = read_pose_table(Path(position), at_home=None if {*"xyz"} <= {*task} else home.p, known=WANTED)
+        read = read_pose_table(position, at_home=None if {*"xyz"} <= {*task} else home.p, known=WANTED)
         position, rotation, turns = read.position, read.rotation(home.r), read.turns
         ids = tuple(read.values.get("id", ()))
         approach = read.block(APPROACH) if {*APPROACH} & {*read.values} else approach

@@ -14,6 +14,7 @@ from stiffmap.common.broadcasting import Floats, given_path
 from stiffmap.common.errors import FileError, refuse_folder, suggestion
 from stiffmap.common.number_text import number_in
 from stiffmap.common.tables.named import Known, read_named
+from stiffmap.common.tables.table_file import refuse_options
 from stiffmap.common.tables.workbook import TABLES
 from stiffmap.common.texts import lines_of
 from stiffmap.machining.toolpath.gcode.load import load_gcode
@@ -35,7 +36,7 @@ def load_path(
     progress: Callable[[int], None] | None = None,
 ) -> Toolpath:
     """A built-in outline by name (washbasin, bathtub, rectangle, circle, pocket; size in m), or a file: G-code (.ngc …),
-    a CL file of APT (.cl, .apt …) or a table of points (.csv).
+    a CL file of APT (.cl, .apt …) or a table of points (.csv), a `TableFile` as well.
 
     feed (m/s) and spindle (rad/s): of a built-in outline. offsets: work offsets of G-code by name, m. progress: called with the number of lines read. Raises FileError.
     """
@@ -43,6 +44,7 @@ def load_path(
     if offsets and Path(name_or_file).suffix.lower() not in GCODE:
         raise FileError("offsets: only a program in G-code takes them", file=str(name_or_file))
     if str(name_or_file) in outline_names():
+        refuse_options(name_or_file, "an outline")
         speeds = {"feed": feed, "rpm": None if spindle is None else spindle * 30 / pi}
         return outline(str(name_or_file), size, **{k: v for k, v in speeds.items() if v is not None})
     path = Path(name_or_file)
@@ -56,12 +58,13 @@ def load_path(
     if size is not None:
         raise FileError("size: only a built-in outline takes one", file=str(path))
     suffix = path.suffix.lower()
+    if suffix in TABLES:
+        return read_points(name_or_file)
+    refuse_options(name_or_file, f"a path of the kind {suffix}")
     if suffix in GCODE:
         return load_gcode(path, offsets=offsets, progress=progress)
     if suffix in CL:
         return read_cl(path)
-    if suffix in TABLES:
-        return read_points(path)
     known = ", ".join((*GCODE, *CL, *TABLES))
     raise FileError(f"unknown kind of path {suffix!r}; known: {known}; {OWN_LANGUAGE}", file=str(path))
 
@@ -75,7 +78,7 @@ ALIASES = {"s": "spindle", "drehzahl": "spindle"} | dict.fromkeys(
 )
 
 
-def read_points(path: Path) -> Toolpath:
+def read_points(path: str | PathLike[str]) -> Toolpath:
     """Rows x_mm, y_mm, z_mm (or ``x [mm]`` …), and where given feed_mm_min, spindle_rpm, i, j, k (tool axis), turn_deg.
 
     Raises FileError naming the column or the line.
@@ -100,7 +103,7 @@ def read_points(path: Path) -> Toolpath:
     unknown = np.full(n, nan)
     return path_of(
         t.block("xyz"), feed=t.values.get("feed", unknown), spindle=t.values.get("spindle", unknown), tool=tool,
-        lines=np.array(t.lines), name=path.stem, turn=t.values.get("turn"),
+        lines=np.array(t.lines), name=Path(path).stem, turn=t.values.get("turn"),
     )  # fmt: skip
 
 

@@ -84,7 +84,7 @@ def known_columns(
     refuse_folder(path, "a table")
     if not Path(path).is_file():
         raise FileError("no such file", file=str(path))
-    layout = Layout(lambda name: name.lower() in units, strict=True, repeated=True)
+    layout = Layout(lambda name: name.lower() in units, strict=True, repeated=True, options=False)
     sheet = read_sheet(Path(path), None, layout)
     cases = [_CASE.match(h) for h in sheet.header]
     names = [f"u{m[1] or 'xyz'[int(m[2]) - 1]}{h[m.end() :]}" if m else h for m, h in zip(cases, sheet.header, strict=True)]  # fmt: skip
@@ -96,7 +96,8 @@ def known_columns(
     found: dict[str, list[Floats]] = {name: [] for name in units}
     for head, cells, name in zip(sheet.header, sheet.columns, map(str.lower, sheet.names), strict=True):
         if name in units:
-            known = Known({name: units[name][0]}, {name: units[name][1]}, {}, assumed={name: unit or ""})
+            usual = {name: units[name][1]}
+            known = Known({name: units[name][0]}, usual, {}, assumed={name: unit or ""}, options=False)
             found[name].append(named(replace(sheet, header=(head,), columns=(cells,)), known).values[name])
     return sheet, found
 

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple, cast
 import typer
 
 from stiffmap.common.errors import MissingPartError
-from stiffmap.ui.cli.options import Json
+from stiffmap.ui.cli.options import TABLE, Json, typed_for
 
 
 class Command(NamedTuple):
@@ -72,7 +72,7 @@ _waiting: list[dict[str, Any]] = []
 
 
 def load(command: Command) -> Callable[..., Any]:
-    """A command's function with the option ``--json``: it imports what it needs when it is called, shows the answer and exits with
+    """A command's function with the option ``--json`` and, of a table, those of `TABLE`: it imports what it needs when it is called, shows the answer and exits with
     1 where that is a finding; raises `MissingPartError` for what is not installed.
 
     A function that does something else under ``--json`` has the option itself.
@@ -81,16 +81,25 @@ def load(command: Command) -> Callable[..., Any]:
         function: Callable[..., Any] = import_module(command.module).command
     parameters = dict(signature(function, eval_str=True).parameters)
     own = "as_json" in parameters
+    table = ""
+    for name, typed in [(n, t) for n, p in parameters.items() if (t := typed_for(p.annotation))]:
+        table, parameters[name] = name, parameters[name].replace(annotation=typed)
+        for field, (of, default) in TABLE.items():
+            parameters[field] = Parameter(field, Parameter.KEYWORD_ONLY, default=default, annotation=of)
     parameters.setdefault(
         "as_json", Parameter("as_json", Parameter.KEYWORD_ONLY, default=False, annotation=Json)
     )
 
     @wraps(function)
-    def called(as_json: bool, **given: object) -> None:
+    def called(as_json: bool, **given: Any) -> None:
+        from stiffmap.ui.cli.inputs import as_table
         from stiffmap.ui.cli.output import show
 
         with _all_installed(command):
             import_all()
+        if table:
+            said = {name: given.pop(name) for name in TABLE}
+            given[table] = as_table(given[table], **said) if any(said.values()) else given[table]
         answer = function(**given, as_json=as_json) if own else function(**given)
         if answer is not None:  # else the command has shown it
             show(as_json, answer)

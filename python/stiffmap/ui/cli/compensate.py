@@ -33,7 +33,7 @@ USES = {"axis": {*LINE, *LOADS, "points"}, "axis of a map": {*LINE, "case"}, "po
 def command(
     context: typer.Context,
     machine: options.Corrected,
-    poses: Path | None = argument("CSV of wanted poses: x,y,z in mm, loads, approach_x …", None),
+    poses: options.TablePath | None = argument("CSV of wanted poses: x,y,z in mm, loads, approach_x …", None),
     output: Path | None = written("CSV of commands, table of --axis, or URDF."),
     effect: options.Effects = None,
     force: str = option("Force at the tool in every pose, N, where the CSV has none.", "0,0,0"),

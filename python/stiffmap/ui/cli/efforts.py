@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,7 +16,7 @@ from stiffmap.workspace.performance import drive_efforts, load_motion
 
 def command(
     machine: options.Machine,
-    trajectory: Path = argument(
+    trajectory: options.TablePath = argument(
         "Motion of the tool: CSV or YAML, numbers with units; or a shipped one: trim."
     ),
     duration: float | None = option(

@@ -13,6 +13,7 @@ import typer
 from rich.text import Text
 
 from stiffmap.common.errors import StiffmapError
+from stiffmap.common.tables.table_file import table_file
 from stiffmap.experiment.noise.level import unknown
 from stiffmap.experiment.spreadsheet.dh import ASSUMED
 from stiffmap.experiment.spreadsheet.from_table import FromTable, experiment_from_table
@@ -26,7 +27,9 @@ from stiffmap.ui.cli.output import table as table_of
 def command(
     context: typer.Context,
     action: str = argument("new: make a folder from a spreadsheet."),
-    file: Path = argument("Spreadsheet: .xlsx, .xls, .ods, .csv, .txt (any separator and decimal sign)."),
+    file: options.TablePath = argument(
+        "Spreadsheet: .xlsx, .xls, .ods, .csv, .txt (any separator and decimal sign)."
+    ),
     output: Path = written("Folder of the experiment.", ...),
     machine: str | None = option("Declared machine: shipped name or machine file; or give --dh."),
     dh: Path | None = option(
@@ -45,20 +48,8 @@ def command(
     instrument: str | None = option(
         "What wrote the file: tracker, dial-gauges, ball-bar, iso-9283, or a mapping file."
     ),
-    mapped: list[str] | None = option(
-        "What a column is, by header or number, e.g. dx='Uhr 1 [µm]', x=2; repeats: dx='Uhr 1|Uhr 2'; "
-        "the other sign: fz='-Last [kg]'; repeatable.",
-        None,
-        "--map",
-    ),
-    unit: list[str] | None = option(
-        "Unit of a column without one, e.g. dx=um; length=mm, joints=deg: of all of them."
-    ),
     constant: list[str] | None = option("What is the same in all rows, mm and N, e.g. z=0.", None, "--set"),
     noise: list[str] | None = option("One standard deviation of a reading in its unit, e.g. dx=2."),
-    sheet: str | None = option("Sheet of the workbook. [default: the first that fits]"),
-    header: str | None = option("Names of the columns of a table that has none, e.g. id,x,y,z,dx,dy,dz."),
-    which: int | None = option("Which of several tables on a sheet, from 1.", None, "--table"),
     record: list[str] | None = option(
         "For the report: operator, instrument, certificate, date, temperature or notes, e.g. operator=Miller."
     ),
@@ -80,11 +71,11 @@ def command(
     if action != "new":
         raise StiffmapError(f"experiment: expected 'new', got '{action}'")
     refuse_unused(context, {"without dh": "dh_convention"})
+    table = table_file(file)
     made = experiment_from_table(
-        machine, file, output, columns=pairs(mapped, "map"), units=pairs(unit, "unit"),
-        constants=_numbers(constant, "set"), noise=_numbers(noise, "noise"), dh=dh, dh_convention=dh_convention,
-        difference=difference, quantity=quantity, instrument=instrument, sheet=sheet,
-        header=header.split(",") if header else (), which=which, record=pairs(record, "record"),
+        machine, table.path, output, columns=table.columns, units=table.units, constants=_numbers(constant, "set"), noise=_numbers(noise, "noise"), dh=dh, dh_convention=dh_convention,
+        difference=difference, quantity=quantity, instrument=instrument, sheet=table.sheet, header=table.header,
+        which=table.which, record=pairs(record, "record"),
         ask=_prompt if dialogue else None, overwrite=overwrite,
     )  # fmt: skip
     found, names = made.understood, made.sheet.header

@@ -11,6 +11,7 @@ import typer
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import number_in, place_text
+from stiffmap.common.tables.table_file import TableFile
 from stiffmap.model.effects import apply_records, parse_effect
 from stiffmap.solve.machine import Machine, load_machine
 
@@ -68,6 +69,16 @@ def pairs(given: Sequence[str] | None, name: str) -> dict[str, str]:
             raise StiffmapError(f"--{name}: expected NAME=VALUE, such as dx=…, each once; got '{text}'")
         out[key.strip()] = value.strip()
     return out
+
+
+def as_table(
+    path: Any, columns: Sequence[str] | None, units: Sequence[str] | None, header: str | None, **more: Any
+) -> TableFile:
+    """The file of a table with what options say of it."""
+    if path is None:
+        raise StiffmapError("--map, --unit, --sheet, --header, --table: only with a table")
+    names = words(header) or ()
+    return TableFile(path, columns=pairs(columns, "map"), units=pairs(units, "unit"), header=names, **more)
 
 
 def position(text: str | None, machine: Machine) -> Floats:

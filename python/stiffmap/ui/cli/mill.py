@@ -14,7 +14,7 @@ from stiffmap.ui.report.milling import summary, write_report
 
 def command(
     machine: options.Corrected,
-    path: str = argument(
+    path: options.TableText = argument(
         "G-code, CL or CSV file; or an outline: washbasin, bathtub, rectangle, circle, pocket."
     ),
     process: str = option("Process file, or a shipped name: trimming, slot.", ...),

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from os import PathLike
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple, get_args
 
 import typer
 
@@ -40,6 +41,34 @@ def _alone(context: typer.Context, path: Path | None) -> Path | None:
             check_replaceable(path)  # before anything is computed
     return path
 
+
+class Tabular(NamedTuple):
+    """Marks the argument of a table's file, whose command has the options of `TABLE` as well and gets a `TableFile` where one is given."""
+
+    typed: Any
+    """What the command line has for it."""
+
+
+def typed_for(annotation: Any) -> Any:
+    """What the command line has for the argument of a table's file; None for another argument."""
+    parts = (annotation, *get_args(annotation))
+    marks = (m for part in parts for m in getattr(part, "__metadata__", ()) if isinstance(m, Tabular))
+    return next((m.typed for m in marks), None)
+
+
+TablePath = Annotated[PathLike[str], Tabular(Path | None)]
+TableText = Annotated[str | PathLike[str], Tabular(str | None)]
+"""Where it may be something else than a file."""
+TABLE: dict[str, tuple[Any, Any]] = {
+    "columns": (list[str] | None, option(
+        "What a column is, by header or number, e.g. x='X pos', y=2; the other sign: fz='-Last [kg]'; repeatable.", None, "--map"
+    )),
+    "units": (list[str] | None, option("Unit of a column without one, e.g. x=um; length=mm: of all of them.", None, "--unit")),
+    "sheet": (str | None, option("Sheet of a workbook. [default: the first that fits]")),
+    "header": (str | None, option("Names of the columns of a table that has none, e.g. id,x,y,z.")),
+    "which": (int | None, option("Which of several tables on a sheet, from 1.", None, "--table")),
+}  # fmt: skip
+"""What a table does not say itself: fields of a `TableFile`, with the type and the option of each."""
 
 Machine = Annotated[str, typer.Argument(help="Shipped name (stiffmap machines) or machine file.")]
 Declared = Annotated[str, typer.Argument(help="Declared machine: shipped name or machine file.")]

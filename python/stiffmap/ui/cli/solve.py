@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import length_text
 from stiffmap.common.outputs import write_rows
 from stiffmap.common.tables.named import PoseTable, read_pose_table
+from stiffmap.common.tables.table_file import refuse_options
 from stiffmap.solve.labels import COMPONENTS, WRENCH
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.mobility import free_motions
@@ -31,7 +33,9 @@ SHOWN = 20  # rows of a file that are printed
 
 def command(
     machine: options.Machine,
-    at: str | None = option("Commanded TCP in mm, e.g. 0,0,300, or a CSV file of poses. [default: home]"),
+    at: options.TableText | None = option(
+        "Commanded TCP in mm, e.g. 0,0,300, or a CSV file of poses. [default: home]"
+    ),
     output: Path | None = written("With a file of poses: CSV of the answers."),
     force: options.Force = "0,0,0",
     moment: str = option("Moment about the point in N mm, base axes.", "0,0,0"),
@@ -59,14 +63,17 @@ def command(
     """
     named = Path(at or "")
     file = named if named.suffix.lower() in (".csv", ".txt", ".tsv") or named.is_file() else None
-    m, place, how = machine_at(machine, effect, None if file else at, turned, gravity_)
+    if file is None and at is not None:
+        refuse_options(at, "a position")
+    m, place, how = machine_at(machine, effect, None if file or at is None else str(at), turned, gravity_)
     how |= {"point": point, "method": method}
     if file is not None:
+        assert at is not None
         acting = force_given(force)[1]
         if acting is None:  # its worst direction would differ from pose to pose
             raise StiffmapError("--force: with a file of poses, expected a vector, such as 0,0,-100")
         load = np.r_[acting, MM * numbers(moment, "moment", 3)]
-        return solve_table(m, file, load, how, output)
+        return solve_table(m, at, load, how, output)
     if output is not None:
         raise StiffmapError("--output: only with a file of poses (--at poses.csv)")
     size, vector = force_given(force)
@@ -114,7 +121,9 @@ def _lines(m: Machine, s: Solution) -> Iterator[str | Table]:
         yield table_of(title, ("", *WRENCH), rows, padding=0, pad_edge=False, collapse_padding=True)
 
 
-def solve_table(m: Machine, file: Path, load: Floats, how: dict[str, Any], output: Path | None) -> Answer:
+def solve_table(
+    m: Machine, file: str | PathLike[str], load: Floats, how: dict[str, Any], output: Path | None
+) -> Answer:
     """Solve the poses of a file; the answers are written."""
     commanded = {"x", "y", "z"} <= set(m.description.task)
     table = read_pose_table(file, at_home=None if commanded else m.description.home.p)

@@ -18,7 +18,7 @@ from stiffmap.ui.cli.output import Answer, write_files
 
 def command(
     machine: options.Machine,
-    table: Path = argument(
+    table: options.TablePath = argument(
         "CSV: x_mm, y_mm, z_mm, frequency_Hz; u_Hz, damping_percent, dir_x, dir_y, dir_z; or response, along, hammer."
     ),
     statics: Path | None = option("Experiment folder of the same machine, explained together."),

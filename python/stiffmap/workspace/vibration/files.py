@@ -37,6 +37,7 @@ COLUMNS = Known(
         **dict.fromkeys(("mag", "amplitude", "|h|", "|frf|", "betrag", "gain", *MEANT), "magnitude"),
     },
     lambda name, unit: _meant(name, unit),
+    options=False,
 )  # fmt: skip
 FORMS = (("real", "imag"), ("magnitude", "phase"))
 

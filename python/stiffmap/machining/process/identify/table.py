@@ -17,6 +17,7 @@ from stiffmap.common.errors import FileError
 from stiffmap.common.tables.cells import Cells
 from stiffmap.common.tables.named import WORD, Known, NamedTable, named, read_named
 from stiffmap.common.tables.table import Table
+from stiffmap.common.tables.table_file import TableFile
 from stiffmap.common.units import feed_unit
 from stiffmap.machining.process.description import SIDES, Cut, EndMill, Process, Tool
 from stiffmap.machining.process.load import FASTEST, THINNEST
@@ -74,7 +75,8 @@ def columns_of(table: ForceColumns, defaults: Mapping[str, object], sheet: str |
     if isinstance(table, Mapping | DataFrame):
         out = named(_of_mapping(table), KNOWN)
     else:
-        out = read_named(given_path(table, "table", "a file or a mapping of columns"), KNOWN, sheet)
+        given_path(table, "table", "a file or a mapping of columns")
+        out = read_named(table if sheet is None else TableFile(table, sheet=sheet), KNOWN)
     if "side" in out.values:
         out.values["side"] = np.array(out.values["side"])
     way, *more = [n for n in ("feed", "feed_per_rev", NEEDED[0]) if n in out.values] or NEEDED[:1]

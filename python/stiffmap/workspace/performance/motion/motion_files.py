@@ -15,6 +15,7 @@ from scipy.interpolate import make_interp_spline
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.tables.named import read_pose_table
+from stiffmap.common.tables.table_file import refuse_options
 from stiffmap.common.yaml_text import Document, read
 from stiffmap.model.files.report import validated
 from stiffmap.model.files.schema.base import FileModel, Name
@@ -119,15 +120,16 @@ class Motion:
 def load_motion(file: str | PathLike[str]) -> Motion:
     """A motion of the tool from a CSV or YAML file, or a shipped one by name: ``trim`` (docs/measures.md).
 
-    CSV (`stiffmap.common.tables.named`): columns ``x [mm]``, ``y [mm]``, ``z [mm]``, perhaps ``fx [N]`` …, which may vary; with ``t [s]`` a
+    A table (`stiffmap.common.tables.named`), a `TableFile` as well: columns ``x [mm]``, ``y [mm]``, ``z [mm]``, perhaps ``fx [N]`` …, which may vary; with ``t [s]`` a
     motion over time, with ``feed [mm/min]`` a path at this speed, without either a path. YAML: ``line``, ``circle`` or ``points``, ``duration`` or ``speed``, ``force``.
     Raises FileError naming file, line, what was expected and what was found.
     """
     place = given_or_shipped(FilePath(file), SHIPPED)
     if place.suffix.lower() in (".yaml", ".yml"):
+        refuse_options(file, "a motion file")
         document = read(place)
         return _described(document, str(place))
-    return _table(place)
+    return _table(file if place == FilePath(file) else place)
 
 
 SHIPPED = FilePath(__file__).with_name("motions")
@@ -165,13 +167,14 @@ def _described(document: Document, file: str) -> Motion:
     return Motion(m.name, path, None, m.duration, speed, np.array(m.force))
 
 
-def _table(place: FilePath) -> Motion:
+def _table(place: str | PathLike[str]) -> Motion:
     table = read_pose_table(place)
     if table.orientation is not None:
         table.fail("expected no orientations: the tool of a motion is turned as at home")
     for name in ("mx", "my", "mz", "rx", "ry", "rz"):
         table.check(name, lambda v: v == 0, "0: a motion has no moment, its tool is turned as at home")
     file, p, f = table.file, table.position, table.wrench[:, :3]
+    name = FilePath(place).stem
     feed = table.values.get("feed")
     if "t" not in table.values:
         if len(p) < 2:
@@ -184,10 +187,10 @@ def _table(place: FilePath) -> Motion:
         along = way_along(p) / way_along(p)[-1]
         force = f[0] if not np.ptp(f, axis=0).any() else _between(path.s, along, f)
         if feed is None:
-            return Motion(place.stem, path, None, None, np.inf, force)
+            return Motion(name, path, None, None, np.inf, force)
         if np.ptp(feed) > 1e-9 * feed[0]:
             table.fail("expected one feed for the whole path (or times, a column t [s])", "feed")
-        return Motion(place.stem, path, None, None, np.inf, force, feed=float(feed[0]))
+        return Motion(name, path, None, None, np.inf, force, feed=float(feed[0]))
     t = table.values["t"]
     if feed is not None:
         table.fail("give times or a feed, not both")
@@ -199,7 +202,7 @@ def _table(place: FilePath) -> Motion:
         table.fail(f"times must increase; {t[i + 1]:g} s follows {t[i]:g} s", "t", i + 1)
     spline = make_interp_spline(t, p, k=5)
     motion = Trajectory(t, p, spline(t, 1), spline(t, 2), f)
-    return Motion(place.stem, None, motion, None, np.inf, np.zeros(3))
+    return Motion(name, None, motion, None, np.inf, np.zeros(3))
 
 
 def _between(s: Floats, at: Floats, values: Floats) -> Floats:
