@@ -162,3 +162,56 @@ def test_options_without_a_table(capsys):
     ):
         assert main(words) == 2
         assert message in capsys.readouterr().err
+
+
+JOINTS = np.deg2rad([[0.0, -90, 90, -90, -90, 0], [10.0, -80, 85, -60, -75, 30]])
+
+
+@pytest.mark.parametrize(
+    ("names", "said", "size"),
+    [
+        ("j1 [deg],j2 [deg],j3 [deg],j4 [deg],j5 [deg],j6 [deg]", {}, 1.0),
+        ("A1,A2,A3,A4,A5,A6", {"units": {"joints": "deg"}}, 1.0),
+        ("q1,q2,q3,q4,q5,q6", {"units": {"angle": "rad"}}, np.pi / 180),
+        ("q_1_deg,q_2_deg,q_3_deg,q_4_deg,q_5_deg,q_6_deg", {}, 1.0),
+        ("a,b,c,d,e,f", {"columns": {f"q{k}": str(k) for k in range(1, 7)}, "units": {"joints": "deg"}}, 1.0),
+        (
+            "q1 [arcmin],q2,q3,q4,q5,q6",
+            {"units": dict.fromkeys([f"q{k}" for k in range(1, 7)], "arcmin")},
+            60.0,
+        ),
+    ],
+)
+def test_a_table_may_command_joints(tmp_path: Path, capsys, names: str, said: dict[str, Any], size: float):
+    rows = [",".join(map(repr, [*(np.rad2deg(q) * size).tolist(), -100.0])) for q in JOINTS]
+    file = tmp_path / "q.csv"
+    file.write_text("\n".join([f"{names},fz [N]", *rows]), encoding="utf-8")
+    arm = sm.load_machine("ur10")
+    told = sm.TableFile(file, **said)
+    words = [w for n, v in told.columns.items() for w in ("--map", f"{n}={v}")]
+    words += [w for n, v in told.units.items() for w in ("--unit", f"{n}={v}")]
+    found = printed(capsys, "solve", "ur10", "--at", str(file), *words)
+    expected = arm.solve_joints(JOINTS, [0, 0, -100, 0, 0, 0])
+    np.testing.assert_allclose([p["displacement"] for p in found["poses"]], expected.displacement, rtol=1e-9)
+    assert expected.unloaded is not None
+    places = [p["position"] for p in found["poses"]]
+    np.testing.assert_allclose(places, expected.unloaded.position, atol=1e-12)
+    commands = sm.compensate(arm, told).actuators
+    np.testing.assert_allclose(
+        commands, sm.compensate(arm, actuators=JOINTS, wrench=[0, 0, -100, 0, 0, 0]).actuators
+    )
+
+
+def test_joints_that_are_not_clear_are_asked_for(tmp_path: Path, capsys):
+    for text, message in (
+        ("q1,q2\n0,1\n1,2\n", "which column commands arm.elbow"),
+        ("q1,q2,q3,q4,q5,q6\n0,1,1,1,1,1\n1,2,1,1,1,1\n", "has no unit: .* say --unit joints="),
+        ("a,b\n0,1\n1,2\n", "unknown column 'a'"),
+    ):
+        (tmp_path / "q.csv").write_text(text, encoding="utf-8")
+        with pytest.raises(sm.StiffmapError, match=message):
+            sm.compensate("ur10", tmp_path / "q.csv")
+    (tmp_path / "q.csv").write_text("q1,q2,q3,q4,q5,q6\n0,1,1,1,1,1\n1,2,1,1,1,1\n", encoding="utf-8")
+    turned = ["--rotation", "0,0,10", "--unit", "joints=rad"]
+    assert main(["solve", "ur10", "--at", str(tmp_path / "q.csv"), *turned]) == 2
+    assert "has orientations of its own" in capsys.readouterr().err

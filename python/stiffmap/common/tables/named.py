@@ -261,6 +261,8 @@ class PoseTable(NamedTable):
     """(n, 3, 3) against the base, as a controller has it; None where the table has no such columns."""
     turns: str = ""
     """Against what, which columns and how they turn, in words."""
+    actuators: Floats | None = None
+    """(n, actuators) m, rad, where joints are commanded in place of positions, which are NaN then."""
 
     @property
     def position(self) -> Floats:
@@ -285,21 +287,27 @@ class PoseTable(NamedTable):
 
 
 def read_pose_table(
-    place: str | PathLike[str], *, at_home: Floats | None = None, known: Known = KNOWN
+    place: str | PathLike[str],
+    *,
+    at_home: Floats | None = None,
+    known: Known = KNOWN,
+    joints: Callable[[Table], tuple[Sequence[int], Floats | None]] = lambda sheet: ((), None),
 ) -> PoseTable:
     """The table of a text, a workbook or a `TableFile`, whose columns are the `known` ones and those of an orientation.
 
     `at_home` (3,) m stands in for x, y or z that have no column, along which a planar machine is not commanded; None: all three
-    are wanted. Raises FileError naming file, line, column, what was expected and what was found.
+    are wanted, or what `joints` finds: columns of commanded joints, and their coordinates (n, actuators). Raises FileError naming file, line, column, what was expected and what was found.
     """
     sheet = _sheet(place, known)
     if sheet.find("target_tcp_pose_0") is None:  # then the pose that was measured stands for it
         header = (re.sub("(?i)^actual(?=_tcp_pose)", "target", h) for h in sheet.header)
         sheet = replace(sheet, header=tuple(header))
     found = orientation_of(sheet)
+    placed = any(_name_of(h, known)[0] in ("x", "y", "z") for h in sheet.header)
+    of_joints, actuators = ((), None) if placed else joints(sheet)
     from_home = found.turns == VECTOR and not IN_SI.fullmatch(sheet.names[found.columns[0]])  # rx, ry, rz
     columns = () if from_home else found.columns
-    table = PoseTable(**vars(named(sheet, known, columns)))
+    table = PoseTable(**vars(named(sheet, known, (*columns, *of_joints))), actuators=actuators)
     if columns:
         if {"rx", "ry", "rz"} & set(table.values):
             table.fail("orientations are given twice", sheet.header[columns[0]])
@@ -309,7 +317,9 @@ def read_pose_table(
     elif turned := [table.header[n] for n in ("rx", "ry", "rz") if n in table.values]:
         table.turns = f"from home: {', '.join(turned)}: a rotation vector"
     missing = [c for c in "xyz" if c not in table.values]
-    if missing and (at_home is None or len(missing) == 3):
+    if actuators is not None:
+        at_home = np.full(3, np.nan)
+    elif missing and (at_home is None or len(missing) == 3):
         table.fail(
             f"no column {', '.join(missing)}; expected x [mm], y [mm], z [mm] and perhaps "
             "t [s], feed [mm/min], fx [N], fy [N], fz [N]"

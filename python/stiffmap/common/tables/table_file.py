@@ -73,7 +73,7 @@ def with_names(file: TableFile, table: Table, meaning: Callable[[str], str]) -> 
 def with_units(file: TableFile, table: Table, meaning: Callable[[str], tuple[str, str, str]]) -> Table:
     """The table with the units that are said; that of a line above it goes to columns that have none. `meaning` of a header: what it is,
     its unit as written, and its quantity. Raises StiffmapError."""
-    header, used = list(table.header), {*SPELLINGS}
+    header, used = list(table.header), {*SPELLINGS, "joints"}
     for i, h in enumerate(table.header):
         name, own, quantity = meaning(h)
         said = [n for n in (name, h, table.names[i], *([] if own else [quantity])) if n in file.units]

@@ -8,10 +8,12 @@ from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
+from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.tables.cells import Cells
 from stiffmap.common.tables.header import with_unit
 from stiffmap.common.tables.orientation import quaternion
+from stiffmap.common.tables.table import Table
 from stiffmap.common.units import Unit, unit_of
 from stiffmap.experiment.channels import AXES
 from stiffmap.experiment.files.fields import POSE, SEEN
@@ -51,8 +53,17 @@ def drives_of(machine: Machine) -> dict[str, bool]:
     return {a: machine.compiled.names.is_prismatic(a) for a in machine.actuators}
 
 
-def commanded(m: Meant, drives: Mapping[str, bool], alone: bool = False) -> None:
-    """Columns of a table of joints, and their units; nothing where no column commands a drive and they are not what `alone` does.
+def commands_in(machine: Machine, units: Mapping[str, str], sheet: Table) -> tuple[list[int], Floats | None]:
+    """Columns of a table that command the joints of a machine, with `units` of those that have none, and the coordinates (n, actuators)
+    m, rad; None where no column does. Raises StiffmapError."""
+    m = Meant(units=dict(units), sheet=sheet)
+    used = commanded(m, drives_of(machine))
+    return used, m.coordinates() if used else None
+
+
+def commanded(m: Meant, drives: Mapping[str, bool], alone: bool = False) -> list[int]:
+    """Columns of a table of joints, which it returns, and their units; none where no column commands a drive and they are not what
+    `alone` does.
 
     `drives`: full name -> whether it slides. Columns go by the drive's name, full or short, or by its number (`joint_1`, `q1`,
     `J1`, `A1`), or as they are chosen. Raises StiffmapError where some drives have a column and others none, and where a unit is
@@ -70,7 +81,7 @@ def commanded(m: Meant, drives: Mapping[str, bool], alone: bool = False) -> None
     at = {n: m.index(given[n]) if n in given else _find(m, n, own[n], said) for n in drives}
     lost = [n for n, i in at.items() if i is None]
     if len(lost) == len(at) and not alone:
-        return
+        return []
     if lost:
         n, words = lost[0], ", ".join(f"{w} in '{m.sheet.header[i]}'" for i, w in said.items())
         seen = f" (the table names {words})" if words else ""
@@ -85,6 +96,7 @@ def commanded(m: Meant, drives: Mapping[str, bool], alone: bool = False) -> None
             m.chosen[f"q{k}"] = [m.sheet.header[index]]
         else:  # a command is in a unit that experiment files have
             m.add(m.sheet.names[index], unit.name, unit.factor * m.sheet.numbers(index), f"q{k}")
+    return [i for i in at.values() if i is not None]
 
 
 def _given(chosen: Mapping[str, list[str]], drives: Mapping[str, bool], short: set[str]) -> dict[str, str]:

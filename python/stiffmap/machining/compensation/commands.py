@@ -8,6 +8,7 @@ is solved with the declared machine's Jacobian; the deviations change it little,
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from os import PathLike
 
 import numpy as np
@@ -19,10 +20,12 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs import number_cells, write_rows
 from stiffmap.common.short import short_repr
 from stiffmap.common.tables.named import KNOWN, WORD, read_pose_table
+from stiffmap.common.tables.table_file import table_file
 from stiffmap.experiment.experiment import AXES, WRENCH, Experiment
 from stiffmap.experiment.files.fields import APPROACH, COUNTED, VECTOR, WORDS
 from stiffmap.experiment.poses.configuration import coordinates_of, drive_jacobian
 from stiffmap.experiment.prediction.equilibria import motions
+from stiffmap.experiment.spreadsheet.joints import commands_in
 from stiffmap.model.description import TASK
 from stiffmap.solve.closing import commanded, of_drives
 from stiffmap.solve.kinematics import Kinematics, forward_kinematics, inverse_kinematics, must_take
@@ -33,12 +36,13 @@ STEPS = 25
 DONE = 1e-10
 """m, rad: step of the commands below which they stand."""
 MM = 1e3
-BARE = dict(zip((*"xyz", *VECTOR, *WRENCH), np.repeat(["mm", "rad", "N", "N*mm"], 3).tolist(), strict=True))
+BARE = dict(zip((*"xyz", *WRENCH), np.repeat(["mm", "N", "N*mm"], 3).tolist(), strict=True))
 """Units of columns that name none."""
 WANTED = replace(
     KNOWN,
     units={**KNOWN.units, **dict.fromkeys((*APPROACH, *COUNTED), ""), **dict.fromkeys(WORDS, WORD)},
-    renamed=lambda name, unit: (name, unit or BARE.get(name, "")),
+    renamed=lambda name, unit: (name, unit or ("rad" if name in VECTOR else "")),
+    assumed=BARE,
 )
 """What a table of wanted poses may have besides those of every table of poses."""
 
@@ -160,8 +164,13 @@ def compensate(
     one_of(point, machine.points, "point")
     if isinstance(position, (str, PathLike)):
         home, task = machine.description.home, machine.description.task
-        read = read_pose_table(position, at_home=None if {*"xyz"} <= {*task} else home.p, known=WANTED)
+        read = read_pose_table(
+            position, at_home=None if {*"xyz"} <= {*task} else home.p, known=WANTED,
+            joints=partial(commands_in, machine, table_file(position).units),
+        )  # fmt: skip
         position, rotation, turns = read.position, read.rotation(home.r), read.turns
+        if read.actuators is not None:
+            position, rotation, actuators = None, None, read.actuators
         ids = tuple(read.values.get("id", ()))
         approach = read.block(APPROACH) if {*APPROACH} & {*read.values} else approach
         wrench = read.wrench if read.loaded else wrench

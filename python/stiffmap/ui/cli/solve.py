@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,8 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import length_text
 from stiffmap.common.outputs import write_rows
 from stiffmap.common.tables.named import PoseTable, read_pose_table
-from stiffmap.common.tables.table_file import refuse_options
+from stiffmap.common.tables.table_file import refuse_options, table_file
+from stiffmap.experiment.spreadsheet.joints import commands_in
 from stiffmap.solve.labels import COMPONENTS, WRENCH
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.mobility import free_motions
@@ -50,7 +52,7 @@ def command(
     A force that is given by its size alone acts in the direction in space that pushes the tool furthest.
 
     A file of poses has columns such as x [mm], y [mm], z [mm], rx [deg] … from home (or a robot's A, B, C; W, P, R; qw …
-    against its base), fx [N] …, mx [N*m] …, one pose a row; --force acts where it has no load.
+    against its base), or commanded joints (q1 [deg] …), fx [N] …, mx [N*m] …, one pose a row; --force acts where it has no load.
 
     Exit codes: 0 converged, 1 any other status, 2 bad input.
 
@@ -126,35 +128,44 @@ def solve_table(
 ) -> Answer:
     """Solve the poses of a file; the answers are written."""
     commanded = {"x", "y", "z"} <= set(m.description.task)
-    table = read_pose_table(file, at_home=None if commanded else m.description.home.p)
+    table = read_pose_table(
+        file, at_home=None if commanded else m.description.home.p,
+        joints=partial(commands_in, m, table_file(file).units),
+    )  # fmt: skip
     turned = table.rotation(m.description.home.r)
-    if turned is not None and how["rotation"] is not None:
+    if how["rotation"] is not None and not (turned is None is table.actuators):
         raise StiffmapError(f"--rotation: {file} has orientations of its own")
     wrench = table.wrench if table.loaded else np.broadcast_to(load, (len(table), 6))
-    s = m.solve(table.position, wrench, **{**how, "rotation": how["rotation"] if turned is None else turned})
+    if table.actuators is None:
+        s = m.solve(
+            table.position, wrench, **{**how, "rotation": how["rotation"] if turned is None else turned}
+        )
+    else:
+        s = m.solve_joints(table.actuators, wrench, **{**how, "rotation": None})
+    position = table.position if s.unloaded is None else s.unloaded.position
     words = [Status(int(v)).name for v in s.status]
     files: list[Path] = []
     if output is not None:
         units = (f"{n} [{'mm' if n[0] == 'd' else 'rad'}]" for n in COMPONENTS)
         head = ["x [mm]", "y [mm]", "z [mm]", *units, "status"]
-        in_mm = np.hstack([table.position / MM, s.displacement * np.r_[np.full(3, 1 / MM), np.ones(3)]])
+        in_mm = np.hstack([position / MM, s.displacement * np.r_[np.full(3, 1 / MM), np.ones(3)]])
         write_rows(output, head, ([*map(repr, row.tolist()), w] for row, w in zip(in_mm, words, strict=True)))
         files = [output]
     rows = [
         {"position": p, "wrench": w, "status": state, "displacement": d}
-        for p, w, state, d in zip(table.position, wrench, words, s.displacement, strict=True)
+        for p, w, state, d in zip(position, wrench, words, s.displacement, strict=True)
     ]
     data = {"machine": m.name, "point": s.point, "poses": rows}
-    return Answer(data, _rows(table, s, words), files, finding=not s.ok.all())
+    return Answer(data, _rows(table, position, s, words), files, finding=not s.ok.all())
 
 
-def _rows(table: PoseTable, s: Solution, words: list[str]) -> Iterator[str | Table]:
+def _rows(table: PoseTable, position: Floats, s: Solution, words: list[str]) -> Iterator[str | Table]:
     heads = ("x", "y", "z", "dx, µm", "dy, µm", "dz, µm", "|d|, µm", "")
     out = table_of(f"displacement of {s.point}", heads)
     sizes = np.linalg.norm(s.displacement[:, :3], axis=1)
     for i in range(min(len(table), SHOWN)):
         moved = [f"{1e6 * v:.2f}" for v in (*s.displacement[i, :3], sizes[i])]
-        where = [f"{v / MM:g}" for v in table.position[i]]
+        where = [f"{v / MM:g}" for v in position[i]]
         word = "" if words[i] == "CONVERGED" else words[i].lower()
         out.add_row(*where, *(["-"] * 4 if not np.isfinite(sizes[i]) else moved), word)
     yield out
