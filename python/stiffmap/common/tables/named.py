@@ -185,7 +185,8 @@ def _name_of(head: str, known: Known) -> tuple[str, str]:
     name, meant = _joined(text), meaning_of(text)
     if not known.has(text) and meant not in known.units and not re.search(r"[])]\s*$", head):
         whole = re.sub(r"\s", "_", head)  # x_per_tooth_mm, real_m/N
-        cuts = [m.start() for m in re.finditer("_", whole) if known.has(whole[: m.start()])]
+        parts = {m.start(): whole[: m.start()].lower() for m in re.finditer("_", whole)}
+        cuts = [k for k, part in parts.items() if known.has(part) or known.has(known.renamed(part, "")[0])]
         if cuts:
             name, unit = whole[: cuts[-1]].lower(), PER.sub(r"/\1", whole[cuts[-1] + 1 :])
             unit = {"N_m": "N*m"}.get(unit, unit)

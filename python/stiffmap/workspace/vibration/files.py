@@ -16,7 +16,7 @@ from stiffmap.common.errors import FileError, StiffmapError, needed, refuse_fold
 from stiffmap.common.tables.lines import complex_number
 from stiffmap.common.tables.named import WORD, Known, NamedTable, sets_of
 from stiffmap.common.tables.workbook import TABLES
-from stiffmap.common.units import FREQUENCIES
+from stiffmap.common.units import FREQUENCIES, unit_of
 from stiffmap.workspace.vibration.response import Complex, frequency_axis
 from stiffmap.workspace.vibration.response_units import ResponseUnit, response_unit
 
@@ -31,26 +31,35 @@ COLUMNS = Known(
     {"frequency": "frequency_Hz", **{n: f"{n}_m/N" for n in ("real", "imag", "magnitude")}, "phase": "phase_deg"},
     {
         **dict.fromkeys(("freq", "freq.", "f", "hz", "frequenz", "linear", "n", "drehzahl", "speed", "rotational_speed", "omega", "ω", "kreisfrequenz", "angular_frequency"), "frequency"), **dict.fromkeys(("coh", "kohärenz"), "coherence"),
-        **dict.fromkeys(("phase_angle", "arg(h)", "arg_h"), "phase"), **dict.fromkeys(("h", "frf", "h1", "h2", "h(f)", "complex"), "response"),
-        **dict.fromkeys(("re", "re(h)", "re(frf)", "real_part", "realteil"), "real"),
-        **dict.fromkeys(("im", "im(h)", "im(frf)", "imaginary", "imaginary_part", "imag_part", "imaginärteil", "imaginär"), "imag"),
-        **dict.fromkeys(("mag", "amplitude", "|h|", "|frf|", "betrag", "gain", *MEANT), "magnitude"),
+        **dict.fromkeys(("phase_angle", "arg_h", "phi", "φ"), "phase"), **dict.fromkeys(("h", "frf", "h1", "h2", "h(f)", "complex"), "response"),
+        **dict.fromkeys(("re", "real_part", "realteil"), "real"),
+        **dict.fromkeys(("im", "imaginary", "imaginary_part", "imag_part", "imaginärteil", "imaginär"), "imag"),
+        **dict.fromkeys(("mag", "amplitude", "betrag", "gain", *MEANT), "magnitude"),
     },
     lambda name, unit: _meant(name, unit),
     options=False,
 )  # fmt: skip
 FORMS = (("real", "imag"), ("magnitude", "phase"))
+OF_IT = re.compile(
+    r"(?P<magnitude>\|[^|]+\|/?|(abs|mag)[({\[].*)|(?P<real>re(al)?[({\[].*)|(?P<imag>im(ag)?[({\[].*)|(?P<phase>(arg|phase|angle|∠).*)"
+)
+"""A name of a part of a complex number."""
 
 
 def _meant(name: str, unit: str) -> tuple[str, str]:
-    """A unit alone, or of frequencies, says what it is of; a name ends with what is known, as in ``H1 Ch2/Ch1 Real``."""
+    """A unit alone, or of frequencies, says what it is of; a name ends with what is known, as in ``H1 Ch2/Ch1 Real``, or is a part of
+    something: ``|Y|``, ``Re{H}``, ``arg(Y)``."""
     if (alone := unit or name).lower() in FREQUENCIES:
         return "frequency", alone
+    if not unit and unit_of(name, "angle"):
+        return "phase", name
+    if part := OF_IT.fullmatch(name):
+        return next(n for n, found in part.groupdict().items() if found), unit
     if not name:
         return "imag" if any((response_unit(unit) or ())[1:]) else "phase", unit
     name, unit = (name[:-3], f"dB {unit}") if name.endswith("_db") else (name, unit)
     ends = (name[m.end() :] for m in re.finditer("^|[_/]", name))
-    return next((e for e in ends if COLUMNS.has(e)), name), unit
+    return next((e for e in ends if e in COLUMNS.units or e in COLUMNS.aliases), name), unit
 
 
 EXAMPLES = "m/N, mm/N, um/N, m/s/N, m/s2/N, g/N and the like, N/m, N/um"

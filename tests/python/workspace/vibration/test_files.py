@@ -46,6 +46,12 @@ TURN = 2 * np.pi
         ("f [Hz];|H| [dB ref 1(m/s²)/N];phase [deg]", lambda f, r: (f, 20 * np.log10(abs(r)), np.degrees(np.angle(r)))),
         ("f [Hz];Gain [dB re 1e-6 m/s²/N];phase [deg]", lambda f, r: (f, 20 * np.log10(1e6 * abs(r)), np.degrees(np.angle(r)))),
         ("f [Hz];H1(f) Real (m/s²/N);H1(f) Imag (m/s²/N)", lambda f, r: (f, r.real, r.imag)),
+        ("Frequency (Hz);|A| (mm/s²/N);arg(A) (deg)", lambda f, r: (f, 1e3 * abs(r), np.degrees(np.angle(r)))),
+        ("f/Hz;|A|/(m/s²/N);phi/°", lambda f, r: (f, abs(r), np.degrees(np.angle(r)))),
+        ("f [Hz];Re{A} [m/s²/N];Im{A} [m/s²/N]", lambda f, r: (f, r.real, r.imag)),
+        ("Hz;Abs(A) [m/s²/N];deg", lambda f, r: (f, abs(r), np.degrees(np.angle(r)))),
+        ("Linear Frequency Hz;Amplitude m/s2/N;Phase rad", lambda f, r: (f, abs(r), np.angle(r))),
+        ("freq_hz;accel_over_force_real_g_per_N;accel_over_force_imag_g_per_N", lambda f, r: (f, r.real / 9.80665, r.imag / 9.80665)),
         ("Frequency [rpm];Amplitude [g/N];Phase [°]", lambda f, r: (60 * f, abs(r) / 9.80665, np.degrees(np.angle(r)))),
     ],
 )  # fmt: skip
