@@ -186,6 +186,7 @@ def by_chance(columns: Columns, fit: Fit, c: Chosen) -> float:
     parts = [(p, np.exp(t)) for p, t in zip(fit.parts, fit.t[1:], strict=True) if p.kind in GAPS]
     pattern = fit.mean(c.part)
     along = sum(v * float(pattern @ p.times(pattern)) for p, v in parts) / float(pattern @ pattern)
+    along = max(along, 0.0)  # round-off of a pattern at right angles to all gaps
     shapes = sum(len(p.shapes) for p in columns.places)
     largest = 2.0 * np.log(ODDS * max(1, shapes)) * along / len(pattern)
     return float(np.sqrt(min(sum(v for _, v in parts), largest)))
