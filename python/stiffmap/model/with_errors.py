@@ -53,7 +53,12 @@ def edited(
         of.setdefault(name, {})[what] = of.get(name, {}).get(what, 0.0) + value
     for name, knots in (travel or {}).items():
         of.setdefault(name, {})["travel"] = knots
-    built = edit_all(bare, lambda elements, name: edit_named(elements, name, partial(_sequence, of=of)))
+    changed = {name.partition(".")[0] for name in of}
+
+    def built_of(elements: Elements, name: str) -> Elements:
+        return edit_named(elements, name, partial(_sequence, of=of)) if name in changed else elements
+
+    built = edit_all(bare, built_of)
     return apply_records(built, description.effects)
 
 

@@ -129,7 +129,11 @@ def edit_all(
     description: MachineDescription, edit: Callable[[Elements, str], Elements]
 ) -> MachineDescription:
     """The machine with ``edit`` applied to the whole of each leg, base and platform, whose name it is given."""
-    legs = tuple(replace(leg, elements=edit(leg.elements, leg.name)) for leg in description.legs)
+    edited = [edit(leg.elements, leg.name) for leg in description.legs]
+    legs = tuple(
+        leg if new is leg.elements else replace(leg, elements=new)
+        for leg, new in zip(description.legs, edited, strict=True)
+    )
     base, platform = (edit(getattr(description, end), end) for end in ENDS)
     return replace(description, legs=legs, base=base, platform=platform)
 
