@@ -117,8 +117,8 @@ def test_every_command_that_takes_a_table_has_all_of_them():
 
 def printed(capsys: pytest.CaptureFixture[str], *words: str) -> dict[str, Any]:
     main([*words, "--json"])
-    told: dict[str, Any] = json.loads(capsys.readouterr().out)
-    return {k: v for k, v in told.items() if k != "path"}
+    answer: dict[str, Any] = json.loads(capsys.readouterr().out)
+    return {k: v for k, v in answer.items() if k != "path"}
 
 
 @pytest.mark.parametrize(
@@ -187,16 +187,16 @@ def test_a_table_may_command_joints(tmp_path: Path, capsys, names: str, said: di
     file = tmp_path / "q.csv"
     file.write_text("\n".join([f"{names},fz [N]", *rows]), encoding="utf-8")
     arm = sm.load_machine("ur10")
-    told = sm.TableFile(file, **said)
-    words = [w for n, v in told.columns.items() for w in ("--map", f"{n}={v}")]
-    words += [w for n, v in told.units.items() for w in ("--unit", f"{n}={v}")]
+    table = sm.TableFile(file, **said)
+    words = [w for n, v in table.columns.items() for w in ("--map", f"{n}={v}")]
+    words += [w for n, v in table.units.items() for w in ("--unit", f"{n}={v}")]
     found = printed(capsys, "solve", "ur10", "--at", str(file), *words)
     expected = arm.solve_joints(JOINTS, [0, 0, -100, 0, 0, 0])
     np.testing.assert_allclose([p["displacement"] for p in found["poses"]], expected.displacement, rtol=1e-9)
     assert expected.unloaded is not None
     places = [p["position"] for p in found["poses"]]
     np.testing.assert_allclose(places, expected.unloaded.position, atol=1e-12)
-    commands = sm.compensate(arm, told).actuators
+    commands = sm.compensate(arm, table).actuators
     np.testing.assert_allclose(
         commands, sm.compensate(arm, actuators=JOINTS, wrench=[0, 0, -100, 0, 0, 0]).actuators
     )
@@ -215,3 +215,15 @@ def test_joints_that_are_not_clear_are_asked_for(tmp_path: Path, capsys):
     turned = ["--rotation", "0,0,10", "--unit", "joints=rad"]
     assert main(["solve", "ur10", "--at", str(tmp_path / "q.csv"), *turned]) == 2
     assert "has orientations of its own" in capsys.readouterr().err
+
+
+def test_joints_and_what_follows_from_them(tmp_path: Path):
+    file = tmp_path / "q.csv"
+    file.write_text(
+        "q1 [deg],q2 [deg],q3 [deg],q4 [deg],q5 [deg],q6 [deg],A,B,C\n0,-90,90,-90,-90,0,0,90,0\n", "utf-8"
+    )
+    with pytest.raises(sm.StiffmapError, match="joints are commanded, so the orientation follows from them"):
+        sm.compensate("ur10", file)
+    file.write_text("q1 [deg],q2 [deg],q3 [deg],q4 [deg],q5 [deg],q6 [deg]\n0,-90,90,-90,-90,0\n", "utf-8")
+    with pytest.raises(sm.StiffmapError, match="either position or actuators"):
+        sm.compensate("ur10", file, actuators=JOINTS)

@@ -297,15 +297,16 @@ def read_pose_table(
     """The table of a text, a workbook or a `TableFile`, whose columns are the `known` ones and those of an orientation.
 
     `at_home` (3,) m stands in for x, y or z that have no column, along which a planar machine is not commanded; None: all three
-    are wanted, or what `joints` finds: columns of commanded joints, and their coordinates (n, actuators). Raises FileError naming file, line, column, what was expected and what was found.
+    are wanted, or what `joints` finds: columns of commanded joints, and their coordinates (n, actuators). Raises FileError naming
+    file, line, column, what was expected and what was found.
     """
     sheet = _sheet(place, known)
     if sheet.find("target_tcp_pose_0") is None:  # then the pose that was measured stands for it
         header = (re.sub("(?i)^actual(?=_tcp_pose)", "target", h) for h in sheet.header)
         sheet = replace(sheet, header=tuple(header))
-    found = orientation_of(sheet)
     placed = any(_name_of(h, known)[0] in ("x", "y", "z") for h in sheet.header)
     of_joints, actuators = ((), None) if placed else joints(sheet)
+    found = orientation_of(sheet, of_joints)
     from_home = found.turns == VECTOR and not IN_SI.fullmatch(sheet.names[found.columns[0]])  # rx, ry, rz
     columns = () if from_home else found.columns
     table = PoseTable(**vars(named(sheet, known, (*columns, *of_joints))), actuators=actuators)
@@ -319,6 +320,8 @@ def read_pose_table(
         table.turns = f"from home: {', '.join(turned)}: a rotation vector"
     missing = [c for c in "xyz" if c not in table.values]
     if actuators is not None:
+        if table.turns:
+            table.fail(f"joints are commanded, so the orientation follows from them; found it {table.turns}")
         at_home = np.full(3, np.nan)
     elif missing and (at_home is None or len(missing) == 3):
         table.fail(

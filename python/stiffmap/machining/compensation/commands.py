@@ -169,7 +169,7 @@ def compensate(
             joints=partial(commands_in, machine, table_file(position).units),
         )  # fmt: skip
         position, rotation, turns = read.position, read.rotation(home.r), read.turns
-        if read.actuators is not None:
+        if read.actuators is not None and actuators is None:
             position, rotation, actuators = None, None, read.actuators
         ids = tuple(read.values.get("id", ()))
         approach = read.block(APPROACH) if {*APPROACH} & {*read.values} else approach
