@@ -103,6 +103,13 @@ def own_frame(seen: Floats, commanded: Floats, rotation: Floats | None = None) -
     return found if alike else None
 
 
+def turns_apart(commanded: Floats, seen: Floats, setup: Integers, target: Integers) -> float:
+    """Median angle, rad, by which seen orientations (n, 3, 3) differ from commanded ones once instruments and targets are turned to fit."""
+    zero = np.zeros((len(seen), 3))
+    s = Sighting(zero, commanded, np.full_like(zero, np.nan), seen, setup, target)
+    return _middle(as_commanded(s, _starts(s)[0])[1])
+
+
 def _middle(vectors: Floats) -> float:
     return float(np.median(np.linalg.norm(vectors, axis=1)))
 

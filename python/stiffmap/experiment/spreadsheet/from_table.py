@@ -41,7 +41,8 @@ from stiffmap.experiment.spreadsheet.joints import (
 )
 from stiffmap.experiment.spreadsheet.places import in_base_axes, seated, seen_next_to_commands, without_lost
 from stiffmap.experiment.spreadsheet.sides import approached
-from stiffmap.experiment.spreadsheet.together import one_point_a_row, oriented, together
+from stiffmap.experiment.spreadsheet.together import named_targets, one_point_a_row, together
+from stiffmap.experiment.spreadsheet.turned import oriented
 from stiffmap.solve.machine import Machine, load_machine
 
 Understand = Callable[[str | None, dialogue.Ask | None], tuple[Meant, ImportedSheet]]
@@ -245,7 +246,8 @@ class _Wanted:
         else:
             dialogue.asked(m, ask, same)
         dialogue.asked(m, ask, partial(in_base_axes, m, partial(self.declared, m)))
-        oriented(m)
+        oriented(m, partial(self.declared, m))
+        named_targets(m)
         if not m.placed:
             turned(m, self.difference, less)
         dialogue.asked(m, ask, partial(seen_next_to_commands, m))

@@ -7,16 +7,12 @@ import re
 from dataclasses import replace
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from stiffmap.common.short import first_of
 from stiffmap.common.tables.cells import Cells
 from stiffmap.common.tables.header import split_unit, with_unit
-from stiffmap.common.tables.orientation import orientation_of
 from stiffmap.common.tables.table import Table, column_letter
 from stiffmap.common.units import Unit, unit_of
-from stiffmap.experiment.channels import AXES
-from stiffmap.experiment.files.fields import EULER, POSE, QUATERNION, SEEN, SEEN_TURNED, VECTOR
 from stiffmap.experiment.spreadsheet.answers import Meant
 from stiffmap.experiment.spreadsheet.guess import READINGS, guessed
 from stiffmap.experiment.spreadsheet.places import without_marks
@@ -60,14 +56,6 @@ def together(m: Meant, deflection: bool) -> None:
     _directions(m)
     if not any(re.fullmatch("[fm][xyz]", c.meaning) for c in m.guessed):
         _hung(m)
-
-
-def oriented(m: Meant) -> None:
-    """Angles, rotation vectors and quaternions next to X Y Z, and names of targets."""
-    taken = {m.index(h) for v in m.chosen.values() for h in v}
-    _turns(m, taken)
-    if "target" not in m.chosen:
-        _targets(m, taken)
 
 
 def one_point_a_row(m: Meant) -> None:
@@ -237,54 +225,11 @@ def _hung(m: Meant) -> None:
             return
 
 
-def _turns(m: Meant, taken: set[int]) -> None:
-    """An orientation that stands with X Y Z."""
-    meanings = {c.meaning: c.index for c in m.guessed}
-    columns, turns, words = found = orientation_of(m.sheet, taken)
-    behind = min(columns, default=0) == meanings.get("z", -1) + 1
-    seen = set(SEEN) <= set(meanings) and not (behind and set(POSE) <= set(meanings))
-    position = SEEN if seen else POSE
-    if (
-        not columns
-        or (m.columns and not seen)
-        or not set(position) <= {*meanings, *([] if turns else m.constants)}
-    ):
-        if columns and not turns:  # half angles are no readings
-            m.chosen["note"] = [*m.chosen.get("note", ()), *(m.sheet.header[i] for i in columns)]
-        return
-    of_pose = {"": QUATERNION, "rotvec": VECTOR}.get(turns, EULER)
-    of_seen = SEEN_TURNED if turns else [f"p{c}" for c in QUATERNION]
-    if of_pose is VECTOR:  # a reading, unless it stands right behind the position and something else is read
-        others = set(READINGS) & set(meanings) - set(AXES[3:])
-        said = not seen and set(AXES[3:]) & set(m.noise)
-        if said or not others or columns[0] != meanings[position[2]] + 1:
-            return
-    headers = [m.sheet.header[i] for i in columns]
-    shown = first_of([*map(repr, headers)], 4)
-    if seen and not set(AXES[3:]) <= set(m.noise):
-        m.chosen["note"] = [*m.chosen.get("note", ()), *headers]
-        m.said.append(f"{shown} are not used; as the orientation seen they need --noise rx=… ry=… rz=…")
-        return
-    if len(columns) > len(QUATERNION):
-        turned = Rotation.from_matrix(found.matrices(m.sheet)).as_quat()[:, [3, 0, 1, 2]]
-        headers = [f"{c} of {headers[0]} …" for c in QUATERNION]
-        for name, values in zip(headers, turned.T, strict=True):
-            m.sheet = m.sheet.with_column(name, values)
-        columns = [m.sheet.header.index(name) for name in headers]
-    for i, header, meaning in zip(columns, headers, of_seen if seen else of_pose, strict=True):
-        m.chosen[meaning] = [header]
-        taken.add(i)
-        if of_pose is EULER and not m.sheet.unit(i):
-            m.units.setdefault(meaning, m.usual_unit("angle") or "deg")
-    if seen:
-        m.head |= {"target_orientation": turns} if turns else {}
-    else:
-        m.head["orientation"] = {"against": "base"} | ({"euler": turns} if of_pose is EULER else {})
-    m.said.append(f"{shown} are the orientation: {words}")
-
-
-def _targets(m: Meant, taken: set[int]) -> None:
+def named_targets(m: Meant) -> None:
     """A column of names of reflectors; also one of points that are read at every pose of the joints."""
+    if "target" in m.chosen:
+        return
+    taken = {m.index(h) for v in m.chosen.values() for h in v}
     commands = [m.sheet.header.index(h) for c in m.columns for h in m.chosen[c]]
     poses = list(zip(*(m.sheet.columns[i] for i in commands), strict=True))
     for i, name in enumerate(m.sheet.names):

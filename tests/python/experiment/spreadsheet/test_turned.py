@@ -1,0 +1,84 @@
+"""Orientations that an instrument saw are read in the way in which they follow the commanded joints."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import stiffmap as sm
+from stiffmap.ui.cli.app import main
+
+DH = ((0.0, 120.0, 0.0, 90.0), (0.0, 0.0, -430.0, 0.0), (0.0, 0.0, -390.0, 0.0), (0.0, 110.0, 0.0, 90.0),
+      (0.0, 95.0, 0.0, -90.0), (0.0, 80.0, 0.0, 0.0))  # fmt: skip
+JOINTS = np.random.default_rng(5).uniform(-80, 80, (14, 6)).round(2)
+
+
+def seen(noise: float = 0.0) -> Rotation:
+    """What an instrument sees: its own turn, the joints' by hand, that of a target on the tool, an error of rad."""
+    out = Rotation.from_rotvec(np.tile([0.4, -1.1, 2.0], (len(JOINTS), 1)))
+    for (zero, _, _, alpha), q in zip(DH, JOINTS.T, strict=True):
+        out = (
+            out
+            * Rotation.from_euler("z", (zero + q)[:, None], degrees=True)
+            * Rotation.from_euler("x", [[alpha]], degrees=True)
+        )
+    error = Rotation.from_rotvec(noise * np.random.default_rng(6).normal(size=(len(JOINTS), 3)))
+    return out * Rotation.from_euler("xyz", [25, -40, 60], degrees=True) * error
+
+
+def experiment(folder: Path, heads: str, cells: np.ndarray, *more: str) -> sm.Experiment:
+    """Of a sheet with joints, places and numbers of an orientation."""
+    rows = [f"{','.join(map(str, q))},{100 + k},{200 - k},300,{','.join(map(repr, c.tolist()))}"
+            for k, (q, c) in enumerate(zip(JOINTS, cells, strict=True))]  # fmt: skip
+    text = f"J1,J2,J3,J4,J5,J6,X meas [mm],Y meas [mm],Z meas [mm],{heads}\n" + "\n".join(rows) + "\n"
+    (folder / "sheet.csv").write_text(text)
+    lines = "\n".join(",".join(map(str, row)) for row in DH)
+    (folder / "dh.csv").write_text(f"theta [deg],d [mm],a [mm],alpha [deg]\n{lines}\n")
+    noise = [o for a in ("dx", "dy", "dz", "rx", "ry", "rz") for o in ("--noise", f"{a}=0.01")]
+    files = [
+        str(folder / "sheet.csv"),
+        "--dh",
+        str(folder / "dh.csv"),
+        "--unit",
+        "joints=deg",
+        "-o",
+        str(folder / "e"),
+    ]
+    assert main(["experiment", "new", *files, *noise, *more]) == 0
+    return sm.load_experiment(folder / "e")
+
+
+@pytest.mark.parametrize("turns", ["xyz", "XYZ", "zyx", "ZYX", "ZYZ", "zyz", "rotvec"])
+@pytest.mark.parametrize("heads", ["rx [deg],ry [deg],rz [deg]", "A,B,C", "Roll [deg],Pitch [deg],Yaw [deg]"])
+def test_three_angles_turn_as_the_joints_do(
+    turns: str, heads: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    true = seen(0.002)
+    cells = true.as_rotvec(degrees=True) if turns == "rotvec" else true.as_euler(turns, degrees=True)
+    e = experiment(tmp_path, heads, cells)
+    assert e.seen_rotation is not None
+    np.testing.assert_allclose(e.seen_rotation, true.as_matrix(), atol=1e-9)
+    named = {"rx": "rotvec", "A,": "ZYX", "Ro": "xyz"}[heads[:2]]
+    assert ("as the joints show" in capsys.readouterr().out) == (turns != named)
+
+
+@pytest.mark.parametrize("heads", ["Q0,Q1,Q2,Q3", "Q1,Q2,Q3,Q4", "qw,qx,qy,qz"])
+@pytest.mark.parametrize("last", [True, False])
+def test_numbered_quaternions_turn_as_the_joints_do(heads: str, last: bool, tmp_path: Path) -> None:
+    """Names say the order of w, x, y, z; numbers do not."""
+    first = seen().as_quat()[:, [3, 0, 1, 2]]
+    e = experiment(tmp_path, heads, first[:, [1, 2, 3, 0]] if last and heads[1] != "w" else first)
+    assert e.seen_rotation is not None
+    np.testing.assert_allclose(e.seen_rotation, seen().as_matrix(), atol=1e-9)
+
+
+@pytest.mark.parametrize("heads", ["rx [deg],ry [deg],rz [deg]", "Q0,Q1,Q2,Q3"])
+def test_joints_that_turn_otherwise_are_said(
+    heads: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    cells = seen().as_quat()[:, [3, 0, 1, 2]] if heads[0] == "Q" else seen().as_rotvec(degrees=True)
+    experiment(tmp_path, heads, cells, "--dh-convention", "modified")
+    assert "do not turn as the joints of the machine do" in capsys.readouterr().out
