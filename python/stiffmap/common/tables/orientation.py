@@ -27,6 +27,7 @@ MATRICES = (
     [f"{column}{row}" for row in "xyz" for column in "noa"],
 )
 """Names of the entries of a matrix, row by row: r11 … r33, from 0, or its columns n, o, a."""
+ABOUT_AXES = "turns about the fixed x, y, z say --map roll=, pitch=, yaw= of the columns, of those about z, the new y, the new x --map A=, B=, C="
 ROUNDED = 0.01
 """By how much digits of a table may change the length of a quaternion, or an entry of a matrix."""
 
@@ -66,6 +67,16 @@ def matrices_of(values: Floats, turns: str = "") -> Floats:
         turned = Rotation.from_quat(v[:, [1, 2, 3, 0]]) if four else Rotation.from_matrix(v.reshape(-1, 3, 3))
     out[good] = turned.as_matrix()
     return out
+
+
+def longest_turn(vectors: Floats) -> str:
+    """What is wrong with rotation vectors (n, 3), rad, if one is longer than half a turn, as angles about axes may be; else nothing."""
+    most = np.degrees(np.linalg.norm(np.nan_to_num(vectors), axis=1).max(initial=0.0))
+    return (
+        f"a rotation vector is at most 180 deg long, found {most:.0f} deg; of {ABOUT_AXES}"
+        if most > 180.1
+        else ""
+    )
 
 
 def off_unit(values: Floats) -> Floats:

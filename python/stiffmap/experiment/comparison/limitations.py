@@ -8,6 +8,7 @@ from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.experiment import WRENCH, Experiment, Floats
 from stiffmap.experiment.noise.level import Noise
 from stiffmap.experiment.poses.commanded import rows_in_words
+from stiffmap.experiment.poses.handeye import SAME
 from stiffmap.solve.machine import Machine
 
 FEWEST = 6
@@ -18,8 +19,10 @@ slope of the load over its command below which it no longer follows."""
 
 
 def refuse(experiment: Experiment, base: Floats) -> None:
-    """Raises StiffmapError for poses that the machine cannot reach and for too few readings."""
+    """Raises StiffmapError for poses that the machine cannot reach, for places of another machine and for too few readings."""
     refuse_unreachable(experiment, base)
+    for text in _elsewhere(experiment):
+        raise StiffmapError(f"{experiment.name}: {text}")
     number = int(experiment.read.sum())
     if number < FEWEST:
         raise StiffmapError(
@@ -39,7 +42,7 @@ def refuse_unreachable(experiment: Experiment, base: Floats) -> None:
 def limitations(experiment: Experiment, noise: Noise, machine: Machine) -> list[str]:
     """What the reader must know, in sentences."""
     e = experiment
-    out = [f"left out: {told}" for told in e.out_of_reach]
+    out = _elsewhere(e) + [f"left out: {told}" for told in e.out_of_reach]
     out += saturated(e)
     out += [*noise.coarse(), *(f"contradictory repeats: {c}" for c in noise.contradictions())]
     if int(e.read.sum()) < FEWEST:
@@ -59,6 +62,23 @@ def limitations(experiment: Experiment, noise: Noise, machine: Machine) -> list[
     if e.quantity == "deflection" and not e.branch:
         out.append("no branch column: friction is judged as if every load came from zero")
     return out + _inside_the_loop(e)
+
+
+def _elsewhere(e: Experiment) -> list[str]:
+    """That places do not follow the commands although frames were found to fit."""
+    read = np.isfinite(e.reading[:, :3]).all(axis=1) & np.isfinite(e.position).all(axis=1)
+    if not e.registration or read.sum() < FEWEST:
+        return []
+    at = e.position[read]
+    each = (e.reading[read, :3], at - np.median(at, axis=0))
+    off, size = (float(np.median(np.linalg.norm(v, axis=1))) for v in each)
+    if not off > SAME * size:
+        return []
+    return [
+        f"the places read do not follow the commands: {1e3 * off:.0f} mm off in the median where the tool moves by {1e3 * size:.0f} mm; "
+        "look first at the machine's geometry (of a table of Denavit and Hartenberg its convention) and at order, signs, zeros and units "
+        "of what was commanded"
+    ]
 
 
 def saturated(e: Experiment) -> list[str]:

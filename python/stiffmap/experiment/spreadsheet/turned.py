@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from stiffmap.common.short import first_of
 from stiffmap.common.tables.orientation import VECTOR as ROTATION_VECTOR
-from stiffmap.common.tables.orientation import Orientation, matrices_of, orientation_of
+from stiffmap.common.tables.orientation import Orientation, longest_turn, matrices_of, orientation_of
 from stiffmap.common.units import unit_of
 from stiffmap.experiment.channels import AXES
 from stiffmap.experiment.experiment import Integers
@@ -60,6 +60,15 @@ def oriented(m: Meant, machine: Callable[[], Machine]) -> None:
         if said or not others or columns[0] != meanings[position[2]] + 1:
             return
     in_degrees = turns not in ("", ROTATION_VECTOR)  # as such names are where no unit is given
+    if not m.columns and turns == ROTATION_VECTOR:
+        sizes = [
+            unit_of(m.written_unit(i, c, quantity="angle"), "angle")
+            for i, c in zip(columns, SEEN_TURNED, strict=True)
+        ]
+        known = [u.size for u in sizes if u]
+        values = np.column_stack([m.sheet.numbers(i) for i in columns])
+        if len(known) == len(columns) and (wrong := longest_turn(values * known)):
+            m.sheet.fail(f"column '{m.sheet.header[columns[0]]}': {wrong}")
     shown = first_of([repr(m.sheet.header[i]) for i in columns], 4)
     if m.columns:
         found = _as_the_joints_turn(m, found, shown, machine)

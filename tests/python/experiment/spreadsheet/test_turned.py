@@ -82,3 +82,46 @@ def test_joints_that_turn_otherwise_are_said(
     cells = seen().as_quat()[:, [3, 0, 1, 2]] if heads[0] == "Q" else seen().as_rotvec(degrees=True)
     experiment(tmp_path, heads, cells, "--dh-convention", "modified")
     assert "do not turn as the joints of the machine do" in capsys.readouterr().out
+
+
+def test_a_machine_of_another_convention_is_no_case_for_a_diagnosis(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The places are those of the arm, read by hand from its transformations; the table is then taken in the other convention."""
+    at = []
+    for q in JOINTS:
+        p, r = np.zeros(3), Rotation.identity()
+        for (zero, d, a, alpha), angle in zip(DH, q, strict=True):
+            r = r * Rotation.from_euler("z", zero + angle, degrees=True)
+            p, r = p + r.apply([a, 0, d]), r * Rotation.from_euler("x", alpha, degrees=True)
+        at.append(p + r.apply([10, 20, 30]))
+    e = experiment(tmp_path, "px [mm],py [mm],pz [mm]", np.array(at), "--map", "note=X meas|Y meas|Z meas")
+    assert np.nanmax(np.abs(sm.residual(tmp_path / "e/machine.yaml", e).values)) < 1e-6
+    modified = ["--dh-convention", "modified", "-o", str(tmp_path / "other.yaml")]
+    assert main(["import", str(tmp_path / "dh.csv"), *modified]) == 0
+    limits = sm.residual(tmp_path / "other.yaml", e).limitations
+    assert "the places read do not follow the commands" in limits[0]
+    for call in (sm.diagnose, sm.calibrate):
+        with pytest.raises(sm.StiffmapError, match="look first at the machine's geometry"):
+            call(tmp_path / "other.yaml", e)
+
+
+def test_angles_that_are_no_rotation_vector_are_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Of 45, -71 and -166 deg the length is 186 deg; where no joints say how they turn, the table must."""
+    poses = tmp_path / "poses.csv"
+    poses.write_text("x [mm],y [mm],z [mm],rx [deg],ry [deg],rz [deg]\n400,10,500,45,-71,-166\n")
+    assert main(["solve", "ur10", "--at", str(poses)]) == 2
+    err = capsys.readouterr().err
+    assert "poses.csv, line 1: rx [deg]: a rotation vector is at most 180 deg long, found 186 deg" in err
+    assert main(["solve", "ur10", "--at", str(poses), "--map", "roll=rx", "--map", "pitch=ry", "--map", "yaw=rz"]) in (0, 1)  # fmt: skip
+    sheet = tmp_path / "sheet.csv"
+    sheet.write_text(
+        "x [mm],y [mm],z [mm],px [mm],py [mm],pz [mm],rx [deg],ry [deg],rz [deg]\n400,10,500,1,2,3,45,-71,-166\n"
+    )
+    noise = [o for a in ("dx", "dy", "dz", "rx", "ry", "rz") for o in ("--noise", f"{a}=0.01")]
+    assert (
+        main(["experiment", "new", str(sheet), "--machine", "ur10", *noise, "-o", str(tmp_path / "e")]) == 2
+    )
+    assert "a rotation vector is at most 180 deg long" in capsys.readouterr().err
