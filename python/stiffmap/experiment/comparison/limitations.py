@@ -67,17 +67,16 @@ def limitations(experiment: Experiment, noise: Noise, machine: Machine) -> list[
 def _elsewhere(e: Experiment) -> list[str]:
     """That places do not follow the commands although frames were found to fit."""
     read = np.isfinite(e.reading[:, :3]).all(axis=1) & np.isfinite(e.position).all(axis=1)
-    if not e.registration or read.sum() < FEWEST:
+    if e.frame == "known" or not e.registration or read.sum() < FEWEST:
         return []
-    at = e.position[read]
-    each = (e.reading[read, :3], at - np.median(at, axis=0))
-    off, size = (float(np.median(np.linalg.norm(v, axis=1))) for v in each)
-    if not off > SAME * size:
+    off = float(np.median(np.linalg.norm(e.reading[read, :3], axis=1)))
+    reach = float(np.linalg.norm(e.position[read], axis=1).max())  # places in one socket hardly differ
+    if not off > SAME * reach:
         return []
     return [
-        f"the places read do not follow the commands: {1e3 * off:.0f} mm off in the median where the tool moves by {1e3 * size:.0f} mm; "
-        "look first at the machine's geometry (of a table of Denavit and Hartenberg its convention) and at order, signs, zeros and units "
-        "of what was commanded"
+        f"the places read do not follow the commands: {1e3 * off:.0f} mm off in the median, of {1e3 * reach:.0f} mm from the base; look "
+        "first at the machine's geometry (of a table of Denavit and Hartenberg its convention) and at order, signs, zeros and units of "
+        "what was commanded"
     ]
 
 
