@@ -65,6 +65,17 @@ def test_three_angles_turn_as_the_joints_do(
     assert ("as the joints show" in capsys.readouterr().out) == (turns != named)
 
 
+def test_every_setup_has_a_frame_of_its_own(tmp_path: Path) -> None:
+    moved = Rotation.from_rotvec(np.outer(np.arange(len(JOINTS)) % 2, [0.3, 0.8, -0.5]))
+    true = moved * seen()
+    setups = np.arange(len(JOINTS))[:, None] % 2 + 1
+    e = experiment(
+        tmp_path, "rx [deg],ry [deg],rz [deg],setup", np.hstack([true.as_euler("xyz", degrees=True), setups])
+    )
+    assert e.seen_rotation is not None
+    np.testing.assert_allclose(e.seen_rotation, true.as_matrix(), atol=1e-9)
+
+
 @pytest.mark.parametrize("heads", ["Q0,Q1,Q2,Q3", "Q1,Q2,Q3,Q4", "qw,qx,qy,qz"])
 @pytest.mark.parametrize("last", [True, False])
 def test_numbered_quaternions_turn_as_the_joints_do(heads: str, last: bool, tmp_path: Path) -> None:
