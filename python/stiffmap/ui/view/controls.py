@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import threading
+import time
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -29,6 +31,8 @@ MOST_FORCE, MOST_GRAVITY = 5000.0, 20.0
 HOME = "as at home"
 NONE = "none"
 DECIMALS = 15  # of numbers that are shown and typed: compliances are as small as 1e-10 m/N
+PAUSE = 1.0
+"""s after the last key, in which a refused number stays as it is typed: it may be the begin of one that is taken, as 0 is of 0.25."""
 TITLES = {q.title: name for name, q in QUANTITIES.items()}
 
 
@@ -43,6 +47,8 @@ class Controls:
         self._modes: dict[str, tuple[float, ...] | None] = {HOME: None}
         self._shown: list[tuple[Any, Callable[[Moment], object]]] = []
         """Controls of the state, and what each of them shows."""
+        self._half: tuple[object, float] = None, 0.0
+        """The control in which a number was refused, and until when it stays there."""
         moment = viewer.model.moment
         self.status = gui.add_html("")
         self.bar = gui.add_html("")
@@ -162,7 +168,12 @@ class Controls:
                 return
             if not keep:
                 self.viewer.model.history.mark()
-            self.viewer.act(lambda m: deed(m, event.target.value))
+            taken = self.viewer.act(lambda m: deed(m, event.target.value))
+            self._half = (None, 0.0) if taken else (handle, time.monotonic() + PAUSE)
+            if not taken:
+                then = threading.Timer(PAUSE, self.viewer.worker.ask)
+                then.daemon = True
+                then.start()
 
         if hasattr(handle, "precision"):  # else a field takes no more decimals than its step has
             handle.precision = DECIMALS
@@ -174,9 +185,16 @@ class Controls:
         """What a button or a command calls, to do this to the model."""
 
         def called(_: object) -> None:
+            self._half = None, 0.0
             self.viewer.act(deed)
 
         return called
+
+    def put(self, handle: Any, value: object) -> None:
+        """What holds goes into a control, but not into one in which somebody may still be typing."""
+        typed, until = self._half
+        if handle is not typed or time.monotonic() >= until:
+            write(handle, "value", value)
 
     def _drawn(self, handle: H) -> H:
         """A control whose value is what is drawn, and no part of the state."""
@@ -212,11 +230,11 @@ class Controls:
     def show(self, moment: Moment) -> None:
         """The state's numbers in all controls."""
         for handle, shown in self._shown:
-            write(handle, "value", shown(moment))
+            self.put(handle, shown(moment))
         rest, solution = self.viewer.scene.rest, self.viewer._solution
         if solution is not None:
             factor = moment.magnification(rest, solution)
-            write(self._factor, "value", factor)
+            self.put(self._factor, factor)
             write(self._legend, "content", legend(moment, rest, factor) + hint(moment))
         self.numbers.show(moment.state)
         self.outputs.show(moment)

@@ -21,7 +21,7 @@ class ChangedNumbers:
     """One number at a time, and a list of those that are changed."""
 
     def __init__(self, controls: Any, gui: GuiApi, moment: Moment) -> None:
-        names = self._list(moment)
+        self._put, names = controls.put, self._list(moment)
         self._find = gui.add_text("Find", "", hint="part of an address")
         self._address = gui.add_dropdown("Number", names, initial_value=names[0])
         self._value = gui.add_number("Value, SI", 0.0)
@@ -50,9 +50,9 @@ class ChangedNumbers:
         address, given = self._address.value, dict(state.changes)
         plain = self.all.get(address, 0.0)
         now = given.get(address, plain)
-        write(self._value, "value", now)
+        self._put(self._value, now)
         power = float(np.log10(now / plain)) if plain and now / plain > 0 else 0.0
-        write(self._scale, "value", round(float(np.clip(power, -DECADE, DECADE)), 2))
+        self._put(self._scale, round(float(np.clip(power, -DECADE, DECADE)), 2))
         lines = [
             f"{a} = {v:.6g} {self._units.get(a, 'SI')}"
             + (f", file: {self.all[a]:.6g}" if a in self.all else "")

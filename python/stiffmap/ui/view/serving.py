@@ -175,7 +175,9 @@ def free_port(host: str, port: int | None) -> int:
 
 HEAD = Path(__file__).parent / "pages/head.html"
 """Script and style for the head of viser's page. Names for screen readers: its client labels the first field of a row at best, and no
-button with a picture. On narrow screens the panel stands below the scene, over which the client lays it."""
+button with a picture. A number that comes without a key (pasted, dictated) is judged by where the last key or mouse button left the
+cursor, and is dropped where the field has become shorter since; so the field looks for its cursor before each text. On narrow screens
+the panel stands below the scene, over which the client lays it."""
 
 
 @lru_cache(maxsize=4)

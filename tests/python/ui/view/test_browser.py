@@ -143,6 +143,46 @@ def test_decimals_are_taken_and_shown_in_every_field(browser: Any) -> None:
         )
 
 
+def test_numbers_are_taken_after_a_longer_one_was_refused_or_undone(browser: Any) -> None:
+    with View(model_of(sm.load_machine("orthoglide-revised"))) as view:
+        page = opened(browser, view)
+
+        def enter(box: Any, text: str) -> None:
+            box.fill(text)
+            box.press("Enter")
+
+        for tab, fields in FIELDS.items():
+            page.get_by_role("tab", name=tab).click()
+            for name, text, value, wanted in fields:
+                box = page.get_by_role("textbox", name=name)
+                before = box.input_value()
+                enter(box, "9000.125" if name.startswith("Tool,") else "123.4567")
+                page.wait_for_timeout(500)  # the page sends the last key late
+                view._viewer.act(lambda m: m.reset())
+                assert until(lambda b=box, t=before: b.input_value() == t, 10), (name, box.input_value())
+                enter(box, text)
+                near = partial(close_to, lambda v=value: v(view), wanted)
+                shown = partial(close_to, lambda b=box: float(b.input_value()), float(text))
+                assert until(near, 10), (name, value(view), view._viewer.error)
+                assert until(shown, 10), (name, box.input_value())
+                view._viewer.act(lambda m: m.reset())
+                assert until(lambda b=box, t=before: b.input_value() == t, 10), (name, box.input_value())
+
+
+def test_a_number_whose_first_digits_are_refused_is_typed(shown: tuple[View, Any]) -> None:
+    view, page = shown
+    page.get_by_role("tab", name="Map").click()
+    box = page.get_by_role("textbox", name="Tolerance, µm")
+    box.click()
+    box.press("Control+a")
+    page.keyboard.type("0.25", delay=300)
+    assert until(lambda: view.state.tolerance == 0.25e-6), (view.state.tolerance, box.input_value())
+    box.press("Control+a")
+    page.keyboard.type("0")
+    page.get_by_role("alert").first.wait_for()
+    assert until(lambda: box.input_value() == "0.25", 10), box.input_value()  # the panel shows what holds
+
+
 def test_every_field_of_a_number_has_decimals() -> None:
     pytest.importorskip("viser", reason="viser is not installed (pip install stiffmap[view])")
     with View(model_of(sm.load_machine("orthoglide-revised"))) as view:
