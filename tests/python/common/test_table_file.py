@@ -86,7 +86,7 @@ def test_angles_without_a_unit_are_in_the_one_that_is_said(tmp_path: Path):
     ("said", "message"),
     [
         ({}, "unknown column 'Xist'.*--map x='Xist', or leave it out: --map note='Xist'"),
-        ({"columns": {"x": "Xost"}}, "--map: no column 'Xost'; there are: Xist, Quer, Hub, Los"),
+        ({"columns": {"x": "Xost"}}, r"strange\.csv: --map: no column 'Xost'; there are: Xist, Quer, Hub, Los"),
         ({**SAID, "units": {}}, r"line 1: x: the unit is missing: write x \[mm\] or say --unit x=mm"),
         ({**SAID, "units": {"Xost": "mm"}}, "--unit Xost: no column has this name or meaning; columns: x, y, z"),
         ({**SAID, "units": {"length": "furlong"}}, r"expected a unit such as in x \[mm\], found furlong"),

@@ -59,7 +59,7 @@ def layout_of(file: TableFile, known: Callable[[str], bool], **more: Any) -> Lay
 def with_names(file: TableFile, table: Table, meaning: Callable[[str], str]) -> Table:
     """The table with the names that are said, without other columns of these meanings; `meaning` of a header. Raises StiffmapError."""
     many = [(n, h) for n, some in file.columns.items() for h in some.split("|")]
-    taken = {find_column(_unsigned(h, table.header), table.header): (n, h) for n, h in many}
+    taken = {find_column(_unsigned(h, table.header), table.header, table.file): (n, h) for n, h in many}
     header, columns = list(table.header), list(table.columns)
     for i, (name, wanted) in taken.items():
         header[i] = with_unit(name, table.unit(i))
@@ -98,13 +98,13 @@ def refuse_options(path: str | os.PathLike[str], expected: str) -> None:
         raise FileError(f"columns, units and the like are of a table; found {expected}", file=str(path))
 
 
-def find_column(wanted: str, headers: Sequence[str]) -> int:
-    """Index of a column by its header, with or without its unit, by how that begins, or by its number from 1; StiffmapError."""
+def find_column(wanted: str, headers: Sequence[str], file: str) -> int:
+    """Index of a column by its header, with or without its unit, by how that begins, or by its number from 1; FileError."""
     exact = [i for i, h in enumerate(headers) if wanted in (h, split_unit(h)[0])]
     loose = [i for i, h in enumerate(headers) if h.lower().startswith(wanted.lower())]
     found = exact or (loose if len(loose) == 1 else [])
     if not found and wanted.isdigit() and 1 <= int(wanted) <= len(headers):
         return int(wanted) - 1
     if not found:
-        raise StiffmapError(f"--map: no column '{wanted}'; there are: {', '.join(headers)}")
+        raise FileError(f"--map: no column '{wanted}'; there are: {', '.join(headers)}", file=file)
     return found[0]

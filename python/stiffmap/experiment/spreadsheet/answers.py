@@ -108,7 +108,7 @@ class Meant(Answers):
     @property
     def guessed(self) -> list[Column]:
         """All columns with their meanings."""
-        return guess(self.sheet.header, self.chosen)
+        return guess(self.sheet.header, self.chosen, self.sheet.file)
 
     def ask_column(self, message: str, meaning: str) -> NoReturn:
         """Raise Question: which column has a meaning."""
@@ -116,8 +116,8 @@ class Meant(Answers):
         raise Question(f"{self.sheet.file}: {message}; columns: {there}", "column", meaning)
 
     def index(self, header: str) -> int:
-        """Of a column as a person says it; StiffmapError."""
-        return find_column(header, self.sheet.header)
+        """Of a column as a person says it; FileError."""
+        return find_column(header, self.sheet.header, self.sheet.file)
 
     def written_unit(self, column: int, *names: str, quantity: str = "") -> str:
         """What --unit says of one of these names, else the header, else the column next to it, else --unit of the quantity, else a

@@ -36,14 +36,14 @@ class Column:
     """From 1, of repeats side by side; 0: none."""
 
 
-def guess(headers: Sequence[str], chosen: Mapping[str, Sequence[str]]) -> list[Column]:
+def guess(headers: Sequence[str], chosen: Mapping[str, Sequence[str]], file: str = "") -> list[Column]:
     """Meaning of every column; ``chosen`` (meaning -> headers) goes before any guess.
 
-    Several headers of one meaning are repeats side by side, in that order. Raises StiffmapError for a chosen
-    header that is not there.
+    Several headers of one meaning are repeats side by side, in that order. Raises FileError, which
+    names the file, for a chosen header that is not there.
     """
     given = {
-        find_column(h, headers): (meaning, i)
+        find_column(h, headers, file): (meaning, i)
         for meaning, many in chosen.items()
         for i, h in enumerate(many, 1)
     }

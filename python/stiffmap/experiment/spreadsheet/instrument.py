@@ -93,7 +93,7 @@ def as_readings(m: Meant, instrument: Instrument) -> set[str]:
             index = bare if m.sheet.find(other, (bare,)) is not None else None
         if index is not None:
             chosen[meaning] = [m.sheet.header[index]]
-    said = guess(m.sheet.header, chosen | m.chosen)
+    said = guess(m.sheet.header, chosen | m.chosen, m.sheet.file)
     seen = any(c.meaning in SEEN for c in said)
     for c in said:
         unit = instrument.units.get(READ.get(c.meaning, c.meaning))

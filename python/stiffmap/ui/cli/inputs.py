@@ -60,13 +60,20 @@ def words_of_all(texts: Sequence[str] | None) -> list[str]:
     return [word for text in texts or () for word in words(text) or ()]
 
 
+PAIRS = {
+    "map": "x='X pos'", "unit": "x=um", "record": "operator=Miller", "set": "z=0", "noise": "dx=0.03", "offset": "G54=0,0,100",
+}  # fmt: skip
+"""What may stand behind an option of names and values."""
+
+
 def pairs(given: Sequence[str] | None, name: str) -> dict[str, str]:
     """The values of NAME=VALUE by their names."""
     out = {}
     for text in given or []:
         key, equals, value = text.partition("=")
         if not equals or not value or key.strip() in out:
-            raise StiffmapError(f"--{name}: expected NAME=VALUE, such as dx=…, each once; got '{text}'")
+            expected = f"NAME=VALUE, such as --{name} {PAIRS[name]}, each name once"
+            raise StiffmapError(f"--{name}: expected {expected}; got '{text}'")
         out[key.strip()] = value.strip()
     return out
 

@@ -128,8 +128,25 @@ def test_everything_may_be_guessed(tmp_path: Path, capsys: pytest.CaptureFixture
         ),
         ("x [mm];y [mm];fx [mN];dx [mm]\n1;2;3;4\n", ("--set", "z=0"), "the unit 'mN' is not one of"),
         ("only words\n", (), "no header line"),
-        ("x [mm];y [mm];dx [mm]\n1;2;3\n", ("--map", "dz=Uhr"), "--map: no column 'Uhr'"),
-        ("x [mm];y [mm];dx [mm]\n1;2;3\n", ("--map", "dz"), "--map: expected NAME=VALUE"),
+        ("x [mm];y [mm];dx [mm]\n1;2;3\n", ("--map", "dz=Uhr"), "t.csv: --map: no column 'Uhr'"),
+        (
+            "x [mm];y [mm];dx [mm]\n1;2;3\n",
+            ("--map", "dz"),
+            "expected NAME=VALUE, such as --map x='X pos', each",
+        ),
+        *(
+            (
+                "x [mm];y [mm];dx [mm]\n1;2;3\n",
+                (name, "0.03"),
+                f"such as {name} {said}, each name once; got '0.03'",
+            )
+            for name, said in (
+                ("--noise", "dx=0.03"),
+                ("--set", "z=0"),
+                ("--unit", "x=um"),
+                ("--record", "operator=Miller"),
+            )
+        ),
     ],
 )
 def test_questions_and_errors_are_one_line(
