@@ -11,7 +11,7 @@ import numpy as np
 from stiffmap.common.errors import StiffmapError
 from stiffmap.solve.compiled import kernel_levels
 from stiffmap.solve.machine import Machine, load_machine
-from stiffmap.ui.cli.options import option
+from stiffmap.ui.cli.options import how_many
 from stiffmap.ui.cli.output import Answer, table
 
 MACHINES = ("tripteron", "orthoglide-revised")
@@ -28,7 +28,7 @@ class BenchCase(NamedTuple):
 
 
 def command(
-    rounds: int = option("Measurements of each case; the median is shown.", 7),
+    rounds: int = how_many("Measurements of each case; the median is shown.", 7),
 ) -> Answer:
     """Speed of this installation on this computer, in less than a minute.
 

@@ -15,7 +15,7 @@ from stiffmap.solve.machine import Machine
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import flags_of, in_si, machine_with, numbers, options_given
 from stiffmap.ui.cli.inputs import gravity as gravity_of
-from stiffmap.ui.cli.options import argument, option, written
+from stiffmap.ui.cli.options import argument, how_many, option, written
 from stiffmap.ui.cli.output import Answer
 
 MM = 1e3
@@ -44,7 +44,7 @@ def command(
     ),
     axis: str | None = option("Instead of poses: a controller's table of this axis, x, y or z."),
     form: str = option("Of the table: csv, linuxcnc, siemens or heidenhain.", "csv", "--format"),
-    points: int = option("Positions of the table, over the workspace.", 21),
+    points: int = how_many("Positions of the table, over the workspace.", 21),
     through: str | None = option("A point of the table's line, mm. [default: home]"),
     case: str | None = option("Of a map with several loads: the one that the table is for, e.g. Fx."),
     zero: float | None = option("Position (mm) of the reference point: the table is zero there."),

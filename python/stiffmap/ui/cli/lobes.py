@@ -14,7 +14,7 @@ from stiffmap.machining.chatter import stability_lobes
 from stiffmap.machining.process import Process, load_process
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import MM, gravity, in_si, machine_with, numbers, percent, position, rotation
-from stiffmap.ui.cli.options import option
+from stiffmap.ui.cli.options import PLANE, check_count, option
 from stiffmap.ui.cli.output import Answer, write_files
 
 RPM = 60 / (2 * math.pi)
@@ -60,7 +60,9 @@ def command(
     """
     m = machine_with(machine, effect)
     p = load_process(process)
-    many = numbers(points, "points", 2).astype(int)
+    sizes = numbers(points, "points", 2)
+    check_count("--points", max(sizes), PLANE)
+    many = sizes.astype(int)
     if min(many) < 2:
         raise StiffmapError(f"--points: expected two numbers from 2 on, got '{points}'")
     ends = in_si(speeds, "speeds", 2, 1 / RPM)

@@ -20,7 +20,7 @@ from stiffmap.solve.status import Status
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import MM, force_given, gravity, machine_with, refuse_unused
 from stiffmap.ui.cli.map_summary import MapSummary, assumptions, label, write_map_files
-from stiffmap.ui.cli.options import flag, option, written
+from stiffmap.ui.cli.options import PLANE, flag, how_many, option, written
 from stiffmap.ui.cli.output import Answer, failed_in_words, table, write_files
 from stiffmap.workspace.maps.inputs import magnitude, plane_axes
 from stiffmap.workspace.maps.statistics import statistics_rows
@@ -40,15 +40,19 @@ def command(
     ),
     y: list[float] | None = option("Planes across y instead, in mm; repeatable."),
     x: list[float] | None = option("Planes across x instead, in mm; repeatable."),
-    points: int = option("Positions along each axis of a plane, over the whole workspace.", 101),
+    points: int = how_many(
+        "Positions along each axis of a plane, over the whole workspace.", 101, most=PLANE
+    ),
     force: options.Force = "300",
     toolpath: str | None = option(
         "Along a path of the tool instead of over planes: CSV or YAML, as for `efforts`; or a shipped one: trim."
     ),
     plane: options.Plane = "xy",
     tolerance: options.Tolerance = 0.25,
-    directions: int = option(
-        "Force directions solved before the extremes are searched; 16 or more for machines with play.", 4
+    directions: int = how_many(
+        "Force directions solved before the extremes are searched; 16 or more for machines with play.",
+        4,
+        most=PLANE,
     ),
     effect: options.Effects = None,
     gravity_: options.Gravity = None,

@@ -12,7 +12,7 @@ from rich.text import Text
 from stiffmap.common.outputs import make_folder
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import MM, gravity, in_si, machine_with, numbers, words
-from stiffmap.ui.cli.options import option
+from stiffmap.ui.cli.options import BOX, how_many, option
 from stiffmap.ui.cli.output import Answer, as_text, write_files
 from stiffmap.ui.cli.output import table as table_of
 from stiffmap.workspace.maps.loading import machine_digest
@@ -30,8 +30,8 @@ def command(
     force: float | None = option("Force on the tool for deflections, N."),
     plane: str | None = option("Plane of speeds, forces, deflections: xy, xz, yz."),
     only: str | None = option("Names of measures, separated by commas."),
-    nodes: int = option("Nodes per edge for kinematic measures.", 51),
-    coarse: int = option("Nodes per edge for deflection, frequency, acceleration.", 7),
+    nodes: int = how_many("Nodes per edge for kinematic measures.", 51, most=BOX),
+    coarse: int = how_many("Nodes per edge for deflection, frequency, acceleration.", 7, most=BOX),
     length: float | None = option("Characteristic length in mm, where units mix; default: the machine's."),
     toolpath: Path | None = option(
         "Motion file (CSV or YAML), or a shipped one (trim), for measures along the task's own path."

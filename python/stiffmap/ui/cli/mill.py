@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from stiffmap.machining.milling import mill_job
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import MM, in_si, machine_with, pairs
-from stiffmap.ui.cli.options import argument, option
+from stiffmap.ui.cli.options import argument, how_many, option
 from stiffmap.ui.cli.output import Answer
 from stiffmap.ui.report.milling import summary, write_report
 
@@ -29,9 +29,9 @@ def command(
     within: float = option("Chord error of the compensated program, mm.", 0.001, min=0),
     thickness: float | None = option("Width to trim, mm; default: the process's."),
     tolerance: float | None = option("Tolerance, mm; default: the process's."),
-    passes: int = option("Passes along the same program.", 1),
+    passes: int = how_many("Passes along the same program.", 1),
     band: bool = option("Also under 80 and 120 % of the force.", False),
-    place: int | None = option(
+    place: int | None = how_many(
         "Try so many placements first and take the best, refined; instead of --at and --turn."
     ),
     stock: str | None = option(

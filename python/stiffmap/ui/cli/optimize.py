@@ -13,7 +13,7 @@ from rich.text import Text
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs import make_folder
 from stiffmap.ui.cli import options
-from stiffmap.ui.cli.options import argument, option, written
+from stiffmap.ui.cli.options import argument, how_many, option, written
 from stiffmap.ui.cli.output import Answer, table, write_files
 from stiffmap.workspace.design import ParetoSet, load_design, optimize
 from stiffmap.workspace.design.chosen import NOTHING, ComparedDesigns, measured
@@ -22,7 +22,7 @@ from stiffmap.workspace.design.chosen import NOTHING, ComparedDesigns, measured
 def command(
     design: str = argument("Design file, or a shipped one by name: redesign."),
     output: Path = written("Folder for results; resumed from there.", Path("design")),
-    generations: int | None = option("Generations; default: the file's."),
+    generations: int | None = how_many("Generations; default: the file's."),
     processes: int | None = option("Processes; default: all cores."),
     scheduler: options.Scheduler = None,
 ) -> Answer:

@@ -7,13 +7,35 @@ from pathlib import Path
 from typing import Annotated, Any, NamedTuple, get_args
 
 import typer
+from typer import CallbackParam
 
+from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs.keeping import check_replaceable, reserved
 
 
 def option(help: str, default: Any = None, *names: str, **more: Any) -> Any:
     """An option of one command, required where its default is ``...``; `names` and `more` as of ``typer.Option``."""
     return typer.Option(default, *names, help=help, **more)
+
+
+LINE, PLANE, BOX = 1_000_000, 100_000, 1_000
+"""The largest counts: along one line, along each axis of a plane or at each of many poses, along each edge of a box."""
+
+
+def how_many(help: str, default: Any = None, *names: str, most: int = LINE) -> Any:
+    """An option that says how many, at most `most`: more would fill the memory, or take days, before anything is said."""
+
+    def at_most(param: CallbackParam, value: int | None) -> int | None:
+        check_count(max(param.opts, key=len), value, most)
+        return value
+
+    return option(help, default, *names, callback=at_most)
+
+
+def check_count(name: str, value: float | None, most: int) -> None:
+    """StiffmapError with an option's name for more than it may be."""
+    if value is not None and value > most:
+        raise StiffmapError(f"{name}: expected at most {most}, got {value:.15g}")
 
 
 def flag(help: str, name: str) -> Any:

@@ -6,7 +6,7 @@ from typing import Any
 
 from stiffmap.common.outputs import make_folder
 from stiffmap.ui.cli import options
-from stiffmap.ui.cli.options import option, written
+from stiffmap.ui.cli.options import PLANE, how_many, option, written
 from stiffmap.ui.cli.output import Answer, write_files
 from stiffmap.ui.paper import Results, Statement, all_statements, compute
 from stiffmap.ui.paper.results import all_figures
@@ -17,7 +17,7 @@ NO_CURVES = "The paper prints no numbers of the curves in Figures 5 to 7; the nu
 
 def command(
     output: Path | None = written("Folder for figures and tables."),
-    points: int = option("Positions along x and y of the error maps.", 101),
+    points: int = how_many("Positions along x and y of the error maps.", 101, most=PLANE),
     figures: bool = option("Draw Figures 5 to 7 (with -o).", True),
     threads: options.Threads = None,
     as_json: options.Json = False,

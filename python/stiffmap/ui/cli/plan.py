@@ -19,7 +19,7 @@ from stiffmap.identification.taps import where_to_tap
 from stiffmap.solve.machine import Machine, load_machine
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import MM, in_si, numbers, refuse_unused
-from stiffmap.ui.cli.options import argument, flag, option, written
+from stiffmap.ui.cli.options import argument, flag, how_many, option, written
 from stiffmap.ui.cli.output import Answer
 
 UNUSED = {"with taps": "rival for_map at rows quantity force read noise frame tool until twin", "with until": "output rival for_map at",
@@ -32,14 +32,14 @@ def command(
     identify: list[str] | None = option(
         "Effect whose numbers are to be identified, at the value given; repeatable.", None, "--identify"
     ),
-    taps: int | None = option("In place of --identify: so many poses for tap tests, best first."),
+    taps: int | None = how_many("In place of --identify: so many poses for tap tests, best first."),
     output: Path | None = written("CSV file of the rows chosen."),
     rival: list[str] | None = option("Explanation to separate from; repeatable.", None, "--rival"),
     for_map: bool = flag("Make the map at the workpiece certain instead of the numbers.", "--map"),
     at: list[str] | None = option("Point of the workpiece, mm, as 100,0,50; repeatable (with --map)."),
-    rows: int = option("Rows to measure.", 12),
+    rows: int = how_many("Rows to measure.", 12),
     quantity: options.Quantity = "deflection",
-    poses: int = option("Candidate poses, at random in the workspace.", 60),
+    poses: int = how_many("Candidate poses, at random in the workspace.", 60),
     force: float = option("Size of the forces, N.", 400.0),
     read: str = option("Axes read, of dx,dy,dz,rx,ry,rz.", "dx,dy,dz"),
     noise: float | None = option("One standard deviation of a reading, mm."),

@@ -11,7 +11,7 @@ import stiffmap
 from stiffmap.common.number_text import place_text
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import MM, force_given, gravity, machine_with, position
-from stiffmap.ui.cli.options import option
+from stiffmap.ui.cli.options import how_many
 from stiffmap.ui.cli.output import Answer, failed, failed_in_words, table, write_files
 from stiffmap.workspace.maps.inputs import magnitude
 
@@ -21,7 +21,7 @@ def command(
     at: options.Places = None,
     force: options.Force = "300",
     plane: options.Plane = "xy",
-    directions: int = option("Number of directions.", 72),
+    directions: int = how_many("Number of directions.", 72),
     tolerance: options.Tolerance = 0.25,
     effect: options.Effects = None,
     gravity_: options.Gravity = None,

@@ -17,7 +17,7 @@ from stiffmap.experiment.virtual import plans as make
 from stiffmap.solve.machine import Machine, load_machine
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import in_si, numbers
-from stiffmap.ui.cli.options import argument, option, written
+from stiffmap.ui.cli.options import argument, how_many, option, written
 from stiffmap.ui.cli.output import Answer
 
 GRID = re.compile(r"^grid:(\d+)x(\d+)x(\d+)$")
@@ -38,10 +38,10 @@ def command(
         "random",
     ),
     quantity: options.Quantity = "deflection",
-    poses: int = option("Poses of a random plan.", 30),
+    poses: int = how_many("Poses of a random plan.", 30),
     loads: str = option("Loads per pose: axes, full (with sums of pairs and zero), or N at random.", "9"),
     forces: str = option("Sizes of the forces, N.", "100,250,400"),
-    repeats: int = option("Readings of each condition.", 2),
+    repeats: int = how_many("Readings of each condition.", 2),
     read: str = option("Axes read, of dx,dy,dz,rx,ry,rz, or none.", "dx,dy,dz"),
     joint: list[str] | None = option("Encoder read: NAME or NAME:motor, as x.actuator:motor; repeatable."),
     distances: bool = option("Read distances from each pose to the next instead of positions.", False),
@@ -52,7 +52,7 @@ def command(
     branches: bool = option("Read every load loading and unloading.", False),
     shuffle: bool = option("Visit the poses in random order.", False),
     temperature: str | None = option("First and last temperature, °C, as 20,26."),
-    setups: int = option("Set-ups that the poses are dealt to.", 1),
+    setups: int = how_many("Set-ups that the poses are dealt to.", 1),
     frame: options.Frame = "known",
     tool: options.Target = "known",
     unloaded: str = option("Unloaded state: centre, approach, unknown.", "centre"),

@@ -14,7 +14,7 @@ from stiffmap.solve.machine import Machine
 from stiffmap.solve.status import Status
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import MM, machine_at, numbers, refuse_unused
-from stiffmap.ui.cli.options import option
+from stiffmap.ui.cli.options import how_many, option
 from stiffmap.ui.cli.output import Answer, table, write_files
 from stiffmap.workspace.maps.inputs import magnitude
 
@@ -26,7 +26,7 @@ def command(
     direction: str = option("Direction of the force, any length.", "1,0,0"),
     to: float = option("Largest force, N.", 1000.0),
     from_: float = option("Smallest force, N; negative: against the direction.", 0.0, "--from"),
-    points: int = option("Number of forces, or of steps to the limit.", 21),
+    points: int = how_many("Number of forces, or of steps to the limit.", 21),
     control: str = option("With --limit: force, displacement (past limit points) or arc.", "force"),
     limit: float | None = option("Follow one path of equilibria to this force (N) or displacement (mm)."),
     cross: int = option(

@@ -7,7 +7,7 @@ import os
 import re
 import subprocess
 import sys
-from inspect import getdoc
+from inspect import getdoc, signature
 from pathlib import Path
 
 import pytest
@@ -244,3 +244,36 @@ def test_options_that_would_not_be_used(
     assert main(words.split()) == 2
     assert message in capsys.readouterr().err
     assert [p.name for p in tmp_path.iterdir()] == ["t.csv"]
+
+
+NO_COUNTS = {"seed", "which", "threads", "processes", "cross", "redundancy", "port"}
+"""Whole numbers that say which one, and those of threads and processes."""
+LISTED = {("calibrate", "rows"), ("residual", "rows")}
+"""How many lines are shown at most, of those that there are."""
+
+
+def test_every_count_has_a_largest_one() -> None:
+    given = [(c.name, *p) for c in COMMANDS for p in signature(load(c)).parameters.items()]
+    whole = [(c, n, p) for c, n, p in given if p.annotation in (int, int | None) and n not in NO_COUNTS]
+    free = {(c, n) for c, n, p in whole if getattr(p.default, "callback", None) is None}
+    assert len(whole) > 15 and free == LISTED
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "sweep orthoglide-revised --points 1000000000",
+        "map orthoglide-revised --points 1000000000",
+        "map orthoglide-revised --directions 1000000000",
+        "polar orthoglide-revised --directions 1000000000",
+        "measures orthoglide-revised --nodes 1000000000",
+        "lobes ur10 --process slot --points 1000000000,80",
+        "lobes ur10 --process slot --points 120,1e9",
+        "simulate orthoglide-revised -o twin --poses 1000000000",
+    ],
+)
+def test_counts_that_nothing_can_hold_are_refused(words: str, capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, err = run(capsys, *words.split())
+    name = words.split()[-2]
+    assert (code, out) == (2, "")
+    assert re.fullmatch(rf"stiffmap: {name}: expected at most 10+, got 1000000000\n", err)
