@@ -165,8 +165,9 @@ def _set(m: Meant, *patterns: str) -> list[str]:
 
 
 def _unit(m: Meant, index: int, name: str, slides: bool) -> Unit:
-    names = (name, name.split(".")[-1], m.sheet.names[index], "joints")
     quantity = "length" if slides else "angle"
+    own = unit_of(m.sheet.unit(index), quantity)
+    names = (name, name.split(".")[-1], m.sheet.names[index], *([] if own else ["joints"]))
     largest = float(np.nanmax(np.abs(m.sheet.numbers(index)), initial=0.0))
     if m.sheet.names[index] in m.spent and (slides or not largest):  # mm by --set; zero in any unit
         return Unit("mm" if slides else "deg")

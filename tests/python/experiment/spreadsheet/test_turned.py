@@ -136,3 +136,18 @@ def test_angles_that_are_no_rotation_vector_are_refused(
         main(["experiment", "new", str(sheet), "--machine", "ur10", *noise, "-o", str(tmp_path / "e")]) == 2
     )
     assert "a rotation vector is at most 180 deg long" in capsys.readouterr().err
+
+
+def test_a_unit_of_joints_is_for_those_without_one(tmp_path: Path) -> None:
+    """In the header of one joint stands rad; the others are in degrees, as is said of all without one."""
+    e = experiment(tmp_path, "rx [deg],ry [deg],rz [deg]", seen().as_rotvec(degrees=True))
+    sheet = tmp_path / "sheet.csv"
+    lines = [line.split(",") for line in sheet.read_text().splitlines()]
+    cells = [["J1 [rad]", *lines[0][1:]]] + [
+        [repr(float(np.radians(float(c[0])))), *c[1:]] for c in lines[1:]
+    ]
+    sheet.write_text("\n".join(",".join(c) for c in cells) + "\n")
+    files = [str(sheet), "--dh", str(tmp_path / "dh.csv"), "--unit", "joints=deg", "--noise", "dx=1"]
+    assert main(["experiment", "new", *files, "-o", str(tmp_path / "rad")]) == 0
+    assert e.command is not None
+    np.testing.assert_allclose(sm.load_experiment(tmp_path / "rad").command, e.command, atol=1e-12)
