@@ -75,7 +75,10 @@ def approached(m: Meant) -> None:
         if {sided[i][1] for i in own} == {1.0, -1.0}:
             m.chosen[meaning] = [m.sheet.header[i] for i in own]
     runs = next((v for k, v in m.chosen.items() if k in AXES and len(v) > 1 and all(map(side_of_run, v))), [])
-    if runs and not {*APPROACH} & {*m.chosen}:
+    places = all(
+        re.search(r"(?i)(?<![a-z])pos(?![a-z])", h) for h in runs
+    )  # positions, unless others are neg
+    if runs and not places and not {*APPROACH} & {*m.chosen}:
         name = f"approach_{_axis(m, runs[0])}"
         m.chosen[name] = [f"{name} of {h}" for h in runs]
         for made, header in zip(m.chosen[name], runs, strict=True):

@@ -159,6 +159,21 @@ def test_runs_in_both_directions_side_by_side_keep_them(names: str, runs: str, t
 
 
 @pytest.mark.parametrize(
+    ("names", "sides"),
+    [("ref_pos(i,1);ref_pos(i,2)", None), ("1 pos;1 neg", (1.0, -1.0)), ("Pos 1;Pos 2", None), ("1 plus;2 plus", (1.0, 1.0))],
+)  # fmt: skip
+def test_positions_are_no_direction(names: str, sides: tuple[float, float] | None, tmp_path: Path) -> None:
+    """``pos`` is a direction of travel where another run is ``neg``."""
+    more: dict[str, Any] = {"constants": {"y": 0, "z": 0}, "units": {"dx": "um"}, "noise": {"dx": 1.0}}
+    runs = {"columns": {"x": "Target [mm]", "dx": names.replace(";", "|")}}
+    found = made(tmp_path, f"Target [mm];{names}", LINE[::2, 0], np.arange(6.0).reshape(3, 2), **runs, **more)
+    approach = found.experiment.approach
+    assert (approach is None) == (sides is None)
+    if approach is not None:
+        np.testing.assert_array_equal(approach[:2, 0], sides)
+
+
+@pytest.mark.parametrize(
     "head",
     [
         "x;dx 1;dx 1;dx 2;dx 2\n;+;-;+;-\nmm;um;um;um;um",
