@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NoReturn, TypeVar
@@ -49,11 +49,6 @@ class Table:
 
     def __contains__(self, column: str) -> bool:
         return column in self.header
-
-    @property
-    def rows(self) -> Iterator[tuple[str, ...]]:
-        """The rows, one by one."""
-        return zip(*self.columns, strict=True)
 
     @cached_property
     def names(self) -> tuple[str, ...]:

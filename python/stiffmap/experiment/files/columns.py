@@ -173,11 +173,11 @@ def ids(table: Table) -> tuple[str, ...]:
     """Names of the rows, each once."""
     if "id" not in table:
         return tuple(str(i + 1) for i in range(len(table)))
-    names = table.text("id")
-    first = {name: i for i, name in reversed(list(enumerate(names)))}
+    names, rows = table.text("id"), dict[str, int]()
+    first = [rows.setdefault(name, i) for i, name in enumerate(names)]
     table.check(
-        [first[name] == i for i, name in enumerate(names)],
-        lambda i: f"column 'id': '{names[i]}' occurs twice (first in line {table.lines[first[names[i]]]})",
+        np.array(first) == np.arange(len(names)),
+        lambda i: f"column 'id': '{names[i]}' occurs twice (first in line {table.lines[first[i]]})",
     )
     return tuple(names)
 

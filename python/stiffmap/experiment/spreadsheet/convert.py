@@ -6,6 +6,7 @@ from array import array
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, islice, repeat
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -192,7 +193,8 @@ class Rows:
         self._name = header.index("id") if "id" in header else None
         self.lines = array("q")
         """Line in the sheet of each row, once they were made."""
-        self._readings = [header.index(m) for m in READINGS if m in header]
+        self._read = itemgetter(*(header.index(m) for m in READINGS if m in header))
+        self._unread = self._read([""] * len(header))
 
     def __iter__(self) -> Iterator[Sequence[object]]:
         self.lines = array("q")
@@ -200,7 +202,7 @@ class Rows:
         sides = zip(*map(self._side, range(self.repeats)), strict=True)
         for line, rows in islice(zip(self._sheet.lines, sides, strict=True), self._count):
             for row in rows:
-                if any(row[i] != "" for i in self._readings):
+                if self._read(row) != self._unread:
                     self.lines.append(line)
                     yield self._once(row, taken)
 
@@ -273,7 +275,7 @@ def write_folder(
             raise StiffmapError(f"{sheet.file}: no row has a reading: no number in {read}")
         notes = [c.index for c in found.columns if c.meaning == "note"]
         if notes:
-            kept = ([row[i] for i in notes] for row in sheet.rows)
+            kept = zip(*(sheet.columns[i] for i in notes), strict=True)
             write_rows(folder / "notes.csv", [sheet.header[i] for i in notes], kept)
         write_text(folder / "experiment.yaml", text_of(head))
 
