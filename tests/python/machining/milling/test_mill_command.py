@@ -177,7 +177,7 @@ def test_the_documentation_says_first_what_the_shipped_process_cuts() -> None:
             ["points.csv", "--offset", "G54=100,0,0"],
             "points.csv: offsets: only a program in G-code takes them",
         ),
-        (["part.ngc", "--offset", "G54=1,0,0", "--offset", "G54=2,0,0"], "each once; got 'G54=2,0,0'"),
+        (["part.ngc", "--offset", "G54=1,0,0", "--offset", "G54=2,0,0"], "each name once; got 'G54=2,0,0'"),
         (["circle", "--within", "-1"], "--within"),
     ],
 )
