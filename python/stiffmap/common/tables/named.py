@@ -26,7 +26,7 @@ from stiffmap.common.number_text import read_value
 from stiffmap.common.short import first_of
 from stiffmap.common.tables.header import IN_SI, meaning_of, split_unit, stated_unit
 from stiffmap.common.tables.lines import Spelling, is_finite
-from stiffmap.common.tables.orientation import VECTOR, longest_turn, matrices_of, orientation_of
+from stiffmap.common.tables.orientation import VECTOR, matrices_of, no_vector, orientation_of
 from stiffmap.common.tables.sheet import read_sheet
 from stiffmap.common.tables.table import Table
 from stiffmap.common.tables.table_file import layout_of, table_file, with_names, with_units
@@ -318,7 +318,7 @@ def read_pose_table(
         table.orientation = found.matrices(sheet, usual)
     elif turned := [table.header[n] for n in ("rx", "ry", "rz") if n in table.values]:
         table.turns = f"from home: {', '.join(turned)}: a rotation vector"
-        if wrong := longest_turn(table.block(("rx", "ry", "rz"))):
+        if wrong := no_vector(table.block(("rx", "ry", "rz"))):
             table.fail(wrong, turned[0])
     missing = [c for c in "xyz" if c not in table.values]
     if actuators is not None:

@@ -27,9 +27,11 @@ MATRICES = (
     [f"{column}{row}" for row in "xyz" for column in "noa"],
 )
 """Names of the entries of a matrix, row by row: r11 … r33, from 0, or its columns n, o, a."""
-ABOUT_AXES = "turns about the fixed x, y, z say --map roll=, pitch=, yaw= of the columns, of those about z, the new y, the new x --map A=, B=, C="
 ROUNDED = 0.01
 """By how much digits of a table may change the length of a quaternion, or an entry of a matrix."""
+
+HALF_A_TURN = 180.1
+"""deg, with what digits of a table may add."""
 
 
 class Orientation(NamedTuple):
@@ -69,13 +71,14 @@ def matrices_of(values: Floats, turns: str = "") -> Floats:
     return out
 
 
-def longest_turn(vectors: Floats) -> str:
-    """What is wrong with rotation vectors (n, 3), rad, if one is longer than half a turn, as angles about axes may be; else nothing."""
-    most = np.degrees(np.linalg.norm(np.nan_to_num(vectors), axis=1).max(initial=0.0))
+def no_vector(values: Floats) -> str:
+    """Why numbers (n, 3), rad, are no rotation vectors: one is longer than half a turn, as angles about axes may be; else nothing."""
+    longest = np.degrees(np.linalg.norm(np.nan_to_num(values), axis=1).max(initial=0.0))
+    if longest <= HALF_A_TURN:
+        return ""
     return (
-        f"a rotation vector is at most 180 deg long, found {most:.0f} deg; of {ABOUT_AXES}"
-        if most > 180.1
-        else ""
+        f"a rotation vector is at most 180 deg long, found {longest:.0f} deg; of turns about the fixed x, y, z say --map roll=, pitch=, "
+        "yaw= of the columns, of those about z, the new y, the new x --map A=, B=, C="
     )
 
 

@@ -8,9 +8,10 @@ from collections.abc import Callable
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from stiffmap.common.broadcasting import Floats
 from stiffmap.common.short import first_of
 from stiffmap.common.tables.orientation import VECTOR as ROTATION_VECTOR
-from stiffmap.common.tables.orientation import Orientation, longest_turn, matrices_of, orientation_of
+from stiffmap.common.tables.orientation import Orientation, matrices_of, no_vector, orientation_of
 from stiffmap.common.units import unit_of
 from stiffmap.experiment.channels import AXES
 from stiffmap.experiment.experiment import Integers
@@ -52,26 +53,19 @@ def oriented(m: Meant, machine: Callable[[], Machine]) -> None:
         if columns and not turns:  # half angles are no readings
             m.chosen["note"] = [*m.chosen.get("note", ()), *(m.sheet.header[i] for i in columns)]
         return
-    if (
-        turns == ROTATION_VECTOR
-    ):  # a reading, unless it stands right behind the position and something else is read
+    if turns == ROTATION_VECTOR:
+        # a reading, unless it stands right behind the position and something else is read
         others = set(READINGS) & set(meanings) - set(AXES[3:])
         said = not seen and set(AXES[3:]) & set(m.noise)
         if said or not others or columns[0] != meanings[position[2]] + 1:
             return
     in_degrees = turns not in ("", ROTATION_VECTOR)  # as such names are where no unit is given
-    if not m.columns and turns == ROTATION_VECTOR:
-        sizes = [
-            unit_of(m.written_unit(i, c, quantity="angle"), "angle")
-            for i, c in zip(columns, SEEN_TURNED, strict=True)
-        ]
-        known = [u.size for u in sizes if u]
-        values = np.column_stack([m.sheet.numbers(i) for i in columns])
-        if len(known) == len(columns) and (wrong := longest_turn(values * known)):
-            m.sheet.fail(f"column '{m.sheet.header[columns[0]]}': {wrong}")
+    values = _in_rad(m, found)
+    if not m.columns and turns == ROTATION_VECTOR and values is not None and (wrong := no_vector(values)):
+        m.sheet.fail(f"column '{m.sheet.header[columns[0]]}': {wrong}")
     shown = first_of([repr(m.sheet.header[i]) for i in columns], 4)
-    if m.columns:
-        found = _as_the_joints_turn(m, found, shown, machine)
+    if m.columns and values is not None:
+        found = _as_the_joints_turn(m, found, values, shown, machine)
         columns, turns = found.columns, found.turns
     headers = [m.sheet.header[i] for i in columns]
     if seen and not set(AXES[3:]) <= set(m.noise):
@@ -81,8 +75,8 @@ def oriented(m: Meant, machine: Callable[[], Machine]) -> None:
     if len(columns) > len(QUATERNION):
         turned = Rotation.from_matrix(found.matrices(m.sheet)).as_quat()[:, [3, 0, 1, 2]]
         headers = [f"{c} of {headers[0]} …" for c in QUATERNION]
-        for name, values in zip(headers, turned.T, strict=True):
-            m.sheet = m.sheet.with_column(name, values)
+        for name, parts in zip(headers, turned.T, strict=True):
+            m.sheet = m.sheet.with_column(name, parts)
         columns = [m.sheet.header.index(name) for name in headers]
     of_pose = {"": QUATERNION, ROTATION_VECTOR: VECTOR}.get(turns, EULER)
     of_seen = SEEN_TURNED if turns else [f"p{c}" for c in QUATERNION]
@@ -97,21 +91,25 @@ def oriented(m: Meant, machine: Callable[[], Machine]) -> None:
     m.said.append(f"{shown} are the orientation: {found.words}")
 
 
+def _in_rad(m: Meant, found: Orientation) -> Floats | None:
+    """(n, columns) numbers of an orientation, angles in rad; None where their unit is asked for later."""
+    values = np.column_stack([m.sheet.numbers(i) for i in found.columns])
+    if not found.turns:
+        return values
+    usual = "" if found.turns == ROTATION_VECTOR else "deg"
+    texts = (m.written_unit(i, c, quantity="angle") for i, c in zip(found.columns, SEEN_TURNED, strict=True))
+    sizes = [u.size for text in texts if (u := unit_of(text or usual, "angle"))]
+    return values * sizes if len(sizes) == len(found.columns) else None
+
+
 def _as_the_joints_turn(
-    m: Meant, found: Orientation, shown: str, machine: Callable[[], Machine]
+    m: Meant, found: Orientation, values: Floats, shown: str, machine: Callable[[], Machine]
 ) -> Orientation:
     """An orientation that was seen, read in the way in which it follows the commanded joints: as its names say, unless another is
     clearly nearer. Where none follows them, that is said."""
-    columns, usual = found.columns, "" if found.turns == ROTATION_VECTOR else "deg"
-    texts = [
-        m.written_unit(i, c, quantity="angle") or usual for i, c in zip(columns, SEEN_TURNED, strict=False)
-    ]
-    units = [unit_of(text, "angle") for text in texts]
-    values = np.column_stack([m.sheet.numbers(i) for i in columns])
+    columns = found.columns
     rows = np.flatnonzero(np.isfinite(values).all(axis=1))
     rows = rows[:: max(1, len(rows) // MOST)]
-    if found.turns and not all(units):
-        return found  # the unit is asked for later
     turned = forward_kinematics(machine(), m.coordinates()[rows]).rotation
     good = np.isfinite(turned).all(axis=(1, 2))
     rows, turned = rows[good], turned[good]
@@ -120,7 +118,6 @@ def _as_the_joints_turn(
     ways = [found]
     if found.turns:
         ways += [Orientation(columns, t, words) for t, words in TURNS.items() if t != found.turns]
-        values = values * [unit.size for unit in units if unit]
     elif len(columns) == len(QUATERNION) and re.search(r"\d$", m.sheet.names[columns[0]]):
         ways.append(Orientation([columns[3], *columns[:3]], "", "quaternions, w last"))
     blocks = [_numbered(m, name)[rows] for name in ("setup", "target")]
