@@ -110,6 +110,13 @@ def turns_apart(commanded: Floats, seen: Floats, setup: Integers, target: Intege
     return _middle(as_commanded(s, _starts(s)[0])[1])
 
 
+def places_apart(p: Floats, r: Floats, seen: Floats, setup: Integers, target: Integers) -> float:
+    """Median distance, m, of places (n, 3) that were seen from where targets on the tool are at commanded poses (n, 3), (n, 3, 3), once
+    instruments and targets are moved to fit."""
+    s = Sighting(p, r, seen, np.full((len(p), 3, 3), np.nan), setup, target)
+    return _middle(as_commanded(s, find_frames(s))[0])
+
+
 def _middle(vectors: Floats) -> float:
     return float(np.median(np.linalg.norm(vectors, axis=1)))
 

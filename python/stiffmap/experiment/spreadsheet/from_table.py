@@ -28,6 +28,7 @@ from stiffmap.experiment.spreadsheet import dialogue
 from stiffmap.experiment.spreadsheet.answers import Answers, Meant, Question
 from stiffmap.experiment.spreadsheet.convert import ImportedSheet, write_folder
 from stiffmap.experiment.spreadsheet.dh import LAYOUT, LEG, QUANTITIES, arm, left_out, read_dh
+from stiffmap.experiment.spreadsheet.followed import followed
 from stiffmap.experiment.spreadsheet.guess import guessed
 from stiffmap.experiment.spreadsheet.instrument import Instrument, as_readings, load_instrument
 from stiffmap.experiment.spreadsheet.joints import (
@@ -247,6 +248,7 @@ class _Wanted:
             dialogue.asked(m, ask, same)
         dialogue.asked(m, ask, partial(in_base_axes, m, partial(self.declared, m)))
         oriented(m, partial(self.declared, m))
+        followed(m, partial(self.declared, m))
         named_targets(m)
         if not m.placed:
             turned(m, self.difference, less)

@@ -120,7 +120,7 @@ def _as_the_joints_turn(
         ways += [Orientation(columns, t, words) for t, words in TURNS.items() if t != found.turns]
     elif len(columns) == len(QUATERNION) and re.search(r"\d$", m.sheet.names[columns[0]]):
         ways.append(Orientation([columns[3], *columns[:3]], "", "quaternions, w last"))
-    blocks = [_numbered(m, name)[rows] for name in ("setup", "target")]
+    blocks = [numbered(m, name)[rows] for name in ("setup", "target")]
     read = [matrices_of(values[rows][:, [columns.index(c) for c in way.columns]], way.turns) for way in ways]
     off = [turns_apart(turned, r, *blocks) for r in read]
     best = int(np.argmin(off))
@@ -136,7 +136,7 @@ def _as_the_joints_turn(
     return found
 
 
-def _numbered(m: Meant, meaning: str) -> Integers:
+def numbered(m: Meant, meaning: str) -> Integers:
     """(n,) from 0, words of a column of this meaning; 0 where there is none."""
     at = next((c.index for c in m.guessed if c.meaning == meaning), None)
     cells = [""] * len(m.sheet) if at is None else list(m.sheet.columns[at])
