@@ -68,7 +68,7 @@ def followed(m: Meant, machine: Callable[[], Machine]) -> None:
 
 
 def _size(places: Floats) -> float:
-    return float(np.median(np.linalg.norm(places - np.median(places, axis=0), axis=1)))
+    return float(np.linalg.norm(places.std(axis=0)))
 
 
 def _read_otherwise(m: Meant, q: Floats, machine: Machine) -> Iterator[tuple[str, Floats]]:

@@ -17,22 +17,24 @@ Q = np.random.default_rng(8).uniform(-70, 70, (40, 6))
 TARGETS = ((90.0, -20.0, 40.0), (-60.0, 70.0, 10.0))
 
 
-def places() -> np.ndarray:
-    """(40, 2, 3) mm of two targets, from the arm's transformations by hand, in the axes of an instrument that stands aside."""
-    out = np.zeros((len(Q), len(TARGETS), 3))
+def places(q: np.ndarray) -> np.ndarray:
+    """(n, 2, 3) mm of two targets, from the arm's transformations by hand, in the axes of an instrument that stands aside."""
+    out = np.zeros((len(q), len(TARGETS), 3))
     aside = Rotation.from_rotvec([0.2, -0.4, 2.1])
-    for k, q in enumerate(Q):
+    for k, row in enumerate(q):
         p, r = np.zeros(3), Rotation.identity()
-        for (zero, d, a, alpha), angle in zip(DH, q, strict=True):
+        for (zero, d, a, alpha), angle in zip(DH, row, strict=True):
             r = r * Rotation.from_euler("z", zero + angle, degrees=True)
             p, r = p + r.apply([a, 0, d]), r * Rotation.from_euler("x", alpha, degrees=True)
         out[k] = aside.apply(p + r.apply(TARGETS)) + [2500.0, -300.0, 800.0]
     return out + 0.3 * np.random.default_rng(9).normal(size=out.shape)
 
 
-def said(folder: Path, shown: np.ndarray, capsys: pytest.CaptureFixture[str], *more: str) -> str:
+def said(
+    folder: Path, shown: np.ndarray, capsys: pytest.CaptureFixture[str], *more: str, true: np.ndarray = Q
+) -> str:
     """What is said of a sheet of the joints as a controller shows them, deg."""
-    rows = np.hstack([shown, places().reshape(len(Q), -1)])
+    rows = np.hstack([shown, places(true).reshape(len(true), -1)])
     heads = ",".join(
         [*(f"J{k} [deg]" for k in range(1, 7)), *(f"N{t}{a} [mm]" for t in (1, 2) for a in "xyz")]
     )
@@ -77,6 +79,17 @@ def test_it_is_said_how_the_joints_are_shown(
     text = said(tmp_path, otherwise(*changes), capsys)
     for one in words:
         assert one in text
+
+
+def test_joints_that_move_one_after_the_other_show_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As for circles about each axis: the tool's own point stands still while the wrist turns about it."""
+    true = np.vstack(
+        [[20, 30, -40, 50, -60, 70] + np.outer(np.linspace(-30, 30, 9), row) for row in np.eye(6)]
+    )
+    shown = true - true[:, [1]] * np.eye(6)[2]
+    assert "`coupled: {joint_2: 1}` at joint_3" in said(tmp_path, shown, capsys, true=true)
 
 
 def test_nothing_is_said_of_joints_as_they_are_or_of_errors_of_an_arm(
