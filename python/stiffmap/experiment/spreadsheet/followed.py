@@ -22,8 +22,8 @@ MOST, CHANGES = 60, 3
 
 
 def followed(m: Meant, machine: Callable[[], Machine]) -> None:
-    """Says which joints turn the other way, have another zero or are shown against the link before the last one (as pendants of many
-    arms do), if places that were seen then follow the machine, and not as the joints are read."""
+    """Says which joints turn the other way, have another zero or are shown less or plus a neighbour (pendants of many arms show the
+    forearm against the base), if places that were seen then follow the machine, and not as the joints are read."""
     of = {c.meaning: c.index for c in m.guessed if c.repeat == 0}
     if not m.columns or not set(SEEN) <= set(of):
         return
