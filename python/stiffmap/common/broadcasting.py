@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from stiffmap.common.errors import StiffmapError
 
 Floats = NDArray[np.float64]
+Integers = NDArray[np.intp]
 MOST_THREADS = 4096
 """More than any machine has cores, and no more than a system starts."""
 

@@ -130,11 +130,11 @@ def known(quantity: str | None = None) -> str:
 
 
 def name_and_unit(header: str) -> tuple[str, str]:
-    """``x [mm]`` is x in mm; an empty unit where none stands in brackets, as in joint[1]."""
+    """``x [mm]`` is x in mm; an empty unit where none stands in brackets, as in joint[1] and T(1,2)."""
     if not header.rstrip().endswith(("]", ")")):  # an endless header of brackets takes seconds
         return header.strip(), ""
     match = re.fullmatch(
-        r"(?s)\s*(.*?)\s*(?:(?!\b\[(?:\w+_)?\d+\])(?:\[\s*([^]]*?)\s*\]|\(\s*((?:[^()]|\([^()]*\))*?)\s*\)|[\[(]\s*([^])]*?)\s*[])]))?\s*",
+        r"(?s)\s*(.*?)\s*(?:(?!(?:\b|(?<=\]))\[(?:\w+_)?\d+\]|\b[\[(]\d+, ?\d+[\])])(?:\[\s*([^]]*?)\s*\]|\(\s*((?:[^()]|\([^()]*\))*?)\s*\)|[\[(]\s*([^])]*?)\s*[])]))?\s*",
         header,
     )
     assert match is not None  # any text is a name

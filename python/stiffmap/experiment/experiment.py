@@ -10,12 +10,12 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffmap.common.broadcasting import Floats, one_of, refused, trailing
+from stiffmap.common.broadcasting import Floats, Integers, one_of, refused, trailing
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.short import short_repr
 from stiffmap.experiment.channels import AXES, AXIS_CHANNELS, Channel
 from stiffmap.experiment.notebook import experiment_html
-from stiffmap.experiment.ramps import Integers, directions
+from stiffmap.experiment.ramps import directions
 
 __all__ = ["AXES", "BRANCHES", "WRENCH", "Channel", "Experiment", "Floats", "Integers", "Loop"]
 

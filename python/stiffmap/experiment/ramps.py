@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from stiffmap.common.broadcasting import Floats
+from stiffmap.common.broadcasting import Floats, Integers
 
-Integers = NDArray[np.intp]
 RETREAT = 0.02
 """Share of the whole range that a load goes back before it counts as turned: less is its noise."""
 ROWS = 5

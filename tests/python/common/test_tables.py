@@ -15,6 +15,7 @@ from stiffmap.common.errors import FileError
 from stiffmap.common.tables.lines import Spelling, is_finite
 from stiffmap.common.tables.named import read_pose_table
 from stiffmap.common.tables.sheet import read_sheet
+from stiffmap.common.tables.table_file import TableFile
 from stiffmap.experiment.files.table import read_table
 from stiffmap.machining.process import load_process
 from stiffmap.machining.toolpath.load import load_path
@@ -350,6 +351,40 @@ def test_orientations_of_controllers_are_against_the_base(
     turned = table.rotation(np.diag([1.0, -1.0, -1.0]))
     assert turned is not None and table.position.tolist() == [[0.001, 0.002, 0.003]]
     np.testing.assert_allclose(turned[0], rows, atol=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("names", "by_columns"),
+    [
+        ([f"T{i}{j}" for i in range(4) for j in range(4)], False),
+        ([f"T({i},{j})" for i in range(1, 5) for j in range(1, 5)], False),
+        ([f"H[{i}][{j}]" for i in range(4) for j in range(4)], False),
+        ([f"pose_{i}{j}" for i in range(3) for j in range(4)], False),
+        ([f"M{k}" for k in range(1, 17)], False),
+        ([f"O_T_EE_{k}" for k in range(16)], True),
+        ([f"O_T_EE[{k}]" for k in range(16)], True),
+    ],
+)
+def test_poses_are_homogeneous_matrices_too(names: list[str], by_columns: bool, tmp_path: Path) -> None:
+    matrix = np.array([[0, 0, 1, 0.5], [1, 0, 0, -0.2], [0, 1, 0, 0.7], [0, 0, 0, 1]])
+    matrices = np.array([matrix, np.eye(4)])
+    cells = np.swapaxes(matrices, 1, 2) if by_columns else matrices[:, : len(names) // 4]
+    rows = [",".join(map(str, c.ravel())) for c in cells]
+    (tmp_path / "p.csv").write_text("\n".join([",".join(f'"{n}"' for n in names), *rows, ""]))
+    table = read_pose_table(TableFile(tmp_path / "p.csv", units={"length": "m"}))
+    turned = table.rotation(np.diag([1.0, -1.0, -1.0]))
+    assert turned is not None
+    np.testing.assert_allclose(table.position, matrices[:, :3, 3])
+    np.testing.assert_allclose(turned, matrices[:, :3, :3], atol=1e-12)
+
+
+def test_numbers_that_are_no_matrices_are_none(tmp_path: Path) -> None:
+    names = [f"T{i}{j}" for i in range(4) for j in range(4)]
+    (tmp_path / "p.csv").write_text(
+        f"{','.join(names)}\n{','.join('0123456789123456')}\n{','.join('1123456789123457')}\n"
+    )
+    with pytest.raises(FileError, match="unknown column 'T00'"):
+        read_pose_table(tmp_path / "p.csv")
 
 
 SCOPE = (

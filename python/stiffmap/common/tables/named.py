@@ -26,7 +26,7 @@ from stiffmap.common.number_text import read_value
 from stiffmap.common.short import first_of
 from stiffmap.common.tables.header import IN_SI, meaning_of, split_unit, stated_unit
 from stiffmap.common.tables.lines import Spelling, is_finite
-from stiffmap.common.tables.orientation import VECTOR, matrices_of, no_vector, orientation_of
+from stiffmap.common.tables.orientation import VECTOR, matrices_of, no_vector, orientation_of, spread
 from stiffmap.common.tables.sheet import read_sheet
 from stiffmap.common.tables.table import Table
 from stiffmap.common.tables.table_file import layout_of, table_file, with_names, with_units
@@ -121,6 +121,8 @@ def _sheet(place: str | PathLike[str], known: Known, *, repeated: bool = False) 
         name, unit = _name_of(header, known)
         return name, unit, QUANTITIES.get(known.units.get(name, ""), "")
 
+    if {*"xyz"} <= {*known.units} and not {*"xyz"} & {meaning(h)[0] for h in table.header}:
+        table = spread(table)
     return with_units(file, with_names(file, table, lambda h: meaning(h)[0]), meaning)
 
 

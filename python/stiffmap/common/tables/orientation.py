@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Iterable, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from stiffmap.common.broadcasting import Floats
-from stiffmap.common.tables.header import IN_SI
+from stiffmap.common.broadcasting import Floats, Integers
+from stiffmap.common.tables.header import IN_SI, with_unit
 from stiffmap.common.tables.table import Table
 from stiffmap.common.units import unit_of
 
@@ -27,6 +29,13 @@ MATRICES = (
     [f"{column}{row}" for row in "xyz" for column in "noa"],
 )
 """Names of the entries of a matrix, row by row: r11 … r33, from 0, or its columns n, o, a."""
+HOMOGENEOUS = [
+    [f"{i + k}{j + k}" if pairs else str(4 * i + j + k) for i in range(rows) for j in range(4)]
+    for rows in (4, 3)
+    for k in (0, 1)
+    for pairs in (True, False)
+]
+"""Numbers in the names of the entries of a homogeneous matrix, row by row."""
 ROUNDED = 0.01
 """By how much digits of a table may change the length of a quaternion, or an entry of a matrix."""
 
@@ -95,8 +104,49 @@ def orientation_of(sheet: Table, taken: Collection[int] = ()) -> Orientation:
     """An orientation whose columns are none of the `taken` ones."""
     forms = [Orientation(quaternion(sheet), "", "quaternions, w first")]
     forms += [Orientation(_all_of(sheet, MATRICES), "", "rotation matrices, row by row")]
+    forms += [
+        Orientation(homogeneous(sheet)[:3, :3].ravel().tolist(), "", "rotations of homogeneous matrices")
+    ]
     forms += [Orientation(_angles(sheet, names), turns, words) for names, turns, words in TURNS]
     return next((f for f in forms if f.columns and not {*taken} & {*f.columns}), Orientation([], "", ""))
+
+
+def homogeneous(sheet: Table) -> Integers:
+    """Columns (3 or 4, 4) of the entries of a homogeneous matrix; (0, 4) where there is none.
+
+    Its entries have one name and 12 or 16 numbers: T00 … T33, T(1,1) …, or O_T_EE_0 … O_T_EE_15, row by row or, as the last row of
+    zeros shows, column by column.
+    """
+    entries: dict[str, dict[str, int]] = {}
+    for i, name in enumerate(sheet.names):
+        stem = re.match(r".*[^\W\d_]", name)
+        if stem and (numbers := re.findall(r"\d+", name[stem.end() :])):
+            entries.setdefault(stem[0], {}).setdefault("".join(numbers), i)
+    for there in entries.values():
+        order = next((o for o in HOMOGENEOUS if {*o} == {*there}), None)
+        if order is None or not all(map(sheet.is_numeric, there.values())):
+            continue
+        at = np.array([there[n] for n in order])
+        values = np.stack([sheet.numbers(i) for i in at.tolist()], axis=1)
+        values, at = values[np.isfinite(values).all(axis=1)].reshape(-1, len(at) // 4, 4), at.reshape(-1, 4)
+        ways = [(at, values), (at.T, values.transpose(0, 2, 1))]
+        for columns, entry in ways[: 1 + (len(at) == 4)]:
+            last = (entry[:, 3:] == (0.0, 0.0, 0.0, 1.0)).all()
+            if len(entry) and last and off_unit(entry[:, :3, :3].reshape(-1, 9)).max() < ROUNDED:
+                return columns
+    return np.zeros((0, 4), dtype=int)
+
+
+def spread(table: Table) -> Table:
+    """With x, y, z and r11 … r33 in place of the entries of a homogeneous matrix, where there is one."""
+    entries = homogeneous(table)
+    names = dict[int, str]()
+    for i, (*turned, place) in enumerate(entries[:3].tolist()):
+        names |= {place: with_unit("xyz"[i], table.unit(place))}
+        names |= {column: f"r{i + 1}{j + 1}" for j, column in enumerate(turned)}
+    kept = [i for i in range(len(table.header)) if i not in entries[3:]]
+    header = tuple(names.get(i, table.header[i]) for i in kept)
+    return replace(table, header=header, columns=tuple(table.columns[i] for i in kept))
 
 
 def quaternion(sheet: Table) -> list[int]:

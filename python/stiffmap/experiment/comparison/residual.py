@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from stiffmap.common.broadcasting import whole_number
 from stiffmap.common.json_text import plain
+from stiffmap.common.number_text import length_text
 from stiffmap.common.outputs import number_cells, write_rows
 from stiffmap.common.short import short_repr, table, titled
 from stiffmap.experiment.channels import AXIS_CHANNELS, Channel, metres
@@ -95,7 +96,7 @@ class Residual:
         unit = {c.name: ("µm", 1e6) if c.unit == "m" else ("mrad", 1e3) for c in self.experiment.channels}
         rows = [(a, f"{v * unit[a][1]:.3g} {unit[a][0]}") for a, v in self.summary.per_axis.items()]
         worst = [(i, a, f"{v * unit[a][1]:.3g} {unit[a][0]}") for i, a, v in self.worst(20)]
-        head = f"{self.experiment.name}: rms {1e6 * self.summary.rms:.3g} µm, p = {self.lack_of_fit:.2g}"
+        head = f"{self.experiment.name}: rms {length_text(self.summary.rms)}, p = {self.lack_of_fit:.2g}"
         return titled(head, table(("axis", "rms"), rows), table(("worst row", "axis", "residual"), worst))
 
     def to_dataframe(self) -> pd.DataFrame:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from stiffmap.common.broadcasting import Floats
+from stiffmap.common.number_text import length_text
 from stiffmap.experiment.files.fields import SEEN
 from stiffmap.experiment.poses.handeye import FEWEST, places_apart
 from stiffmap.experiment.spreadsheet.answers import Meant
@@ -62,8 +63,8 @@ def followed(m: Meant, machine: Callable[[], Machine]) -> None:
         changed.append(ways[best][0])
     if changed and CLEAR * now < before:
         m.said.append(
-            f"the places seen are {1e3 * before:.3g} mm off in the median where the machine goes to the joints as they stand there, "
-            f"{1e3 * now:.3g} mm if {', and '.join(changed)}"
+            f"the places seen are {length_text(before)} off in the median where the machine goes to the joints as they stand there, "
+            f"{length_text(now)} if {', and '.join(changed)}"
         )
 
 

@@ -43,7 +43,7 @@ from stiffmap.experiment.spreadsheet.joints import (
 from stiffmap.experiment.spreadsheet.places import in_base_axes, seated, seen_next_to_commands, without_lost
 from stiffmap.experiment.spreadsheet.sides import approached
 from stiffmap.experiment.spreadsheet.together import named_targets, one_point_a_row, together
-from stiffmap.experiment.spreadsheet.turned import oriented
+from stiffmap.experiment.spreadsheet.turned import oriented, positioned
 from stiffmap.solve.machine import Machine, load_machine
 
 Understand = Callable[[str | None, dialogue.Ask | None], tuple[Meant, ImportedSheet]]
@@ -231,6 +231,7 @@ class _Wanted:
             m.said.append(f"answers of an earlier sheet of this form are used: {dialogue.profile_file(form)}")
         one_point_a_row(m)
         together(m, self.deflection)
+        positioned(m)
         approached(m)
         commanded(m, self.drives, self.alone)
         measured = (self.wrote or load_instrument("tracker")).measured

@@ -11,7 +11,13 @@ from scipy.spatial.transform import Rotation
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.short import first_of
 from stiffmap.common.tables.orientation import VECTOR as ROTATION_VECTOR
-from stiffmap.common.tables.orientation import Orientation, matrices_of, no_vector, orientation_of
+from stiffmap.common.tables.orientation import (
+    Orientation,
+    homogeneous,
+    matrices_of,
+    no_vector,
+    orientation_of,
+)
 from stiffmap.common.units import unit_of
 from stiffmap.experiment.channels import AXES
 from stiffmap.experiment.experiment import Integers
@@ -34,6 +40,13 @@ CLEAR, LEAST = 3.0, 1e-4
 """How many times nearer to the machine another way of reading must be to be taken, and from how many rad on that counts."""
 MOST = 300
 """Rows by which ways of reading are compared, at most."""
+
+
+def positioned(m: Meant) -> None:
+    """The position within homogeneous matrices is x y z, where nothing else is a position."""
+    entries = homogeneous(m.sheet)
+    if len(entries) and not {*POSE, *SEEN} & {c.meaning for c in m.guessed}:
+        m.chosen |= {a: [m.sheet.header[i]] for a, i in zip(POSE, entries[:3, 3], strict=True)}
 
 
 def oriented(m: Meant, machine: Callable[[], Machine]) -> None:

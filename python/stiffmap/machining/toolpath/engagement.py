@@ -7,11 +7,11 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from stiffmap.common.broadcasting import Floats, real_array
+from stiffmap.common.broadcasting import Floats, Integers, real_array
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import place_text
 from stiffmap.machining.process.description import Process
-from stiffmap.machining.toolpath.path import Integers, Kind, Toolpath
+from stiffmap.machining.toolpath.path import Kind, Toolpath
 from stiffmap.workspace.maps.inputs import magnitude
 
 CORNER = np.radians(15.0)

@@ -9,10 +9,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from stiffmap.common.broadcasting import Floats, real_array, real_number
+from stiffmap.common.broadcasting import Floats, Integers, real_array, real_number
 from stiffmap.common.errors import StiffmapError
-
-Integers = NDArray[np.int64]
 
 
 class Kind(IntEnum):

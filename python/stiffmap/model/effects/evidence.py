@@ -10,9 +10,8 @@ from itertools import product
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-from stiffmap.common.broadcasting import Floats
+from stiffmap.common.broadcasting import Floats, Integers
 from stiffmap.model.description import AppliedEffect
 
 
@@ -99,7 +98,7 @@ class Plan(Protocol):
         """(n,)."""
 
     @property
-    def load_direction(self) -> NDArray[np.intp] | None:
+    def load_direction(self) -> Integers | None:
         """(n,) which way the load of each row was reached; None where loads do not run."""
 
     @property
@@ -146,9 +145,6 @@ class Tried:
     legs: tuple[str, ...]
     parameters: tuple[Parameter, ...]
     """Those that a fit may move, with the units and bounds of the place."""
-
-
-Integers = NDArray[np.intp]
 
 
 class Many(Protocol):

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.kept import Kept
+from stiffmap.common.number_text import length_text
 from stiffmap.experiment import Experiment
 from stiffmap.experiment.calls import residual
 from stiffmap.identification.diagnosis.report.findings import Effect
@@ -112,7 +113,7 @@ class Data:
             scene.lines(f"/rows/{name}", pieces, colour, 0.004 * scene.extent)
             if found is not None:
                 rms = float(np.sqrt(np.mean(np.sum(arrows**2, axis=1))))
-                words.append(f"{said} {which} {1e6 * rms:.3g} µm rms")
+                words.append(f"{said} {which} {length_text(rms)} rms")
         text = f"{len(places)} rows, residuals (measured less predicted) × {factor:g}: {', '.join(words)}"
         self._said["Experiment"] = f"{escape(e.name)}, {text}"
         scene.points("/rows/places", places, rgb("#444444"), 0.005)
@@ -136,12 +137,12 @@ class Data:
             scene.lines(f"/path/{name}", pieces[good], colour, 0.003 * scene.extent)
         vertices, faces = ribbon(wanted, cut)
         scene.mesh("/path/ribbon", vertices, faces, VERMILLION)
-        off = [1e6 * largest(line - wanted) / factor for line in (cut, corrected)]
+        off = [length_text(largest(line - wanted) / factor) for line in (cut, corrected)]
         failed = int((~np.isfinite(cut).all(axis=1)).sum())
         more = f"; {failed} of {len(path)} points have no equilibrium" if failed else ""
         self._said["Path"] = (
-            f"errors × {factor:g}: wanted green, as cut red (most {off[0]:.3g} µm), "
-            f"compensated by one mirror step blue (most {off[1]:.3g} µm){more}"
+            f"errors × {factor:g}: wanted green, as cut red (most {off[0]}), "
+            f"compensated by one mirror step blue (most {off[1]}){more}"
         )
 
 

@@ -9,6 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import stiffmap as sm
+from stiffmap.experiment.channels import AXES
 from stiffmap.ui.cli.app import main
 
 DH = ((0.0, 120.0, 0.0, 90.0), (0.0, 0.0, -430.0, 0.0), (0.0, 0.0, -390.0, 0.0), (0.0, 110.0, 0.0, 90.0),
@@ -63,6 +64,35 @@ def test_three_angles_turn_as_the_joints_do(
     np.testing.assert_allclose(e.seen_rotation, true.as_matrix(), atol=1e-9)
     named = {"rx": "rotvec", "A,": "ZYX", "Ro": "xyz"}[heads[:2]]
     assert ("as the joints show" in capsys.readouterr().out) == (turns != named)
+
+
+@pytest.mark.parametrize("by_columns", [False, True])
+@pytest.mark.parametrize("joints", [True, False])
+def test_poses_are_homogeneous_matrices_too(by_columns: bool, joints: bool, tmp_path: Path) -> None:
+    """Next to commanded joints an instrument saw them; alone they are what was commanded."""
+    matrices = np.tile(np.eye(4), (len(JOINTS), 1, 1))
+    matrices[:, :3, :3] = seen().as_matrix()
+    matrices[:, :3, 3] = np.random.default_rng(7).uniform(0.2, 0.6, (len(JOINTS), 3))
+    cells = np.swapaxes(matrices, 1, 2) if by_columns else matrices
+    heads = (
+        [f"O_T_EE_{k}" for k in range(16)] if by_columns else [f"T{i}{j}" for i in range(4) for j in range(4)]
+    )
+    more = JOINTS if joints else np.tile([0.1, 50.0], (len(JOINTS), 1))
+    heads += [f"J{k} [deg]" for k in range(1, 7)] if joints else ["dz [mm]", "fz [N]"]
+    rows = np.hstack([cells.reshape(-1, 16), more])
+    np.savetxt(tmp_path / "sheet.csv", rows, delimiter=",", header=",".join(heads), comments="")
+    made = ["experiment", "new", str(tmp_path / "sheet.csv"), "--machine", "ur10", "-o", str(tmp_path / "e")]
+    made += [o for a in AXES for o in ("--noise", f"{a}=0.01") if joints or a == "dz"]
+    if joints:  # a controller writes such places too
+        assert main([*made, "--unit", "length=m"]) == 2
+        at = (12, 13, 14) if by_columns else (3, 7, 11)
+        made += [o for a, k in zip("xyz", at, strict=True) for o in ("--map", f"p{a}={heads[k]}")]
+    assert main([*made, "--unit", "length=m"]) == 0
+    e = sm.load_experiment(tmp_path / "e")
+    turned, places = (e.seen_rotation, e.seen) if joints else (e.rotation, e.position)
+    assert turned is not None and places is not None
+    np.testing.assert_allclose(turned, matrices[:, :3, :3], atol=1e-9)
+    np.testing.assert_allclose(places, matrices[:, :3, 3], atol=1e-9)
 
 
 def test_every_setup_has_a_frame_of_its_own(tmp_path: Path) -> None:

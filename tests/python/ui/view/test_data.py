@@ -10,6 +10,7 @@ import pytest
 
 import stiffmap as sm
 from stiffmap.common.errors import FileError, StiffmapError
+from stiffmap.common.number_text import length_text
 from stiffmap.ui.cli import main
 from stiffmap.ui.plot.skeleton import element_links
 from stiffmap.ui.view.data import ShownFindings, findings, ribbon
@@ -60,15 +61,17 @@ def test_a_diagnosis_is_lit_and_its_residuals_are_drawn(machine: sm.Machine, tmp
             in text
         )
         after = data.diagnosis.machine
-        assert f"red as opened {rms(machine):.3g} µm rms" in text
-        assert f"pink with the diagnosis {rms(after):.3g} µm rms" in text
+        assert f"red as opened {length_text(1e-6 * rms(machine))} rms" in text
+        assert f"pink with the diagnosis {length_text(1e-6 * rms(after))} rms" in text
         assert rms(after) < 0.3 * rms(machine)
         shown = {n: h.visible for n, h in scene._lines.items() if n.startswith("/rows")}
         assert shown == {"/rows/before": True, "/rows/now": False, "/rows/diagnosed": True}
         v.set(changes=(("x.foot/beam.EIx", 500.0),))
         assert v._viewer.worker.idle(60) and scene._lines["/rows/now"].visible
         changed = machine.with_number("x.foot/beam.EIx", 500.0)
-        assert f"blue as changed here {rms(changed):.3g} µm rms" in v._viewer.controls._why.content
+        assert (
+            f"blue as changed here {length_text(1e-6 * rms(changed))} rms" in v._viewer.controls._why.content
+        )
         v.set(position=(0.1, 0.0, 0.0))
         assert v._viewer.worker.idle(60)
         moved = scene._lines["/diagnosis/element"].points
@@ -123,7 +126,7 @@ def test_a_path_says_how_much_it_errs(machine: sm.Machine) -> None:
         assert v._viewer.worker.idle(60) and not v._viewer.error
         off = machine.solve(path, model.state.wrench).displacement[:, :3]
         text = v._viewer.controls._why.content
-        assert f"as cut red (most {1e6 * np.linalg.norm(off, axis=1).max():.3g} µm)" in text
+        assert f"as cut red (most {length_text(np.linalg.norm(off, axis=1).max())})" in text
 
 
 def test_machine_view_takes_data(machine: sm.Machine) -> None:

@@ -175,11 +175,11 @@ def before_after(d: Diagnosis) -> Figure:
     unit = d.before.size[1]
     values = [UM * d.before.size[0], UM * d.after.size[0], UM * d.noise_size]
     figure = new_figure(4.6, 2.4)
-    texts = [f"{v:#.3g} µ{unit}".replace(". ", " ") for v in values]
+    texts = [f"{v:.0f} µ{unit}" if v >= 100.0 else f"{v:#.3g} µ{unit}" for v in values]
     named = (("your file", BEFORE), (f"machine.yaml ({d.which})", AFTER), ("noise", "0.7"))
     ax = _bars(figure, [(n, v, c, text) for (n, c), v, text in zip(named, values, texts, strict=True)])
     ax.invert_yaxis()
-    ax.set_xlim(0, 1.3 * max(values))
+    ax.set_xlim(0, 1.4 * max(values))
     ax.set(xlabel=f"left of {d.after.n} readings, rms, µ{unit}")
     if d.held_out is None:
         ax.set_title("not held out: the fit saw these readings", fontsize=9)
