@@ -94,7 +94,7 @@ SPELLINGS = {
     | {w: Unit("N", float(GRAVITY * MASSES[w]), True) for w in MASSES},
     "angle": _table(
         ("rad", "rad", 1), ("mrad|mm/m", "mrad", 1), ("urad|µrad|μrad|um/m|µm/m", "mrad", 1e-3),
-        ("deg|°|grad|degree|degrees", "deg", 1), ("arcmin|'", "deg", 1 / 60), ("arcsec|sec", "deg", 1 / 3600),
+        ("deg|°|grad|degree|degrees", "deg", 1), ("arcmin|'", "deg", 1 / 60), ("arcsec|sec", "deg", 1 / 3600), ("gon", "deg", 0.9),
     ),
     "moment": _table(
         ("nm|n*m", "N*m", 1), ("nmm|n*mm", "N*mm", 1), ("ncm|n*cm", "N*mm", 10), ("knm|kn*m", "kN*m", 1),
@@ -108,7 +108,7 @@ SPELLINGS = {
 SHOWN = {
     "length": "m, cm, mm, µm, in, mil, thou, in/1000, 1/100 mm, 1/1000 mm",
     "force": "N, daN, kN, kgf, kp, lbf, and kg of a mass that hangs",
-    "angle": "rad, mrad, µrad, deg, arcmin, arcsec",
+    "angle": "rad, mrad, µrad, deg, gon, arcmin, arcsec",
     "moment": "N*m, N*mm, kN*m, kgf*m, lbf*ft, lbf*in",
     "temperature": "°C, K",
 }

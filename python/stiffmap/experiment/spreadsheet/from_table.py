@@ -42,6 +42,7 @@ from stiffmap.experiment.spreadsheet.joints import (
 )
 from stiffmap.experiment.spreadsheet.places import in_base_axes, seated, seen_next_to_commands, without_lost
 from stiffmap.experiment.spreadsheet.sides import approached
+from stiffmap.experiment.spreadsheet.spherical import spherical
 from stiffmap.experiment.spreadsheet.together import named_targets, one_point_a_row, together
 from stiffmap.experiment.spreadsheet.turned import oriented, positioned
 from stiffmap.solve.machine import Machine, load_machine
@@ -234,6 +235,7 @@ class _Wanted:
         positioned(m)
         approached(m)
         commanded(m, self.drives, self.alone)
+        dialogue.asked(m, ask, partial(spherical, m, partial(self.declared, m)))
         measured = (self.wrote or load_instrument("tracker")).measured
         without_lost(m, self.wrote.columns if self.wrote else {}, measured)
         same = partial(compared, m, self.difference, measured, self.deflection)
