@@ -93,9 +93,13 @@ class Residual:
     """What this experiment cannot determine, in sentences."""
 
     def _repr_html_(self) -> str:
-        unit = {c.name: ("µm", 1e6) if c.unit == "m" else ("mrad", 1e3) for c in self.experiment.channels}
-        rows = [(a, f"{v * unit[a][1]:.3g} {unit[a][0]}") for a, v in self.summary.per_axis.items()]
-        worst = [(i, a, f"{v * unit[a][1]:.3g} {unit[a][0]}") for i, a, v in self.worst(20)]
+        long = {c.name for c in self.experiment.channels if c.unit == "m"}
+
+        def text(name: str, value: float) -> str:
+            return length_text(value) if name in long else f"{1e3 * value:.3g} mrad"
+
+        rows = [(a, text(a, v)) for a, v in self.summary.per_axis.items()]
+        worst = [(i, a, text(a, v)) for i, a, v in self.worst(20)]
         head = f"{self.experiment.name}: rms {length_text(self.summary.rms)}, p = {self.lack_of_fit:.2g}"
         return titled(head, table(("axis", "rms"), rows), table(("worst row", "axis", "residual"), worst))
 

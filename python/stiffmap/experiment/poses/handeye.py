@@ -112,8 +112,12 @@ def turns_apart(commanded: Floats, seen: Floats, setup: Integers, target: Intege
 
 def places_apart(p: Floats, r: Floats, seen: Floats, setup: Integers, target: Integers) -> float:
     """Median distance, m, of places (n, 3) that were seen from where targets on the tool are at commanded poses (n, 3), (n, 3, 3), once
-    instruments and targets are moved to fit."""
-    s = Sighting(p, r, seen, np.full((len(p), 3, 3), np.nan), setup, target)
+    instruments and targets are moved to fit; infinite where fewer than half of the places, or than `FEWEST`, have a pose."""
+    read = np.isfinite(seen).all(axis=1)
+    good = read & np.isfinite(p).all(axis=1)
+    if good.sum() < max(FEWEST, read.sum() // 2):
+        return np.inf
+    s = Sighting(p[good], r[good], seen[good], np.full((good.sum(), 3, 3), np.nan), setup[good], target[good])
     return _middle(as_commanded(s, find_frames(s))[0])
 
 

@@ -38,12 +38,7 @@ def followed(m: Meant, machine: Callable[[], Machine]) -> None:
 
     def off(q: Floats) -> float:
         poses = forward_kinematics(arm, q)
-        good = np.isfinite(poses.position).all(axis=1)
-        if good.sum() < max(FEWEST, len(q) // 2):
-            return np.inf
-        return places_apart(
-            poses.position[good], poses.rotation[good], seen[good], *(b[good] for b in blocks)
-        )
+        return places_apart(poses.position, poses.rotation, seen, *blocks)
 
     there = forward_kinematics(arm, q).position
     there = there[np.isfinite(there).all(axis=1)]

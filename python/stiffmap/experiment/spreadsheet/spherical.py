@@ -8,7 +8,7 @@ import numpy as np
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.experiment.files.fields import POSE, SEEN
-from stiffmap.experiment.poses.handeye import FEWEST, places_apart
+from stiffmap.experiment.poses.handeye import places_apart
 from stiffmap.experiment.spreadsheet.answers import Meant
 from stiffmap.experiment.spreadsheet.guess import READINGS
 from stiffmap.experiment.spreadsheet.turned import numbered
@@ -46,7 +46,10 @@ def spherical(m: Meant, machine: Callable[[], Machine]) -> None:
     flat, high = distance * np.cos(rise), distance * np.sin(rise)
     places = np.column_stack([flat * np.cos(turn), flat * np.sin(turn), high])
     mirrored = places * (1.0, -1.0, 1.0)
-    clockwise = CLEAR * _apart(m, mirrored, machine) < _apart(m, places, machine)
+    blocks = [numbered(m, name) for name in ("setup", "target")]
+    position, rotation = _commanded(m, machine)
+    off, other = (places_apart(position, rotation, p, *blocks) for p in (places, mirrored))
+    clockwise = CLEAR * other < off
     for seen, values in zip(SEEN, (mirrored if clockwise else places).T, strict=True):
         m.add(f"{seen} of {names[2]}", "mm", 1e3 * values, seen)
     m.chosen["note"] = [*m.chosen.get("note", ()), *(m.sheet.header[i] for i in (around, up, away))]
@@ -54,19 +57,11 @@ def spherical(m: Meant, machine: Callable[[], Machine]) -> None:
     m.said.append(f"places seen are '{names[0]}'{way}, '{names[1]}' from {start} and '{names[2]}'")
 
 
-def _apart(m: Meant, places: Floats, machine: Callable[[], Machine]) -> float:
-    """Median distance, m, of places (n, 3) from what was commanded, once instruments and targets fit; infinite where nobody knows."""
+def _commanded(m: Meant, machine: Callable[[], Machine]) -> tuple[Floats, Floats]:
+    """Positions (n, 3), m, of the tool and rotations (n, 3, 3) that were commanded, by joints or places; NaN where neither was."""
     if m.columns:
         at = forward_kinematics(machine(), m.coordinates())
-        position, rotation = at.position, at.rotation
-    else:
-        of = {c.meaning: c.index for c in m.guessed}
-        if not {*POSE} <= {*of}:
-            return np.inf
-        position = m.metres([of[a] for a in POSE], POSE)
-        rotation = np.tile(np.eye(3), (len(position), 1, 1))
-    good = np.isfinite(position).all(axis=1) & np.isfinite(places).all(axis=1)
-    if good.sum() < FEWEST:
-        return np.inf
-    blocks = (numbered(m, name)[good] for name in ("setup", "target"))
-    return places_apart(position[good], rotation[good], places[good], *blocks)
+        return at.position, at.rotation
+    of = {c.meaning: c.index for c in m.guessed}
+    places = m.metres([of[a] for a in POSE], POSE) if {*POSE} <= {*of} else np.full((len(m.sheet), 3), np.nan)
+    return places, np.tile(np.eye(3), (len(places), 1, 1))
