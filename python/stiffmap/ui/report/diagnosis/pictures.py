@@ -180,6 +180,7 @@ def before_after(d: Diagnosis) -> Figure:
     ax = _bars(figure, [(n, v, c, text) for (n, c), v, text in zip(named, values, texts, strict=True)])
     ax.invert_yaxis()
     ax.set_xlim(0, 1.4 * max(values))
+    ax.locator_params(axis="x", nbins=6, prune="upper")  # the last number would be cut at the edge
     ax.set(xlabel=f"left of {d.after.n} readings, rms, µ{unit}")
     if d.held_out is None:
         ax.set_title("not held out: the fit saw these readings", fontsize=9)
