@@ -33,6 +33,8 @@ NONE = "none"
 DECIMALS = 15  # of numbers that are shown and typed: compliances are as small as 1e-10 m/N
 PAUSE = 1.0
 """s after the last key, in which a refused number stays as it is typed: it may be the begin of one that is taken, as 0 is of 0.25."""
+CROSSING = 5.0
+"""s in which a page may be behind: what the program wrote then may have come after what somebody typed there meanwhile."""
 TITLES = {q.title: name for name, q in QUANTITIES.items()}
 
 
@@ -47,8 +49,10 @@ class Controls:
         self._modes: dict[str, tuple[float, ...] | None] = {HOME: None}
         self._shown: list[tuple[Any, Callable[[Moment], object]]] = []
         """Controls of the state, and what each of them shows."""
-        self._half: tuple[object, float] = None, 0.0
-        """The control in which a number was refused, and until when it stays there."""
+        self._half: tuple[Any, float] = None, 0.0
+        """The control whose page may show another number than holds, and until when it stays there."""
+        self._written: dict[int, float] = {}
+        """When the program last wrote into a control, by its id."""
         moment = viewer.model.moment
         self.status = gui.add_html("")
         self.bar = gui.add_html("")
@@ -169,8 +173,10 @@ class Controls:
             if not keep:
                 self.viewer.model.history.mark()
             taken = self.viewer.act(lambda m: deed(m, event.target.value))
-            self._half = (None, 0.0) if taken else (handle, time.monotonic() + PAUSE)
-            if not taken:
+            now = time.monotonic()
+            sure = taken and now - self._written.get(id(handle), -np.inf) > CROSSING
+            self._half = (None, 0.0) if sure else (handle, now + PAUSE)
+            if not sure:
                 then = threading.Timer(PAUSE, self.viewer.worker.ask)
                 then.daemon = True
                 then.start()
@@ -193,8 +199,14 @@ class Controls:
     def put(self, handle: Any, value: object) -> None:
         """What holds goes into a control, but not into one in which somebody may still be typing."""
         typed, until = self._half
-        if handle is not typed or time.monotonic() >= until:
-            write(handle, "value", value)
+        if handle is typed and time.monotonic() < until:
+            return
+        if handle.value != value:
+            self._written[id(handle)] = time.monotonic()
+        write(handle, "value", value)
+        if handle is typed:  # viser sends no value twice
+            self._half = None, 0.0
+            handle._queue_update("value", handle.value)
 
     def _drawn(self, handle: H) -> H:
         """A control whose value is what is drawn, and no part of the state."""

@@ -14,7 +14,7 @@ from tests.python.ui.view.pages import client_of, on_screen, opened, pixels, pul
 
 import stiffmap as sm
 from stiffmap.ui.cli import main
-from stiffmap.ui.view.controls import DECIMALS
+from stiffmap.ui.view.controls import DECIMALS, PAUSE
 from stiffmap.ui.view.open import View, model_of
 from stiffmap.ui.view.plane import table
 
@@ -141,6 +141,26 @@ def test_decimals_are_taken_and_shown_in_every_field(browser: Any) -> None:
             own,
             shown.input_value(),
         )
+
+
+def test_what_came_late_to_a_page_does_not_stay_in_place_of_what_was_typed(shown: tuple[View, Any]) -> None:
+    view, page = shown
+    controls = view._viewer.controls
+    box, field = page.get_by_role("textbox", name="Magnification"), controls._factor
+
+    def late(event: Any) -> None:
+        """What was written before arrives only now."""
+        if event.client_id is not None:
+            field._queue_update("value", 2000.0)
+
+    field.on_update(late)
+    controls.put(field, 2000.0)  # as after a change of the load
+    box.fill("37.5")
+    box.press("Enter")
+    assert until(lambda: view.state.magnification == 37.5, 10)
+    field.remove_update_callback(late)
+    page.wait_for_timeout(1e3 * (PAUSE + 1.5))
+    assert box.input_value() == "37.5"
 
 
 def test_numbers_are_taken_after_a_longer_one_was_refused_or_undone(browser: Any) -> None:
