@@ -165,7 +165,7 @@ def test_words_behind_a_row_are_said(text: str, tmp_path: Path) -> None:
     (tmp_path / "t.txt").write_text(text.replace("80", f"80{between}# bumped"))
     sheet = read_sheet(tmp_path / "t.txt")
     assert sheet.numbers(2).tolist() == [40.0, 80.0]
-    assert sheet.aside == ("row 3, '# bumped' behind the last column",)
+    assert sheet.left_out == ("row 3, '# bumped' behind the last column",)
 
 
 def test_what_is_no_reading_is_found_anywhere_in_a_long_table(tmp_path: Path) -> None:
@@ -186,11 +186,11 @@ def test_what_is_no_reading_is_found_anywhere_in_a_long_table(tmp_path: Path) ->
     table = read_sheet(file)
     left_out = {3, 1203, 1600, 1998, 1999}
     assert list(table.lines) == [i + 2 for i in range(2000) if i not in left_out]
-    assert table.aside == (
+    assert table.left_out == (
         "row 5, 'Mean', is no reading",
-        "row 1205 is a remark: # a remark  5",
-        "row 2001 is a remark: checked by hand",
         "row 1501, 'seen twice' behind the last column",
+        "row 1205 is a remark: # a remark 5",
+        "row 2001 is a remark: checked by hand",
     )
     dz = table.numbers(4)
     assert np.isnan(dz[list(table.lines).index(1779)])
@@ -212,7 +212,7 @@ def test_a_decimal_fraction_below_one_is_never_thousands(text: str, tmp_path: Pa
 def test_a_heading_between_rows_is_said_where_it_is_a_comment(mark: str, tmp_path: Path) -> None:
     rows = f"{mark} loading\nx [mm],fx [N],dx [mm]\n0,50,0.1\n1,50,0.1\n{mark}\n{mark}----\n{mark} unloading\n0,50,0.2\n"
     (tmp_path / "t.csv").write_text(rows)
-    assert read_sheet(tmp_path / "t.csv").aside == (f"row 7 is a remark: {mark} unloading",)
+    assert read_sheet(tmp_path / "t.csv").left_out == (f"row 7 is a remark: {mark} unloading",)
 
 
 @pytest.mark.parametrize(

@@ -101,9 +101,9 @@ def lines_of(path: Path, sheet: str | None = None) -> tuple[str, Lines, str]:
 
 
 def kept(
-    lines: Iterable[tuple[int, list[str]]], aside: list[str] | None = None
+    lines: Iterable[tuple[int, list[str]]], titles: list[tuple[int, list[str]]] | None = None
 ) -> Iterator[tuple[int, list[str]]]:
-    """Lines with something in them that are no comments; comments with a word in them are said in `aside`."""
+    """Lines with something in them that are no comments; `titles` gathers comments with a word in them."""
     for block in blocks(lines):
         begins = {c[0].lstrip()[:1] if c else "" for _, c in block}
         if begins.isdisjoint(("", *(mark[0] for mark in COMMENTS))):
@@ -112,8 +112,8 @@ def kept(
         for n, cells in block:
             if filled(cells) and not cells[0].lstrip().startswith(COMMENTS):
                 yield n, cells
-            elif aside is not None and re.search(r"[^\W_]", text := " ".join(cells)):
-                aside.append(f"row {n} is a remark: {text.strip()[:40]}")
+            elif titles is not None and re.search(r"[^\W_]", " ".join(cells)):
+                titles.append((n, cells))
 
 
 def even(

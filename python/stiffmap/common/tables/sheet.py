@@ -137,7 +137,8 @@ def _read(path: Path, sheet: str | None, layout: Layout) -> Table:
         raise NoTableError(f"no header line with rows of numbers below it was found{more}", file=str(path))
     number_, header = found
     aside = [f"row {n}, of numbers above the header" for n, _ in begun[:-1] if not layout.strict]
-    every = blocks(chain([first], kept(rows, None if layout.strict else aside)))
+    titles = [*above]
+    every = blocks(chain([first], kept(rows, None if layout.strict else titles)))
     opening = next(every)
     labels = _labels(opening, header, layout, spelling.comma)
     if labels:
@@ -153,20 +154,23 @@ def _read(path: Path, sheet: str | None, layout: Layout) -> Table:
     said = [*header, *(c.strip() for _, cells in above for c in cells)]
     means = MEAN.fullmatch(opening[0][1][-1].strip()) is not None
     clear = (
-        _data(b, means, header, said, spelling, aside, layout, str(path)) for b in chain([opening], every)
+        _data(b, means, header, said, spelling, aside, titles, layout, str(path))
+        for b in chain([opening], every)
     )
     data = even(chain.from_iterable(clear), width, str(path), separator, None if layout.strict else aside)
     cells_of, lines_ = packed(data, width)
     columns = list(cells_of)
     file = f"{path}, sheet '{page}'" if page else str(path)
     file += ", rows and columns exchanged" if turned else ""
-    if aside and layout.strict:
-        raise FileError(f"expected rows of numbers alone below the header; {aside[0]}", file=file)
     for i in range(width):
         names[i], columns[i] = _united(names[i], columns[i], file, lines_)
     top = tuple(said[len(header) :])
     record = record_of(above)
-    found_ = Table(file, tuple(names), tuple(columns), lines_, number_, comma, record, top, tuple(aside))
+    found_ = Table(
+        file, tuple(names), tuple(columns), lines_, number_, comma, record, top, tuple(aside), tuple(titles)
+    )
+    if layout.strict and (left := found_.left_out):
+        raise FileError(f"expected rows of numbers alone below the header; {left[0]}", file=file)
     _refuse_many_times(found_)
     return found_
 
@@ -353,10 +357,11 @@ def _data(
     names: Sequence[str],
     spelling: Spelling,
     aside: list[str],
+    titles: list[Line],
     layout: Layout,
     file: str,
 ) -> Iterator[Line]:
-    """Rows of readings: without rows of means, headers that are repeated and remarks, of which `aside` says so.
+    """Rows of readings: without rows of means, of which `aside` says so, and without headers that are repeated and remarks, in `titles`.
 
     `names`: all that stands above the rows; `means`: whether the first one ends with a word for a mean.
     """
@@ -375,7 +380,6 @@ def _data(
                 way = ": say --table 1 for the one above, --table 2 for this one" if layout.options else ""
                 what = f"another table begins here{way}"
                 raise FileError(what, file=file, line=n)
-            again = [c.strip() for c in cells[:2]] == list(header[:2])
-            aside.append(f"row {n} {'repeats the header' if again else f'is a remark: {first[:40]}'}")
+            titles.append((n, cells))
         else:
             yield n, cells

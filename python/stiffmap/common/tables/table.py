@@ -15,6 +15,7 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError, MissingColumnError, suggestion
 from stiffmap.common.number_text import number_in
 from stiffmap.common.outputs import unguarded
+from stiffmap.common.short import first_of
 from stiffmap.common.tables.cells import Cells
 from stiffmap.common.tables.header import split_unit
 from stiffmap.common.tables.lines import Spelling, number, with_points
@@ -39,7 +40,9 @@ class Table:
     above: tuple[str, ...] = ()
     """Cells of the lines down to the header."""
     aside: tuple[str, ...] = ()
-    """What was left out: rows of means, remarks below the table."""
+    """What was left out: rows of means, cells behind the last column."""
+    titles: tuple[tuple[int, Sequence[str]], ...] = ()
+    """Lines of words above the rows and between them, by their numbers."""
     sizes: Mapping[str, float] = field(default_factory=dict)
     """SI size of a column's unit, by which `si` multiplies its numbers."""
     _read: dict[int, Floats] = field(default_factory=dict, init=False, repr=False, compare=False)
@@ -49,6 +52,23 @@ class Table:
 
     def __contains__(self, column: str) -> bool:
         return column in self.header
+
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """What is in none of the columns, in words."""
+        again, first = self.headers_again, self.lines[0] if self.lines else 0
+        lines = [(n, " ".join(filter(None, map(str.strip, cells)))) for n, cells in self.titles if n > first]
+        said = [f"row {n} is a remark: {text[:40]}" for n, text in lines if n not in again]
+        one = len(again) == 1
+        headers = [f"row{'s' * (not one)} {first_of([*map(str, again)], 3)} repeat{'s' * one} the header"]
+        return (*self.aside, *said, *(headers if again else ()))
+
+    @property
+    def headers_again(self) -> list[int]:
+        """Lines between the rows that are the header again."""
+        own, first = self.names[:2], self.lines[0] if self.lines else 0
+        found = ([split_unit(c.strip())[0] for c in cells[:2]] for _, cells in self.titles)
+        return [n for (n, _), f in zip(self.titles, found, strict=True) if n > first and tuple(f) == own]
 
     @cached_property
     def names(self) -> tuple[str, ...]:

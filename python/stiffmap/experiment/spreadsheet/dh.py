@@ -192,7 +192,7 @@ def left_out(given: Table) -> tuple[str, ...]:
     plain = (split_unit(INDEX.sub(r"\1", h))[0] for h in _symbols(given))
     each = zip(given.header, plain, given.columns, strict=True)
     unread = (h for h, n, cells in each if any(cells) and not re.fullmatch(known, n, re.IGNORECASE))
-    return (*(f"column '{h}'" for h in unread), *given.aside)
+    return (*(f"column '{h}'" for h in unread), *given.left_out)
 
 
 def _constants(sheet: Table, at: Mapping[str, int], units: Mapping[str, str]) -> tuple[Table, list[str]]:

@@ -41,9 +41,10 @@ from stiffmap.experiment.spreadsheet.joints import (
     turned,
 )
 from stiffmap.experiment.spreadsheet.places import in_base_axes, seated, seen_next_to_commands, without_lost
+from stiffmap.experiment.spreadsheet.reshaped import one_load_a_row, one_point_a_row, titled
 from stiffmap.experiment.spreadsheet.sides import approached
 from stiffmap.experiment.spreadsheet.spherical import spherical
-from stiffmap.experiment.spreadsheet.together import named_targets, one_point_a_row, together
+from stiffmap.experiment.spreadsheet.together import named_targets, together
 from stiffmap.experiment.spreadsheet.turned import oriented, positioned
 from stiffmap.solve.machine import Machine, load_machine
 
@@ -169,7 +170,7 @@ def experiment_from_table(
     of_loads = no_difference(made) or not_at_zero(made) or against_the_load(made)
     warnings = tuple(line for line in (of_loads, *contradictions(made)) if line)
     left = () if joints is None else left_out(joints)
-    remarks = (*m.said, *(f"left out: {t}" for t in own.aside), *(f"left out of {dh}: {t}" for t in left))
+    remarks = (*m.said, *(f"left out: {t}" for t in own.left_out), *(f"left out of {dh}: {t}" for t in left))
     return FromTable(made, output, declared, warnings, remarks, own, found, m if m.columns else None)
 
 
@@ -230,7 +231,9 @@ class _Wanted:
         m = Meant.of_sheet(form, self.given if kept is None else kept.below(self.given))
         if kept is not None:
             m.said.append(f"answers of an earlier sheet of this form are used: {dialogue.profile_file(form)}")
+        titled(m)
         one_point_a_row(m)
+        one_load_a_row(m)
         together(m, self.deflection)
         positioned(m)
         approached(m)

@@ -4,13 +4,11 @@ names of targets, and headers with a sign."""
 from __future__ import annotations
 
 import re
-from dataclasses import replace
 
 import numpy as np
 
 from stiffmap.common.short import first_of
-from stiffmap.common.tables.cells import Cells
-from stiffmap.common.tables.header import split_unit, with_unit
+from stiffmap.common.tables.header import split_unit
 from stiffmap.common.tables.table import Table, column_letter
 from stiffmap.common.units import Unit, unit_of
 from stiffmap.experiment.spreadsheet.answers import Meant
@@ -56,45 +54,6 @@ def together(m: Meant, deflection: bool) -> None:
     _directions(m)
     if not any(re.fullmatch("[fm][xyz]", c.meaning) for c in m.guessed):
         _hung(m)
-
-
-def one_point_a_row(m: Meant) -> None:
-    """Rows that are one coordinate of a point each, as in reports of features, as one row a point: columns whose cells differ within a
-    point get its axes behind their names. StiffmapError where the rows of a point are not together."""
-    if {*"xyz"} & {*map(guessed, m.sheet.names), *m.constants}:
-        return
-    for at, column in enumerate(m.sheet.columns):
-        cells = [c.lower() for c in column]
-        axes = sorted({*cells})
-        if axes not in (["x", "y"], ["x", "y", "z"]):
-            continue
-        points = [cells[k : k + len(axes)] for k in range(0, len(cells), len(axes))]
-        good = np.repeat([sorted(p) == axes for p in points], len(axes))[: len(cells)]
-        if any(h.isdigit() for headers in m.chosen.values() for h in headers):
-            good[:] = False  # whose columns are those of the rows
-        what = f"column '{m.sheet.header[at]}': each row is one coordinate of a point; expected its rows {', '.join(axes)} together, and columns by name"
-        m.sheet.check(good, lambda _: what)  # noqa: B023
-        m.sheet = _points(m.sheet, at, points)
-        m.said.append(f"rows of one coordinate each are taken together: {len(points)} points")
-        return
-
-
-def _points(sheet: Table, at: int, points: list[list[str]]) -> Table:
-    """A row for each of the points, whose axes, in the order of their rows, are the cells of a column."""
-    size = len(points[0])
-    first = range(0, len(sheet), size)
-    columns: dict[str, Cells] = {}
-    for i, cells in enumerate(map(list, sheet.columns)):
-        own = [[c for c in cells[k : k + size] if c] for k in first]
-        name, unit = sheet.names[i], sheet.unit(i)
-        if i != at and all(len({*c}) <= 1 for c in own):
-            columns[sheet.header[i]] = Cells.of(c[0] if c else "" for c in own)
-        elif i != at:
-            for axis in sorted(points[0]):
-                rows = (k + p.index(axis) for k, p in zip(first, points, strict=True))
-                columns[with_unit(f"{name} {axis}", unit)] = Cells.of(cells[k] for k in rows)
-    lines = [sheet.lines[k] for k in first]
-    return replace(sheet, header=tuple(columns), columns=tuple(columns.values()), lines=lines)
 
 
 def _signs(m: Meant) -> None:

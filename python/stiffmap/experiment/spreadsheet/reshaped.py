@@ -1,0 +1,191 @@
+"""Sheets that hold one experiment in another shape than a row for each reading: a row for each coordinate, columns for each load."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+
+from stiffmap.common.tables.cells import Cells
+from stiffmap.common.tables.header import split_unit, with_unit
+from stiffmap.common.tables.table import Table
+from stiffmap.common.units import unit_of
+from stiffmap.experiment.experiment import WRENCH, Mask
+from stiffmap.experiment.files.fields import POSE
+from stiffmap.experiment.spreadsheet.answers import Meant
+from stiffmap.experiment.spreadsheet.guess import guessed
+from stiffmap.experiment.spreadsheet.joints import JOINT
+from stiffmap.experiment.spreadsheet.together import DIRECTION, LOAD, STATES
+
+OF_LOAD = re.compile(
+    r"(?i)(?:^|[\s@(\[,;:_/|]+)(?:(?:at|bei|with|mit|under|unter|à|avec|con|load|last|force|kraft|charge)[\s_]+)*"
+    r"(?P<name>[fm][ _]?[xyz]?(?=[\s=:+−-]))?\s*[=:]?\s*(?P<size>[+−-]?\d+(?:[.,]\d+)?)[ _]?(?P<unit>N·?m|k?N|daN|kgf?|g|lbf?)"
+    r"(?=$|[\s)\]@,;:_/|])[)\]]?"
+)
+"""A load in the name of a column: ``dz @ 50 N``, ``Fz = -100 N dx [mm]``, ``10 kg``."""
+STATED = re.compile(
+    r"(?<![\w.])(?P<name>[^\W\d][\w ./-]*?)\s*(?:[\[(](?P<in>[^\])]+)[\])])?\s*[=:]\s*"
+    r"(?:(?P<size>[+−-]?\d+(?:[.,]\d+)?)(?:\s*(?P<unit>[^\W\d][^\s,;)=:]*|°)(?=[\s,;)]|$)(?!\s*[=:]))?|(?P<way>[+−-]?[xyz])(?=\s*(?:[,;)]|$)))",
+    re.IGNORECASE,
+)
+"""A number or an axis in a title: ``X = 50 mm``, ``Fz: -100 N``, ``Load direction: +x``."""
+READING = "reading"
+"""Name of a column that is named by its load alone."""
+
+
+def one_point_a_row(m: Meant) -> None:
+    """Rows that are one coordinate of a point each, as in reports of features, as one row a point: columns whose cells differ within a
+    point get its axes behind their names. StiffmapError where the rows of a point are not together."""
+    if {*"xyz"} & {*map(guessed, m.sheet.names), *m.constants}:
+        return
+    for at, column in enumerate(m.sheet.columns):
+        cells = [c.lower() for c in column]
+        axes = sorted({*cells})
+        if axes not in (["x", "y"], ["x", "y", "z"]):
+            continue
+        points = [cells[k : k + len(axes)] for k in range(0, len(cells), len(axes))]
+        good = np.repeat([sorted(p) == axes for p in points], len(axes))[: len(cells)]
+        if any(h.isdigit() for headers in m.chosen.values() for h in headers):
+            good[:] = False  # whose columns are those of the rows
+        what = f"column '{m.sheet.header[at]}': each row is one coordinate of a point; expected its rows {', '.join(axes)} together, and columns by name"
+        m.sheet.check(good, lambda _: what)  # noqa: B023
+        m.sheet = _points(m.sheet, at, points)
+        m.said.append(f"rows of one coordinate each are taken together: {len(points)} points")
+        return
+
+
+def _points(sheet: Table, at: int, points: list[list[str]]) -> Table:
+    """A row for each of the points, whose axes, in the order of their rows, are the cells of a column."""
+    size = len(points[0])
+    first = range(0, len(sheet), size)
+    columns: dict[str, Cells] = {}
+    for i, cells in enumerate(map(list, sheet.columns)):
+        own = [[c for c in cells[k : k + size] if c] for k in first]
+        name, unit = sheet.names[i], sheet.unit(i)
+        if i != at and all(len({*c}) <= 1 for c in own):
+            columns[sheet.header[i]] = Cells.of(c[0] if c else "" for c in own)
+        elif i != at:
+            for axis in sorted(points[0]):
+                rows = (k + p.index(axis) for k, p in zip(first, points, strict=True))
+                columns[with_unit(f"{name} {axis}", unit)] = Cells.of(cells[k] for k in rows)
+    lines = [sheet.lines[k] for k in first]
+    return replace(sheet, header=tuple(columns), columns=tuple(columns.values()), lines=lines)
+
+
+def titled(m: Meant) -> None:
+    """Poses and loads that stand in a title above the rows that they are of, ``Pose 3: X = 50 mm, Y = 0 mm``, as columns; of what the
+    table has no column for, and no number that is the same in all rows."""
+    has = {guessed(n) for n in m.sheet.names} - {"note"} | {*m.constants, *m.chosen}
+    found: dict[tuple[str, str], dict[int, str]] = {}
+    for line, cells in m.sheet.titles:
+        for match in STATED.finditer(_plain(cells)):
+            name = match["name"] if _of_row(match["name"]) else match["name"].split()[-1]
+            if match["way" if DIRECTION.fullmatch(name) else "size"] and _of_row(name):
+                text = (match["way"] or match["size"]).replace("−", "-")
+                found.setdefault((name, match["unit"] or match["in"] or ""), {})[line] = text
+    new: dict[str, Mask] = {}
+    used: set[int] = set()
+    for (name, unit), of in found.items():
+        at = np.searchsorted([*of], m.sheet.lines) - 1
+        sure = len(of) > 1 or guessed(name) in (*POSE, *WRENCH)
+        if sure and at.min() >= 0 and guessed(name) not in has and name not in m.sheet.names:
+            header, where = with_unit(name, unit), "titles between" if len(of) > 1 else "title above"
+            m.sheet = m.sheet.with_cells(header, map([*of.values()].__getitem__, at))
+            m.said.append(f"'{header}' stands in the {where} the rows")
+            new[header], used = np.diff(at, prepend=-1) > 0, used | {*of}
+    if new:
+        _all_titled(m.sheet, new)
+        m.sheet = replace(m.sheet, titles=tuple(t for t in m.sheet.titles if t[0] not in used))
+
+
+def _all_titled(sheet: Table, new: dict[str, Mask]) -> None:
+    """FileError where a title lacks what the others say: rows would have the pose of those above them. `new`: rows of which a title
+    says it anew."""
+    begins = np.diff(np.searchsorted(sheet.headers_again, sheet.lines), prepend=0) > 0
+    poses = {h: n for h, n in new.items() if guessed(split_unit(h)[0]) in POSE}
+    for names, where in ((new, begins), (poses, np.any([*poses.values()], axis=0))):
+        for header, own in names.items():
+            good = ~where | (np.any([*new.values()], axis=0) if names is new else own)
+            sheet.check(good, lambda _: f"no title above this row says '{header}', as those of other rows do")  # noqa: B023
+
+
+def _of_row(name: str) -> bool:
+    """Whether a title says with this name where the rows below it were read, or under which load."""
+    return guessed(name) in (*POSE, *WRENCH) or any(p.fullmatch(name) for p in (JOINT, LOAD, DIRECTION))
+
+
+def _plain(cells: Sequence[str]) -> str:
+    """A title as one text, also where its cells are names and numbers."""
+    text = " ; ".join(c.strip() for c in cells if c.strip())
+    return re.sub(r"([=:]) ; ", r"\1 ", text)
+
+
+def one_load_a_row(m: Meant) -> None:
+    """Columns whose names differ by a load alone, as ``dz @ 50 N`` and ``dz @ 100 N``, as a row for each load, which has a column then.
+
+    Not where a person says of one of them, or by a number, what a column is."""
+    matches = [OF_LOAD.search(h) for h in m.sheet.header]
+    found = {i: match for i, match in enumerate(matches) if match and m.sheet.is_numeric(i)}
+    loads = {
+        i: (_axis(match["name"] or ""), _size(match["size"]), match["unit"]) for i, match in found.items()
+    }
+    names = {i: _without(m.sheet.header[i], match) for i, match in found.items()}
+    said = {h.strip().lstrip("+-−") for headers in m.chosen.values() for h in headers}
+    own = {m.sheet.header[i] for i in found}
+    every, kinds = dict.fromkeys(loads.values()), {load[::2] for load in loads.values()}
+    if (
+        len(every) < 2
+        or len({*zip(loads.values(), names.values(), strict=True)}) < len(found)
+        or len({unit for _, unit in kinds}) > 1
+        or any(h.isdigit() or h in own for h in said)
+    ):
+        return
+    _, unit = next(iter(kinds))
+    axes = list(dict.fromkeys(axis for axis, _ in kinds))
+    sheet, many = m.sheet, range(len(m.sheet))
+    wide = {h: i for i, h in enumerate(sheet.header) if i not in found}
+    columns = {_unloaded(h): Cells.of(c for c in sheet.columns[i] for _ in every) for h, i in wide.items()}
+    for axis in axes:
+        sizes = [str(load[1]) if load[0] == axis else "0" for load in every]
+        columns[with_unit(axis or _load(unit), unit)] = Cells.of(s for _ in many for s in sizes)
+    at = {(name, loads[i]): i for i, name in names.items()}
+    for name in dict.fromkeys(names.values()):
+        cells = [
+            [*sheet.columns[at[name, load]]] if (name, load) in at else [""] * len(many) for load in every
+        ]
+        columns[name] = Cells.of(cells[k][row] for row, k in product(many, range(len(every))))
+    lines = [n for n in sheet.lines for _ in every]
+    m.sheet = replace(sheet, header=tuple(columns), columns=tuple(columns.values()), lines=lines)
+    texts = ", ".join(f"{axis} {size:g} {unit}".strip() for axis, size, unit in every)
+    m.said.append(f"columns of several loads are rows, one below the other: {texts}")
+
+
+def _axis(name: str) -> str:
+    name = re.sub(r"[ _]", "", name)
+    return name.capitalize() if len(name) == 2 else ""
+
+
+def _size(text: str) -> float:
+    return float(text.replace("−", "-").replace(",", "."))
+
+
+def _load(unit: str) -> str:
+    """Name of a column of loads without an axis."""
+    found = unit_of(unit, "force")
+    return "Mass" if found and found.mass else "Load"
+
+
+def _without(header: str, load: re.Match[str]) -> str:
+    """The name of a column without its load."""
+    left = f"{header[: load.start()]} {header[load.end() :]}".strip(" @,;:_/|=-")
+    name, unit = split_unit(f"{READING} {left}" if left[:1] in ("", "[", "(") else left)
+    return with_unit(name, unit)
+
+
+def _unloaded(header: str) -> str:
+    """A column that is called ``unloaded`` alone is the reading without a load."""
+    alone = any(words.fullmatch(split_unit(header)[0].strip()) for words in STATES.values())
+    return f"{READING} {header}" if alone else header

@@ -1,0 +1,132 @@
+"""Sheets in another shape than a row for each reading: what is read is that of the plain table, or refused in one line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.python.experiment.spreadsheet.test_columns_together import made
+
+import stiffmap as sm
+
+POSES = [(-50.0, 40.0, -30.0), (60.0, 0.0, 10.0), (20.0, -70.0, 50.0)]
+LOADS = (50.0, 100.0, 150.0)
+READ = np.array([[21.4, 43.6, 65.1], [23.0, 46.2, 70.9], [19.8, 40.1, 61.3]])
+"""µm against the load, of a pose and a load."""
+NOISE = ("--noise", "dz=0.002")
+DOWN, LENGTH = ("--map", "fz=-Load [N]"), ("--unit", "length=mm")
+
+
+def table(*head: str, comma: bool = False, zero: float | None = None) -> str:
+    """Poses below one another and loads side by side; `zero`: what the gauge shows without a load, in a column before."""
+    rows = ["Pose;X [mm];Y [mm];Z [mm];" + ";".join(head)]
+    for i, (pose, read) in enumerate(zip(POSES, READ, strict=True)):
+        values = [*([] if zero is None else [zero]), *(-1e-3 * read + (zero or 0.0))]
+        rows.append(";".join([f"P{i + 1}", *map(str, pose), *(f"{v:.4f}" for v in values)]))
+    text = "\n".join(rows) + "\n"
+    return text.replace(".", ",") if comma else text
+
+
+def is_plain(e: sm.Experiment | None, scale: float = 1.0) -> None:
+    """Nine rows: every load at every pose, in this order."""
+    assert e is not None
+    assert np.allclose(e.position, 1e-3 * np.repeat(POSES, 3, axis=0))
+    assert np.allclose(e.wrench, np.outer(np.tile(LOADS, 3), [0, 0, -scale, 0, 0, 0]))
+    assert np.allclose(e.reading[:, 2], -1e-6 * READ.ravel(), atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "more"),
+    [
+        (table(*(f"dz @ Fz=-{f:g} N [mm]" for f in LOADS)), ()),
+        (table(*(f"Fz = −{f:g} N dz (mm)" for f in LOADS)), ()),
+        (table(*(f"dz_{f:g}N" for f in LOADS)), (*DOWN, *LENGTH)),
+        (table(*(f"dz [{f:g} N]" for f in LOADS)), (*DOWN, *LENGTH)),
+        (table(*(f"Uhr Z bei {f:g} N [mm]" for f in LOADS), comma=True), DOWN),
+        (table(*(f"{f:g} N" for f in LOADS)), (*DOWN, *LENGTH, "--map", "dz=reading")),
+        (table("unloaded [mm]", *(f"{f:g} N [mm]" for f in LOADS), zero=0.37), (*DOWN, "--map", "dz=reading")),
+        (table("dz unloaded [mm]", *(f"dz {f:g} N [mm]" for f in LOADS), zero=0.37), DOWN),
+    ],
+)  # fmt: skip
+def test_columns_of_several_loads_are_rows(tmp_path: Path, text: str, more: tuple[str, ...]) -> None:
+    is_plain(made(tmp_path, text, *NOISE, *more, machine="orthoglide-revised"))
+
+
+def test_masses_side_by_side_hang(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = table(*(f"dz ({f:g} kg) [mm]" for f in LOADS))
+    is_plain(made(tmp_path, text, *NOISE, machine="orthoglide-revised"), 9.80665)
+    assert (
+        "columns of several loads are rows, one below the other: 50 kg, 100 kg, 150 kg"
+        in capsys.readouterr().out
+    )
+
+
+@pytest.mark.parametrize(
+    "head", [("dz 50 N [mm]", "dz 100 kg [mm]", "dz 9 N [mm]"), ("dz 50 N [mm]",) * 2 + ("dz 9 N [mm]",)]
+)
+def test_loads_that_are_no_series_are_refused(tmp_path: Path, head: tuple[str, ...]) -> None:
+    assert made(tmp_path, table(*head), *NOISE, machine="orthoglide-revised") is None
+
+
+def test_a_column_that_a_person_chooses_stays(tmp_path: Path) -> None:
+    text = table(*(f"dz {f:g} N [mm]" for f in LOADS))
+    e = made(
+        tmp_path, text, *NOISE, "--map", "dz=dz 100 N [mm]", "--set", "fz=-100", machine="orthoglide-revised"
+    )
+    assert e is not None
+    assert np.allclose(e.reading[:, 2], -1e-6 * READ[:, 1])
+
+
+def blocks(title: str, again: bool = True, comma: bool = False, separator: str = ";") -> str:
+    """A title above the rows of each pose; `again`: and the header."""
+    out = []
+    for i, (pose, read) in enumerate(zip(POSES, READ, strict=True)):
+        out.append(title.format(i + 1, *pose))
+        out += ["Fz [N];dz [mm]"] if again or not i else []
+        out += [f"{-f:g};{-1e-3 * r:.4f}" for f, r in zip(LOADS, read, strict=True)]
+    text = "\n".join(out) + "\n"
+    return text.replace(".", ",") if comma else text.replace(";", separator)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        blocks("Pose {}: X = {} mm, Y = {} mm, Z = {} mm"),
+        blocks("X: {1} mm   Y: {2} mm   Z: {3} mm", comma=True),
+        blocks("# P{}  X={} Y={} Z={}", separator="\t"),
+        blocks("Position {} (x={}, y={}, z={})", again=False),
+        blocks("Point {}, x [mm] = {}, y [mm] = {}, z [mm] = {}", separator=","),
+    ],
+)
+def test_poses_in_titles_are_columns(tmp_path: Path, text: str) -> None:
+    is_plain(made(tmp_path, text, *NOISE, *LENGTH, machine="orthoglide-revised"))
+
+
+def test_a_load_in_titles_or_above_all(tmp_path: Path) -> None:
+    rows = [f"{x};{y};{z};" for x, y, z in POSES]
+    head = "X [mm];Y [mm];Z [mm];dz [mm]\n"
+    parts = [
+        f"Load direction: -Z, Load: {f:g} N\n"
+        + head
+        + "".join(f"{r}{-1e-3 * v:.4f}\n" for r, v in zip(rows, read, strict=True))
+        for f, read in zip(LOADS, READ.T, strict=True)
+    ]
+    e = made(tmp_path / "many", "".join(parts), *NOISE, machine="orthoglide-revised")
+    assert e is not None
+    assert np.allclose(e.wrench[:, 2], -np.repeat(LOADS, 3))
+    assert np.allclose(e.reading[:, 2], -1e-6 * READ.T.ravel())
+    one = "Fz = -50 N\n" + parts[0].partition("\n")[2]
+    e = made(tmp_path / "one", one, *NOISE, machine="orthoglide-revised")
+    assert e is not None
+    assert np.allclose(e.wrench[:, 2], -50.0)
+
+
+@pytest.mark.parametrize("again", [True, False])
+def test_a_title_that_lacks_what_others_say_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], again: bool
+) -> None:
+    text = blocks("Pose {}: X = {} mm, Y = {} mm, Z = {} mm", again)
+    for lost in ("Pose 2: X = 60.0 mm, Y = 0.0 mm, Z = 10.0 mm\n",)[:again] + ("X = 60.0 mm, ",):
+        assert made(tmp_path, text.replace(lost, ""), *NOISE, machine="orthoglide-revised") is None
+        assert "no title above this row says 'X [mm]', as those of other rows do" in capsys.readouterr().err
