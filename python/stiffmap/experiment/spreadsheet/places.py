@@ -158,7 +158,11 @@ def without_lost(m: Meant, columns: Mapping[str, str], measured: Mapping[str, st
                 if whole:
                     _emptied(m, made, lost & as_made(np.abs(seen - asked)), "made of it")
                 _emptied(m, places, lost, what)
-    if whole and np.nanquantile(sizes.max(axis=1), SMALL) < SMALL * np.nanmax(sizes):
+    if (
+        whole
+        and np.isfinite(sizes).all(axis=1).any()
+        and np.nanquantile(sizes.max(axis=1), SMALL) < SMALL * np.nanmax(sizes)
+    ):
         _emptied(m, made, as_made(np.abs(asked)), "as large as the commands, whose places were then 0")
 
 

@@ -18,7 +18,7 @@ from stiffmap.experiment.files.fields import POSE
 from stiffmap.experiment.spreadsheet.answers import Meant
 from stiffmap.experiment.spreadsheet.guess import guessed
 from stiffmap.experiment.spreadsheet.joints import JOINT
-from stiffmap.experiment.spreadsheet.together import DIRECTION, LOAD, STATES
+from stiffmap.experiment.spreadsheet.together import DIRECTION, HUNG, LOAD, STATES
 
 OF_LOAD = re.compile(
     r"(?i)(?:^|[\s@(\[,;:_/|]+)(?:(?:at|bei|with|mit|under|unter|à|avec|con|load|last|force|kraft|charge)[\s_]+)*"
@@ -39,8 +39,9 @@ READING = "reading"
 def one_point_a_row(m: Meant) -> None:
     """Rows that are one coordinate of a point each, as in reports of features, as one row a point: columns whose cells differ within a
     point get its axes behind their names. StiffmapError where the rows of a point are not together."""
-    if {*"xyz"} & {*map(guessed, m.sheet.names), *m.constants}:
-        return
+    placed = bool({*"xyz"} & {*map(guessed, m.sheet.names), *m.constants})
+    ways = [i for i, n in enumerate(m.sheet.names) if DIRECTION.fullmatch(n)]
+    pulled = any(LOAD.fullmatch(n) and not HUNG.search(n) for n in m.sheet.names)
     for at, column in enumerate(m.sheet.columns):
         cells = [c.lower() for c in column]
         axes = sorted({*cells})
@@ -48,6 +49,10 @@ def one_point_a_row(m: Meant) -> None:
             continue
         points = [cells[k : k + len(axes)] for k in range(0, len(cells), len(axes))]
         good = np.repeat([sorted(p) == axes for p in points], len(axes))[: len(cells)]
+        if placed and pulled and not {*ways} - {at}:
+            continue  # the axis is that of the load
+        if placed and not (good.all() and _differ_in_one(m.sheet, at, len(axes))):
+            continue
         if any(h.isdigit() for headers in m.chosen.values() for h in headers):
             good[:] = False  # whose columns are those of the rows
         what = f"column '{m.sheet.header[at]}': each row is one coordinate of a point; expected its rows {', '.join(axes)} together, and columns by name"
@@ -55,6 +60,13 @@ def one_point_a_row(m: Meant) -> None:
         m.sheet = _points(m.sheet, at, points)
         m.said.append(f"rows of one coordinate each are taken together: {len(points)} points")
         return
+
+
+def _differ_in_one(sheet: Table, at: int, size: int) -> bool:
+    """Whether so many rows each differ, but for a column of axes, in one column of numbers alone: not in a load or a pose."""
+    others = [c for i, c in enumerate(sheet.columns) if i != at]
+    several = (any(len({*r}) > 1 for r in zip(*[iter(c)] * size, strict=True)) for c in others)
+    return sum(several) == 1
 
 
 def _points(sheet: Table, at: int, points: list[list[str]]) -> Table:

@@ -7,8 +7,9 @@ import re
 
 import numpy as np
 
+from stiffmap.common.broadcasting import Floats
 from stiffmap.common.short import first_of
-from stiffmap.common.tables.header import split_unit
+from stiffmap.common.tables.header import DEFLECTION, split_unit
 from stiffmap.common.tables.table import Table, column_letter
 from stiffmap.common.units import Unit, unit_of
 from stiffmap.experiment.spreadsheet.answers import Meant
@@ -26,6 +27,10 @@ DIRECTION = re.compile(
     r"richtung der (last|kraft)"
 )
 WAY = re.compile(r"([+-]?)\s*([xyz])|([xyz])\s*([+-])", re.IGNORECASE)
+ALONG = re.compile(
+    rf"(?i)({DEFLECTION}|reading|dial|gauge|indicator|messuhr|uhr|ablesung|lvdt)( along the load)?"
+)
+"""A reading whose axis is that of the load."""
 STATES = {
     "before": re.compile(r"\b((unloaded|after unloading)( again)?|no[ -]load|without load|before( loading)?|unbelastet|ohne last|vorher|leer|entlastet|initial|zero|pre|vor|avant|sans (charge|effort)|prima|antes)\b", re.I),
     "loaded": re.compile(r"\b(loaded|with load|under load|belastet|mit last|unter last|(en|sous) charge)\b", re.I),
@@ -51,7 +56,7 @@ def together(m: Meant, deflection: bool) -> None:
     _lengths(m)
     if deflection:
         _differences(m)
-    _directions(m)
+    _directions(m, deflection)
     if not any(re.fullmatch("[fm][xyz]", c.meaning) for c in m.guessed):
         _hung(m)
 
@@ -138,8 +143,8 @@ def way_of(cell: str) -> tuple[str, float] | None:
     return (match[2] or match[3]).lower(), -1.0 if "-" in (match[1] or "", match[4] or "") else 1.0
 
 
-def _directions(m: Meant) -> None:
-    """Components of a load whose size and direction stand in columns of their own."""
+def _directions(m: Meant, deflection: bool) -> None:
+    """Components of a load whose size and direction stand in columns of their own, and of a deflection that was read along it."""
     names = m.sheet.names
     at = [i for i, n in enumerate(names) if DIRECTION.fullmatch(n) and any(map(way_of, m.sheet.columns[i]))]
     loads = [
@@ -171,6 +176,26 @@ def _directions(m: Meant) -> None:
         if values.any() or (axis == "z" and not parts.any()):
             m.add(f"+{names[load]} along {axis}", unit, values, f"f{axis}")
     m.said.append(f"the load is '{m.sheet.header[load]}' along '{m.sheet.header[way]}'")
+    read = [i for i, n in enumerate(names) if ALONG.fullmatch(n) and m.sheet.is_numeric(i)]
+    if deflection and len(read) == 1 and not {c.meaning for c in m.guessed} & {*READINGS}:
+        _read_along(m, read[0], parts)
+
+
+def _read_along(m: Meant, read: int, loads: Floats) -> None:
+    """A deflection (column) that names no axis, where each load (n, 3) has one, was read along it: positive where the load pulls, if
+    loads against the axes have no other sign than those along them, else along the axis."""
+    values, header = m.sheet.numbers(read), m.sheet.header[read]
+    axes = np.sign(loads).sum(axis=1)
+    with_load = np.nansum(np.sign(values)[axes < 0]) > 0 or not (axes > 0).any()
+    signs = np.sign(loads) if with_load else np.abs(np.sign(loads))
+    for axis, sign in zip("xyz", signs.T, strict=True):
+        if sign.any():
+            found = np.where(sign != 0, sign * values, np.nan)
+            m.add(f"{m.sheet.names[read]} along {axis}", m.written_unit(read, f"d{axis}"), found, f"d{axis}")
+    way = "the load" if with_load else "its axis"
+    m.said.append(
+        f"'{header}' is read along {way}, and positive so; --map dx='HEADER' (dy, dz) where it is not"
+    )
 
 
 def _hung(m: Meant) -> None:

@@ -130,3 +130,54 @@ def test_a_title_that_lacks_what_others_say_is_refused(
     for lost in ("Pose 2: X = 60.0 mm, Y = 0.0 mm, Z = 10.0 mm\n",)[:again] + ("X = 60.0 mm, ",):
         assert made(tmp_path, text.replace(lost, ""), *NOISE, machine="orthoglide-revised") is None
         assert "no title above this row says 'X [mm]', as those of other rows do" in capsys.readouterr().err
+
+
+WAYS = (("+X", 0, 1.0), ("y", 1, 1.0), ("-Z", 2, -1.0))
+
+
+def along(sign: float, name: str = "Deflection [µm]") -> str:
+    """A load along each axis, and one reading; `sign`: of what is read where the load is against the axis."""
+    out = [f"X [mm];Y [mm];Z [mm];Direction;Load [N];{name}"]
+    for pose, read in zip(POSES, READ, strict=True):
+        at = ";".join(map(str, pose))
+        out += [
+            f"{at};{way};100;{v if s > 0 else sign * v}" for (way, _, s), v in zip(WAYS, read, strict=True)
+        ]
+    return "\n".join(out) + "\n"
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_reading_without_an_axis_is_along_the_load(tmp_path: Path, sign: float) -> None:
+    e = made(
+        tmp_path, along(sign), *NOISE, "--noise", "dx=2", "--noise", "dy=2", machine="orthoglide-revised"
+    )
+    assert e is not None
+    signs = np.diag([s for _, _, s in WAYS])
+    assert np.allclose(e.wrench[:, :3], 100.0 * np.tile(signs, (3, 1)))
+    wanted = np.where(signs, signs, np.nan)[None] * 1e-6 * READ[:, :, None]
+    assert np.allclose(e.reading[:, :3], wanted.reshape(-1, 3), equal_nan=True)
+
+
+def test_a_length_of_a_deflection_is_none_along_the_load(tmp_path: Path) -> None:
+    assert made(tmp_path, along(1.0, "|d| [µm]"), *NOISE, machine="orthoglide-revised") is None
+
+
+def test_rows_of_one_axis_each_with_their_pose(tmp_path: Path) -> None:
+    out = ["X [mm];Y [mm];Z [mm];Load direction;Load [N];Axis;Deflection [µm]"]
+    for pose, read in zip(POSES, READ, strict=True):
+        at = ";".join(map(str, pose))
+        out += [f"{at};-Z;100;{axis};{v}" for axis, v in zip("XYZ", read, strict=True)]
+    e = made(
+        tmp_path,
+        "\n".join(out) + "\n",
+        *NOISE,
+        "--noise",
+        "dx=2",
+        "--noise",
+        "dy=2",
+        machine="orthoglide-revised",
+    )
+    assert e is not None
+    assert np.allclose(e.position, 1e-3 * np.array(POSES))
+    assert np.allclose(e.wrench[:, :3], [0.0, 0.0, -100.0])
+    assert np.allclose(e.reading[:, :3], 1e-6 * READ)
