@@ -174,8 +174,9 @@ def not_at_zero(experiment: Experiment) -> str:
     if e.quantity != "deflection" or e.unloaded == "unknown" or not idle.any():
         return ""
     row, axis = np.argwhere(idle)[0]
+    read = f"{1e3 * e.reading[row, axis]:.4g} m{e.channels[axis].unit}"
     return (
-        f"rows without a load do not read zero (row {e.ids[row]}: {e.channels[axis].name} {e.reading[row, axis]:.4g} in SI): where "
+        f"rows without a load do not read zero (row {e.ids[row]}: {e.channels[axis].name} {read}): where "
         "the gauge was not set to zero, write 'unloaded: unknown' into experiment.yaml, and the zero of each pose is fitted"
     )
 

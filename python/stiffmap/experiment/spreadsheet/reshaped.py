@@ -32,6 +32,8 @@ STATED = re.compile(
     re.IGNORECASE,
 )
 """A number or an axis in a title: ``X = 50 mm``, ``Fz: -100 N``, ``Load direction: +x``."""
+MOST_WORDS = 5
+"""Of a title that says that nothing was loaded."""
 READING = "reading"
 """Name of a column that is named by its load alone."""
 
@@ -92,12 +94,24 @@ def titled(m: Meant) -> None:
     table has no column for, and no number that is the same in all rows."""
     has = {guessed(n) for n in m.sheet.names} - {"note"} | {*m.constants, *m.chosen}
     found: dict[tuple[str, str], dict[int, str]] = {}
+    loads: dict[tuple[str, str], dict[int, str]] = {}
+    idle: list[int] = []
     for line, cells in m.sheet.titles:
-        for match in STATED.finditer(_plain(cells)):
+        text = _plain(cells)
+        for match in STATED.finditer(text):
             name = match["name"] if _of_row(match["name"]) else match["name"].split()[-1]
             if match["way" if DIRECTION.fullmatch(name) else "size"] and _of_row(name):
-                text = (match["way"] or match["size"]).replace("−", "-")
-                found.setdefault((name, match["unit"] or match["in"] or ""), {})[line] = text
+                said = (match["way"] or match["size"]).replace("−", "-")
+                found.setdefault((name, match["unit"] or match["in"] or ""), {})[line] = said
+        if load := OF_LOAD.search(text):
+            name = _axis(load["name"] or "") or _load(load["unit"])
+            loads.setdefault((name, load["unit"]), {})[line] = load["size"].replace("−", "-")
+        elif len(text.split()) <= MOST_WORDS and STATES["before"].search(text):
+            idle.append(line)
+    for key, of in loads.items():
+        of |= dict.fromkeys(idle, "0")
+        if len(of) > 1:
+            found[key] = dict(sorted((found.get(key, {}) | of).items()))
     new: dict[str, Mask] = {}
     used: set[int] = set()
     for (name, unit), of in found.items():
@@ -147,11 +161,13 @@ def one_load_a_row(m: Meant) -> None:
     names = {i: _without(m.sheet.header[i], match) for i, match in found.items()}
     said = {h.strip().lstrip("+-−") for headers in m.chosen.values() for h in headers}
     own = {m.sheet.header[i] for i in found}
+    units = {*map(split_unit, names.values())}
     every, kinds = dict.fromkeys(loads.values()), {load[::2] for load in loads.values()}
     if (
         len(every) < 2
         or len({*zip(loads.values(), names.values(), strict=True)}) < len(found)
         or len({unit for _, unit in kinds}) > 1
+        or any(unit and not (unit_of(unit, "length") or unit_of(unit, "angle")) for _, unit in units)
         or any(h.isdigit() or h in own for h in said)
     ):
         return

@@ -420,7 +420,7 @@ def test_rows_without_a_load_that_do_not_read_zero_come_first(
     e = made(tmp_path, text, "--noise", "dz=1")
     out = capsys.readouterr().out
     assert e is not None and out.startswith(
-        "WARNING: rows without a load do not read zero (row 1: dz 0.001234 in SI)"
+        "WARNING: rows without a load do not read zero (row 1: dz 1.234 mm)"
     )
     assert (
         "write 'unloaded: unknown' into experiment.yaml" in out.replace("\n", " ") and "other sign" not in out

@@ -181,3 +181,40 @@ def test_rows_of_one_axis_each_with_their_pose(tmp_path: Path) -> None:
     assert np.allclose(e.position, 1e-3 * np.array(POSES))
     assert np.allclose(e.wrench[:, :3], [0.0, 0.0, -100.0])
     assert np.allclose(e.reading[:, :3], 1e-6 * READ)
+
+
+@pytest.mark.parametrize(
+    ("titles", "more"),
+    [(("Unloaded", "Loaded, Fz = -100 N"), ()), (("Fz = 0 N", "Fz = -100 N"), ()), (("Without load", "With load 100 N"), DOWN),
+     (("# Messung ohne Last", "# Messung mit 10 kg"), ("--map", "fz=-Mass [kg]")), (("Load case 1: 0 N", "Load case 2: 100 N"), DOWN)],
+)  # fmt: skip
+def test_tables_of_several_loads_below_one_another(
+    tmp_path: Path, titles: tuple[str, str], more: tuple[str, ...]
+) -> None:
+    rows = [f"{x};{y};{z};{{}}\n" for x, y, z in POSES]
+    parts = [
+        title
+        + "\nX [mm];Y [mm];Z [mm];gauge z [mm]\n"
+        + "".join(r.format(0.3 + v) for r, v in zip(rows, read, strict=True))
+        for title, read in zip(titles, ((0.0,) * 3, -1e-3 * READ[:, 1]), strict=True)
+    ]
+    e = made(tmp_path, "\n".join(parts), *NOISE, *more, machine="orthoglide-revised")
+    assert e is not None
+    assert np.allclose(e.wrench[:, 2], np.repeat([0.0, -10 * 9.80665 if "kg" in titles[1] else -100.0], 3))
+    assert np.allclose(e.reading[:, 2], np.r_[[3e-4] * 3, 3e-4 - 1e-6 * READ[:, 1]])
+
+
+@pytest.mark.parametrize(
+    "above",
+    [
+        "Force sensor 500 N",
+        "Payload: 6 kg",
+        "Load cell 500 N, gain 2",
+        "# max. load 900 N",
+        "Robot mass = 335 kg",
+    ],
+)
+def test_what_is_no_load_of_the_rows_is_none(tmp_path: Path, above: str) -> None:
+    e = made(tmp_path, above + "\n" + table("Fz [N]", "dz [mm]", "u"), *NOISE, machine="orthoglide-revised")
+    assert e is not None
+    assert np.allclose(e.wrench[:, 2], -1e-3 * READ[:, 0])
