@@ -117,10 +117,9 @@ def _read(path: Path, sheet: str | None, layout: Layout) -> Table:
         if begun:
             break
     behind = begun[-1][1][len(_checked(found[1], str(path), found[0])) if found else 0 :] if begun else []
-    named = (
-        layout.strict or layout.header or layout.numbered or not any(is_finite(c, spelling) for c in behind)
-    )
-    turned = [] if named else _turned(kept(lines()), spelling, layout)
+    named = layout.strict or layout.header or layout.numbered
+    lost = any(is_finite(c, spelling) for c in behind) or (found and not _knows(found[1], layout))
+    turned = _turned(kept(lines()), spelling, layout) if lost and not named else []
     if turned:
         rows, above, begun, found = _begun(lambda: turned, spelling, layout, str(path))
     first = begun[-1] if begun else None
@@ -186,6 +185,11 @@ def _refuse_many_times(table: Table) -> None:
     if all((np.diff(t) > 0).all() for t in times):
         what = f"'{table.names[0]}' stands again, with other numbers, before each column; {ONE_TIME}"
         table.check(np.ptp(times, axis=0) == 0, lambda row: what)
+
+
+def _knows(names: Sequence[str], layout: Layout) -> bool:
+    """Whether a name, but for the first, has a unit or a meaning."""
+    return any(split_unit(n)[1] or layout.known(split_unit(n)[0]) for n in names[1:])
 
 
 def _turned(lines: Iterable[Line], spelling: Spelling, layout: Layout) -> list[Line]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import replace
 from itertools import product
 
@@ -23,9 +23,12 @@ from stiffmap.experiment.spreadsheet.together import DIRECTION, HUNG, LOAD, STAT
 OF_LOAD = re.compile(
     r"(?i)(?:^|[\s@(\[,;:_/|]+)(?:(?:at|bei|with|mit|under|unter|à|avec|con|load|last|force|kraft|charge)[\s_]+)*"
     r"(?P<name>[fm][ _]?[xyz]?(?=[\s=:+−-]))?\s*[=:]?\s*(?P<size>[+−-]?\d+(?:[.,]\d+)?)[ _]?(?P<unit>N·?m|k?N|daN|kgf?|g|lbf?)"
-    r"(?=$|[\s)\]@,;:_/|])[)\]]?"
+    r"(?=$|[\s)\]@,;:_/|])"
+    r"(?:\s*(?:in|along|entlang)?\s*(?P<way>[+−-]?[xyz])(?=$|[\s)\]]))?[)\]]?"
 )
-"""A load in the name of a column: ``dz @ 50 N``, ``Fz = -100 N dx [mm]``, ``10 kg``."""
+"""A load in the name of a column: ``dz @ 50 N``, ``Fz = -100 N dx [mm]``, ``10 kg``, ``100 N along -Z``."""
+BRANCH = re.compile(r"(?i)[\s_(,;]*\b(?P<un>un|ent)?(loading|lasten|lastung|belasten|belastung)\b\)?")
+"""In the name of a column, whether the load went up or down."""
 STATED = re.compile(
     r"(?<![\w.])(?P<name>[^\W\d][\w ./-]*?)\s*(?:[\[(](?P<in>[^\])]+)[\])])?\s*[=:]\s*"
     r"(?:(?P<size>[+−-]?\d+(?:[.,]\d+)?)(?:\s*(?P<unit>[^\W\d][^\s,;)=:]*|°)(?=[\s,;)]|$)(?!\s*[=:]))?|(?P<way>[+−-]?[xyz])(?=\s*(?:[,;)]|$)))",
@@ -97,21 +100,21 @@ def titled(m: Meant) -> None:
     loads: dict[tuple[str, str], dict[int, str]] = {}
     idle: list[int] = []
     for line, cells in m.sheet.titles:
-        text = _plain(cells)
+        text = _plain(c for c in cells if not any(c.strip() in h for h in m.sheet.header))
         for match in STATED.finditer(text):
             name = match["name"] if _of_row(match["name"]) else match["name"].split()[-1]
             if match["way" if DIRECTION.fullmatch(name) else "size"] and _of_row(name):
                 said = (match["way"] or match["size"]).replace("−", "-")
                 found.setdefault((name, match["unit"] or match["in"] or ""), {})[line] = said
         if load := OF_LOAD.search(text):
-            name = _axis(load["name"] or "") or _load(load["unit"])
-            loads.setdefault((name, load["unit"]), {})[line] = load["size"].replace("−", "-")
+            *key, size = _load(load)
+            loads.setdefault((key[0], key[1]), {})[line] = size
         elif len(text.split()) <= MOST_WORDS and STATES["before"].search(text):
             idle.append(line)
-    for key, of in loads.items():
+    for key_, of in loads.items():
         of |= dict.fromkeys(idle, "0")
         if len(of) > 1:
-            found[key] = dict(sorted((found.get(key, {}) | of).items()))
+            found[key_] = dict(sorted((found.get(key_, {}) | of).items()))
     new: dict[str, Mask] = {}
     used: set[int] = set()
     for (name, unit), of in found.items():
@@ -143,7 +146,7 @@ def _of_row(name: str) -> bool:
     return guessed(name) in (*POSE, *WRENCH) or any(p.fullmatch(name) for p in (JOINT, LOAD, DIRECTION))
 
 
-def _plain(cells: Sequence[str]) -> str:
+def _plain(cells: Iterable[str]) -> str:
     """A title as one text, also where its cells are names and numbers."""
     text = " ; ".join(c.strip() for c in cells if c.strip())
     return re.sub(r"([=:]) ; ", r"\1 ", text)
@@ -153,32 +156,31 @@ def one_load_a_row(m: Meant) -> None:
     """Columns whose names differ by a load alone, as ``dz @ 50 N`` and ``dz @ 100 N``, as a row for each load, which has a column then.
 
     Not where a person says of one of them, or by a number, what a column is."""
-    matches = [OF_LOAD.search(h) for h in m.sheet.header]
+    branches = [BRANCH.search(h) for h in m.sheet.header]
+    matches = [OF_LOAD.search(BRANCH.sub("", h)) for h in m.sheet.header]
     found = {i: match for i, match in enumerate(matches) if match and m.sheet.is_numeric(i)}
-    loads = {
-        i: (_axis(match["name"] or ""), _size(match["size"]), match["unit"]) for i, match in found.items()
-    }
-    names = {i: _without(m.sheet.header[i], match) for i, match in found.items()}
+    loads = {i: (*_load(match), _branch(branches[i])) for i, match in found.items()}
+    names = {i: _without(match) for i, match in found.items()}
     said = {h.strip().lstrip("+-−") for headers in m.chosen.values() for h in headers}
     own = {m.sheet.header[i] for i in found}
     units = {*map(split_unit, names.values())}
-    every, kinds = dict.fromkeys(loads.values()), {load[::2] for load in loads.values()}
+    every = dict.fromkeys(loads.values())
     if (
         len(every) < 2
         or len({*zip(loads.values(), names.values(), strict=True)}) < len(found)
-        or len({unit for _, unit in kinds}) > 1
+        or len({unit for _, unit, _, _ in every}) > 1
         or any(unit and not (unit_of(unit, "length") or unit_of(unit, "angle")) for _, unit in units)
         or any(h.isdigit() or h in own for h in said)
     ):
         return
-    _, unit = next(iter(kinds))
-    axes = list(dict.fromkeys(axis for axis, _ in kinds))
     sheet, many = m.sheet, range(len(m.sheet))
     wide = {h: i for i, h in enumerate(sheet.header) if i not in found}
     columns = {_unloaded(h): Cells.of(c for c in sheet.columns[i] for _ in every) for h, i in wide.items()}
-    for axis in axes:
-        sizes = [str(load[1]) if load[0] == axis else "0" for load in every]
-        columns[with_unit(axis or _load(unit), unit)] = Cells.of(s for _ in many for s in sizes)
+    for name, unit in dict.fromkeys(load[:2] for load in every):
+        sizes = [load[2] if load[0] == name else "0" for load in every]
+        columns[with_unit(name, unit)] = Cells.of(s for _ in many for s in sizes)
+    if any(branches[i] for i in found):
+        columns["branch"] = Cells.of(load[3] for _ in many for load in every)
     at = {(name, loads[i]): i for i, name in names.items()}
     for name in dict.fromkeys(names.values()):
         cells = [
@@ -187,28 +189,29 @@ def one_load_a_row(m: Meant) -> None:
         columns[name] = Cells.of(cells[k][row] for row, k in product(many, range(len(every))))
     lines = [n for n in sheet.lines for _ in every]
     m.sheet = replace(sheet, header=tuple(columns), columns=tuple(columns.values()), lines=lines)
-    texts = ", ".join(f"{axis} {size:g} {unit}".strip() for axis, size, unit in every)
+    texts = ", ".join(f"{name} {size} {unit} {branch}".strip() for name, unit, size, branch in every)
     m.said.append(f"columns of several loads are rows, one below the other: {texts}")
 
 
-def _axis(name: str) -> str:
-    name = re.sub(r"[ _]", "", name)
-    return name.capitalize() if len(name) == 2 else ""
-
-
-def _size(text: str) -> float:
-    return float(text.replace("−", "-").replace(",", "."))
-
-
-def _load(unit: str) -> str:
-    """Name of a column of loads without an axis."""
+def _load(match: re.Match[str]) -> tuple[str, str, str]:
+    """Column of a load, its unit and size."""
+    name, unit, way = re.sub(r"[ _]", "", match["name"] or ""), match["unit"], match["way"] or ""
     found = unit_of(unit, "force")
-    return "Mass" if found and found.mass else "Load"
+    size = match["size"].replace("−", "-")
+    if len(name) == 2:
+        return name.capitalize(), unit, size
+    if way:
+        return f"F{way[-1].lower()}", unit, f"-{size}" if way[0] in "-−" else size
+    return "Mass" if found and found.mass else "Load", unit, size
 
 
-def _without(header: str, load: re.Match[str]) -> str:
+def _branch(match: re.Match[str] | None) -> str:
+    return ("unloading" if match["un"] else "loading") if match else ""
+
+
+def _without(load: re.Match[str]) -> str:
     """The name of a column without its load."""
-    left = f"{header[: load.start()]} {header[load.end() :]}".strip(" @,;:_/|=-")
+    left = f"{load.string[: load.start()]} {load.string[load.end() :]}".strip(" @,;:_/|=-")
     name, unit = split_unit(f"{READING} {left}" if left[:1] in ("", "[", "(") else left)
     return with_unit(name, unit)
 

@@ -53,11 +53,38 @@ def test_columns_of_several_loads_are_rows(tmp_path: Path, text: str, more: tupl
     is_plain(made(tmp_path, text, *NOISE, *more, machine="orthoglide-revised"))
 
 
+@pytest.mark.parametrize(
+    "head",
+    [";;;;Fx = 100 N;Fy = 100 N;Fz = -100 N\nPose;X [mm];Y [mm];Z [mm];dz [mm];dz [mm];dz [mm]",
+     "Pose;X [mm];Y [mm];Z [mm];dz @ 100 N +X [mm];dz @ 100 N along y [mm];dz @ 100 N in -Z [mm]"],
+)  # fmt: skip
+def test_loads_along_several_axes_side_by_side(tmp_path: Path, head: str) -> None:
+    e = made(tmp_path, head + "\n" + table().partition("\n")[2], *NOISE, machine="orthoglide-revised")
+    assert e is not None
+    assert np.allclose(e.wrench[:, :3], 100.0 * np.tile(np.diag([1.0, 1.0, -1.0]), (3, 1)))
+    assert np.allclose(e.reading[:, 2], -1e-6 * READ.ravel())
+
+
+def test_loads_up_and_down_side_by_side(tmp_path: Path) -> None:
+    text = table("dz 50 N (loading) [mm]", "dz 100 N [mm]", "dz 50 N (unloading) [mm]")
+    e = made(tmp_path, text, *NOISE, *DOWN, machine="orthoglide-revised")
+    assert e is not None
+    assert np.allclose(e.wrench[:, 2], np.tile([-50.0, -100.0, -50.0], 3))
+    assert e.branch == ("loading", "", "unloading") * 3
+
+
+def test_poses_and_loads_may_be_exchanged(tmp_path: Path) -> None:
+    """Names of the poses above, of positions and readings to the left."""
+    rows = [line.split(";") for line in table(*(f"dz @ Fz=-{f:g} N [mm]" for f in LOADS)).splitlines()]
+    text = "\n".join(";".join(column) for column in zip(*rows, strict=True)) + "\n"
+    is_plain(made(tmp_path, text, *NOISE, machine="orthoglide-revised"))
+
+
 def test_masses_side_by_side_hang(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     text = table(*(f"dz ({f:g} kg) [mm]" for f in LOADS))
     is_plain(made(tmp_path, text, *NOISE, machine="orthoglide-revised"), 9.80665)
     assert (
-        "columns of several loads are rows, one below the other: 50 kg, 100 kg, 150 kg"
+        "columns of several loads are rows, one below the other: Mass 50 kg, Mass 100 kg, Mass 150 kg"
         in capsys.readouterr().out
     )
 
