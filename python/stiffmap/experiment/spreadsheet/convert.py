@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from array import array
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -15,6 +16,7 @@ import numpy as np
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs import make_folder, only_job, write_rows, write_text
 from stiffmap.common.tables.cells import BLOCK
+from stiffmap.common.tables.header import split_unit
 from stiffmap.common.tables.table import Table
 from stiffmap.common.units import unit_of
 from stiffmap.common.yaml_text import text_of
@@ -30,6 +32,8 @@ from stiffmap.experiment.spreadsheet.together import weight
 WORDS = ("id", "setup", "branch", "target")
 """Columns of words that a sheet may have."""
 Numbers = Mapping[str, float]
+RATIO = re.compile(r"N/\s?[mµu]?m\b|\b[mµu]?m/k?N\b")
+"""Units of stiffness and compliance."""
 RARE = 0.03
 """How seldom readings are by chance as near to the mean of others as one that is computed."""
 ABSOLUTE = {"ll": "length"}
@@ -159,10 +163,12 @@ def _ask(m: Meant, known_: set[str], joints: bool) -> None:
                 f"which column is a reading? Of runs in both directions, say --map dx='{'|'.join(runs)}' (dy, dz)",
                 "reading",
             )
+        made = [h for h in m.sheet.header if RATIO.search(split_unit(h)[1])]
+        of = f" '{made[0]}' is computed: expected the load and the deflection." if made else ""
         if names:
             places = f"--instrument tracker, which takes the command off '{names[0]}'; of differences "
         m.ask_column(
-            f"which column is a reading? Say {places}--map dx='HEADER' (dy, dz, rx, ry, rz), several headers with | between them for "
+            f"which column is a reading?{of} Say {places}--map dx='HEADER' (dy, dz, rx, ry, rz), several headers with | between them for "
             "repeats, or length='HEADER'; where a ball stood in one socket, --set px=0 --set py=0 --set pz=0",
             "reading",
         )

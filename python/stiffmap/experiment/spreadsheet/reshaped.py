@@ -134,7 +134,8 @@ def _all_titled(sheet: Table, new: dict[str, Mask]) -> None:
     """FileError where a title lacks what the others say: rows would have the pose of those above them. `new`: rows of which a title
     says it anew."""
     begins = np.diff(np.searchsorted(sheet.headers_again, sheet.lines), prepend=0) > 0
-    poses = {h: n for h, n in new.items() if guessed(split_unit(h)[0]) in POSE}
+    names_of = {h: split_unit(h)[0] for h in new}
+    poses = {h: new[h] for h, n in names_of.items() if guessed(n) in POSE or JOINT.fullmatch(n)}
     for names, where in ((new, begins), (poses, np.any([*poses.values()], axis=0))):
         for header, own in names.items():
             good = ~where | (np.any([*new.values()], axis=0) if names is new else own)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 from collections.abc import Iterator, Sequence
 from itertools import islice
@@ -17,6 +18,7 @@ from stiffmap.common.tables.table_file import table_file
 from stiffmap.experiment.noise.level import unknown
 from stiffmap.experiment.spreadsheet.dh import ASSUMED
 from stiffmap.experiment.spreadsheet.from_table import FromTable, experiment_from_table
+from stiffmap.experiment.spreadsheet.guess import Column
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import numbers, options_given, pairs, refuse_unused
 from stiffmap.ui.cli.options import argument, flag, option, written
@@ -96,6 +98,15 @@ def _prompt(text: str) -> str:
         ) from None
 
 
+def _used(column: Column, table: FromTable) -> bool:
+    """Whether another column was made of this one."""
+    name, header = re.escape(column.name), table.sheet.header
+    made = re.compile(rf"([+-]|.* less ){name}.*|{name} (less .*|along [xyz]|in use).*")
+    others = (header[c.index] for c in table.understood.columns if c.meaning != "note")
+    own = (f"'{column.name}'", f"'{header[column.index]}'")
+    return any(map(made.fullmatch, others)) or any(n in r for n in own for r in table.remarks)
+
+
 def _told(table: FromTable, words: Sequence[str]) -> Iterator[Any]:
     """What each column was taken for, the first rows, and what to do next; `words` are those of this command."""
     found, header, made = table.understood, table.sheet.header, table.experiment
@@ -104,7 +115,7 @@ def _told(table: FromTable, words: Sequence[str]) -> Iterator[Any]:
         if c.meaning in commands:
             said = f"command of {', '.join(commands[c.meaning])}"
         elif c.meaning == "note":
-            said = "kept in notes.csv"
+            said = "other columns are made of it" if _used(c, table) else "kept in notes.csv"
         else:
             said = f"repeat {c.repeat} of {c.meaning}" if c.repeat else c.meaning
             said += f", {found.units.get(c.meaning, 'no unit')}"

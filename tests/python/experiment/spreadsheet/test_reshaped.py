@@ -130,6 +130,29 @@ def test_poses_in_titles_are_columns(tmp_path: Path, text: str) -> None:
     is_plain(made(tmp_path, text, *NOISE, *LENGTH, machine="orthoglide-revised"))
 
 
+def test_joints_in_titles_are_columns(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    poses = [(10, -90, 80, 5, 40, 0), (-30, -70, 60, 15, 50, 90)]
+    titles = ["Config: " + ", ".join(f"J{k} = {v}°" for k, v in enumerate(p, 1)) for p in poses]
+    text = "".join(f"{title}\nMass [kg];dz [mm]\n2;-0.04\n5;-0.1\n" for title in titles)
+    e = made(tmp_path / "good", text, *NOISE, machine="ur10")
+    assert e is not None and e.command is not None
+    assert np.allclose(np.degrees(e.command), np.repeat(poses, 2, axis=0))
+    assert made(tmp_path / "bad", text.replace("J4 = 15°, ", ""), *NOISE, machine="ur10") is None
+    assert "no title above this row says 'J4 [°]'" in capsys.readouterr().err
+
+
+def test_what_was_computed_is_no_reading_and_what_is_used_is_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = "X [mm];Y [mm];Z [mm];kz [N/mm]\n0;0;0;1900\n50;0;0;1800\n"
+    assert made(tmp_path / "k", text, *NOISE, machine="orthoglide-revised") is None
+    assert "'kz [N/mm]' is computed: expected the load and the deflection" in capsys.readouterr().err
+    text = "X [mm];Y [mm];Z [mm];Load [N];By;dz [mm]\n0;0;0;100;me;-0.05\n50;0;0;100;me;-0.06\n"
+    assert made(tmp_path / "u", text, *NOISE, *DOWN, machine="orthoglide-revised") is not None
+    out = capsys.readouterr().out
+    assert "'Load [N]': other columns are made of it" in out and "'By': kept in notes.csv" in out
+
+
 def test_a_load_in_titles_or_above_all(tmp_path: Path) -> None:
     rows = [f"{x};{y};{z};" for x, y, z in POSES]
     head = "X [mm];Y [mm];Z [mm];dz [mm]\n"
