@@ -131,7 +131,7 @@ def test_poses_in_titles_are_columns(tmp_path: Path, text: str) -> None:
 
 
 def test_joints_in_titles_are_columns(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    poses = [(10, -90, 80, 5, 40, 0), (-30, -70, 60, 15, 50, 90)]
+    poses = [(10, -90, 80, 5, 40, 0), (20, -80, 70, 10, 45, 30), (-30, -70, 60, 15, 50, 90)]
     titles = ["Config: " + ", ".join(f"J{k} = {v}°" for k, v in enumerate(p, 1)) for p in poses]
     text = "".join(f"{title}\nMass [kg];dz [mm]\n2;-0.04\n5;-0.1\n" for title in titles)
     e = made(tmp_path / "good", text, *NOISE, machine="ur10")
