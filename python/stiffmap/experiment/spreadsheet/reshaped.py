@@ -166,10 +166,13 @@ def one_load_a_row(m: Meant) -> None:
     own = {m.sheet.header[i] for i in found}
     units = {*map(split_unit, names.values())}
     every = dict.fromkeys(loads.values())
+    new = {*names.values(), *(with_unit(name, unit) for name, unit, _, _ in every)}
+    others = {h for i, h in enumerate(m.sheet.header) if i not in found}
     if (
         len(every) < 2
         or len({*zip(loads.values(), names.values(), strict=True)}) < len(found)
-        or len({unit for _, unit, _, _ in every}) > 1
+        or len({(unit, len(name) == 2) for name, unit, _, _ in every}) > 1
+        or others & {*new, "branch"}
         or any(unit and not (unit_of(unit, "length") or unit_of(unit, "angle")) for _, unit in units)
         or any(h.isdigit() or h in own for h in said)
     ):
@@ -179,6 +182,7 @@ def one_load_a_row(m: Meant) -> None:
     columns = {_unloaded(h): Cells.of(c for c in sheet.columns[i] for _ in every) for h, i in wide.items()}
     for name, unit in dict.fromkeys(load[:2] for load in every):
         sizes = [load[2] if load[0] == name else "0" for load in every]
+        sizes = [s.replace(".", ",") if sheet.decimal_comma else s.replace(",", ".") for s in sizes]
         columns[with_unit(name, unit)] = Cells.of(s for _ in many for s in sizes)
     if any(branches[i] for i in found):
         columns["branch"] = Cells.of(load[3] for _ in many for load in every)

@@ -96,6 +96,23 @@ def test_loads_that_are_no_series_are_refused(tmp_path: Path, head: tuple[str, .
     assert made(tmp_path, table(*head), *NOISE, machine="orthoglide-revised") is None
 
 
+@pytest.mark.parametrize(("size", "comma"), [("2,5", False), ("2.5", True), ("2,5", True)])
+def test_sizes_of_loads_have_either_decimal_sign(tmp_path: Path, size: str, comma: bool) -> None:
+    text = table("dz 1 kg [mm]", "dz 2 kg [mm]", "dz 2kg5 [mm]", comma=comma).replace("2kg5", f"{size} kg")
+    e = made(tmp_path, text, *NOISE, machine="orthoglide-revised")
+    assert e is not None
+    assert np.allclose(e.wrench[:, 2], -9.80665 * np.tile([1.0, 2.0, 2.5], 3))
+
+
+@pytest.mark.parametrize("head", [("Load [N]", "dz 50 N [mm]", "dz 100 N [mm]"), ("dz [mm]", "dz 50 N [mm]", "dz 100 N [mm]"),
+                                  ("u", "dz 50 N [mm]", "dz Fz=-100 N [mm]")])  # fmt: skip
+def test_nothing_of_a_sheet_is_written_over(
+    tmp_path: Path, head: tuple[str, ...], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert made(tmp_path, table(*head), *NOISE, machine="orthoglide-revised") is None
+    assert all(f"'{h}'" in capsys.readouterr().err for h in head[:1])
+
+
 def test_a_column_that_a_person_chooses_stays(tmp_path: Path) -> None:
     text = table(*(f"dz {f:g} N [mm]" for f in LOADS))
     e = made(
