@@ -118,7 +118,7 @@ def _read(path: Path, sheet: str | None, layout: Layout) -> Table:
             break
     behind = begun[-1][1][len(_checked(found[1], str(path), found[0])) if found else 0 :] if begun else []
     named = layout.strict or layout.header or layout.numbered
-    lost = any(is_finite(c, spelling) for c in behind) or (found and not _knows(found[1], layout))
+    lost = any(is_finite(c, spelling) for c in behind) or (found and not _knows(found[1][1:], layout))
     turned = _turned(kept(lines()), spelling, layout) if lost and not named else []
     if turned:
         rows, above, begun, found = _begun(lambda: turned, spelling, layout, str(path))
@@ -188,8 +188,8 @@ def _refuse_many_times(table: Table) -> None:
 
 
 def _knows(names: Sequence[str], layout: Layout) -> bool:
-    """Whether a name, but for the first, has a unit or a meaning."""
-    return any(split_unit(n)[1] or layout.known(split_unit(n)[0]) for n in names[1:])
+    """Whether a name has a unit or a meaning."""
+    return any(split_unit(n)[1] or layout.known(n) for n in names)
 
 
 def _turned(lines: Iterable[Line], spelling: Spelling, layout: Layout) -> list[Line]:
@@ -197,8 +197,7 @@ def _turned(lines: Iterable[Line], spelling: Spelling, layout: Layout) -> list[L
     no word there has a unit or a meaning."""
     rows = [(cells, is_data(cells, spelling)) for _, cells in lines]
     names = [cells[0].strip() for cells, data in rows if data]
-    said = any(split_unit(n)[1] or layout.known(n) for n in names)
-    if not said or any(is_finite(n, Spelling(spelling.comma, units=True)) for n in names):
+    if not _knows(names, layout) or any(is_finite(n, Spelling(spelling.comma, units=True)) for n in names):
         return []
     columns = zip_longest(*(cells for cells, data in rows if data), fillvalue="")
     return [*enumerate([*(cells for cells, data in rows if not data), *map(list, columns)], 1)]

@@ -57,11 +57,12 @@ class Table:
     def left_out(self) -> tuple[str, ...]:
         """What is in none of the columns, in words."""
         again, first = self.headers_again, self.lines[0] if self.lines else 0
-        lines = [(n, " ".join(filter(None, map(str.strip, cells)))) for n, cells in self.titles if n > first]
-        said = [f"row {n} is a remark: {text[:40]}" for n, text in lines if n not in again]
-        one = len(again) == 1
-        headers = [f"row{'s' * (not one)} {first_of([*map(str, again)], 3)} repeat{'s' * one} the header"]
-        return (*self.aside, *said, *(headers if again else ()))
+        remarks = {n: " ".join(filter(None, map(str.strip, cells))) for n, cells in self.titles if n > first}
+        said = [f"row {n} is a remark: {remarks[n][:40]}" for n in sorted(remarks.keys() - {*again})]
+        if again:
+            rows = f"row{'s' * (len(again) > 1)} {first_of([*map(str, again)], 3)}"
+            said.append(f"{rows} repeat{'s' * (len(again) == 1)} the header")
+        return (*self.aside, *said)
 
     @property
     def headers_again(self) -> list[int]:

@@ -16,7 +16,6 @@ import numpy as np
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs import make_folder, only_job, write_rows, write_text
 from stiffmap.common.tables.cells import BLOCK
-from stiffmap.common.tables.header import split_unit
 from stiffmap.common.tables.table import Table
 from stiffmap.common.units import unit_of
 from stiffmap.common.yaml_text import text_of
@@ -163,7 +162,7 @@ def _ask(m: Meant, known_: set[str], joints: bool) -> None:
                 f"which column is a reading? Of runs in both directions, say --map dx='{'|'.join(runs)}' (dy, dz)",
                 "reading",
             )
-        made = [h for h in m.sheet.header if RATIO.search(split_unit(h)[1])]
+        made = [h for i, h in enumerate(m.sheet.header) if RATIO.search(m.sheet.unit(i))]
         of = f" '{made[0]}' is computed: expected the load and the deflection." if made else ""
         if names:
             places = f"--instrument tracker, which takes the command off '{names[0]}'; of differences "

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from dataclasses import replace
-from itertools import product
+from itertools import chain, repeat
 
 import numpy as np
 
@@ -96,25 +96,26 @@ def titled(m: Meant) -> None:
     """Poses and loads that stand in a title above the rows that they are of, ``Pose 3: X = 50 mm, Y = 0 mm``, as columns; of what the
     table has no column for, and no number that is the same in all rows."""
     has = {guessed(n) for n in m.sheet.names} - {"note"} | {*m.constants, *m.chosen}
-    found: dict[tuple[str, str], dict[int, str]] = {}
-    loads: dict[tuple[str, str], dict[int, str]] = {}
+    found: dict[tuple[str, str], dict[int, float | str]] = {}
+    loads: dict[tuple[str, str], dict[int, float | str]] = {}
     idle: list[int] = []
     for line, cells in m.sheet.titles:
         text = _plain(c for c in cells if not any(c.strip() in h for h in m.sheet.header))
         for match in STATED.finditer(text):
             name = match["name"] if _of_row(match["name"]) else match["name"].split()[-1]
-            if match["way" if DIRECTION.fullmatch(name) else "size"] and _of_row(name):
-                said = (match["way"] or match["size"]).replace("−", "-")
-                found.setdefault((name, match["unit"] or match["in"] or ""), {})[line] = said
+            text_of = match["way" if DIRECTION.fullmatch(name) else "size"]
+            if text_of and _of_row(name):
+                key = name, match["unit"] or match["in"] or ""
+                found.setdefault(key, {})[line] = text_of if match["way"] else _number(text_of)
         if load := OF_LOAD.search(text):
-            *key, size = _load(load)
-            loads.setdefault((key[0], key[1]), {})[line] = size
+            name, unit, size = _load(load)
+            loads.setdefault((name, unit), {})[line] = size
         elif len(text.split()) <= MOST_WORDS and STATES["before"].search(text):
             idle.append(line)
-    for key_, of in loads.items():
-        of |= dict.fromkeys(idle, "0")
+    for key, of in loads.items():
+        of |= dict.fromkeys(idle, 0.0)
         if len(of) > 1:
-            found[key_] = dict(sorted((found.get(key_, {}) | of).items()))
+            found[key] = dict(sorted((found.get(key, {}) | of).items()))
     new: dict[str, Mask] = {}
     used: set[int] = set()
     for (name, unit), of in found.items():
@@ -122,7 +123,9 @@ def titled(m: Meant) -> None:
         sure = len(of) > 1 or guessed(name) in (*POSE, *WRENCH)
         if sure and at.min() >= 0 and guessed(name) not in has and name not in m.sheet.names:
             header, where = with_unit(name, unit), "titles between" if len(of) > 1 else "title above"
-            m.sheet = m.sheet.with_cells(header, map([*of.values()].__getitem__, at))
+            cells = [[*of.values()][k] for k in at]
+            words = DIRECTION.fullmatch(name)
+            m.sheet = m.sheet.with_cells(header, cells) if words else m.sheet.with_column(header, cells)
             m.said.append(f"'{header}' stands in the {where} the rows")
             new[header], used = np.diff(at, prepend=-1) > 0, used | {*of}
     if new:
@@ -134,12 +137,12 @@ def _all_titled(sheet: Table, new: dict[str, Mask]) -> None:
     """FileError where a title lacks what the others say: rows would have the pose of those above them. `new`: rows of which a title
     says it anew."""
     begins = np.diff(np.searchsorted(sheet.headers_again, sheet.lines), prepend=0) > 0
-    names_of = {h: split_unit(h)[0] for h in new}
-    poses = {h: new[h] for h, n in names_of.items() if guessed(n) in POSE or JOINT.fullmatch(n)}
-    for names, where in ((new, begins), (poses, np.any([*poses.values()], axis=0))):
-        for header, own in names.items():
-            good = ~where | (np.any([*new.values()], axis=0) if names is new else own)
-            sheet.check(good, lambda _: f"no title above this row says '{header}', as those of other rows do")  # noqa: B023
+    titled_anew = np.any([*new.values()], axis=0)
+    poses = [h for h in new if guessed(n := split_unit(h)[0]) in POSE or JOINT.fullmatch(n)]
+    placed_anew = np.any([new[h] for h in poses], axis=0)
+    for header, own in new.items():
+        good = (titled_anew | ~begins) & (own | ~placed_anew if header in poses else True)
+        sheet.check(good, lambda _: f"no title above this row says '{header}', as those of other rows do")  # noqa: B023
 
 
 def _of_row(name: str) -> bool:
@@ -177,37 +180,40 @@ def one_load_a_row(m: Meant) -> None:
         or any(h.isdigit() or h in own for h in said)
     ):
         return
-    sheet, many = m.sheet, range(len(m.sheet))
-    wide = {h: i for i, h in enumerate(sheet.header) if i not in found}
-    columns = {_unloaded(h): Cells.of(c for c in sheet.columns[i] for _ in every) for h, i in wide.items()}
+    sheet, many = m.sheet, len(m.sheet)
+    left = [i for i in range(len(sheet.header)) if i not in found]
+    header = tuple(_unloaded(sheet.header[i]) for i in left)
+    tall = replace(sheet, header=header, columns=tuple(sheet.columns[i] for i in left)).repeated(len(every))
     for name, unit in dict.fromkeys(load[:2] for load in every):
-        sizes = [load[2] if load[0] == name else "0" for load in every]
-        sizes = [s.replace(".", ",") if sheet.decimal_comma else s.replace(",", ".") for s in sizes]
-        columns[with_unit(name, unit)] = Cells.of(s for _ in many for s in sizes)
+        sizes = [load[2] if load[0] == name else 0.0 for load in every]
+        tall = tall.with_column(with_unit(name, unit), np.tile(sizes, many))
     if any(branches[i] for i in found):
-        columns["branch"] = Cells.of(load[3] for _ in many for load in every)
+        tall = tall.with_cells("branch", [load[3] for load in every] * many)
     at = {(name, loads[i]): i for i, name in names.items()}
     for name in dict.fromkeys(names.values()):
-        cells = [
-            [*sheet.columns[at[name, load]]] if (name, load) in at else [""] * len(many) for load in every
-        ]
-        columns[name] = Cells.of(cells[k][row] for row, k in product(many, range(len(every))))
-    lines = [n for n in sheet.lines for _ in every]
-    m.sheet = replace(sheet, header=tuple(columns), columns=tuple(columns.values()), lines=lines)
-    texts = ", ".join(f"{name} {size} {unit} {branch}".strip() for name, unit, size, branch in every)
+        there = (at.get((name, load)) for load in every)
+        cells = (repeat("", many) if i is None else sheet.columns[i] for i in there)
+        tall = tall.with_cells(name, chain.from_iterable(zip(*cells, strict=True)))
+    m.sheet = tall
+    texts = ", ".join(f"{name} {size:g} {unit} {branch}".strip() for name, unit, size, branch in every)
     m.said.append(f"columns of several loads are rows, one below the other: {texts}")
 
 
-def _load(match: re.Match[str]) -> tuple[str, str, str]:
-    """Column of a load, its unit and size."""
+def _load(match: re.Match[str]) -> tuple[str, str, float]:
+    """Column of a load, its unit and its size in that."""
     name, unit, way = re.sub(r"[ _]", "", match["name"] or ""), match["unit"], match["way"] or ""
     found = unit_of(unit, "force")
-    size = match["size"].replace("−", "-")
+    size = _number(match["size"])
     if len(name) == 2:
         return name.capitalize(), unit, size
     if way:
-        return f"F{way[-1].lower()}", unit, f"-{size}" if way[0] in "-−" else size
+        return f"F{way[-1].lower()}", unit, -size if way[0] in "-−" else size
     return "Mass" if found and found.mass else "Load", unit, size
+
+
+def _number(text: str) -> float:
+    """With either decimal sign, whatever that of the table is."""
+    return float(text.replace("−", "-").replace(",", "."))
 
 
 def _branch(match: re.Match[str] | None) -> str:
@@ -222,6 +228,6 @@ def _without(load: re.Match[str]) -> str:
 
 
 def _unloaded(header: str) -> str:
-    """A column that is called ``unloaded`` alone is the reading without a load."""
+    """A column that is named by its state alone, as ``unloaded``, is the reading in that state."""
     alone = any(words.fullmatch(split_unit(header)[0].strip()) for words in STATES.values())
     return f"{READING} {header}" if alone else header

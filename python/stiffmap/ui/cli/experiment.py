@@ -99,12 +99,10 @@ def _prompt(text: str) -> str:
 
 
 def _used(column: Column, table: FromTable) -> bool:
-    """Whether another column was made of this one."""
-    name, header = re.escape(column.name), table.sheet.header
-    made = re.compile(rf"([+-]|.* less ){name}.*|{name} (less .*|along [xyz]|in use).*")
-    others = (header[c.index] for c in table.understood.columns if c.meaning != "note")
-    own = (f"'{column.name}'", f"'{header[column.index]}'")
-    return any(map(made.fullmatch, others)) or any(n in r for n in own for r in table.remarks)
+    """Whether the name of another column says that it was made of this one."""
+    name = re.escape(column.name)
+    made = re.compile(rf"([+-]|.* (less|of) ){name}(?!\w).*|{name} (less .*|along [xyz]|in use).*")
+    return any(made.fullmatch(c.name) for c in table.understood.columns if c.meaning != "note")
 
 
 def _told(table: FromTable, words: Sequence[str]) -> Iterator[Any]:

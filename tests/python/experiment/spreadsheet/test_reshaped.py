@@ -147,6 +147,15 @@ def test_poses_in_titles_are_columns(tmp_path: Path, text: str) -> None:
     is_plain(made(tmp_path, text, *NOISE, *LENGTH, machine="orthoglide-revised"))
 
 
+@pytest.mark.parametrize("comma", [False, True])
+def test_titles_may_have_another_decimal_sign_than_the_rows(tmp_path: Path, comma: bool) -> None:
+    titles = [f"X = {x} mm / Y = {y} mm / Z = {z} mm" for x, y, z in POSES]
+    text = blocks("Pose {}", comma=comma)
+    for k, title in enumerate(titles, 1):
+        text = text.replace(f"Pose {k}", title if comma else title.replace(".", ","))
+    is_plain(made(tmp_path, text, *NOISE, machine="orthoglide-revised"))
+
+
 def test_joints_in_titles_are_columns(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     poses = [(10, -90, 80, 5, 40, 0), (20, -80, 70, 10, 45, 30), (-30, -70, 60, 15, 50, 90)]
     titles = ["Config: " + ", ".join(f"J{k} = {v}°" for k, v in enumerate(p, 1)) for p in poses]
