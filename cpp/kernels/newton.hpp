@@ -188,7 +188,7 @@ struct Newton {
       laws.evaluate(secant);
       V m[6][6];
       M active = ~done & ~failed;
-      if (P.serial_joints > 0) {
+      if (P.serial_joints >= 0) {
         serial.play.decides = corners && k == 1 && !turning.turns();
         step_joints();
       } else {
@@ -215,16 +215,16 @@ struct Newton {
       // An arm's axes are answered where this step leads: of the tangent only the loads' share is left behind, with
       // that of springs outside too much.
       const V softest = e.lowest < 1.0 ? e.lowest : splat(1);
-      M near = P.serial_joints > 0 && P.spring_count == 0 ? ~last & (change < nearly * softest) : M{};
+      M near = P.serial_joints >= 0 && P.spring_count == 0 ? ~last & (change < nearly * softest) : M{};
       last |= near;
       M settled = active & whole & (last | ((norm < in.tolerance) & (way.previous < in.tolerance)));
       if (P.hardens && any(settled)) {
         const V bent = laws.hardening_change();
         const M same = (bent < same_slope) | ((norm < small) & (way.previous < small));
-        if (P.serial_joints > 0) near |= ~same & (bent < near_slope);
+        if (P.serial_joints >= 0) near |= ~same & (bent < near_slope);
         settled &= same | near;
       }
-      if (P.serial_joints > 0 && any(settled)) answer_joints(near, m);
+      if (P.serial_joints >= 0 && any(settled)) answer_joints(near, m);
       failed |= settled & ~(e.lowest > pivot_floor);
       const M resting = settled & last, kept = resting & (change < nothing);
       if (any(settled)) take(settled & ~failed, m);
@@ -247,7 +247,7 @@ struct Newton {
         distrusted |= active & ~settled & (way.tries > 2.0) & ~(norm <= 0.5 * way.previous);
       // Free play is the reference's to find: a singular step would leave the gap by chance.
       if (corners && k == 1) distrusted |= active & laws.open_gaps() & ~serial.play.lanes;
-      if (P.serial_joints > 0) distrusted |= active & serial.play.doubtful;
+      if (P.serial_joints >= 0) distrusted |= active & serial.play.doubtful;
       distrusted |= active & ~settled & (way.tries >= most_tries);
       if (searches) {
         // Beyond that the tangent says little of the way: what tightens a cable is of second order.
@@ -282,10 +282,10 @@ struct Newton {
       settle();
     } else {
       put_load(splat(1), splat(1));
-      if (load_moves() && P.serial_joints > 0) take_step();  // what pulls the tip does so where the step leads
+      if (load_moves() && P.serial_joints >= 0) take_step();  // what pulls the tip does so where the step leads
       if (load_moves()) pull();
-      if (P.serial_joints > 0 || any(stepped)) transmit();
-      if (!(load_moves() && P.serial_joints > 0)) take_step();
+      if (P.serial_joints >= 0 || any(stepped)) transmit();
+      if (!(load_moves() && P.serial_joints >= 0)) take_step();
     }
     return done & ~failed;
   }
@@ -295,7 +295,7 @@ struct Newton {
     const bool none = !any(stepped);
     for (int q = 0; q < P.coordinate_count; ++q) s.rest[q] = select(lanes, s.dz[q], none ? splat(0) : s.rest[q]);
     V6 twist = moved;
-    if (P.serial_joints > 0) {
+    if (P.serial_joints >= 0) {
       twist = V6{};
       for (int k = 0; k < P.serial_joints; ++k) {
         const int q = serial.joint[k]->coordinate;
@@ -355,7 +355,7 @@ struct Newton {
   }
 
   /// Whether corners can be crossed by deflections (F19).
-  bool steps_by_deflections() const { return P.bends && P.serial_joints == 0; }
+  bool steps_by_deflections() const { return P.bends && P.serial_joints < 0; }
 
   /// Takes only a share of the last step.
   [[gnu::noinline]] void shorten(V share) {

@@ -194,7 +194,7 @@ struct Program {
   const ArmLeg* arm;             ///< of the only leg, or null
   const double* grid;            ///< closure starts: nodes x row of unknowns of all legs, NaN where unreachable
   std::int32_t op_count, chain_count, error_count, drive_count, coordinate_count, leg_count, unknown_count,
-      spring_count, spin_count, serial_count, serial_joints;  ///< serial_joints 0: no such arm
+      spring_count, spin_count, serial_count, serial_joints;  ///< serial_joints -1: no such arm
   std::int32_t root, legs_op;                                 ///< root chain; the legs' block operation
   std::int32_t joint_slots, stiff_slots, group_slots, stroke_count;
   std::int32_t closes;         ///< 1: leg by leg, 2: all at once (`legs` is then the whole machine)

@@ -234,7 +234,7 @@ struct Serial {
       }
 #pragma GCC unroll 6
       for (int i = 0; i < 6; ++i) {
-        C[i][r] = J[i][0] * g[0];
+        C[i][r] = n > 0 ? J[i][0] * g[0] : splat(0);  // nothing yields
 #pragma GCC unroll 6
         for (int k = 1; k < n; ++k) C[i][r] += J[i][k] * g[k];
       }

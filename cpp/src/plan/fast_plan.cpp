@@ -172,9 +172,10 @@ bool follow_serial(const FastPlanData& d, std::int32_t chain, std::vector<std::i
   return true;
 }
 
-void find_serial(FastPlanData& d) {
+void find_serial(const Mechanism& m, FastPlanData& d) {
   constexpr long most_joints = 12;  // as serial.hpp of the kernels
-  if (!follow_serial(d, d.program.root, d.serial)) return;
+  d.program.serial_joints = -1;
+  if (m.floating || !follow_serial(d, d.program.root, d.serial)) return;
   const auto joints = std::count_if(d.serial.begin(), d.serial.end(), [&](std::int32_t i) {
     return d.ops[static_cast<std::size_t>(i)].kind != OpKind::load;
   });
@@ -186,7 +187,7 @@ void find_serial(FastPlanData& d) {
 
 /// Whether the joints of an arm of joints alone leave some motion of its tip impossible, wherever they are.
 bool is_deficient(const Mechanism& m, const FastPlanData& d) {
-  if (d.program.serial_joints == 0) return false;
+  if (d.program.serial_joints < 0) return false;
   if (d.program.serial_joints < 6) return true;
   std::mt19937 random(1);
   std::uniform_real_distribution<double> turn(-1, 1);
@@ -295,7 +296,7 @@ FastPlan::FastPlan(const Mechanism& m, const Vec3& low, const Vec3& high, int gr
   }
   const CompiledChains chains = compile_chains(m, *data_);
   if (missing_.empty()) missing_ = chains.missing;
-  if (!m.floating) find_serial(*data_);
+  find_serial(m, *data_);
   data_->program.deficient = is_deficient(m, *data_);
   if (data_->program.deficient) data_->program.flag_always |= flag::rigid_direction;
   else if (missing_.empty() && m.floating) missing_ = fill_floating(m, *data_);
