@@ -178,7 +178,7 @@ def _bare(cell: str) -> str:
     return (inside[1] or inside[2] or "").strip() if inside else text
 
 
-def _is_unit(text: str) -> bool:
+def is_unit(text: str) -> bool:
     """Whether it is a unit, also one of several, such as g/N, m/s^2/N or mm/min."""
     more = (*TIMES, *SHORT_TIMES, "Hz", "kHz", "rpm", "tooth", "rev")
     with suppress(StiffmapError):
@@ -189,7 +189,7 @@ def _is_unit(text: str) -> bool:
 def _units(cells: Sequence[str]) -> bool:
     """Whether a line holds nothing but units."""
     filled = [b for c in cells if (b := _bare(c)) not in NO_UNIT and not UNIT_LABEL.fullmatch(c)]
-    named = [c for c in filled if _is_unit(c)]
+    named = [c for c in filled if is_unit(c)]
     return bool(named) and len(named) >= 0.6 * len(filled)
 
 
@@ -201,7 +201,7 @@ def with_unit(name: str, unit: str) -> str:
 def _with_own_unit(name: str, unit: str) -> str:
     bare = _bare(unit)
     none = bare in NO_UNIT or UNIT_LABEL.fullmatch(unit) or split_unit(name)[1]
-    return name if none or not (name or _is_unit(bare)) else with_unit(name, bare)
+    return name if none or not (name or is_unit(bare)) else with_unit(name, bare)
 
 
 def with_labels(names: Sequence[str], lines: Sequence[Sequence[str]]) -> list[str]:
@@ -308,7 +308,7 @@ def split_unit(header: str) -> tuple[str, str]:
 FORCE = "force|kraft|last|load|effort|charge|forza|carico|fuerza|carga"
 MOMENT = "moment|torque|drehmoment|momento|couple"
 DEFLECTION = (
-    "defl|deflection|displ?\\.?|displacement|d[ée]placement|fl[èe]che|verschiebung|verlagerung|verformung|durchbiegung|"
+    "defl|deflection|(directional )?deformation|displ?\\.?|displacement|d[ée]placement|fl[èe]che|verschiebung|verlagerung|verformung|durchbiegung|"
     "spostamento|freccia|desplazamiento|deflexión|flecha"
 )
 OF_SOME = re.compile(f"(?i){DEFLECTION}|{FORCE}|{MOMENT}")
@@ -334,7 +334,7 @@ PATTERNS: tuple[tuple[str, str], ...] = (
     *((f"approach_{a}", rf"(approach|travel|anfahrt|anfahrrichtung|fahrrichtung)[ _.-]?(in |dir(ection)?[ _.-]?)?{a}") for a in "xyz"),
     ("ll", r"l|ll|(measured |gemessene )?(length|länge|laenge)|(draw[ -]?)?wire( ?length)?|(cable|string|ball-?bar|bar) ?length|seil(zug)?(länge)?|distance|abstand"),
     *((f"r{a}", rf"r ?_?{a}|rotation ?_?{a}") for a in "xyz"),
-    *((a, rf"{a}|(.*[./])?(position|point|translation)[./]{a}|target_tcp_pose_{i}|pos\.?[ _-]?{a}|{a}[ _-]?pos\.?|position ?_?{a}|(pose|punkt|messpunkt|tcp|ort|lage|koordinate|coordinate) ?_?{a}|{a}[ _-]?(t|{COMMANDED})|({COMMANDED})[ _-]?{a}") for i, a in enumerate("xyz")),
+    *((a, rf"{a}|(.*[./])?(position|point|translation)[./]{a}|target_tcp_pose_{i}|(pos\.?|location|coord(inate)?)[ _-]?{a}|{a}[ _-]?(pos\.?|location|coord(inate)?)|position ?_?{a}|(pose|punkt|messpunkt|tcp|ort|lage|koordinate|coordinate) ?_?{a}|{a}[ _-]?(t|{COMMANDED})|({COMMANDED})[ _-]?{a}") for i, a in enumerate("xyz")),
 )  # fmt: skip
 
 

@@ -24,18 +24,22 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError, StiffmapError, frames_of_this_package, suggestion
 from stiffmap.common.number_text import read_value
 from stiffmap.common.short import first_of
-from stiffmap.common.tables.header import IN_SI, meaning_of, split_unit, stated_unit
+from stiffmap.common.tables.header import IN_SI, meaning_of, split_unit, stated_unit, with_unit
 from stiffmap.common.tables.lines import Spelling, is_finite
 from stiffmap.common.tables.orientation import VECTOR, matrices_of, no_vector, orientation_of, spread
 from stiffmap.common.tables.sheet import read_sheet
 from stiffmap.common.tables.table import Table
 from stiffmap.common.tables.table_file import layout_of, table_file, with_names, with_units
+from stiffmap.common.tables.titles import said_in, with_said
 from stiffmap.common.units import FREQUENCIES, QUANTITIES, SHORT_TIMES, feed_unit, unit_of
 
 SPELLED = {"s": SHORT_TIMES, "percent": {"%": 1.0, "-": 100.0, "1": 100.0}}
 """SI unit -> others that tables of such columns have."""
 PER = re.compile(r"_(?:per_)?(min|s|tooth|rev)$")
-COUNTER = re.compile(r"(?i)column \d+|unnamed: ?\d+|index|idx|line|sample|frame|record|pose|serial( no)?")
+COUNTER = re.compile(
+    r"(?i)column \d+|unnamed: ?\d+|(index|idx|line|sample|frame|record|pose|serial|n|test|run|cut|trial|exp(eriment)?|versuch|measurement)"
+    r"( ?(no|nr|number|id))?\.?"
+)
 """Names of columns that may number the rows, or groups of them; programs leave out the name, or write ``Unnamed: 0``."""
 ASIDE = re.compile(
     r"(?i)time ?stamp|date|mac|mpc|coh(erence)?|(actual|target)_(q|qd|qdd|current|moment|tcp_\w+)_\d|(joint|q|j)[ _]?[1-9]|"
@@ -54,7 +58,8 @@ class Known:
     """Name -> SI unit; empty for a plain number, `WORD` for text."""
     usual: Mapping[str, str]
     """Name -> how a table usually writes it."""
-    aliases: Mapping[str, str]
+    spelled: Mapping[str, str]
+    """Name -> regular expression of other spellings, blanks as underscores."""
     renamed: Callable[[str, str], tuple[str, str]] = lambda name, unit: (name, unit)
     """Name and unit of a column whose unit decides what it is."""
     assumed: Mapping[str, str] | None = None
@@ -63,10 +68,23 @@ class Known:
     """Whether cells may be empty, which are NaN then."""
     options: bool = True
     """Whether the command has --map, --unit, --header and --table."""
+    aside: str = ""
+    """Regular expression of names that are left out with a word: what such tables have next to what is read."""
+    titled: Collection[str] = ()
+    """Names that a title above rows may say of them."""
+    stacked: Collection[str] = ()
+    """Names that may stand side by side with numbers behind them, ``f1``, ``f2``, of which each is a row."""
+
+    def named(self, name: str) -> str:
+        """The name of a column by one of its spellings; the name itself where it is none."""
+        joined = _joined(name)
+        if joined in self.units:
+            return joined
+        return next((n for n, other in self.spelled.items() if re.fullmatch(other, joined)), joined)
 
     def has(self, name: str) -> bool:
         """Whether a table may have a column of this name, without its unit."""
-        return _joined(name) in {*self.units, *self.aliases}
+        return self.named(name) in self.units
 
 
 @dataclass(eq=False)
@@ -115,7 +133,9 @@ def _sheet(place: str | PathLike[str], known: Known, *, repeated: bool = False) 
     file = table_file(place)
     names = ", ".join(known.usual.get(n, n) for n in known.units)
     layout = layout_of(file, known.has, strict=True, repeated=repeated, names=names, options=known.options)
-    table = read_sheet(Path(file), file.sheet, layout)
+    table = _titled(read_sheet(Path(file), file.sheet, layout), known, file.columns)
+    replace(table, aside=()).refuse_remarks()
+    table = _stacked(table, known) if known.stacked else table
 
     def meaning(header: str) -> tuple[str, str, str]:
         name, unit = _name_of(header, known)
@@ -124,6 +144,52 @@ def _sheet(place: str | PathLike[str], known: Known, *, repeated: bool = False) 
     if {*"xyz"} <= {*known.units} and not {*"xyz"} & {meaning(h)[0] for h in table.header}:
         table = spread(table)
     return with_units(file, with_names(file, table, lambda h: meaning(h)[0]), meaning)
+
+
+def _titled(table: Table, known: Known, chosen: Collection[str]) -> Table:
+    """With columns of what titles say that the table has no column of, in a unit of that quantity."""
+    has = {_name_of(h, known)[0] for h in table.header} | {*chosen}
+    said = said_in(table, lambda n: known.has(n) or known.has(known.renamed(n, "")[0]), lambda _: False)
+    names = {key: _name_of(with_unit(*key), known) for key in said}
+    good = {
+        key: said[key]
+        for key, (name, unit) in names.items()
+        if name in known.titled and name not in has and _has_dimension(unit, known.units[name])
+    }
+    table, words = with_said(table, good, lambda *_: True, lambda n: _name_of(n, known)[0] in "xyz")
+    if words:
+        warnings.warn(f"{table.file}: {'; '.join(words)}", stacklevel=frames_of_this_package())
+    return table
+
+
+def _has_dimension(unit: str, si: str) -> bool:
+    try:
+        return not unit if si == "" else si != WORD and bool(unit) and size_in(unit, si) > 0
+    except StiffmapError:
+        return False
+
+
+def _stacked(table: Table, known: Known) -> Table:
+    """``f1``, ``f2``, ``D1``, ``D2`` as two rows of ``f`` and ``D``, but not where a name without a number stands next to them."""
+    found: dict[str, dict[int, int]] = {}
+    for i, name in enumerate(table.names):
+        if match := re.fullmatch(r"(.*?)[ _]*(\d{1,2})", name):
+            base = with_unit(match[1], table.unit(i))
+            if _name_of(base, known)[0] in known.stacked:
+                found.setdefault(base, {})[int(match[2])] = i
+    every = sorted({k for of in found.values() for k in of})
+    if len(every) < 2 or any(base in table.header for base in found):
+        return table
+    taken = {i for of in found.values() for i in of.values()}
+    kept = [i for i in range(len(table.header)) if i not in taken]
+    tall = replace(
+        table, header=tuple(table.header[i] for i in kept), columns=tuple(table.columns[i] for i in kept)
+    )
+    tall = tall.repeated(len(every))
+    for base, of in found.items():
+        cells = (table.columns[of[k]] if k in of else [""] * len(table) for k in every)
+        tall = tall.with_cells(base, (c for row in zip(*cells, strict=True) for c in row))
+    return tall
 
 
 def sets_of(path: Path, known: Known, shared: str) -> list[NamedTable]:
@@ -145,12 +211,14 @@ def named(
 ) -> NamedTable:
     """Columns of a sheet, but some, by their known names; raises FileError, also for a second one of a name where there is no `again`,
     which takes them."""
-    out, left = NamedTable(sheet.file, list(sheet.lines), sheet.top, {}, {}, {}, {}), []
+    out, left = NamedTable(sheet.file, list(sheet.lines), sheet.top, {}, {}, {}, {}), [*sheet.aside]
     for i, (head, text) in enumerate(zip(sheet.header, sheet.names, strict=True)):
         meant = meaning_of(text)
         if i in besides or (not known.has(head) and (meant == "id" or _counts(sheet, i))):
             continue
-        said = ASIDE.fullmatch(text) and meant not in known.units
+        said = meant not in known.units and ASIDE.fullmatch(text) is not None
+        if known.aside and _name_of(head, known)[0] not in known.units:
+            said = said or re.fullmatch(known.aside, _joined(text)) is not None
         if not known.has(text) and (said or meant == "temperature") and sheet.is_numeric(i):
             left.append(head)
             continue
@@ -171,10 +239,10 @@ def named(
 
 
 def _counts(sheet: Table, column: int) -> bool:
-    """Whether a column numbers the rows, or groups of them."""
-    if not COUNTER.fullmatch(sheet.names[column]) or not sheet.is_numeric(column):
+    """Whether a column numbers the rows, or groups of them, or gives them names."""
+    if not COUNTER.fullmatch(sheet.names[column]):
         return False
-    return bool(np.isin(np.diff(sheet.numbers(column)), (0.0, 1.0)).all())
+    return not sheet.is_numeric(column) or bool(np.isin(np.diff(sheet.numbers(column)), (0.0, 1.0)).all())
 
 
 def _joined(name: str) -> str:
@@ -193,7 +261,8 @@ def _name_of(head: str, known: Known) -> tuple[str, str]:
             name, unit = whole[: cuts[-1]].lower(), PER.sub(r"/\1", whole[cuts[-1] + 1 :])
             unit = {"N_m": "N*m"}.get(unit, unit)
     name, unit = known.renamed(name, unit)
-    name = known.aliases.get(name, name)
+    meant = meant or meaning_of(name.replace("_", " "))
+    name = known.named(name)
     return meant if name not in known.units and meant in known.units else name, unit
 
 
@@ -252,8 +321,10 @@ COLUMNS = {
 }  # fmt: skip
 """Name of a column of poses -> SI unit."""
 USUAL = {"m": "mm", "m/s": "mm/min", "rad": "deg"}
-ALIASES = {"time": "t"} | {f"rot{a}": f"r{a}" for a in "xyz"}
-KNOWN = Known(COLUMNS, {n: f"{n} [{USUAL.get(si, si)}]" for n, si in COLUMNS.items()}, ALIASES)
+SPELLED_POSES = {"t": "time"} | {f"r{a}": f"rot{a}" for a in "xyz"}
+KNOWN = Known(
+    COLUMNS, {n: f"{n} [{USUAL.get(si, si)}]" for n, si in COLUMNS.items()}, SPELLED_POSES, titled="xyz"
+)
 
 
 @dataclass(eq=False)

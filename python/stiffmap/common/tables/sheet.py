@@ -76,7 +76,7 @@ class Layout:
     table: int | None = None
     """Which of several tables on a sheet, from 1."""
     strict: bool = False
-    """Whether all below the header are rows of numbers, with a cell for each column."""
+    """Whether all below the header are rows of numbers, with a cell for each column, and titles (`Table.refuse_remarks`)."""
     repeated: bool = False
     """Whether names may come again, as those of displacements do once per load case."""
     names: str = ""
@@ -117,8 +117,8 @@ def _read(path: Path, sheet: str | None, layout: Layout) -> Table:
         if begun:
             break
     behind = begun[-1][1][len(_checked(found[1], str(path), found[0])) if found else 0 :] if begun else []
-    named = layout.strict or layout.header or layout.numbered
-    lost = any(is_finite(c, spelling) for c in behind) or (found and not _knows(found[1][1:], layout))
+    named = layout.header or layout.numbered or (layout.strict and found)
+    lost = found is None or any(is_finite(c, spelling) for c in behind) or not _knows(found[1][1:], layout)
     turned = _turned(kept(lines()), spelling, layout) if lost and not named else []
     if turned:
         rows, above, begun, found = _begun(lambda: turned, spelling, layout, str(path))
@@ -137,7 +137,7 @@ def _read(path: Path, sheet: str | None, layout: Layout) -> Table:
     number_, header = found
     aside = [f"row {n}, of numbers above the header" for n, _ in begun[:-1] if not layout.strict]
     titles = [*above]
-    every = blocks(chain([first], kept(rows, None if layout.strict else titles)))
+    every = blocks(chain([first], kept(rows, titles)))
     opening = next(every)
     labels = _labels(opening, header, layout, spelling.comma)
     if labels:
@@ -168,8 +168,6 @@ def _read(path: Path, sheet: str | None, layout: Layout) -> Table:
     found_ = Table(
         file, tuple(names), tuple(columns), lines_, number_, comma, record, top, tuple(aside), tuple(titles)
     )
-    if layout.strict and (left := found_.left_out):
-        raise FileError(f"expected rows of numbers alone below the header; {left[0]}", file=file)
     _refuse_many_times(found_)
     return found_
 

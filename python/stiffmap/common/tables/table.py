@@ -18,7 +18,7 @@ from stiffmap.common.outputs import unguarded
 from stiffmap.common.short import first_of
 from stiffmap.common.tables.cells import Cells
 from stiffmap.common.tables.header import split_unit
-from stiffmap.common.tables.lines import Spelling, number, with_points
+from stiffmap.common.tables.lines import COMMENTS, Spelling, number, with_points
 
 T = TypeVar("T")
 
@@ -97,6 +97,16 @@ class Table:
         """The table and one column of numbers (rows,) more, empty where they are NaN."""
         cells = ["" if v != v else repr(v) for v in np.asarray(values, dtype=float).tolist()]
         return self.with_cells(name, (c.replace(".", ",") for c in cells) if self.decimal_comma else cells)
+
+    def refuse_remarks(self) -> None:
+        """FileError where something between the rows is in none of the columns, no comment and not the header again."""
+        comments = [n for n, cells in self.titles if cells[0].lstrip().startswith(COMMENTS)]
+        if left := self.without_titles([*comments, *self.headers_again]).left_out:
+            raise FileError(f"expected rows of numbers alone below the header; {left[0]}", file=self.file)
+
+    def without_titles(self, lines: Collection[int]) -> Table:
+        """The table without the titles in these lines, which have become columns."""
+        return replace(self, titles=tuple(t for t in self.titles if t[0] not in lines))
 
     def repeated(self, times: int) -> Table:
         """Every row so often, one below the other."""

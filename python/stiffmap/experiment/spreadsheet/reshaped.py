@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
 from dataclasses import replace
 from itertools import chain, repeat
 
@@ -12,8 +11,9 @@ import numpy as np
 from stiffmap.common.tables.cells import Cells
 from stiffmap.common.tables.header import split_unit, with_unit
 from stiffmap.common.tables.table import Table
+from stiffmap.common.tables.titles import Said, as_number, said_in, texts_of, with_said
 from stiffmap.common.units import unit_of
-from stiffmap.experiment.experiment import WRENCH, Mask
+from stiffmap.experiment.experiment import WRENCH
 from stiffmap.experiment.files.fields import POSE
 from stiffmap.experiment.spreadsheet.answers import Meant
 from stiffmap.experiment.spreadsheet.guess import guessed
@@ -29,12 +29,6 @@ OF_LOAD = re.compile(
 """A load in the name of a column: ``dz @ 50 N``, ``Fz = -100 N dx [mm]``, ``10 kg``, ``100 N along -Z``."""
 BRANCH = re.compile(r"(?i)[\s_(,;]*\b(?P<un>un|ent)?(loading|lasten|lastung|belasten|belastung)\b\)?")
 """In the name of a column, whether the load went up or down."""
-STATED = re.compile(
-    r"(?<![\w.])(?P<name>[^\W\d][\w ./-]*?)\s*(?:[\[(](?P<in>[^\])]+)[\])])?\s*[=:]\s*"
-    r"(?:(?P<size>[+−-]?\d+(?:[.,]\d+)?)(?:\s*(?P<unit>[^\W\d][^\s,;)=:]*|°)(?=[\s,;)]|$)(?!\s*[=:]))?|(?P<way>[+−-]?[xyz])(?=\s*(?:[,;)]|$)))",
-    re.IGNORECASE,
-)
-"""A number or an axis in a title: ``X = 50 mm``, ``Fz: -100 N``, ``Load direction: +x``."""
 MOST_WORDS = 5
 """Of a title that says that nothing was loaded."""
 READING = "reading"
@@ -96,17 +90,10 @@ def titled(m: Meant) -> None:
     """Poses and loads that stand in a title above the rows that they are of, ``Pose 3: X = 50 mm, Y = 0 mm``, as columns; of what the
     table has no column for, and no number that is the same in all rows."""
     has = {guessed(n) for n in m.sheet.names} - {"note"} | {*m.constants, *m.chosen}
-    found: dict[tuple[str, str], dict[int, float | str]] = {}
-    loads: dict[tuple[str, str], dict[int, float | str]] = {}
+    found = said_in(m.sheet, _of_row, DIRECTION.fullmatch)
+    loads: Said = {}
     idle: list[int] = []
-    for line, cells in m.sheet.titles:
-        text = _plain(c for c in cells if not any(c.strip() in h for h in m.sheet.header))
-        for match in STATED.finditer(text):
-            name = match["name"] if _of_row(match["name"]) else match["name"].split()[-1]
-            text_of = match["way" if DIRECTION.fullmatch(name) else "size"]
-            if text_of and _of_row(name):
-                key = name, match["unit"] or match["in"] or ""
-                found.setdefault(key, {})[line] = text_of if match["way"] else _number(text_of)
+    for line, text in texts_of(m.sheet):
         if load := OF_LOAD.search(text):
             name, unit, size = _load(load)
             loads.setdefault((name, unit), {})[line] = size
@@ -116,44 +103,17 @@ def titled(m: Meant) -> None:
         of |= dict.fromkeys(idle, 0.0)
         if len(of) > 1:
             found[key] = dict(sorted((found.get(key, {}) | of).items()))
-    new: dict[str, Mask] = {}
-    used: set[int] = set()
-    for (name, unit), of in found.items():
-        at = np.searchsorted([*of], m.sheet.lines) - 1
-        sure = len(of) > 1 or guessed(name) in (*POSE, *WRENCH)
-        if sure and at.min() >= 0 and guessed(name) not in has and name not in m.sheet.names:
-            header, where = with_unit(name, unit), "titles between" if len(of) > 1 else "title above"
-            cells = [[*of.values()][k] for k in at]
-            words = DIRECTION.fullmatch(name)
-            m.sheet = m.sheet.with_cells(header, cells) if words else m.sheet.with_column(header, cells)
-            m.said.append(f"'{header}' stands in the {where} the rows")
-            new[header], used = np.diff(at, prepend=-1) > 0, used | {*of}
-    if new:
-        _all_titled(m.sheet, new)
-        m.sheet = replace(m.sheet, titles=tuple(t for t in m.sheet.titles if t[0] not in used))
 
+    def sure(name: str, several: bool) -> bool:
+        return (several or guessed(name) in (*POSE, *WRENCH)) and guessed(name) not in has
 
-def _all_titled(sheet: Table, new: dict[str, Mask]) -> None:
-    """FileError where a title lacks what the others say: rows would have the pose of those above them. `new`: rows of which a title
-    says it anew."""
-    begins = np.diff(np.searchsorted(sheet.headers_again, sheet.lines), prepend=0) > 0
-    titled_anew = np.any([*new.values()], axis=0)
-    poses = [h for h in new if guessed(n := split_unit(h)[0]) in POSE or JOINT.fullmatch(n)]
-    placed_anew = np.any([new[h] for h in poses], axis=0)
-    for header, own in new.items():
-        good = (titled_anew | ~begins) & (own | ~placed_anew if header in poses else True)
-        sheet.check(good, lambda _: f"no title above this row says '{header}', as those of other rows do")  # noqa: B023
+    m.sheet, words = with_said(m.sheet, found, sure, lambda n: guessed(n) in POSE or JOINT.fullmatch(n))
+    m.said += words
 
 
 def _of_row(name: str) -> bool:
     """Whether a title says with this name where the rows below it were read, or under which load."""
     return guessed(name) in (*POSE, *WRENCH) or any(p.fullmatch(name) for p in (JOINT, LOAD, DIRECTION))
-
-
-def _plain(cells: Iterable[str]) -> str:
-    """A title as one text, also where its cells are names and numbers."""
-    text = " ; ".join(c.strip() for c in cells if c.strip())
-    return re.sub(r"([=:]) ; ", r"\1 ", text)
 
 
 def one_load_a_row(m: Meant) -> None:
@@ -203,17 +163,12 @@ def _load(match: re.Match[str]) -> tuple[str, str, float]:
     """Column of a load, its unit and its size in that."""
     name, unit, way = re.sub(r"[ _]", "", match["name"] or ""), match["unit"], match["way"] or ""
     found = unit_of(unit, "force")
-    size = _number(match["size"])
+    size = as_number(match["size"])
     if len(name) == 2:
         return name.capitalize(), unit, size
     if way:
         return f"F{way[-1].lower()}", unit, -size if way[0] in "-−" else size
     return "Mass" if found and found.mass else "Load", unit, size
-
-
-def _number(text: str) -> float:
-    """With either decimal sign, whatever that of the table is."""
-    return float(text.replace("−", "-").replace(",", "."))
 
 
 def _branch(match: re.Match[str] | None) -> str:

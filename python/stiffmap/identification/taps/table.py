@@ -20,21 +20,30 @@ from stiffmap.workspace.vibration.extraction import extract_modes
 from stiffmap.workspace.vibration.files import MeasuredResponse, read_responses
 
 POSE, WAY = ("x", "y", "z"), ("dir_x", "dir_y", "dir_z")
-ABOVE_ZERO = ("frequency", "u", "u_damping", "u_dir", "q")
+ABOVE_ZERO = ("frequency", "u", "u_damping", "u_dir", "q", "loss")
 NUMBERS = (*POSE, *ABOVE_ZERO, "damping", *WAY)
 UNITS = {
-    **dict.fromkeys(POSE, "m"), "frequency": "Hz", "u": "Hz", "u_damping": "percent", "u_dir": "", "damping": "percent", "q": "",
+    **dict.fromkeys(POSE, "m"), "frequency": "Hz", "u": "Hz", "u_damping": "percent", "u_dir": "", "damping": "percent", "q": "", "loss": "",
     **dict.fromkeys(WAY, ""), **dict.fromkeys(("response", "along", "hammer", "mode"), WORD),
 }  # fmt: skip
 USUAL = {n: f"{n}_{ {'m': 'mm'}.get(u, u) }" for n, u in UNITS.items() if u not in ("", WORD)}
-ALIASES = {
-    **dict.fromkeys(("f", "fn", "f_n", "freq", "natural_frequency", "eigenfrequency", "frequenz", "eigenfrequenz", "omega", "ω"), "frequency"),
-    **dict.fromkeys(("zeta", "ζ", "damp", "damping_ratio", "dämpfung", "dämpfungsgrad", "lehr"), "damping"),
-    **dict.fromkeys(("q_factor", "quality_factor", "gütefaktor", "güte"), "q"),
-    **dict.fromkeys(("mode_no", "mode_no.", "mode_number", "mode_nr"), "mode"),
-    **{f"{shape}_{a}": f"dir_{a}" for a in "xyz" for shape in ("mode_shape", "shape", "phi", "direction")},
+SPELLED = {
+    "frequency": "f_?n?|freq\\.?|(natural|resonan(ce|t)|modal|damped|undamped)_freq(uency)?|resonance|eigenfrequency|(eigen|resonanz)?frequenz|omega|ω",
+    "damping": "ζ|zeta|d|damp|(modal_)?damping(_ratio)?|dämpfung(sgrad)?|lehr", "loss": "loss_factor|eta|η|verlustfaktor",
+    "q": "(q|quality)_factor|güte(faktor)?", "mode": r"mode_(no\.?|number|nr)",
+    "u": r"(u|σ|sigma|std\.?_?(dev\.?)?|uncertainty)(_(f|freq|frequency))?", "u_damping": "(u|σ|sigma|std)_(d|damping|zeta)",
+    **{f"dir_{a}": f"(mode_shape|shape|phi|direction)_{a}" for a in "xyz"},
 }  # fmt: skip
-KNOWN = Known(UNITS, USUAL, ALIASES, blank=True)
+ASIDE = r"modal_(mass|stiffness|damping_coefficient)|(modal)?_?(phase_)?(collinearity|complexity)|residue|amplitude"
+KNOWN = Known(
+    UNITS,
+    USUAL,
+    SPELLED,
+    blank=True,
+    aside=ASIDE,
+    titled="xyz",
+    stacked={"frequency", "damping", "loss", "q", "u"},
+)
 SHARE = 0.01
 """Standard uncertainty of a frequency where none is given, relative."""
 DAMPING_SHARE = 0.2
@@ -119,9 +128,13 @@ def load_taps(path: str | PathLike[str], machine: Machine | Source | None = None
         )
     for name in ABOVE_ZERO:
         t.check(name, lambda v: v > 0, "a number above zero")
-    if "q" in t.values and "damping" in t.values:
-        t.fail(f"expected the damping once, found it as '{t.header['damping']}' as well", "q")
-    t.values |= {"damping": 50 / t.values["q"]} if "q" in t.values else {}
+    given = [n for n in ("q", "loss", "damping") if n in t.values]
+    if len(given) > 1:
+        t.fail(f"expected the damping once, found it as '{t.header[given[1]]}' as well", given[0])
+    if "q" in given:
+        t.values["damping"] = 50 / t.values["q"]
+    elif "loss" in given:
+        t.values["damping"] = 50 * t.values["loss"]
     # in %, where all are below they may as well be ratios
     least = 0.1 if t.size.get("damping", 1.0) == 1 else 0.0
     expected = "from 0 to below 100 %, and not all below 0.1 (a ratio of 0.02 is 2 %)"

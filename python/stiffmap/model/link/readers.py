@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from stiffmap.common.errors import FileError, StiffmapError, needed, refuse_folder
 from stiffmap.common.number_text import number_in
+from stiffmap.common.tables.header import meaning_of, split_unit, with_unit
 from stiffmap.common.tables.named import Known, named
 from stiffmap.common.tables.sheet import Layout, read_sheet
 from stiffmap.common.tables.table import Table
@@ -28,6 +29,8 @@ _HEAD = re.compile(
 """Above rows of nodes, with the names of their columns: CalculiX, Abaqus and Ansys, Nastran; its punch files have none."""
 _MOVED = re.compile(r"(?i)(?:U[.-])?(?:[UD]([XYZ])|[UT]([123])(?!\d))")
 _CASE = re.compile(rf"{_MOVED.pattern}(?:[ _]?(?:lc|case)?[ _]?(\d+))?(?![^\W_])")
+_BLOCK = re.compile(r"(?i)\W*(?:load[ _]?case|sub[ _]?case|case|lc|load step|step|lastfall)\W*(\d+)\b")
+_WITH_UNITS = re.compile(r"(?im)^\W*(?:node|knoten)\b.*[\[(] ?(?:mm|cm|m|in|inch|[uµμ]m) ?[\])]")
 _WORDS = re.compile(r"(?m)^(?:\s*[A-Za-z*$]|[01] {3,}[A-Z]{2})")  # a page of Nastran begins with 0 or 1
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[Ee][-+]?\d+)?")
 _FORTRAN = re.compile(r"(?<=[\d.])(?:[Dd](?=[-+\d])|(?=[-+]\d+(?![\d.])))")
@@ -76,6 +79,25 @@ def cases_rise(table: Table, names: str, repeated: bool = False) -> None:
         table.check(~falls, lambda i: f"'{table.header[at]}': expected cases in the order of the field")
 
 
+def _without_case_titles(sheet: Table) -> Table:
+    """Without lines that number load cases, one block below the other; FileError where they do not rise."""
+    texts = {n: " ".join(filter(None, map(str.strip, cells))) for n, cells in sheet.titles}
+    found = {n: m for n, text in texts.items() if (m := _BLOCK.match(text))}
+    if wrong := [
+        n
+        for n, fall in zip(found, np.diff([int(m[1]) for m in found.values()], prepend=0) <= 0, strict=True)
+        if fall
+    ]:
+        raise FileError("expected load cases in rising order", file=sheet.file, line=wrong[0])
+    return sheet.without_titles(found)
+
+
+def _axis_of(name: str, axes: Collection[str]) -> str:
+    """``ux`` of ``Deformation X`` and the like, where that is one of the axes; else the name."""
+    meant = re.sub("^d(?=[xyz]$)", "u", meaning_of(name))
+    return meant if meant in axes and name.lower() not in axes else name
+
+
 def known_columns(
     path: str | Path, units: Mapping[str, tuple[str, str]], unit: str | None = None
 ) -> tuple[Table, dict[str, list[Floats]]]:
@@ -86,8 +108,11 @@ def known_columns(
         raise FileError("no such file", file=str(path))
     layout = Layout(lambda name: name.lower() in units, strict=True, repeated=True, options=False)
     sheet = read_sheet(Path(path), None, layout)
+    _without_case_titles(sheet).refuse_remarks()
     cases = [_CASE.match(h) for h in sheet.header]
     names = [f"u{m[1] or 'xyz'[int(m[2]) - 1]}{h[m.end() :]}" if m else h for m, h in zip(cases, sheet.header, strict=True)]  # fmt: skip
+    names = [re.sub(r"(?i)^COORD[-.]COOR([123])", lambda m: "xyz"[int(m[1]) - 1], n) for n in names]
+    names = [with_unit(_axis_of(split_unit(n)[0], units), split_unit(n)[1]) for n in names]
     names = [re.sub(r"(?i)^(node|knoten)[ _]?(label|number|id|n[or]\.?|nummer)?$", "node", n) for n in names]
     names = [re.sub(r"(?i)^(u?[xyz])_m$", r"\1 [m]", n) for n in names]  # x as measured is no column here
     order = sorted(range(len(names)), key=lambda i: int(m[3] or 0) if (m := cases[i]) else 0)
@@ -196,7 +221,7 @@ def read_field(
         StiffmapError: unknown suffix, unit missing, coordinates missing, no displacements.
     """
     suffix = Path(path).suffix.lower()
-    if suffix == ".csv":
+    if suffix == ".csv" or (suffix == ".txt" and _WITH_UNITS.search(text_of(Path(path)))):
         return read_csv_field(path, unit)
     if suffix not in FIELDS:
         raise StiffmapError(f"{path}: expected {', '.join(FIELDS)}, got {suffix!r}")

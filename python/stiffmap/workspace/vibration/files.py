@@ -30,11 +30,10 @@ COLUMNS = Known(
     {**dict.fromkeys(("frequency", "real", "imag", "magnitude", "coherence"), ""), "phase": "rad", "response": WORD},
     {"frequency": "frequency_Hz", **{n: f"{n}_m/N" for n in ("real", "imag", "magnitude")}, "phase": "phase_deg"},
     {
-        **dict.fromkeys(("freq", "freq.", "f", "hz", "frequenz", "linear", "n", "drehzahl", "speed", "rotational_speed", "omega", "ω", "kreisfrequenz", "angular_frequency"), "frequency"), **dict.fromkeys(("coh", "kohärenz"), "coherence"),
-        **dict.fromkeys(("phase_angle", "arg_h", "phi", "φ"), "phase"), **dict.fromkeys(("h", "frf", "h1", "h2", "h(f)", "complex"), "response"),
-        **dict.fromkeys(("re", "real_part", "realteil"), "real"),
-        **dict.fromkeys(("im", "imaginary", "imaginary_part", "imag_part", "imaginärteil", "imaginär"), "imag"),
-        **dict.fromkeys(("mag", "amplitude", "betrag", "gain", *MEANT), "magnitude"),
+        "frequency": r"f|freq\.?|hz|frequenz|linear|n|drehzahl|(rotational_)?speed|omega|ω|kreisfrequenz|angular_frequency",
+        "coherence": "coh|kohärenz", "phase": "phase_angle|arg_h|phi|φ", "response": r"h[12]?|frf|h\(f\)|complex",
+        "real": "re|real_part|realteil", "imag": "im|imaginary(_part)?|imag_part|imaginär(teil)?",
+        "magnitude": "|".join(["mag|amplitude|betrag|gain", *MEANT]),
     },
     lambda name, unit: _meant(name, unit),
     options=False,
@@ -59,7 +58,7 @@ def _meant(name: str, unit: str) -> tuple[str, str]:
         return "imag" if any((response_unit(unit) or ())[1:]) else "phase", unit
     name, unit = (name[:-3], f"dB {unit}") if name.endswith("_db") else (name, unit)
     ends = (name[m.end() :] for m in re.finditer("^|[_/]", name))
-    return next((e for e in ends if e in COLUMNS.units or e in COLUMNS.aliases), name), unit
+    return next((e for e in ends if COLUMNS.has(e)), name), unit
 
 
 EXAMPLES = "m/N, mm/N, um/N, m/s/N, m/s2/N, g/N and the like, N/m, N/um"

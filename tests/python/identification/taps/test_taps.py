@@ -107,6 +107,38 @@ def test_a_quality_factor_is_a_damping_and_a_mac_says_nothing(tmp_path):
         np.testing.assert_allclose(load_taps(path).ratio, [1 / 32, 1 / 40])
 
 
+MODES = {(1500, 0, 1200): [(9.1, 2.1), (11.2, 1.8)], (1800, 300, 1000): [(8.9, 2.0), (10.9, 1.9)]}
+ROWS = [(*p, f, d) for p, modes in MODES.items() for f, d in modes]
+TABLES = {
+    "titles": "\n".join(
+        f"Pose {k}: X = {p[0]} mm, Y = {p[1]} mm, Z = {p[2]} mm\nMode,Frequency [Hz],Damping [%]\n"
+        + "".join(f"{j},{f},{d}\n" for j, (f, d) in enumerate(modes, 1))
+        for k, (p, modes) in enumerate(MODES.items(), 1)
+    ),
+    "side by side": "Pose;X [mm];Y [mm];Z [mm];f1 [Hz];f2 [Hz];D1 [%];D2 [%]\n"
+    + "".join(f"P1;{p[0]};{p[1]};{p[2]};{a};{b};{c};{d}\n" for p, ((a, c), (b, d)) in MODES.items()),
+    "loss factor": "x_mm,y_mm,z_mm,omega (rad/s),loss factor\n"
+    + "".join(f"{x},{y},{z},{2 * np.pi * f!r},{d / 50!r}\n" for x, y, z, f, d in ROWS),
+    "words": "TCP X,TCP Y,TCP Z,Resonance,Modal damping,Modal mass,Remarks\nmm,mm,mm,Hz,%,kg,\n"
+    + "".join(f"{x},{y},{z},{f},{d},100,ok\n" for x, y, z, f, d in ROWS),
+}
+
+
+@pytest.mark.filterwarnings("ignore:.*(stands in the titles|Modal mass)")
+@pytest.mark.parametrize("text", TABLES.values(), ids=TABLES)
+def test_tables_as_modal_programs_write_them(tmp_path, text):
+    (tmp_path / "taps.csv").write_text(text)
+    found = load_taps(tmp_path / "taps.csv")
+    rows = np.column_stack([1e3 * found.position, found.frequency, 1e2 * found.ratio])
+    np.testing.assert_allclose(rows, ROWS, rtol=1e-12)
+
+
+def test_a_title_that_lacks_a_coordinate_is_refused(tmp_path):
+    (tmp_path / "taps.csv").write_text(TABLES["titles"].replace(", Y = 300 mm", ""))
+    with pytest.raises(sm.StiffmapError, match=r"line 8: no title above this row says 'Y \[mm\]'"):
+        load_taps(tmp_path / "taps.csv")
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [

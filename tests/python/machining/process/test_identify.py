@@ -227,7 +227,7 @@ BAD = [
     ({"Fx_N": [1, 2, 3, 4, float("nan")]}, "finite"),
     ({"axial_mm": 0}, "axial_mm: expected a number above zero"),
     ({"side": "climb"}, "radial_mm"),
-    ({"side": "up"}, "expected one of climb"),
+    ({"side": "across"}, "expected one of climb"),
     ({"teeth": 2.5}, "whole number"),
     ({"time_s": [1, 2, 3, 4, 5]}, "spindle_rpm"),
     *((dict.fromkeys(("Fx_N", "Fy_N", "Fz_N"), 0.0) | more, "expected forces, found 0 N in every row") for more in ({}, {"diameter_mm": 25})),

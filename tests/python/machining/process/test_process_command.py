@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bench.force_laws import FEEDS, coverage, mean, noisy, runout_coverage, table
+from bench.force_laws import FEEDS, MILL, coverage, mean, noisy, runout_coverage, table
 from tests.python.project.docs.reader_files import FORCES, force_signals
 
 import stiffmap as sm
@@ -167,6 +167,74 @@ def test_one_table_written_in_many_ways(text: str, tmp_path: Path) -> None:
     found = sm.identify_process(tmp_path / "other.csv", base).coefficients
     for n, v in measured_coefficients().items():
         assert found[n] == pytest.approx(v, rel=1e-9)
+
+
+def cuts(line: str, side: str = "slot") -> str:
+    """A line for each feed: c the feed per tooth in mm, x, y, z the means in N."""
+    each = ((c, *mean("straight", side, c)) for c in FEEDS)
+    return "".join(line.format(c=c, v=c * 2 * 6000, x=x, y=y, z=z) + "\n" for c, x, y, z in each)
+
+
+MEANS = "Feed per tooth (mm),Fx (N),Fy (N),Fz (N)\n" + cuts("{c},{x},{y},{z}")
+ABOVE = "Workpiece: Al 7075\nTool: end mill, D = 25 mm, z = 2\nap = 3 mm, slotting\n\n"
+CELLS = "Tool diameter,25,mm\nNumber of teeth,2,\nAxial depth of cut,3,mm\nSpindle speed,6000,rpm\n,,\n"
+TABLES = {
+    "titles": ABOVE + MEANS,
+    "titles of cells": CELLS + "vf [mm/min],Fx [N],Fy [N],Fz [N]\n" + cuts("{v},{x},{y},{z}"),
+    "a title for each feed": "".join(
+        f"Feed per tooth: {c} mm\nFx [N],Fy [N],Fz [N],teeth,ap [mm]\n{x},{y},{z},2,3\n\n"
+        for c, (x, y, z) in ((c, mean("straight", "slot", c)) for c in FEEDS)
+    ),
+    "a decimal comma": (ABOVE + MEANS).replace(",", ";").replace(".", ","),
+    "words": "Test No.,Feed per tooth (mm),Mean force X (N),Fy avg (N),Axial force (N),Number of teeth,Depth of cut (mm)\n"
+    + cuts("T{c},{c},{x},{y},{z},2,3"),
+    "units below": "Feed per tooth,Fx,Fy,Fz,Flutes,Axial depth\nmm,N,N,N,-,mm\n" + cuts("{c},{x},{y},{z},2,3"),
+    "climb": "Zahnvorschub [mm];Fx [N];Fy [N];Fz [N];Zähnezahl;Schnitttiefe [mm];Eingriffsbreite [mm];Fräserdurchmesser [mm];Art\n"
+    + cuts("{c};{x};{y};{z};2;3;8;25;Gleichlauf", "climb"),
+    "up milling": "fz [mm],Fx [N],Fy [N],Fz [N],z,ap [mm],ae [mm],D [mm],Milling mode\n"
+    + cuts("{c},{x},{y},{z},2,3,8,25,up milling", "conventional"),
+    "names to the left": "\n".join(
+        ",".join(row) for row in zip(*(line.split(",") for line in (
+            "Feed per tooth (mm),Fx (N),Fy (N),Fz (N),Teeth,ap (mm)\n" + cuts("{c},{x},{y},{z},2,3")
+        ).splitlines()), strict=True)
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.filterwarnings("ignore:.*stands in the title")
+@pytest.mark.parametrize("text", TABLES.values(), ids=TABLES)
+def test_tables_as_laboratories_write_them(text: str, tmp_path: Path) -> None:
+    (tmp_path / "cuts.csv").write_text(text, encoding="utf-8")
+    found = sm.identify_process(tmp_path / "cuts.csv").coefficients
+    for n, truth in MILL.items():
+        assert found[n][0] == pytest.approx(truth * (1e3 if n[-1] == "e" else 1e6), rel=1e-4)
+
+
+def test_what_no_law_is_found_from_is_left_out_with_a_word(tmp_path: Path) -> None:
+    path = tmp_path / "cuts.csv"
+    head = "vc [m/min],ft [mm],Fx mean [N],Fx max [N],Fy [N],Fz [N],Mz [Nm],flutes,ap [mm]\n"
+    path.write_text(head + cuts("188,{c},{x},9,{y},{z},1,2,3") + "Mean,1,1,1,1,1,1,,\n")
+    with pytest.warns(
+        UserWarning, match=r"row 7, 'Mean', is no reading, vc \[m/min\], Fx max \[N\], Mz \[Nm\]"
+    ):
+        assert sm.identify_process(path).coefficients["Ktc"][0] == pytest.approx(958.8e6, rel=1e-4)
+    path.write_text(path.read_text().replace("Fx mean", "Fx min"))
+    with pytest.warns(UserWarning, match="Fx min"), pytest.raises(FileError, match="missing column 'Fx_N'"):
+        sm.identify_process(path)
+
+
+@pytest.mark.parametrize(
+    ("title", "message"),
+    [
+        ("Feed per tooth: 0.05 N", "missing column 'feed_per_tooth_mm'"),  # no length
+        ("Feed per tooth: 0.05", "missing column 'feed_per_tooth_mm'"),
+        ("Surface speed: 0.05 mm", "missing column 'feed_per_tooth_mm'"),
+    ],
+)
+def test_titles_that_say_nothing_of_a_cut(title: str, message: str, tmp_path: Path) -> None:
+    (tmp_path / "cuts.csv").write_text(f"{title}\nFx [N],Fy [N],Fz [N],teeth,ap [mm]\n1,2,3,2,3\n1,2,4,2,3\n")
+    with pytest.raises(FileError, match=message):
+        sm.identify_process(tmp_path / "cuts.csv")
 
 
 def test_a_workbook_is_the_same_table(tmp_path: Path, forces: Path) -> None:

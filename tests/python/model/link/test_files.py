@@ -312,6 +312,46 @@ SPELLINGS = {
 }
 
 
+def blocks(title="Load case {k}", order=range(1, 7)):
+    """A block for each load case, below its title."""
+    head, *rows = (line.split(",") for line in csv_text().removeprefix("# a field\n").splitlines())
+    parts = []
+    for k, of in zip(order, range(4, 22, 3), strict=True):
+        cut = ["\t".join(row[:4] + row[of : of + 3]) for row in (head, *rows)]
+        parts.append("\n".join([title.format(k=k), *cut]))
+    return "\n\n".join(parts) + "\n"
+
+
+NAMES = {
+    "Workbench": ("Node Number", "{} Location (mm)", "Directional Deformation {} (mm)"),
+    "words": ("Knoten-Nr", "{} [mm]", "Verschiebung {} [mm]"),
+    "Abaqus": ("Node Label", "COORD-COOR{} [mm]", "U-U{} [mm]"),
+}
+
+
+@pytest.mark.parametrize("names", NAMES.values(), ids=NAMES)
+def test_names_of_other_programs(tmp_path, names):
+    node, place, moved = names
+    axes = "123" if "COOR" in place else "XYZ"
+    head = [node, *map(place.format, axes), *(moved.format(a) for _ in range(6) for a in axes)]
+    rows = csv_text().splitlines()[2:]
+    for name, separator in (("f.csv", ","), ("f.txt", "\t")):
+        text = "\n".join([",".join(head), *rows]).replace(",", separator) + "\n"
+        points, u = read_field(write(tmp_path, name, text))
+        np.testing.assert_allclose(points, POINTS, rtol=1e-15)
+        np.testing.assert_allclose(u, U, rtol=1e-15)
+
+
+def test_load_cases_below_their_titles(tmp_path):
+    points, u = read_field(write(tmp_path, "f.txt", blocks()))
+    np.testing.assert_allclose(points, POINTS, rtol=1e-15)
+    np.testing.assert_allclose(u, U, rtol=1e-15)
+    with pytest.raises(StiffmapError, match="line 14: expected load cases in rising order"):
+        read_field(write(tmp_path, "g.txt", blocks(order=(2, 1, 3, 4, 5, 6))))
+    with pytest.raises(StiffmapError, match="row 14 is a remark: Twice as fine"):
+        read_field(write(tmp_path, "h.txt", blocks(title="Twice as fine")))
+
+
 @pytest.mark.parametrize("spelling", SPELLINGS)
 def test_tables_as_programs_write_them(tmp_path, spelling):
     """Fields and load cases are tables like all others."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import isclose, pi
@@ -31,14 +32,30 @@ COLUMNS = {
 }  # fmt: skip
 """Name -> how a table usually writes it, and its SI unit."""
 NEEDED = ("feed_per_tooth", "fx", "fy", "fz", "teeth", "axial")
-ALIASES = {
-    "c": "feed_per_tooth", "f": "feed", "chip": "feed_per_tooth", "depth": "axial", "ap": "axial", "ae": "radial", "width": "radial",
-    "rpm": "spindle", "z": "teeth", "n_teeth": "teeth", "flutes": "teeth", "t": "time", "vf": "feed", "n": "spindle",
-    "d": "diameter", "spindle_speed": "spindle", "a_p": "axial", "a_e": "radial", "axial_depth": "axial", "axial_depth_of_cut": "axial",
-    "number_of_teeth": "teeth", "zähne": "teeth", "zeit": "time", "vorschub": "feed", "drehzahl": "spindle",
-    **{f"{force}_{mean}": force for force in ("fx", "fy", "fz") for mean in ("mean", "avg", "average")},
+DEPTH = "(depth|engagement|immersion|width|(depth|width)_of_cut)"
+SPELLED = {
+    "feed_per_tooth": "c|ft|f_t|f_z|chip(_?(load|thickness))?|feed_(per|/)_?(tooth|flute|edge)|zahnvorschub|vorschub_pro_zahn",
+    "feed": "f|v_?f|(table_)?feed(_?(rate|speed))?|vorschub(sgeschwindigkeit)?", "feed_per_rev": "f_?rev|feed_per_rev(olution)?",
+    "axial": f"a_?p|a?doc|depth(_of_cut)?|axial_{DEPTH}|(cutting_)?depth|schnitttiefe", "helix": "helix_angle|drallwinkel",
+    "radial": f"a_?e|woc|rdoc|width(_of_cut)?|radial_{DEPTH}|step_?over|eingriffsbreite|schnittbreite",
+    "teeth": "z|n_(teeth|z|t)|(number|no\\.?|num\\.?)_of_(teeth|flutes|edges|inserts)|flutes|edges|zähne(zahl)?|zähnezahl|schneiden(zahl)?",
+    "spindle": "n|rpm|s|spindle_?speed|drehzahl|rotational_speed|speed_of_rotation", "time": "t|zeit",
+    "diameter": "d|((tool|cutter|mill)_?)?(diameter|dia\\.?)|tool_d|(werkzeug|fräser)?durchmesser|ø",
+    "side": "((milling|cut(ting)?)_)?(mode|type|direction|strategy)|up/down|art|fräsart|milling", "fx": "(feed|vorschub)_?(force|kraft)", "fy": "(cross_?feed|feed_?normal|normal)_?force|vorschubnormalkraft",
+    "fz": "(axial|thrust|passive)_?force|(axial|passiv)kraft",
 }  # fmt: skip
-PER_EDGE = ("feed_per_tooth", "c", "chip")
+"""Other spellings; forces along x, y, z have those of all tables."""
+SIDE_WORDS = {
+    "climb": "climb|down|gleichlauf", "conventional": "conventional|up|gegenlauf", "slot": "(full |voll)?(slot(ting)?|nut)|full",
+}  # fmt: skip
+"""How tables write a side, with ``milling`` behind it or without."""
+MEAN = re.compile(r"(?:^|_)(?:mean|avg\.?|average|mittel(?:wert)?|mw|ø)(?=_|$)")
+ASIDE = (
+    r"(.*_)?(max|min|peak|std|sd|stdev|rms|range|pp|amplitude)(imum)?(_.*)?|(m|moment|torque|drehmoment)_?[xyz]?|f_?r(es)?|resultant(_force)?|"
+    r"power|leistung|v_?c|cutting_speed|schnittgeschwindigkeit|mrr|ra"
+)
+"""Of a dynamometer's table, what no law is found from."""
+PER_EDGE = ("feed_per_tooth", "c", "chip", "ft", "f_t", "f_z")
 
 
 def above_zero(c: NamedTable, name: str, row: int, default: float = 0.0) -> float:
@@ -51,7 +68,8 @@ def above_zero(c: NamedTable, name: str, row: int, default: float = 0.0) -> floa
 
 def _renamed(name: str, unit: str) -> tuple[str, str]:
     """A feed by its unit: ``fz`` is a force in N, and a feed per tooth in mm."""
-    (length, per), is_feed = feed_unit(unit), ALIASES.get(name, name) == "feed"
+    name = MEAN.sub("", name).strip("_") or name
+    (length, per), is_feed = feed_unit(unit), re.fullmatch(SPELLED["feed"], name) is not None
     speed = length.endswith(("/min", "/s"))
     if (is_feed and not per and not speed) or (name == "feed_per_tooth" and (speed or per == "rev")):
         return name, f"{unit or 'none'}; a feed is in mm/tooth, mm/rev or mm/min"
@@ -65,8 +83,10 @@ def _renamed(name: str, unit: str) -> tuple[str, str]:
 KNOWN = Known(
     {n: WORD if n == "side" else si for n, (_, si) in COLUMNS.items()},
     {n: usual for n, (usual, _) in COLUMNS.items()},
-    ALIASES,
+    SPELLED,
     _renamed,
+    aside=ASIDE,
+    titled={*COLUMNS} - {"time", "fx", "fy", "fz", "side"},
 )
 
 
@@ -78,7 +98,7 @@ def columns_of(table: ForceColumns, defaults: Mapping[str, object], sheet: str |
         given_path(table, "table", "a file or a mapping of columns")
         out = read_named(table if sheet is None else TableFile(table, sheet=sheet), KNOWN)
     if "side" in out.values:
-        out.values["side"] = np.array(out.values["side"])
+        out.values["side"] = np.array([_side(word) for word in out.values["side"]])
     way, *more = [n for n in ("feed", "feed_per_rev", NEEDED[0]) if n in out.values] or NEEDED[:1]
     if more:
         out.fail(f"expected one feed, found '{out.header[more[0]]}' and '{out.header[way]}'")
@@ -86,7 +106,9 @@ def columns_of(table: ForceColumns, defaults: Mapping[str, object], sheet: str |
         out.values.setdefault(name, np.full(len(out.lines), value))
     needed = (way, *(["spindle"] if way == "feed" else []), *NEEDED[1:])
     if missing := [COLUMNS[n][0] for n in needed if n not in out.values]:
-        out.fail(f"missing column '{missing[0]}'; needed: {', '.join(COLUMNS[n][0] for n in needed)}")
+        wanted = ", ".join(COLUMNS[n][0] for n in needed)
+        place = "what is the same in all rows may stand in a line above them, as in teeth: 2, or in a process file"
+        out.fail(f"missing column '{missing[0]}'; needed: {wanted}; {place}")
     if way != NEEDED[0]:
         names = (way, "teeth", *(["spindle"] if way == "feed" else []))
         feed, teeth, *spindle = np.array([[above_zero(out, n, i) for i in range(len(out))] for n in names])
@@ -94,6 +116,11 @@ def columns_of(table: ForceColumns, defaults: Mapping[str, object], sheet: str |
         out.values[NEEDED[0]] = (feed * 2 * pi / spindle[0] if spindle else feed) / teeth
         out.header[NEEDED[0]] = out.header[way]
     return out
+
+
+def _side(word: str) -> str:
+    bare = re.sub(r"[ _-]*(milling|cut(ting)?|fräsen)?$", "", word.strip().lower())
+    return next((side for side, text in SIDE_WORDS.items() if re.fullmatch(text, bare)), word)
 
 
 def _of_mapping(table: Mapping[Any, Any] | DataFrame) -> Table:
