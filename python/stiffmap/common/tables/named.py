@@ -214,7 +214,7 @@ def named(
     out, left = NamedTable(sheet.file, list(sheet.lines), sheet.top, {}, {}, {}, {}), [*sheet.aside]
     for i, (head, text) in enumerate(zip(sheet.header, sheet.names, strict=True)):
         meant = meaning_of(text)
-        if i in besides or (not known.has(head) and (meant == "id" or _counts(sheet, i))):
+        if i in besides or (not known.has(text) and (meant == "id" or _counts(sheet, i))):
             continue
         said = meant not in known.units and ASIDE.fullmatch(text) is not None
         if known.aside and _name_of(head, known)[0] not in known.units:
