@@ -54,6 +54,65 @@ def test_a_table_is_the_same_in_every_spelling_and_command(name: str, tmp_path: 
     np.testing.assert_allclose(load_path(file).end[-1], POINTS[-1], rtol=1e-12, atol=1e-15)
 
 
+LABVIEW = "LabVIEW Measurement\t\nWriter_Version\t2\nSeparator\tTab\n***End_of_Header***\t\n\t\n"
+
+
+def labview(kind: str, units: str, rows: str) -> str:
+    """A file as LabVIEW writes it: two headers, numbers in them, a cell for comments that no row has."""
+    head = f"Channels\t2\t\nSamples\t3\t3\nX_Dimension\t{kind}\t{kind}\nY_Unit_Label\t{units}\nX0\t0.0\t0.0\nDelta_X\t0.5\t0.5\n"
+    return f"{LABVIEW}{head}***End_of_Header***\t\t\n{rows}"
+
+
+def test_files_of_labview(tmp_path: Path) -> None:
+    times = labview("Time", "N\tmm", "X_Value\tFx\tdx\tComment\n0.0\t1.5\t2\n0.5\t1.25\t3\n1.0\t1\t4\n")
+    for text, comma in ((times, False), (times.replace(".", ","), True)):
+        (tmp_path / "t.lvm").write_text(text)
+        table = read_sheet(tmp_path / "t.lvm")
+        assert table.header == ("Time [s]", "Fx [N]", "dx [mm]") and table.decimal_comma is comma
+        assert [*table.lines] == [14, 15, 16] and not table.left_out
+        np.testing.assert_array_equal(table.numbers(1), [1.5, 1.25, 1])
+    rows = "".join(f"{f}\t{1 / (1 - (f / 12) ** 2)}\t{170 - f}\n" for f in range(5, 9))
+    (tmp_path / "f.lvm").write_text(
+        labview("Frequency", "m/s^2/N\tdeg", f"X_Value\tMagnitude\tPhase\n{rows}")
+    )
+    (found,) = read_responses(tmp_path / "f.lvm")
+    w = 2 * np.pi * 6
+    assert found.receptance[1] == pytest.approx(-np.exp(1j * np.radians(164)) / (1 - 0.25) / w**2, rel=1e-12)
+
+
+def test_units_of_several_behind_a_word(tmp_path: Path) -> None:
+    (tmp_path / "r.csv").write_text(
+        "f in Hz;Nachgiebigkeit in µm/N;Phase in °\n5;2,5;-10\n6;3,5;-20\n7;3;-90\n"
+    )
+    (found,) = read_responses(tmp_path / "r.csv")
+    np.testing.assert_allclose(found.receptance[0], 2.5e-6 * np.exp(-1j * np.radians(10)), rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "points"),
+    [
+        ("Plane Z = 700 mm\nX [mm],Y [mm]\n50.5,0\n0,-20.25\n", POINTS),
+        ("Z,700,mm\nX [mm],Y [mm]\n50.5,0\n0,-20.25\n", POINTS),
+        ("Z: 0.7 m\nX [mm];Y [mm]\n50,5;0\nZ: 0,7 m\nX [mm];Y [mm]\n0;-20,25\n", POINTS),
+    ],
+)
+def test_a_title_says_a_coordinate_of_the_rows_below(
+    text: str, points: list[list[float]], tmp_path: Path
+) -> None:
+    (tmp_path / "points.csv").write_text(text)
+    with pytest.warns(UserWarning, match=r"'Z \[mm?\]' stands in the title"):
+        np.testing.assert_allclose(read_pose_table(tmp_path / "points.csv").position, points, atol=1e-15)
+
+
+def test_a_title_changes_no_column_and_takes_no_other_quantity(tmp_path: Path) -> None:
+    text = "Measured at z = 20 °C, x = 3 mm\nx [mm],y [mm],z [mm]\n50.5,0,700\n0,-20.25,700\n"
+    (tmp_path / "points.csv").write_text(text)
+    np.testing.assert_allclose(read_pose_table(tmp_path / "points.csv").position, POINTS, atol=1e-15)
+    (tmp_path / "points.csv").write_text(text.replace(",z [mm]", "").replace(",700", ""))
+    with pytest.raises(FileError, match="no column z"):
+        read_pose_table(tmp_path / "points.csv")
+
+
 @pytest.mark.parametrize(
     "reader", [sm.load_machine, load_process, load_path, read_responses, read_csv_field, sm.import_urdf]
 )

@@ -186,6 +186,10 @@ def is_unit(text: str) -> bool:
     return False
 
 
+def _is_ratio(text: str) -> bool:
+    return "/" in text and is_unit(text)
+
+
 def _units(cells: Sequence[str]) -> bool:
     """Whether a line holds nothing but units."""
     filled = [b for c in cells if (b := _bare(c)) not in NO_UNIT and not UNIT_LABEL.fullmatch(c)]
@@ -300,7 +304,7 @@ def split_unit(header: str) -> tuple[str, str]:
     if name != header.strip():
         return name, unit
     found = (pattern.fullmatch(header) for pattern in BEHIND)
-    units = (m for m in found if m and (unit_of(m[2]) or m[2].lower() in FREQUENCIES))
+    units = (m for m in found if m and (unit_of(m[2]) or m[2].lower() in FREQUENCIES or _is_ratio(m[2])))
     match = None if unit_of(header) else next(units, None)
     return (match[1].strip(), match[2].strip()) if match else (header.strip(), "")
 

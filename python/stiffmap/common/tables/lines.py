@@ -61,6 +61,7 @@ SIGNS = tuple(
 )
 """Of sums and products, as Python writes them."""
 LONGEST_SUM = 80
+LABVIEW = "LabVIEW Measurement"
 LATEX = re.compile(r"(?m)^ *\\(?:hline|\w+rule)\b|\\\\(?:\[.*?\])? *(?:\\\w+)? *$|^.*\\(?:begin|end)\{.*$")
 """Rules before a row or behind it, and the strokes at its end."""
 FORTRAN = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)[dD][+-]?\d+")
@@ -266,6 +267,7 @@ def is_data(cells: list[str], spelling: Spelling) -> bool:
 def _text(path: Path) -> tuple[str, Lines, str]:
     text = text_of(path)
     text = LATEX.sub("", text) if "\\begin{" in text else text
+    text = _below_headers(text) if text.startswith(LABVIEW) else text
     lines_ = (line for line in io.StringIO(text) if line.strip() and not line.strip().startswith(COMMENTS))
     sample = list(islice(lines_, SAMPLE))
     well = {s: _numbers_between(s, sample) for s in SEPARATORS}
@@ -290,6 +292,15 @@ def _text(path: Path) -> tuple[str, Lines, str]:
     if rows and all(len(cells) == len(names) + 1 and all(map(str.strip, cells)) for _, cells in rows):
         return "", lambda: ((n, ["row", *cells] if n == top else cells) for n, cells in lines()), best
     return "", lines, best
+
+
+def _below_headers(text: str) -> str:
+    """A file of LabVIEW with blank lines for its headers, but for the units, and a name that says what the first column is."""
+    head, _, rows = text.rpartition("***End_of_Header***")
+    first = "Frequency [Hz]" if re.search(r"(?m)^X_Dimension\s+Frequency", head) else "Time [s]"
+    units = (line if line.startswith("Y_Unit_Label") else "" for line in head.split("\n"))
+    rows = re.sub(r"[\t,;]Comment\s*?$", "", rows, count=1, flags=re.MULTILINE)  # of a cell that no row has
+    return "\n".join(units) + rows.replace("X_Value", first, 1)
 
 
 def _numbers_between(separator: str, lines: Sequence[str]) -> tuple[int, int, int]:
