@@ -40,6 +40,7 @@ from stiffmap.common.tables.lines import (
     parted,
 )
 from stiffmap.common.tables.table import Table
+from stiffmap.common.tables.vectors import one_number_a_cell
 from stiffmap.common.tables.workbook import WORKBOOKS, sheet_names
 from stiffmap.common.units import SHORT_TIMES, TIMES, unit_of
 
@@ -107,6 +108,7 @@ def read_sheet(path: Path, sheet: str | None = None, layout: Layout = PLAIN) -> 
 
 def _read(path: Path, sheet: str | None, layout: Layout) -> Table:
     page, lines, separator = lines_of(path, sheet)
+    lines = one_number_a_cell(lines)
     for units in (False, True):  # cells such as 12.5 µm only where no row is plain: 100 N may head a column
         cells_only = (c for _, c in kept(lines()))
         comma = decimal_comma(

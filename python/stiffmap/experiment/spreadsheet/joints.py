@@ -28,7 +28,8 @@ NUMBERED = rf"(?!.*(?:veloc|accel|effort|torque|current))(?:{BEFORE}{{}}(?:joint
 JOINT = re.compile(NUMBERED.format("", r"\d"), re.IGNORECASE)
 OF_MESSAGE = re.compile(r"(?i)(.*[/.])position(\[?\d+\]?)")
 """A joint of a message that names its joints next to it: ``field.name0`` says whose ``field.position0`` is."""
-MEASURED = r"([xyz])[ _.-]?(?:meas(?:ured|\.)?|gemessen|mesuré|misurat[oa]|medid[oa])"
+BY_INSTRUMENT = r"(?:meas(?:ured|\.)?|gemessen|mesuré|misurat[oa]|medid[oa]|(?:laser[ _-]?)?tracker|smr|reflector|reflektor|cmm)"
+MEASURED = rf"([xyz])[ _.-]?{BY_INSTRUMENT}|{BY_INSTRUMENT}(?:[ _.-]?(?:position|pos|point))?[ _.-]?([xyz])"
 """A header of a measured position, next to joints."""
 MOST_TURNS = 4.0 * math.pi
 """Of a joint; larger numbers are degrees."""
@@ -233,7 +234,7 @@ def as_seen(m: Meant, difference: str, by_instrument: bool) -> None:
     places, groups = dict[str, Column](), _side_by_side(columns)
     if not any(k.meaning in READINGS and k.meaning not in AXES[3:] for k in columns):
         notes = [(k, re.fullmatch(MEASURED, k.name.lower())) for k in columns if k.meaning == "note"]
-        places = {seen[1]: k for k, seen in notes if seen}
+        places = {seen[1] or seen[2]: k for k, seen in notes if seen}
         if by_instrument and not places and not groups:
             places = {k.meaning: k for k in columns if k.meaning in POSE}
         for a, k in places.items():

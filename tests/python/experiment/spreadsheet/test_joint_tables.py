@@ -881,3 +881,38 @@ def test_a_controllers_own_pose_next_to_joints_is_a_note(tmp_path: Path) -> None
     found = of_log(tmp_path, ",".join(heads), rows).experiment
     np.testing.assert_allclose(found.command, np.radians(90 * LOGGED[:, :6]), atol=1e-6)
     assert found.rotation is None and found.seen is not None
+
+
+@pytest.mark.parametrize(
+    ("names", "row"),
+    [
+        (["joint {k} [rad]", "measured {a} [mm]"], None),
+        (["j{k} [rad]", "Tracker {a} [mm]"], None),
+        (["joints [rad]", "SMR [mm]"], '"{q}","{p}"'),
+        (["joint_positions [rad]", "Measured position [mm]"], '"{q}","{p}"'),
+    ],
+)
+def test_positions_next_to_joints_are_those_of_the_instrument_that_names_them(
+    names: list[str], row: str | None, tmp_path: Path
+) -> None:
+    """Also as lists in single cells."""
+    machine = sm.load_machine("ur10")
+    home = sm.inverse_kinematics(machine, machine.description.home.p).actuators
+    q = home + np.random.default_rng(3).uniform(-0.3, 0.3, (12, 6))
+    p = sm.forward_kinematics(machine, q).position * 1e3
+    if row is None:
+        head = [names[0].format(k=k + 1) for k in range(6)] + [names[1].format(a=a) for a in "xyz"]
+        rows = [",".join(map(repr, [*a.tolist(), *b.tolist()])) for a, b in zip(q, p, strict=True)]
+    else:
+        head = names
+        rows = [row.format(q=a.tolist(), p=tuple(b.tolist())) for a, b in zip(q, p, strict=True)]
+    (tmp_path / "t.csv").write_text("\n".join([",".join(head), *rows]) + "\n")
+    noise = ["--noise", "dx=0.01", "--noise", "dy=0.01", "--noise", "dz=0.01"]
+    out = tmp_path / "e"
+    assert (
+        main(["experiment", "new", str(tmp_path / "t.csv"), "--machine", "ur10", "-o", str(out), *noise]) == 0
+    )
+    found = sm.load_experiment(out)
+    assert found.command == pytest.approx(q, abs=1e-12)
+    assert found.seen is not None and (found.frame, found.tool) == ("unknown", "unknown")
+    assert 1e3 * found.seen == pytest.approx(p, abs=1e-9)
