@@ -77,8 +77,8 @@ inline V wrapped(V angle) {
 
 /// Home turned about the first axis to where `tip` is about it, in some lanes: all that follows it turns with it, on
 /// the branch of home.
-inline void turn_home(const ArmLeg& arm, const V3& tip, M lanes, Frame& home, V* x) {
-  const V3 w = constant(arm.w1), first = constant(arm.first), lever = home.p - first;
+inline void turn_home(const FirstTurn& joint, const V3& tip, M lanes, Frame& home, V* x) {
+  const V3 w = constant(joint.axis), first = constant(joint.point), lever = home.p - first;
   const V3 from = cross(w, lever), to = cross(w, tip - first);
   const V s = dot(w, cross(from, to)), c = dot(from, to), square = s * s + c * c;
   lanes &= square > 1e-20;
@@ -86,8 +86,8 @@ inline void turn_home(const ArmLeg& arm, const V3& tip, M lanes, Frame& home, V*
   const AxisTurn turn{w, c * inverse, s * inverse};
   home.p = select(lanes, first + turn * lever, home.p);
   for (V3& axis : home.R.c) axis = select(lanes, turn * axis, axis);
-  V& angle = x[arm.coordinate[0]];
-  angle = select(lanes, arm.home[0] + arm.sense[0] * arc_tangent(s, c), angle);
+  V& angle = x[joint.coordinate];
+  angle = select(lanes, joint.home + arc_tangent(s, c), angle);
 }
 
 }  // namespace stiffmap::kernel

@@ -64,7 +64,7 @@ struct Closing {
     M closed_lanes{}, stuck{};
     for (int q = 0; q < P.coordinate_count; ++q)
       if (P.coordinates[q].role != 2) s.x[q] = select(moving, splat(P.coordinates[q].home), s.x[q]);
-    if (P.arm) turn_home(*P.arm, tip.p, moving, from, s.x);
+    if (P.arm) turn_home(*P.first_turn, tip.p, moving, from, s.x);
     for (int i = 0; i < W && !P.arm; ++i) {
       if (!moving[i]) continue;
       double node[3];
@@ -95,8 +95,7 @@ struct Closing {
       moving &= ~closed_lanes & ~stuck;
     }
     stuck |= moving;
-    // Other arms may stay away on their way round their own first axis: the reference path turns them there.
-    if (any(stuck) && (P.arm || P.leg_count > 1)) never |= out_of_reach(tip, stuck);
+    if (any(stuck)) never |= out_of_reach(tip, stuck);
     return closed_lanes;
   }
 
@@ -116,15 +115,16 @@ struct Closing {
     return way;
   }
 
-  /// Lanes where a leg stays away from `tip` in descents from the present coordinates and from home.
+  /// Lanes where a leg stays away from `tip` in descents from the present coordinates, from home, and of an arm from
+  /// home turned towards it.
   M out_of_reach(const Frame& tip, M lanes) {
     M no = lanes;
-    for (int attempt = 0; attempt < 2 && any(no); ++attempt) {
-      if (attempt == 1) {
+    for (int attempt = 0; attempt < (P.first_turn ? 3 : 2) && any(no); ++attempt) {
+      if (attempt > 0) {
         for (int q = 0; q < P.coordinate_count; ++q)
           if (P.coordinates[q].role != 2) s.x[q] = select(no, splat(P.coordinates[q].home), s.x[q]);
         Frame there = home();
-        if (P.arm) turn_home(*P.arm, tip.p, no, there, s.x);
+        if (attempt == 2) turn_home(*P.first_turn, tip.p, no, there, s.x);
       }
       M some{};
       each_leg(tip, [&](const LegClosure& leg, int chain, const Frame& before, const Frame& after) {

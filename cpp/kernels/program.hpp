@@ -128,6 +128,12 @@ struct ArmLeg {
   std::int32_t coordinate[6];
 };
 
+/// The first joint of an arm that turns, at home in base axes: towards a pose, it is where the arm may begin.
+struct FirstTurn {
+  double point[3], axis[3], home;
+  std::int32_t coordinate;
+};
+
 /// How far a leg can stretch beyond its first slides: from the centre of its first turning joint, in base axes, to that
 /// of its last one, in the tip's frame. A target further away, but for the slides, is out of reach for sure.
 struct ReachProgram {
@@ -192,6 +198,7 @@ struct Program {
   const double* nearness;        ///< per unknown: weight of its distance from home (F25); null: a pose decides all
   const PlanarLeg* planar;       ///< one per leg, or null: the closure starts from the grid
   const ArmLeg* arm;             ///< of the only leg, or null
+  const FirstTurn* first_turn;   ///< the same
   const double* grid;            ///< closure starts: nodes x row of unknowns of all legs, NaN where unreachable
   std::int32_t op_count, chain_count, error_count, drive_count, coordinate_count, leg_count, unknown_count,
       spring_count, spin_count, serial_count, serial_joints;  ///< serial_joints -1: no such arm

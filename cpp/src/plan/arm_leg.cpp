@@ -98,7 +98,16 @@ std::optional<ArmLeg> arm_leg(const Mechanism& m, const HomeLeg& leg) {
 void recognise_arm(const Mechanism& m, FastPlanData& out) {
   if (out.ops[static_cast<std::size_t>(out.program.legs_op)].count != 1) return;
   const auto home = leg_at_home(m, out, 0);
-  if (const auto arm = home ? arm_leg(m, *home) : std::nullopt) out.arm = {*arm};
+  if (!home || home->joints.empty()) return;
+  const HomeJoint& first = home->joints.front();
+  if (!first.prismatic) {
+    FirstTurn& turn = out.first_turn.emplace_back();
+    store(first.point, turn.point);
+    store(first.axis, turn.axis);
+    turn.home = m.home_coordinates[first.coordinate];
+    turn.coordinate = first.coordinate;
+  }
+  if (const auto arm = arm_leg(m, *home)) out.arm = {*arm};
 }
 
 }  // namespace stiffmap

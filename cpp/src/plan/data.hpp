@@ -33,6 +33,7 @@ struct FastPlanData {
   std::vector<double> nearness;  ///< of a redundant machine, per unknown
   std::vector<PlanarLeg> planar;
   std::vector<ArmLeg> arm;  ///< one or none
+  std::vector<FirstTurn> first_turn;
   std::vector<ReachProgram> reach;
   std::vector<TipSpringProgram> springs;
   std::vector<PlaceProgram> places;

@@ -235,6 +235,7 @@ void link(const Mechanism& m, FastPlanData& d) {
   p.place_steps = d.place_steps.data();
   p.planar = d.planar.empty() ? nullptr : d.planar.data();
   p.arm = d.arm.empty() ? nullptr : d.arm.data();
+  p.first_turn = d.first_turn.empty() ? nullptr : d.first_turn.data();
   p.op_count = i32(d.ops.size());
   p.chain_count = i32(d.chains.size());
   p.error_count = i32(d.errors.size());
@@ -303,6 +304,7 @@ FastPlan::FastPlan(const Mechanism& m, const Vec3& low, const Vec3& high, int gr
   else if (missing_.empty() && chains.deficient)
     missing_ = "a chain with neither a full link spring nor six joints that yield";
   if (data_->program.legs_op < 0 && !m.floating) missing_ = "no legs";
+  if (m.size() == 0) missing_ = "no joint and no spring";
   if (missing_.empty() && m.beside_home.size() > 0) missing_ = "hinges that do not lock at home";
   if (!missing_.empty()) return;
   const Spins spins(m);

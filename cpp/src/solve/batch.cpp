@@ -115,7 +115,7 @@ class ClosedPoses {
   template <class PoseAt>
   void put(const Mechanism& m, const BatchInput& in, Index begin, Index end, const PoseAt& pose_at,
            Reference& reference, KernelInput& out) {
-    start_.resize(at(m.size() * fast_chunk + 1));  // null would be closed by the kernels: a machine may have no joint
+    start_.resize(at(m.size() * fast_chunk));
     position_.resize(at(3 * fast_chunk));
     rotation_.resize(at(9 * fast_chunk));
     Pose reached;
