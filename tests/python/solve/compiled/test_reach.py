@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.oracle.classes import Classes
+from tests.oracle.generate import Generator
 
 import stiffmap as sm
+from stiffmap.model.description import MachineDescription
 
 
 @pytest.mark.parametrize(
@@ -40,3 +44,21 @@ def test_a_box_mostly_out_of_reach_changes_no_answer() -> None:
     expected, found = machine.solve(position, load), slipped.solve(position, load)
     np.testing.assert_array_equal(found.status, expected.status)
     np.testing.assert_allclose(found.displacement, expected.displacement, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("make", [lambda: Generator(80).machine(), lambda: Generator(146).machine(), lambda: Classes(27).task().description])  # fmt: skip
+def test_general_arms_and_machines_closed_as_a_whole_say_so_in_lanes(
+    make: Callable[[], MachineDescription],
+) -> None:
+    description = make()
+    home = description.home.p
+    box = (tuple((home - 0.1).tolist()), tuple((home + 0.1).tolist()))
+    machine = sm.Machine(replace(description, workspace=box))
+    position = home + np.random.default_rng(7).uniform(-0.4, 0.4, (60, 3))
+    fast, reference = (
+        machine.solve(position, stiffness=False, method=method) for method in ("fast", "reference")
+    )
+    lost = fast.status == sm.Status.UNREACHABLE
+    assert 10 < lost.sum() < 55
+    assert (reference.status[lost] == sm.Status.UNREACHABLE).all()  # some others only the lanes reach
+    assert fast.reference_share < 0.15
