@@ -80,6 +80,22 @@ def test_files_of_labview(tmp_path: Path) -> None:
     assert found.receptance[1] == pytest.approx(-np.exp(1j * np.radians(164)) / (1 - 0.25) / w**2, rel=1e-12)
 
 
+@pytest.mark.parametrize(
+    ("content", "found"),
+    [
+        (b"\x93NUMPY\x01\x00v\x00{'descr': '<f8', 'fortran_order': False, 'shape': (4, 4), }\n" + bytes(128), "a binary file"),
+        (b'[{"x": 1.0, "y": 2.0, "z": 3.0}, {"x": 1.5, "y": 2.0, "z": 3.0}]', "JSON"),
+        (b'{"x": [1.0, 1.5], "y": [2.0, 2.0]}', "JSON"),
+    ],
+)  # fmt: skip
+def test_what_is_no_text_is_said(content: bytes, found: str, tmp_path: Path) -> None:
+    (tmp_path / "t.dat").write_bytes(content)
+    with pytest.raises(
+        FileError, match=rf"expected rows of text, or a workbook \(.*\), found {found}: save the table as CSV"
+    ):
+        read_sheet(tmp_path / "t.dat")
+
+
 def test_units_of_several_behind_a_word(tmp_path: Path) -> None:
     (tmp_path / "r.csv").write_text(
         "f in Hz;Nachgiebigkeit in µm/N;Phase in °\n5;2,5;-10\n6;3,5;-20\n7;3;-90\n"

@@ -266,6 +266,11 @@ def is_data(cells: list[str], spelling: Spelling) -> bool:
 
 def _text(path: Path) -> tuple[str, Lines, str]:
     text = text_of(path)
+    binary = "\0" in text[:SAMPLE]
+    if binary or re.match(r"\s*[\[{]\s*[\[{\"]", text):
+        found = "a binary file" if binary else "JSON"
+        what = f"expected rows of text, or a workbook ({', '.join(WORKBOOKS)}), found {found}: save the table as CSV"
+        raise FileError(what, file=str(path))
     text = LATEX.sub("", text) if "\\begin{" in text else text
     text = _below_headers(text) if text.startswith(LABVIEW) else text
     lines_ = (line for line in io.StringIO(text) if line.strip() and not line.strip().startswith(COMMENTS))
