@@ -371,14 +371,17 @@ def _data(
     if _all_readings(rows):
         yield from rows
         return
+    begins = [is_finite(cells[0], spelling) for _, cells in rows if is_data(cells, spelling)]
+    counted = 2 * sum(begins) > len(begins)
     for n, cells in rows:
         first = next(c.strip() for c in cells if c.strip())
         last = cells[-1].strip()
+        words = counted and number(first, spelling) is None and not is_data(cells, spelling)
         if STATISTICS.fullmatch(first) and number(first, spelling) is None:
             aside.append(f"row {n}, '{first}', is no reading")
         elif MEAN.fullmatch(last) and not means and len(cells) == len(header):
             aside.append(f"row {n}, '{last}', is no reading")
-        elif not any(is_finite(c, spelling) for c in cells):
+        elif words or not any(is_finite(c, spelling) for c in cells):
             if _begins_table(cells, names, len(header), spelling, layout):
                 way = ": say --table 1 for the one above, --table 2 for this one" if layout.options else ""
                 what = f"another table begins here{way}"

@@ -141,6 +141,7 @@ def blocks(title: str, again: bool = True, comma: bool = False, separator: str =
         blocks("# P{}  X={} Y={} Z={}", separator="\t"),
         blocks("Position {} (x={}, y={}, z={})", again=False),
         blocks("Point {}, x [mm] = {}, y [mm] = {}, z [mm] = {}", separator=","),
+        blocks("Pose;{}\nX =;{};mm;Y =;{};mm;Z =;{};mm"),  # as in cells of their own
     ],
 )
 def test_poses_in_titles_are_columns(tmp_path: Path, text: str) -> None:
