@@ -120,6 +120,18 @@ def test_a_title_says_a_coordinate_of_the_rows_below(
         np.testing.assert_allclose(read_pose_table(tmp_path / "points.csv").position, points, atol=1e-15)
 
 
+def test_what_logs_have_next_to_poses_is_left_out_with_a_word(tmp_path: Path) -> None:
+    rows = "N;Time [s];x [mm];y [mm];z [mm];Velocity [mm/s]\n1;0;50.5;0;700;10\n2;1;0;-20.25;700;12\n"
+    (tmp_path / "points.csv").write_text(rows)
+    with pytest.warns(UserWarning, match=r"left out: Velocity \[mm/s\]"):
+        found = read_pose_table(tmp_path / "points.csv")
+    np.testing.assert_allclose(found.position, POINTS, atol=1e-15)
+    np.testing.assert_allclose(found.values["t"], [0, 1])
+    with pytest.warns(UserWarning, match=r"left out: Time \[s\]"):
+        path = load_path(tmp_path / "points.csv")
+    np.testing.assert_allclose(path.feed[-1], 12e-3)
+
+
 def test_a_title_changes_no_column_and_takes_no_other_quantity(tmp_path: Path) -> None:
     text = "Measured at z = 20 °C, x = 3 mm\nx [mm],y [mm],z [mm]\n50.5,0,700\n0,-20.25,700\n"
     (tmp_path / "points.csv").write_text(text)

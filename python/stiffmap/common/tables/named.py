@@ -323,8 +323,9 @@ COLUMNS = {
 USUAL = {"m": "mm", "m/s": "mm/min", "rad": "deg"}
 SPELLED_POSES = {"t": "time"} | {f"r{a}": f"rot{a}" for a in "xyz"}
 KNOWN = Known(
-    COLUMNS, {n: f"{n} [{USUAL.get(si, si)}]" for n, si in COLUMNS.items()}, SPELLED_POSES, titled="xyz"
-)
+    COLUMNS, {n: f"{n} [{USUAL.get(si, si)}]" for n, si in COLUMNS.items()}, SPELLED_POSES,
+    aside="(tcp_)?(velocity|speed|acceleration)(_?[xyz])?|spindle|rpm", titled="xyz",
+)  # fmt: skip
 
 
 @dataclass(eq=False)

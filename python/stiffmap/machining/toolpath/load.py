@@ -73,7 +73,7 @@ COLUMNS = {
     **dict.fromkeys("xyz", "m"), "feed": "m/s", "spindle": "rad/s", **dict.fromkeys("ijk", ""), "turn": "rad",
 }  # fmt: skip
 USUAL = {**{a: f"{a}_mm" for a in "xyz"}, "feed": "feed_mm_min", "spindle": "spindle_rpm", "turn": "turn_deg"}
-SPELLED = {"spindle": "s|drehzahl", "feed": "f|feed_?rate|vorschub"}
+SPELLED = {"spindle": "s|drehzahl", "feed": "f|feed_?rate|velocity|vorschub"}
 
 
 def read_points(path: str | PathLike[str]) -> Toolpath:
@@ -81,7 +81,7 @@ def read_points(path: str | PathLike[str]) -> Toolpath:
 
     Raises FileError naming the column or the line.
     """
-    t = read_named(path, Known(COLUMNS, USUAL, SPELLED))
+    t = read_named(path, Known(COLUMNS, USUAL, SPELLED, aside="t|time|zeit", titled="z"))
     n = len(t.lines)
     if n < 2:
         t.fail("expected a line of names and two or more points")
