@@ -371,7 +371,7 @@ def _data(
     if _all_readings(rows):
         yield from rows
         return
-    begins = [is_finite(cells[0], spelling) for _, cells in rows if is_data(cells, spelling)]
+    begins = [is_finite(cells[0], spelling) for _, cells in rows[:MOST_ABOVE] if is_data(cells, spelling)]
     counted = 2 * sum(begins) > len(begins)
     for n, cells in rows:
         first = next(c.strip() for c in cells if c.strip())
