@@ -149,7 +149,11 @@ def _sheet(place: str | PathLike[str], known: Known, *, repeated: bool = False) 
 def _titled(table: Table, known: Known, chosen: Collection[str]) -> Table:
     """With columns of what titles say that the table has no column of, in a unit of that quantity."""
     has = {_name_of(h, known)[0] for h in table.header} | {*chosen}
-    said = said_in(table, lambda n: known.has(n) or known.has(known.renamed(n, "")[0]), lambda _: False)
+    said = said_in(
+        table,
+        lambda n: known.has(n) or known.has(known.renamed(n, "")[0]),
+        counted=lambda n: known.units.get(known.named(n)) == "",
+    )
     names = {key: _name_of(with_unit(*key), known) for key in said}
     good = {
         key: said[key]

@@ -20,6 +20,8 @@ STATED = re.compile(
     re.IGNORECASE,
 )
 """A number or an axis in a title: ``X = 50 mm``, ``Fz: -100 N``, ``Load direction: +x``."""
+COUNTED = re.compile(r"(?<![\w.,-])(\d+)[ -]([^\W\d]+)(?!\s*[\w=:])")
+"""A number before its name: ``2 teeth``, ``4-flute``."""
 
 
 def texts_of(sheet: Table) -> Iterator[tuple[int, str]]:
@@ -40,8 +42,14 @@ def texts_of(sheet: Table) -> Iterator[tuple[int, str]]:
         yield line, " ; ".join(parts)
 
 
-def said_in(sheet: Table, of_rows: Callable[[str], bool], of_ways: Callable[[str], object]) -> Said:
-    """What titles say by names that are of rows, some of which an axis follows and not a number."""
+def said_in(
+    sheet: Table,
+    of_rows: Callable[[str], bool],
+    of_ways: Callable[[str], object] = lambda name: False,
+    counted: Callable[[str], bool] = lambda name: False,
+) -> Said:
+    """What titles say by names that are of rows, some of which an axis follows and not a number; a number may stand before those
+    that are `counted`."""
     found: Said = {}
     for line, text in texts_of(sheet):
         for match in STATED.finditer(text):
@@ -50,6 +58,9 @@ def said_in(sheet: Table, of_rows: Callable[[str], bool], of_ways: Callable[[str
             if value and of_rows(name):
                 key = name, match["unit"] or match["in"] or ""
                 found.setdefault(key, {})[line] = value if match["way"] else as_number(value)
+        for count, name in COUNTED.findall(text):
+            if counted(name):
+                found.setdefault((name, ""), {}).setdefault(line, float(count))
     return found
 
 

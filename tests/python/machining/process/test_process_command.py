@@ -185,6 +185,7 @@ TABLES = {
         f"Feed per tooth: {c} mm\nFx [N],Fy [N],Fz [N],teeth,ap [mm]\n{x},{y},{z},2,3\n\n"
         for c, (x, y, z) in ((c, mean("straight", "slot", c)) for c in FEEDS)
     ),
+    "counted": "4 mm holder\nEnd mill D25, 2 teeth, ap: 3 mm, 5 passes\n" + MEANS,
     "a decimal comma": (ABOVE + MEANS).replace(",", ";").replace(".", ","),
     "words": "Test No.,Feed per tooth (mm),Mean force X (N),Fy avg (N),Axial force (N),Number of teeth,Depth of cut (mm)\n"
     + cuts("T{c},{c},{x},{y},{z},2,3"),

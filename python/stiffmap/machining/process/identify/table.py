@@ -38,7 +38,7 @@ SPELLED = {
     "feed": "f|v_?f|(table_)?feed(_?(rate|speed))?|vorschub(sgeschwindigkeit)?", "feed_per_rev": "f_?rev|feed_per_rev(olution)?",
     "axial": f"a_?p|a?doc|depth(_of_cut)?|axial_{DEPTH}|(cutting_)?depth|schnitttiefe", "helix": "helix_angle|drallwinkel",
     "radial": f"a_?e|woc|rdoc|width(_of_cut)?|radial_{DEPTH}|step_?over|eingriffsbreite|schnittbreite",
-    "teeth": "z|n_(teeth|z|t)|(number|no\\.?|num\\.?)_of_(teeth|flutes|edges|inserts)|flutes|edges|zähne(zahl)?|zähnezahl|schneiden(zahl)?",
+    "teeth": "z|n_(teeth|z|t)|(number|no\\.?|num\\.?)_of_(teeth|flutes|edges|inserts)|flutes?|edges|tooth|zähne(zahl)?|zähnezahl|schneiden(zahl)?",
     "spindle": "n|rpm|s|spindle_?speed|drehzahl|rotational_speed|speed_of_rotation", "time": "t|zeit",
     "diameter": "d|((tool|cutter|mill)_?)?(diameter|dia\\.?)|tool_d|(werkzeug|fräser)?durchmesser|ø",
     "side": "((milling|cut(ting)?)_)?(mode|type|direction|strategy)|up/down|art|fräsart|milling", "fx": "(feed|vorschub)_?(force|kraft)", "fy": "(cross_?feed|feed_?normal|normal)_?force|vorschubnormalkraft",
