@@ -31,8 +31,9 @@ MOST_FORCE, MOST_GRAVITY = 5000.0, 20.0
 HOME = "as at home"
 NONE = "none"
 DECIMALS = 15  # of numbers that are shown and typed: compliances are as small as 1e-10 m/N
-PAUSE = 1.0
-"""s after the last key, in which a refused number stays as it is typed: it may be the begin of one that is taken, as 0 is of 0.25."""
+PAUSE = 2.0
+"""s after the last key, in which a number stays as it is typed: a refused one may be the begin of one that is taken, as 0 is of 0.25, and a
+page under load sends its keys late."""
 CROSSING = 5.0
 """s in which a page may be behind: what the program wrote then may have come after what somebody typed there meanwhile."""
 TITLES = {q.title: name for name, q in QUANTITIES.items()}
