@@ -35,10 +35,10 @@ inline V wrapped(V angle) {
 
 /// Joint coordinates where the arm's end is `end`, on the branch of home; returns the lanes that are far from the ends
 /// of that branch and not more than `most` from home: further away a continuation may have gone the other way round.
-[[gnu::noinline]] inline M close_arm(const ArmLeg& arm, const Frame& end, V* x) {
+[[gnu::noinline]] inline M close_arm(const FirstTurn& base, const ArmLeg& arm, const Frame& end, V* x) {
   constexpr double most = 2.0;
-  const V3 u = constant(arm.u), w1 = constant(arm.w1), w5 = constant(arm.w5), w6 = constant(arm.w6);
-  const V3 along = constant(arm.along), across = constant(arm.across), first = constant(arm.first);
+  const V3 u = constant(arm.u), w1 = constant(base.axis), w5 = constant(arm.w5), w6 = constant(arm.w6);
+  const V3 along = constant(arm.along), across = constant(arm.across), first = constant(base.point);
   M3 turn;  // of the end since home
   for (int k = 0; k < 3; ++k)
     turn.c[k] = end.R * V3{splat(arm.end_R[k]), splat(arm.end_R[3 + k]), splat(arm.end_R[6 + k])};

@@ -47,7 +47,7 @@ struct Closing {
       for (int k = 0; k < P.leg_count; ++k) usable &= close_planar(P.planar[k], end, s.x, never);
       return usable;
     }
-    const M sure = P.arm ? close_arm(*P.arm, legs_end(tip), s.x) : M{};
+    const M sure = P.arm ? close_arm(*P.first_turn, *P.arm, legs_end(tip), s.x) : M{};
     if (all(sure)) return sure;
     alignas(64) double rows[W][most_closure_unknowns];
     for (int i = 0; i < W; ++i) usable[i] = !sure[i] && Starts{P}.interpolate(at[i], rows[i]) ? -1 : 0;

@@ -109,10 +109,15 @@ struct PlanarLeg {
   std::int32_t coordinate[4];
 };
 
+/// The first joint of an arm that turns, at home in base axes: towards a pose, it is where the arm may begin.
+struct FirstTurn {
+  double point[3], axis[3], home;
+  std::int32_t coordinate;
+};
+
 /// An arm of six revolutes, the second to fourth parallel, the last two meeting, closes in closed form. Base axes, at
 /// home; angles count from there.
 struct ArmLeg {
-  double first[3], w1[3];            ///< a point of the first axis, its direction
   double u[3], along[3], across[3];  ///< of the parallel axes, and of the plane across them
   double second[3];                  ///< a point of the second axis
   double w5[3], w6[3];
@@ -126,12 +131,6 @@ struct ArmLeg {
   double side, flip, branch;   ///< signs at home: of the shoulder, the wrist, the elbow
   double home[6], sense[6];
   std::int32_t coordinate[6];
-};
-
-/// The first joint of an arm that turns, at home in base axes: towards a pose, it is where the arm may begin.
-struct FirstTurn {
-  double point[3], axis[3], home;
-  std::int32_t coordinate;
 };
 
 /// How far a leg can stretch beyond its first slides: from the centre of its first turning joint, in base axes, to that

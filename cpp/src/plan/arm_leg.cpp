@@ -78,8 +78,6 @@ std::optional<ArmLeg> arm_leg(const Mechanism& m, const HomeLeg& leg) {
   out.B5 = u.dot(w5.cross(w6));
   out.flip = branch_sign(out.A5, out.B5);
   if (out.side == 0 || out.flip == 0) return std::nullopt;
-  store(j[0].point, out.first);
-  store(w1, out.w1);
   store(w5, out.w5);
   store(w6, out.w6);
   store(*wrist - leg.end.p, out.wrist);

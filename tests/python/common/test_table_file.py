@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import stiffmap as sm
-from stiffmap.common.tables.named import read_pose_table
+from stiffmap.common.tables.pose_table import read_pose_table
 from stiffmap.identification.taps import load_taps
 from stiffmap.machining.toolpath import load_path
 from stiffmap.ui.cli.app import main

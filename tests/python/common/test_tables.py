@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 import stiffmap as sm
 from stiffmap.common.errors import FileError
 from stiffmap.common.tables.lines import Spelling, is_finite
-from stiffmap.common.tables.named import read_pose_table
+from stiffmap.common.tables.pose_table import read_pose_table
 from stiffmap.common.tables.sheet import read_sheet
 from stiffmap.common.tables.table_file import TableFile
 from stiffmap.experiment.files.table import read_table

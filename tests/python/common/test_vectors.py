@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from stiffmap.common.errors import FileError
-from stiffmap.common.tables.named import read_pose_table
+from stiffmap.common.tables.pose_table import read_pose_table
 from stiffmap.common.tables.sheet import read_sheet
 from stiffmap.common.tables.vectors import one_number_a_cell
 

@@ -1,10 +1,7 @@
-"""Tables whose columns have known names, each with its unit, for all commands that take points, forces or frequencies; tables of poses
-among them, one convention for all commands.
+"""Tables whose columns have known names, each with its unit, for all commands that take points, forces or frequencies.
 
 ``x [mm]``, ``x (mm)``, ``x in mm`` or ``x_mm``; order and case are free, a column of remarks, of names or of numbers of rows is left
-out, and all that `read_sheet` understands is read: groups, units in a line of their own or in the cells, lines above the header. Of
-poses x, y, z are the commanded TCP, rx, ry, rz its rotation vector from home, A, B, C, W, P, R or qw … qz its orientation against the
-base, fx … mz the wrench on the tool, t the time, feed the speed along the path.
+out, and all that `read_sheet` understands is read: groups, units in a line of their own or in the cells, lines above the header.
 """
 
 from __future__ import annotations
@@ -24,9 +21,9 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError, StiffmapError, frames_of_this_package, suggestion
 from stiffmap.common.number_text import read_value
 from stiffmap.common.short import first_of
-from stiffmap.common.tables.header import IN_SI, meaning_of, split_unit, stated_unit, with_unit
+from stiffmap.common.tables.header import IN_SI, meaning_of, split_unit, with_unit
 from stiffmap.common.tables.lines import Spelling, is_finite
-from stiffmap.common.tables.orientation import VECTOR, matrices_of, no_vector, orientation_of, spread
+from stiffmap.common.tables.orientation import spread
 from stiffmap.common.tables.sheet import read_sheet
 from stiffmap.common.tables.table import Table
 from stiffmap.common.tables.table_file import layout_of, table_file, with_names, with_units
@@ -86,6 +83,22 @@ class Known:
         """Whether a table may have a column of this name, without its unit."""
         return self.named(name) in self.units
 
+    def name_of(self, head: str) -> tuple[str, str]:
+        """What a column is, its own name where it is nothing known, and its unit as written."""
+        text, unit = split_unit(head)
+        name, meant = _joined(text), meaning_of(text)
+        if not self.has(text) and meant not in self.units and not re.search(r"[])]\s*$", head):
+            whole = re.sub(r"\s", "_", head)  # x_per_tooth_mm, real_m/N
+            parts = {m.start(): whole[: m.start()].lower() for m in re.finditer("_", whole)}
+            cuts = [k for k, part in parts.items() if self.has(part) or self.has(self.renamed(part, "")[0])]
+            if cuts:
+                name, unit = whole[: cuts[-1]].lower(), PER.sub(r"/\1", whole[cuts[-1] + 1 :])
+                unit = {"N_m": "N*m"}.get(unit, unit)
+        name, unit = self.renamed(name, unit)
+        meant = meant or meaning_of(name.replace("_", " "))
+        name = self.named(name)
+        return meant if name not in self.units and meant in self.units else name, unit
+
 
 @dataclass(eq=False)
 class NamedTable:
@@ -126,10 +139,10 @@ class NamedTable:
 
 def read_named(place: str | PathLike[str], known: Known) -> NamedTable:
     """A text or a workbook, or a `TableFile`. Raises FileError naming file, line and column, what was expected and what was found."""
-    return named(_sheet(place, known), known)
+    return named(known_sheet(place, known), known)
 
 
-def _sheet(place: str | PathLike[str], known: Known, *, repeated: bool = False) -> Table:
+def known_sheet(place: str | PathLike[str], known: Known, *, repeated: bool = False) -> Table:
     file = table_file(place)
     names = ", ".join(known.usual.get(n, n) for n in known.units)
     layout = layout_of(file, known.has, strict=True, repeated=repeated, names=names, options=known.options)
@@ -138,7 +151,7 @@ def _sheet(place: str | PathLike[str], known: Known, *, repeated: bool = False) 
     table = _stacked(table, known) if known.stacked else table
 
     def meaning(header: str) -> tuple[str, str, str]:
-        name, unit = _name_of(header, known)
+        name, unit = known.name_of(header)
         return name, unit, QUANTITIES.get(known.units.get(name, ""), "")
 
     if {*"xyz"} <= {*known.units} and not {*"xyz"} & {meaning(h)[0] for h in table.header}:
@@ -148,19 +161,19 @@ def _sheet(place: str | PathLike[str], known: Known, *, repeated: bool = False) 
 
 def _titled(table: Table, known: Known, chosen: Collection[str]) -> Table:
     """With columns of what titles say that the table has no column of, in a unit of that quantity."""
-    has = {_name_of(h, known)[0] for h in table.header} | {*chosen}
+    has = {known.name_of(h)[0] for h in table.header} | {*chosen}
     said = said_in(
         table,
         lambda n: known.has(n) or known.has(known.renamed(n, "")[0]),
         counted=lambda n: known.units.get(known.named(n)) == "",
     )
-    names = {key: _name_of(with_unit(*key), known) for key in said}
+    names = {key: known.name_of(with_unit(*key)) for key in said}
     good = {
         key: said[key]
         for key, (name, unit) in names.items()
         if name in known.titled and name not in has and _has_dimension(unit, known.units[name])
     }
-    table, words = with_said(table, good, lambda *_: True, lambda n: _name_of(n, known)[0] in "xyz")
+    table, words = with_said(table, good, lambda *_: True, lambda n: known.name_of(n)[0] in "xyz")
     if words:
         warnings.warn(f"{table.file}: {'; '.join(words)}", stacklevel=frames_of_this_package())
     return table
@@ -179,7 +192,7 @@ def _stacked(table: Table, known: Known) -> Table:
     for i, name in enumerate(table.names):
         if match := re.fullmatch(r"(.*?)[ _]*(\d{1,2})", name):
             base = with_unit(match[1], table.unit(i))
-            if _name_of(base, known)[0] in known.stacked:
+            if known.name_of(base)[0] in known.stacked:
                 found.setdefault(base, {})[int(match[2])] = i
     every = sorted({k for of in found.values() for k in of})
     if len(every) < 2 or any(base in table.header for base in found):
@@ -198,7 +211,7 @@ def _stacked(table: Table, known: Known) -> Table:
 
 def sets_of(path: Path, known: Known, shared: str) -> list[NamedTable]:
     """A text or a workbook whose names come again, but a `shared` one: the first of each, the second of each, … Raises FileError."""
-    sheet = _sheet(path, known, repeated=True)
+    sheet = known_sheet(path, known, repeated=True)
     out, left = list[NamedTable](), {*range(len(sheet.header))}
     while left or not out:
         again: list[int] = []
@@ -221,7 +234,7 @@ def named(
         if i in besides or (not known.has(text) and (meant == "id" or _counts(sheet, i))):
             continue
         said = meant not in known.units and ASIDE.fullmatch(text) is not None
-        if known.aside and _name_of(head, known)[0] not in known.units:
+        if known.aside and known.name_of(head)[0] not in known.units:
             said = said or re.fullmatch(known.aside, _joined(text)) is not None
         if not known.has(text) and (said or meant == "temperature") and sheet.is_numeric(i):
             left.append(head)
@@ -253,27 +266,10 @@ def _joined(name: str) -> str:
     return re.sub(r"\s+", "_", name.lower())
 
 
-def _name_of(head: str, known: Known) -> tuple[str, str]:
-    """What a column is, its own name where it is nothing known, and its unit as written."""
-    text, unit = split_unit(head)
-    name, meant = _joined(text), meaning_of(text)
-    if not known.has(text) and meant not in known.units and not re.search(r"[])]\s*$", head):
-        whole = re.sub(r"\s", "_", head)  # x_per_tooth_mm, real_m/N
-        parts = {m.start(): whole[: m.start()].lower() for m in re.finditer("_", whole)}
-        cuts = [k for k, part in parts.items() if known.has(part) or known.has(known.renamed(part, "")[0])]
-        if cuts:
-            name, unit = whole[: cuts[-1]].lower(), PER.sub(r"/\1", whole[cuts[-1] + 1 :])
-            unit = {"N_m": "N*m"}.get(unit, unit)
-    name, unit = known.renamed(name, unit)
-    meant = meant or meaning_of(name.replace("_", " "))
-    name = known.named(name)
-    return meant if name not in known.units and meant in known.units else name, unit
-
-
 def _meaning(sheet: Table, column: int, known: Known, table: NamedTable) -> tuple[str, str, float]:
     """Name of a column, nothing where no cell is a number, its unit as written, and the SI size of that."""
     head = sheet.header[column]
-    name, unit = _name_of(head, known)
+    name, unit = known.name_of(head)
     usual = known.usual.get(name, name)
     if name not in known.units:
         spelling = Spelling(sheet.decimal_comma)
@@ -291,7 +287,7 @@ def _meaning(sheet: Table, column: int, known: Known, table: NamedTable) -> tupl
     if not unit:
         unit = si if IN_SI.fullmatch(sheet.names[column]) else (known.assumed or {}).get(name, "")
     if not unit:
-        way = f" or say --unit {name}={_name_of(usual, known)[1]}" if known.options else ""
+        way = f" or say --unit {name}={known.name_of(usual)[1]}" if known.options else ""
         table.fail(
             f"the unit is missing: write {usual}{way}; expected a unit such as in {usual}, found none", head
         )
@@ -317,98 +313,3 @@ def size_in(unit: str, si: str) -> float:
         if spelled is None or spelled.mass:
             raise
         return spelled.size
-
-
-LOADS = {**dict.fromkeys(("fx", "fy", "fz"), "N"), **dict.fromkeys(("mx", "my", "mz"), "N*m")}
-COLUMNS = {
-    **dict.fromkeys("xyz", "m"), **dict.fromkeys(("rx", "ry", "rz"), "rad"), **LOADS, "t": "s", "feed": "m/s",
-}  # fmt: skip
-"""Name of a column of poses -> SI unit."""
-USUAL = {"m": "mm", "m/s": "mm/min", "rad": "deg"}
-SPELLED_POSES = {"t": "time"} | {f"r{a}": f"rot{a}" for a in "xyz"}
-KNOWN = Known(
-    COLUMNS, {n: f"{n} [{USUAL.get(si, si)}]" for n, si in COLUMNS.items()}, SPELLED_POSES,
-    aside="(tcp_)?(velocity|speed|acceleration)(_?[xyz])?|spindle|rpm", titled="xyz",
-)  # fmt: skip
-
-
-@dataclass(eq=False)
-class PoseTable(NamedTable):
-    """Columns (n,) in SI by name, and the line of each row in the file."""
-
-    orientation: Floats | None = None
-    """(n, 3, 3) against the base, as a controller has it; None where the table has no such columns."""
-    turns: str = ""
-    """Against what, which columns and how they turn, in words."""
-    actuators: Floats | None = None
-    """(n, actuators) m, rad, where joints are commanded in place of positions, which are NaN then."""
-
-    @property
-    def position(self) -> Floats:
-        """(n, 3) m."""
-        return self.block("xyz")
-
-    @property
-    def wrench(self) -> Floats:
-        """(n, 6) N, N·m; zero where there is no column."""
-        return self.block([*LOADS])
-
-    @property
-    def loaded(self) -> bool:
-        """Whether a column is a force or a moment."""
-        return not LOADS.keys().isdisjoint(self.values)
-
-    def rotation(self, home: Floats) -> Floats | None:
-        """(n, 3, 3) commanded orientations: those of a controller, or turned from `home` about base axes; None: as at home."""
-        if not {"rx", "ry", "rz"} & set(self.values):
-            return self.orientation
-        return np.asarray(matrices_of(self.block(("rx", "ry", "rz")), VECTOR) @ home)
-
-
-def read_pose_table(
-    place: str | PathLike[str],
-    *,
-    at_home: Floats | None = None,
-    known: Known = KNOWN,
-    joints: Callable[[Table], tuple[Sequence[int], Floats | None]] = lambda sheet: ((), None),
-) -> PoseTable:
-    """The table of a text, a workbook or a `TableFile`, whose columns are the `known` ones and those of an orientation.
-
-    `at_home` (3,) m stands in for x, y or z that have no column, along which a planar machine is not commanded; None: all three
-    are wanted, or what `joints` finds: columns of commanded joints, and their coordinates (n, actuators). Raises FileError naming
-    file, line, column, what was expected and what was found.
-    """
-    sheet = _sheet(place, known)
-    if sheet.find("target_tcp_pose_0") is None:  # then the pose that was measured stands for it
-        header = (re.sub("(?i)^actual(?=_tcp_pose)", "target", h) for h in sheet.header)
-        sheet = replace(sheet, header=tuple(header))
-    placed = any(_name_of(h, known)[0] in ("x", "y", "z") for h in sheet.header)
-    of_joints, actuators = ((), None) if placed else joints(sheet)
-    found = orientation_of(sheet, of_joints)
-    from_home = found.turns == VECTOR and not IN_SI.fullmatch(sheet.names[found.columns[0]])  # rx, ry, rz
-    columns = () if from_home else found.columns
-    table = PoseTable(**vars(named(sheet, known, (*columns, *of_joints))), actuators=actuators)
-    if columns:
-        if {"rx", "ry", "rz"} & set(table.values):
-            table.fail("orientations are given twice", sheet.header[columns[0]])
-        table.turns = f"against the base: {first_of([sheet.header[i] for i in columns], 4)}: {found.words}"
-        usual = table_file(place).units.get("angle") or stated_unit(sheet.above, "angle")
-        table.orientation = found.matrices(sheet, usual)
-    elif turned := [table.header[n] for n in ("rx", "ry", "rz") if n in table.values]:
-        table.turns = f"from home: {', '.join(turned)}: a rotation vector"
-        if wrong := no_vector(table.block(("rx", "ry", "rz"))):
-            table.fail(wrong, turned[0])
-    missing = [c for c in "xyz" if c not in table.values]
-    if actuators is not None:
-        if table.turns:
-            table.fail(f"joints are commanded, so the orientation follows from them; found it {table.turns}")
-        at_home = np.full(3, np.nan)
-    elif missing and (at_home is None or len(missing) == 3):
-        table.fail(
-            f"no column {', '.join(missing)}; expected x [mm], y [mm], z [mm] and perhaps "
-            "t [s], feed [mm/min], fx [N], fy [N], fz [N]"
-        )
-    for c in missing:
-        assert at_home is not None  # refused before
-        table.values[c] = np.full(len(table.lines), at_home["xyz".index(c)])
-    return table

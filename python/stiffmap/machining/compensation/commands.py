@@ -19,7 +19,8 @@ from stiffmap.common.broadcasting import Floats, names_of, one_of, refused, trai
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.outputs import number_cells, write_rows
 from stiffmap.common.short import short_repr
-from stiffmap.common.tables.named import KNOWN, WORD, read_pose_table
+from stiffmap.common.tables.named import WORD
+from stiffmap.common.tables.pose_table import KNOWN, read_pose_table
 from stiffmap.common.tables.table_file import table_file
 from stiffmap.experiment.experiment import AXES, WRENCH, Experiment
 from stiffmap.experiment.files.fields import APPROACH, COUNTED, VECTOR, WORDS

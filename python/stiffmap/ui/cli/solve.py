@@ -13,7 +13,7 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import length_text
 from stiffmap.common.outputs import write_rows
-from stiffmap.common.tables.named import PoseTable, read_pose_table
+from stiffmap.common.tables.pose_table import PoseTable, read_pose_table
 from stiffmap.common.tables.table_file import refuse_options, table_file
 from stiffmap.experiment.spreadsheet.joints import commands_in
 from stiffmap.solve.labels import COMPONENTS, WRENCH

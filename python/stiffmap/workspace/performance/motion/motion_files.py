@@ -14,7 +14,7 @@ from scipy.interpolate import make_interp_spline
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError, StiffmapError
-from stiffmap.common.tables.named import read_pose_table
+from stiffmap.common.tables.pose_table import read_pose_table
 from stiffmap.common.tables.table_file import refuse_options
 from stiffmap.common.yaml_text import Document, read
 from stiffmap.model.files.report import validated
@@ -120,7 +120,7 @@ class Motion:
 def load_motion(file: str | PathLike[str]) -> Motion:
     """A motion of the tool from a CSV or YAML file, or a shipped one by name: ``trim`` (docs/measures.md).
 
-    A table (`stiffmap.common.tables.named`), a `TableFile` as well: columns ``x [mm]``, ``y [mm]``, ``z [mm]``, perhaps ``fx [N]`` …, which may vary; with ``t [s]`` a
+    A table (`stiffmap.common.tables.pose_table`), a `TableFile` as well: columns ``x [mm]``, ``y [mm]``, ``z [mm]``, perhaps ``fx [N]`` …, which may vary; with ``t [s]`` a
     motion over time, with ``feed [mm/min]`` a path at this speed, without either a path. YAML: ``line``, ``circle`` or ``points``, ``duration`` or ``speed``, ``force``.
     Raises FileError naming file, line, what was expected and what was found.
     """
