@@ -16,7 +16,8 @@ from scipy.spatial.transform import Rotation
 
 from stiffmap.experiment.experiment import Floats, Integers, Mask
 
-STEPS = 60
+STEPS, ROUGH = 60, 8
+"""Of a fit at most; of one whose size alone matters, which is off by less than a tenth then."""
 DONE = 1e-12
 """m, rad: last step of a fit that has come to rest."""
 ARM = 0.2
@@ -75,9 +76,9 @@ class Sighting:
         object.__setattr__(self, "turned", np.isfinite(self.m).all(axis=(1, 2)))
 
 
-def find_frames(s: Sighting) -> Frames:
-    """Frames of instruments and targets of best fit."""
-    refined = (_refined(s, f) for f in _starts(s))
+def find_frames(s: Sighting, steps: int = STEPS) -> Frames:
+    """Frames of instruments and targets of best fit, in so many `steps` from each start at most."""
+    refined = (_refined(s, f, steps) for f in _starts(s))
     return min(refined, key=lambda f: float(np.sum(np.abs(_linear(s, f)[0]))))
 
 
@@ -112,13 +113,13 @@ def turns_apart(commanded: Floats, seen: Floats, setup: Integers, target: Intege
 
 def places_apart(p: Floats, r: Floats, seen: Floats, setup: Integers, target: Integers) -> float:
     """Median distance, m, of places (n, 3) that were seen from where targets on the tool are at commanded poses (n, 3), (n, 3, 3), once
-    instruments and targets are moved to fit; infinite where fewer than half of the places, or than `FEWEST`, have a pose."""
+    instruments and targets are moved to fit, to a tenth; infinite where fewer than half of the places, or than `FEWEST`, have a pose."""
     read = np.isfinite(seen).all(axis=1)
     good = read & np.isfinite(p).all(axis=1)
     if good.sum() < max(FEWEST, read.sum() // 2):
         return np.inf
     s = Sighting(p[good], r[good], seen[good], np.full((good.sum(), 3, 3), np.nan), setup[good], target[good])
-    return _middle(as_commanded(s, find_frames(s))[0])
+    return _middle(as_commanded(s, find_frames(s, ROUGH))[0])
 
 
 def _middle(vectors: Floats) -> float:
@@ -216,9 +217,9 @@ def _rigid(s: Sighting, tool_r: Floats, tool_p: Floats, setups: int) -> Frames:
     return out
 
 
-def _refined(s: Sighting, f: Frames) -> Frames:
+def _refined(s: Sighting, f: Frames, steps: int) -> Frames:
     """Gauss-Newton on all frames; steps of least norm, so that what the plan leaves open stays."""
-    for _ in range(STEPS):
+    for _ in range(steps):
         residual, columns = _linear(s, f)
         far = np.abs(residual) / max(HUBER * _typical(residual), 1e-15)
         weight = np.sqrt(1.0 / np.maximum(far, 1.0))
@@ -252,7 +253,7 @@ def _linear(s: Sighting, f: Frames) -> tuple[Floats, Floats]:
 
     Positions are judged at the target, on the commanded orientation: errors of angle shall not move it by the lever.
     """
-    _, turn = as_commanded(s, f)
+    turn = as_commanded(s, f)[1] if s.turned.any() else np.zeros_like(s.p)
     at = np.einsum("nji,nj->ni", f.base_r[s.setup], s.q - f.base_p[s.setup])
     shift = at - s.p - np.einsum("nij,nj->ni", s.r, f.tool_p[s.target])
     setups, targets = len(f.base_r), len(f.tool_r)
