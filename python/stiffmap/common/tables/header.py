@@ -7,6 +7,7 @@ import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
+from functools import lru_cache
 from itertools import pairwise, takewhile, zip_longest
 
 from stiffmap.common.errors import FileError, StiffmapError
@@ -17,6 +18,8 @@ from stiffmap.common.units import FREQUENCIES, SHORT_TIMES, TIMES, name_and_unit
 Line = tuple[int, list[str]]
 MOST_LINES = 4
 """Lines above the data that may be of the header."""
+KEPT = 10_000
+"""Names of columns whose units and meanings are known at once when they are asked for again."""
 DIRECTIONS = re.compile(r"\+|[-−–]|[↑↓←→]")
 """Of travel, in a line of their own above the names."""
 BEHIND = [
@@ -297,6 +300,7 @@ def _is_of_some(title: Sequence[str], names: Sequence[str]) -> bool:
     return not more and len(columns) > 1 and OF_SOME.search(first) is not None
 
 
+@lru_cache(KEPT)
 def split_unit(header: str) -> tuple[str, str]:
     """``Uhr 1 [µm]`` is ``Uhr 1`` in ``µm``; also round brackets, and ``x / mm``, ``x, mm``, ``x in mm``, ``x_mm``,
     ``x 1/100 mm``."""
@@ -342,6 +346,7 @@ PATTERNS: tuple[tuple[str, str], ...] = (
 )  # fmt: skip
 
 
+@lru_cache(KEPT)
 def meaning_of(name: str) -> str:
     """``x``, ``fz``, ``dx``, ``temperature``, ``id`` and the like, of a name without its unit; empty for what is none of them."""
     plain = re.sub(r"\s+", " ", name.strip().lower())

@@ -287,7 +287,7 @@ def arm(
         raise StiffmapError(
             f"{source or name}: the arm reaches {reach:.3g} m: say the unit of its lengths, as in --unit a=mm --unit d=mm"
         )
-    q = _home(rows, standard) if home is None else np.asarray(home, dtype=float)
+    q = _home(rows, standard, reach) if home is None else np.asarray(home, dtype=float)
     elements: list[Element] = []
     for i, r in enumerate(rows):
         own = _screw("z", r.theta, r.d)
@@ -301,7 +301,7 @@ def arm(
         if np.any(behind - np.eye(4)):
             elements.append(Offset(f"link_{i + 1}" if standard else f"{r.name}_end", _pose(behind)))
     at = forward(rows, standard, q)
-    room = ROOM * _reach(rows, standard)
+    room = ROOM * reach
     low, high = (tuple(float(v) for v in at[:3, 3] + side * room) for side in (-1.0, 1.0))
     return MachineDescription(
         name, (Leg(LEG, tuple(elements)),), home=_pose(at), workspace=(low, high), source=source,  # type: ignore[arg-type]
@@ -319,10 +319,9 @@ def forward(rows: Sequence[DHRow], standard: bool, q: Floats) -> Floats:
     return out
 
 
-def _home(rows: Sequence[DHRow], standard: bool) -> Floats:
+def _home(rows: Sequence[DHRow], standard: bool, reach: float) -> Floats:
     """Of coordinates in steps of 30 degrees those whose slopes are farthest from losing a direction."""
     rng = np.random.default_rng(0)
-    reach = _reach(rows, standard)
     best, where = -1.0, np.zeros(len(rows))
     for k in range(TRIES):
         q = np.array([_within(r, STEP * int(rng.integers(-4, 5)) if k else 0.0, reach) for r in rows])
