@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.stats import nct
 
+from stiffmap.common.broadcasting import Floats
 from stiffmap.common.tasks import workers
 from stiffmap.model.link.identify import identify_link
 from stiffmap.model.link.result import critical_multiple
-from stiffmap.model.link.transport import Floats
 
 L, EIZ, EIY, EA, GJ = 0.31, 43.0, 205.0, 6.8e6, 10.8
 REFERENCE = np.array([L, 0.0, 0.0])

@@ -23,6 +23,7 @@ from stiffmap.common.errors import StiffmapError
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.intp]
+Mask = NDArray[np.bool_]
 MOST_THREADS = 4096
 """More than any machine has cores, and no more than a system starts."""
 

@@ -19,7 +19,6 @@ from stiffmap.experiment.ramps import directions
 
 __all__ = ["AXES", "BRANCHES", "WRENCH", "Channel", "Experiment", "Floats", "Integers", "Loop"]
 
-Mask = NDArray[np.bool_]
 WRENCH = ("fx", "fy", "fz", "mx", "my", "mz")
 ASKED = tuple(f"{c}_cmd" for c in WRENCH)
 """Columns of loads that were commanded, in addition to those that were measured."""

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from stiffmap.experiment.experiment import WRENCH, Experiment, Mask
+from stiffmap.common.broadcasting import Mask
+from stiffmap.experiment.experiment import WRENCH, Experiment
 from stiffmap.experiment.poses.configuration import coordinates_of
 from stiffmap.solve.machine import Machine
 from stiffmap.solve.validity import Validity, drive_coordinates, kinds, range_of

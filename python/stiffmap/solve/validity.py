@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from stiffmap.common.broadcasting import Floats
+from stiffmap.common.broadcasting import Floats, Mask
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.description.tree import joints
 from stiffmap.solve.labels import WRENCH
@@ -21,7 +21,6 @@ KEY = "validity"
 SLACK = 0.05
 """Share of a range beyond its ends that still belongs to it."""
 
-Mask = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 Range = tuple[float, float]
 
 

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from stiffmap.common.broadcasting import whole_number
+from stiffmap.common.broadcasting import Mask, whole_number
 from stiffmap.common.json_text import plain
 from stiffmap.common.number_text import length_text
 from stiffmap.common.outputs import number_cells, write_rows
 from stiffmap.common.short import short_repr, table, titled
 from stiffmap.experiment.channels import AXIS_CHANNELS, Channel, metres
-from stiffmap.experiment.experiment import Experiment, Floats, Mask
+from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.noise.checks import Check
 from stiffmap.experiment.noise.level import Noise, rms
 

@@ -15,7 +15,8 @@ from itertools import combinations, pairwise
 import numpy as np
 from scipy.special import chdtrc
 
-from stiffmap.experiment.experiment import Experiment, Floats, Integers, Mask, numbered
+from stiffmap.common.broadcasting import Mask
+from stiffmap.experiment.experiment import Experiment, Floats, Integers, numbered
 from stiffmap.experiment.noise.level import sums
 
 Contrast = tuple[list[tuple[int, int]], list[float]]

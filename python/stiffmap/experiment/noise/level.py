@@ -7,9 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import chdtr
 
+from stiffmap.common.broadcasting import Mask
 from stiffmap.common.errors import StiffmapError
 from stiffmap.experiment.channels import Channel, metres
-from stiffmap.experiment.experiment import Experiment, Floats, Integers, Mask, numbered
+from stiffmap.experiment.experiment import Experiment, Floats, Integers, numbered
 from stiffmap.experiment.poses.handeye import ERROR, own_frame
 
 CONTRADICTION = 1e-4

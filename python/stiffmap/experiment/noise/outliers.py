@@ -8,8 +8,9 @@ from itertools import combinations
 import numpy as np
 from scipy.special import chdtrc
 
+from stiffmap.common.broadcasting import Mask
 from stiffmap.common.short import first_of
-from stiffmap.experiment.experiment import Experiment, Floats, Integers, Mask
+from stiffmap.experiment.experiment import Experiment, Floats, Integers
 from stiffmap.experiment.noise.level import Noise, noise_of
 from stiffmap.experiment.noise.whitening import LinearProblem, nuisance_part
 from stiffmap.experiment.setups import target_positions

@@ -12,9 +12,9 @@ from functools import cached_property
 
 import numpy as np
 
-from stiffmap.common.broadcasting import random_numbers
+from stiffmap.common.broadcasting import Mask, random_numbers
 from stiffmap.common.errors import StiffmapError
-from stiffmap.experiment.experiment import Experiment, Floats, Integers, Mask
+from stiffmap.experiment.experiment import Experiment, Floats, Integers
 from stiffmap.experiment.noise.nuisance import nuisance_columns
 
 FOLDS, MANY_RUNS = 5, 4

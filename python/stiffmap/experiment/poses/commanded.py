@@ -7,8 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from stiffmap.common.broadcasting import Mask
 from stiffmap.common.errors import StiffmapError
-from stiffmap.experiment.experiment import Experiment, Floats, Integers, Mask
+from stiffmap.experiment.experiment import Experiment, Floats, Integers
 from stiffmap.experiment.poses.handeye import Sighting, as_commanded, find_frames, unmoved
 from stiffmap.experiment.readings import kinds
 from stiffmap.experiment.setups import SEEN, setups_of, targets_of

@@ -16,8 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from stiffmap.common.broadcasting import Mask
 from stiffmap.common.kept import Kept
-from stiffmap.experiment.experiment import Experiment, Floats, Integers, Loop, Mask
+from stiffmap.experiment.experiment import Experiment, Floats, Integers, Loop
 from stiffmap.model.description import Element, Point, Spring
 from stiffmap.model.description.alike import nominal_geometry, straight
 from stiffmap.model.effects import get, kinds

@@ -14,7 +14,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from stiffmap.experiment.experiment import Floats, Integers, Mask
+from stiffmap.common.broadcasting import Mask
+from stiffmap.experiment.experiment import Floats, Integers
 
 STEPS, ROUGH = 60, 8
 """Of a fit at most; of one whose size alone matters, which is off by less than a tenth then."""

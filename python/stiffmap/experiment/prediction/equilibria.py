@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from stiffmap.experiment.experiment import Experiment, Floats, Mask
+from stiffmap.common.broadcasting import Mask
+from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.poses.configuration import (
     carrier,
     coordinates_of,

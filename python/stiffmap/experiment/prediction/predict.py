@@ -10,11 +10,11 @@ from functools import partial
 import numpy as np
 
 from stiffmap.common.arguments import checked
-from stiffmap.common.broadcasting import instance_of
+from stiffmap.common.broadcasting import Mask, instance_of
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.fingerprints import code, digest
 from stiffmap.common.kept import MOST_BYTES, Kept
-from stiffmap.experiment.experiment import Experiment, Floats, Mask
+from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.poses.commanded import OUT_OF_REACH, located, resolved, without
 from stiffmap.experiment.poses.configuration import at_rest, coordinates_of
 from stiffmap.experiment.prediction.equilibria import motions

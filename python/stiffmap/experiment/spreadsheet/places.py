@@ -8,14 +8,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from stiffmap.common.broadcasting import Floats
+from stiffmap.common.broadcasting import Floats, Mask
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.short import first_of
 from stiffmap.common.tables.cells import Cells
 from stiffmap.common.tables.header import MEASURED
 from stiffmap.common.tables.table import Table
 from stiffmap.experiment.channels import AXES
-from stiffmap.experiment.experiment import Mask
 from stiffmap.experiment.files.fields import POSE, SEEN
 from stiffmap.experiment.poses.handeye import own_frame
 from stiffmap.experiment.spreadsheet.answers import Meant, Question

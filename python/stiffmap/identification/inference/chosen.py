@@ -8,7 +8,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.special import log_ndtr, ndtri
 
-from stiffmap.experiment.experiment import Floats, Mask
+from stiffmap.common.broadcasting import Mask
+from stiffmap.experiment.experiment import Floats
 from stiffmap.identification.candidates.candidates import Candidate
 from stiffmap.identification.candidates.sensitivity import Variant
 from stiffmap.identification.inference.amplitudes import Fit

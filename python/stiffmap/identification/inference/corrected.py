@@ -18,8 +18,9 @@ from itertools import compress
 
 import numpy as np
 
+from stiffmap.common.broadcasting import Mask
 from stiffmap.common.errors import StiffmapError
-from stiffmap.experiment.experiment import Experiment, Floats, Mask
+from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.noise.outliers import GROSS, MANY
 from stiffmap.identification.inference.chosen import WIDE, Term
 from stiffmap.identification.inference.constants import DEGREES, STANDS_OUT

@@ -15,7 +15,8 @@ import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 from scipy.spatial.distance import cdist
 
-from stiffmap.experiment.experiment import Experiment, Floats, Integers, Mask
+from stiffmap.common.broadcasting import Mask
+from stiffmap.experiment.experiment import Experiment, Floats, Integers
 from stiffmap.experiment.poses.configuration import coordinates_of
 from stiffmap.solve.machine import Machine
 

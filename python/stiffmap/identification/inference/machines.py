@@ -9,9 +9,10 @@ import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 from scipy.special import fdtrc
 
+from stiffmap.common.broadcasting import Mask
 from stiffmap.experiment.channels import metres
 from stiffmap.experiment.comparison.residual import Summary, summary
-from stiffmap.experiment.experiment import Experiment, Floats, Integers, Mask
+from stiffmap.experiment.experiment import Experiment, Floats, Integers
 from stiffmap.experiment.noise.outliers import GROSS
 from stiffmap.experiment.noise.over_time import OverTime, over_time
 from stiffmap.experiment.noise.whitening import LinearProblem, folds, left_unseen, nuisance_part

@@ -11,8 +11,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from stiffmap.common.broadcasting import Mask
 from stiffmap.common.errors import StiffmapError
-from stiffmap.experiment.experiment import Floats, Mask
+from stiffmap.experiment.experiment import Floats
 from stiffmap.experiment.noise.level import Noise
 from stiffmap.experiment.noise.outliers import without_suspects
 from stiffmap.experiment.prediction.predict import Predictor

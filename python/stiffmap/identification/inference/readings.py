@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from stiffmap.common.broadcasting import Mask
 from stiffmap.common.errors import StiffmapError
-from stiffmap.experiment.experiment import Floats, Integers, Mask
+from stiffmap.experiment.experiment import Floats, Integers
 from stiffmap.experiment.noise.nuisance import nuisance_columns
 from stiffmap.experiment.noise.whitening import basis, readings_of
 from stiffmap.experiment.prediction.predict import Predictor

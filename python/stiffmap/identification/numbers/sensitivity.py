@@ -9,9 +9,10 @@ from functools import cache, partial
 
 import numpy as np
 
+from stiffmap.common.broadcasting import Mask
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.kept import Kept
-from stiffmap.experiment.experiment import Experiment, Floats, Mask
+from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.prediction.nearby import Ahead, Near
 from stiffmap.experiment.prediction.predict import Predictor, fingerprint
 from stiffmap.identification.numbers.certificate import INSTRUMENT, SCALE, frame_columns, scaled

@@ -7,10 +7,11 @@ from os import PathLike
 
 import numpy as np
 
+from stiffmap.common.broadcasting import Mask
 from stiffmap.experiment.calls import as_experiment
 from stiffmap.experiment.comparison.limitations import refuse
 from stiffmap.experiment.comparison.residual import Summary, summary
-from stiffmap.experiment.experiment import Experiment, Mask
+from stiffmap.experiment.experiment import Experiment
 from stiffmap.experiment.noise.level import noise_of
 from stiffmap.experiment.noise.whitening import LinearProblem, nuisance_part
 from stiffmap.experiment.prediction.predict import Predictor

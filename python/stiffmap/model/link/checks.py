@@ -7,10 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from stiffmap.common.broadcasting import real_array
+from stiffmap.common.broadcasting import Floats, Mask, real_array
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.number_text import SMALLEST
-from stiffmap.model.link.transport import Bools, Floats
 
 AXES = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
 COLLINEAR = 1e-6  # second singular value of the centred nodes over the first
@@ -78,7 +77,7 @@ def spread(points: Floats) -> Floats:
     return np.asarray(np.linalg.svd(points - points.mean(axis=0), compute_uv=False))
 
 
-def identifiable_columns(wrenches: Floats, *, partial: bool) -> Bools:
+def identifiable_columns(wrenches: Floats, *, partial: bool) -> Mask:
     """Which of the six columns of the compliance the wrenches (cases, 6) determine, as (6,) bool.
 
     Column j is determined when the unit wrench j is in the row space of the cases.
@@ -90,7 +89,7 @@ def identifiable_columns(wrenches: Floats, *, partial: bool) -> Bools:
     _, s, vt = np.linalg.svd(wrenches / np.where(scale > 0, scale, 1.0))
     rank = int(np.sum(s > RANK * s.max(initial=0.0)))
     null = vt[rank:]
-    seen: Bools = (np.linalg.norm(null, axis=0) < 1e-6) & (scale > 0)
+    seen: Mask = (np.linalg.norm(null, axis=0) < 1e-6) & (scale > 0)
     if rank < 6 and not partial:
         missing = ", ".join(a for a, ok in zip(AXES, seen, strict=True) if not ok)
         raise StiffmapError(

@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from stiffmap.common.broadcasting import real_array
+from stiffmap.common.broadcasting import Floats, Mask, real_array
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.link.checks import (
     DisplacementField,
@@ -21,7 +21,7 @@ from stiffmap.model.link.outliers import LEVEL, find_outliers
 from stiffmap.model.link.regression import regress
 from stiffmap.model.link.result import Evidence, Link, build_link
 from stiffmap.model.link.rigidfit import RigidFit, fit_exact, fit_linear, parting_rotation, turn_back
-from stiffmap.model.link.transport import Bools, Floats, twist_transport
+from stiffmap.model.link.transport import twist_transport
 
 Known = float | ArrayLike | Literal["independent"] | None
 FITS = {"linear": fit_linear, "exact": fit_exact}
@@ -104,7 +104,7 @@ def known_noise(noise: Known, cases: int) -> Floats | None:
     return np.asarray(np.broadcast_to(sigma, (cases,)))
 
 
-def _outliers(field: DisplacementField, known: Floats | None, wanted: bool, method: str) -> Bools:
+def _outliers(field: DisplacementField, known: Floats | None, wanted: bool, method: str) -> Mask:
     found = np.zeros(field.displacements.shape[:2], dtype=bool)
     if wanted:
         for k, u in enumerate(field.displacements):
@@ -115,7 +115,7 @@ def _outliers(field: DisplacementField, known: Floats | None, wanted: bool, meth
     return found
 
 
-def _fit(field: DisplacementField, case: int, kept: Bools, method: str) -> RigidFit:
+def _fit(field: DisplacementField, case: int, kept: Mask, method: str) -> RigidFit:
     points = field.points[kept]
     check_points(points)
     return FITS[method](points, field.displacements[case, kept], field.reference)
@@ -131,7 +131,7 @@ def _noise(field: DisplacementField, fits: list[RigidFit], known: Floats | None)
     return noise._replace(used=known, used_dof=np.full(len(known), np.inf), pooled=False)
 
 
-def _correlation(field: DisplacementField, kept: Bools, noise: Known, method: str) -> Correlation | None:
+def _correlation(field: DisplacementField, kept: Mask, noise: Known, method: str) -> Correlation | None:
     """Correlation of the residuals on the nodes that every case keeps; None when not asked for."""
     common = kept.all(axis=0)
     if noise is not None or common.sum() < 12:
@@ -146,7 +146,7 @@ def _correlation(field: DisplacementField, kept: Bools, noise: Known, method: st
 
 def _twist_covariances(
     field: DisplacementField,
-    kept: Bools,
+    kept: Mask,
     fits: list[RigidFit],
     noise: FieldNoise,
     correlation: Correlation | None,
@@ -167,7 +167,7 @@ EVIDENCE = 20.0  # difference of the residual sums in units of the noise varianc
 MATERIAL = 1e-3  # of the displacement: a smaller misfit of the linear motion is accepted
 
 
-def finite_rotation(field: DisplacementField, kept: Bools) -> str:
+def finite_rotation(field: DisplacementField, kept: Mask) -> str:
     """Why a field turns by more than the linearised rotation (14) can follow; empty where it does not.
 
     A linear solver's field stays linear at any size, so size alone is no fault: it counts as finite when

@@ -9,6 +9,7 @@ from typing import Any, Generic, Literal, TypeVar
 import numpy as np
 from pydantic import Field
 
+from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError, StiffmapError
 from stiffmap.common.units import STRESSES, size_of
 from stiffmap.common.yaml_text import read
@@ -18,7 +19,6 @@ from stiffmap.model.link.gmshmesh import UNITS
 from stiffmap.model.link.readers import cases_rise, known_columns
 from stiffmap.model.link.shapes import Bar, Foot, ForkBar, HollowBar, Length
 from stiffmap.model.link.solve import Material
-from stiffmap.model.link.transport import Floats
 
 # Handbook values for a first estimate; a measured modulus belongs in the part file.
 MATERIALS = {

@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 import yaml
 
+from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError, unknown_name
 from stiffmap.common.outputs import write_text
 from stiffmap.common.yaml_text import read
-from stiffmap.model.link.transport import Floats, standard_errors, unit_diagonal
+from stiffmap.model.link.transport import standard_errors, unit_diagonal
 
 SYMMETRY = 1e-6  # of sqrt(C_ii C_jj)
 UNITS = {"length": "m", "force": "N", "angle": "rad"}

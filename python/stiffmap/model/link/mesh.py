@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csr_matrix
 
+from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.link.rigidfit import design_matrix
-from stiffmap.model.link.transport import Floats, Ints
+from stiffmap.model.link.transport import Ints
 
 FLAT = 1e-9  # volume of a tetrahedron over its longest edge cubed
 # Six-point rule of degree 4 on the triangle (Dunavant): points are (a, a, 1 - 2a) and permutations.

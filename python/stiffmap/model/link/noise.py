@@ -19,8 +19,9 @@ from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 from scipy.special import chdtrc, ndtr
 
+from stiffmap.common.broadcasting import Floats
 from stiffmap.model.link.rigidfit import design_matrix
-from stiffmap.model.link.transport import Floats, Ints
+from stiffmap.model.link.transport import Ints
 
 HOMOGENEITY_LEVEL = 0.01
 

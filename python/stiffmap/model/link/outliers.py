@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.special import chdtri
 
+from stiffmap.common.broadcasting import Floats, Mask
 from stiffmap.model.link.rigidfit import design_matrix
-from stiffmap.model.link.transport import Bools, Floats
 
 LEVEL = 0.01  # probability that a clean field of independent noise loses any node
 STARTS = 200
@@ -19,7 +19,7 @@ SMALLEST_FIELD = 9  # below this the residuals cannot tell an outlier from noise
 ROUNDS = 50
 
 
-def find_outliers(points: Floats, displacements: Floats, level: float, sigma: float | None) -> Bools:
+def find_outliers(points: Floats, displacements: Floats, level: float, sigma: float | None) -> Mask:
     """(n,) bool, True for a node that leaves the rigid motion of the others.
 
     A node is an outlier when its residual, standardised by its own covariance (leverage included),
@@ -45,7 +45,7 @@ def find_outliers(points: Floats, displacements: Floats, level: float, sigma: fl
     return outliers
 
 
-def _trimmed_start(A: Floats, u: Floats) -> Bools:
+def _trimmed_start(A: Floats, u: Floats) -> Mask:
     """Inliers (half of the nodes) of the least-trimmed-squares fit, best of random elemental starts."""
     n, half = len(u), (len(u) + 7) // 2
     normal, right = np.einsum("nia,nib->nab", A, A), np.einsum("nia,ni->na", A, u)
@@ -62,11 +62,11 @@ def _trimmed_start(A: Floats, u: Floats) -> Bools:
     return np.asarray(member[np.argmin(np.sum(d2 * member, axis=1))] > 0)
 
 
-def _refine(A: Floats, u: Floats, inlier: Bools, cut: float, floor: float, sigma: float | None) -> Bools:
+def _refine(A: Floats, u: Floats, inlier: Mask, cut: float, floor: float, sigma: float | None) -> Mask:
     n = len(u)
     d2 = _squared_residuals(A, u, np.flatnonzero(inlier))
     scale2 = sigma**2 if sigma else max(float(np.median(d2) / chdtri(3, 0.5)), floor**2)
-    seen: list[Bools] = []
+    seen: list[Mask] = []
     for _ in range(ROUNDS):
         if scale2 == 0.0:
             return np.zeros(n, dtype=bool)
@@ -87,7 +87,7 @@ def _squared_residuals(A: Floats, u: Floats, keep: np.ndarray) -> Floats:
     return np.asarray(np.sum((u - A @ x) ** 2, axis=1))
 
 
-def _standardised(A: Floats, u: Floats, inlier: Bools) -> Floats:
+def _standardised(A: Floats, u: Floats, inlier: Mask) -> Floats:
     """Squared residual of every node in the metric of its own covariance, m² (noise variance left in)."""
     Ai = A[inlier].reshape(-1, 6)
     N = np.linalg.inv(Ai.T @ Ai)

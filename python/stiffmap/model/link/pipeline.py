@@ -10,6 +10,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from scipy.optimize import brentq
 
+from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.link.checks import spread
 from stiffmap.model.link.identify import identify_link
@@ -17,7 +18,7 @@ from stiffmap.model.link.linkfile import LinkFile
 from stiffmap.model.link.mesh import SolidMesh
 from stiffmap.model.link.result import Link
 from stiffmap.model.link.solve import Material, Setup, has_ccx, mean_motion, solve_ccx, solve_skfem
-from stiffmap.model.link.transport import Floats, Ints, standard_errors
+from stiffmap.model.link.transport import Ints, standard_errors
 
 PLAUSIBLE = (0.5, 5.0)  # an order outside is not believed; order one is then assumed
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import FileError, StiffmapError, needed, refuse_folder
 from stiffmap.common.number_text import number_in
 from stiffmap.common.tables.header import meaning_of, split_unit, with_unit
@@ -17,7 +18,7 @@ from stiffmap.common.tables.sheet import Layout, read_sheet
 from stiffmap.common.tables.table import Table
 from stiffmap.common.texts import text_of
 from stiffmap.model.link.gmshmesh import UNITS
-from stiffmap.model.link.transport import Floats, Ints
+from stiffmap.model.link.transport import Ints
 
 Rows = tuple[Ints, Floats]
 Nodes = dict[int, list[float]]

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import pinvh
 
-from stiffmap.model.link.transport import Bools, Floats
+from stiffmap.common.broadcasting import Floats, Mask
 
 
 class Regression(NamedTuple):
@@ -46,7 +46,7 @@ def regress(wrenches: Floats, twists: Floats, covariances: Floats) -> Regression
     return Regression(entries, gain, inverse * np.outer(unit, unit), chi, 6 * (len(w) - rank))
 
 
-def structure(*, symmetric: bool, zeros: Bools | None = None, known: Bools | None = None) -> Floats:
+def structure(*, symmetric: bool, zeros: Mask | None = None, known: Mask | None = None) -> Floats:
     """(36, parameters) matrix Z with ``entries = Z @ parameters``: link (7).
 
     Entry (i, j) and (j, i) share a parameter under symmetry; ``zeros`` (6, 6) take theirs away;
@@ -63,7 +63,7 @@ def structure(*, symmetric: bool, zeros: Bools | None = None, known: Bools | Non
     return np.array(columns).T if columns else np.zeros((36, 0))
 
 
-def constrain(covariance: Floats, Z: Floats, measured: Bools) -> Floats:
+def constrain(covariance: Floats, Z: Floats, measured: Mask) -> Floats:
     """(36, 36) projection P: ``P @ entries`` is the best estimate of the form Z @ parameters, link (7).
 
     Generalised least squares with the entries' own covariance; rows of unmeasured entries not used.

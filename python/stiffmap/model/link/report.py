@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from stiffmap.model.link.transport import Floats
+from stiffmap.common.broadcasting import Floats
 
 UNIT_FACTOR = np.kron([[1e3, 1.0], [1.0, 1e-3]], np.ones((3, 3)))
 """(6, 6) from SI entries to mm/N, 1/N, rad/(N·mm), as the paper prints them."""

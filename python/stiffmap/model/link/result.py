@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import chdtrc, stdtrit
 
-from stiffmap.common.broadcasting import random_numbers
+from stiffmap.common.broadcasting import Floats, Mask, random_numbers
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.short import table, titled
 from stiffmap.model.link.checks import DisplacementField, finite_array
@@ -17,27 +17,20 @@ from stiffmap.model.link.noise import Correlation, FieldNoise
 from stiffmap.model.link.regression import Regression, constrain, structure
 from stiffmap.model.link.report import UNIT_FACTOR, findings, unit_name
 from stiffmap.model.link.rigidfit import RigidFit, design_matrix
-from stiffmap.model.link.transport import (
-    Bools,
-    Floats,
-    Ints,
-    standard_errors,
-    transport_compliance,
-    unit_diagonal,
-)
+from stiffmap.model.link.transport import Ints, standard_errors, transport_compliance, unit_diagonal
 
 
 class Evidence(NamedTuple):
     """All that the estimate is made from; kept so that it can be made again under other constraints."""
 
     field: DisplacementField
-    kept: Bools  # (cases, n)
+    kept: Mask  # (cases, n)
     fits: tuple[RigidFit, ...]
     noise: FieldNoise
     correlation: Correlation | None
     twist_covariance: Floats  # (cases, 6, 6)
     regression: Regression
-    columns: Bools  # (6,) columns of the compliance that the wrenches determine
+    columns: Mask  # (6,) columns of the compliance that the wrenches determine
     method: str
 
 
@@ -49,9 +42,9 @@ class Link:
     covariance: Floats  # (36, 36) of the entries; rank 21 under symmetry
     dof: Ints  # (cases,) 3 n - 6 of the nodes kept
     sigma: Floats  # (cases,) m, noise of the field per case
-    insignificant: Bools  # (6, 6) zero within the test's level
+    insignificant: Mask  # (6, 6) zero within the test's level
     level: float  # family-wise level of that test
-    outliers: Bools  # (cases, n)
+    outliers: Mask  # (cases, n)
     raw: Floats  # (6, 6) before symmetry and zeros
     raw_covariance: Floats  # (36, 36)
     entry_dof: Floats  # (6, 6) degrees of freedom behind each standard error (Satterthwaite)
@@ -186,7 +179,7 @@ def critical_multiple(level: float, tests: int, dof: Floats | float) -> Floats:
     return np.asarray(-stdtrit(dof, level / (2 * tests)))
 
 
-def build_link(evidence: Evidence, symmetric: bool, level: float, zeros: Bools | None = None) -> Link:
+def build_link(evidence: Evidence, symmetric: bool, level: float, zeros: Mask | None = None) -> Link:
     """Project the regression on symmetry and zeros, carry the covariance along, and test for zeros.
 
     Raises:
@@ -213,7 +206,7 @@ def build_link(evidence: Evidence, symmetric: bool, level: float, zeros: Bools |
     )  # fmt: skip
 
 
-def _projection(e: Evidence, symmetric: bool, zeros: Bools | None) -> Floats:
+def _projection(e: Evidence, symmetric: bool, zeros: Mask | None) -> Floats:
     measured = np.tile(e.columns, (6, 1))
     Z = structure(symmetric=symmetric, zeros=zeros, known=measured)
     return constrain(e.regression.covariance, Z, measured.ravel())

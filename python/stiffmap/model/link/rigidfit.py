@@ -9,7 +9,8 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
-from stiffmap.model.link.transport import Floats, skew, twist_transport
+from stiffmap.common.broadcasting import Floats
+from stiffmap.model.link.transport import skew, twist_transport
 
 
 class RigidFit(NamedTuple):

@@ -12,10 +12,10 @@ from typing import Literal
 import numpy as np
 from pydantic import Field, model_validator
 
+from stiffmap.common.broadcasting import Floats
 from stiffmap.model.files.schema.base import FileModel
 from stiffmap.model.link.gmshmesh import Faces, mesh_model, with_others
 from stiffmap.model.link.mesh import SolidMesh
-from stiffmap.model.link.transport import Floats
 
 Length = Field(gt=0, allow_inf_nan=False)
 Vector = tuple[float, float, float]

@@ -16,11 +16,12 @@ from scipy.sparse import csc_matrix, csr_matrix, kron
 from scipy.sparse import eye as sparse_eye
 from scipy.sparse.linalg import splu
 
+from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError, needed
 from stiffmap.model.link.mesh import SolidMesh, face_area_centre, face_loads, face_mass
 from stiffmap.model.link.readers import read_listing
 from stiffmap.model.link.rigidfit import design_matrix
-from stiffmap.model.link.transport import Floats, Ints
+from stiffmap.model.link.transport import Ints
 
 RESIDUAL = 1e-7  # work of the residual over the work of the load: the relative error of the compliance
 

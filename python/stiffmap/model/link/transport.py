@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
+from stiffmap.common.broadcasting import Floats
+
 Ints = NDArray[np.int64]
 
 

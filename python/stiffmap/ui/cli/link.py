@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, cast
 
+from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.link.gmshmesh import CAD, MESH, mesh_file
 from stiffmap.model.link.identify import identify_link
@@ -18,7 +19,7 @@ from stiffmap.model.link.pipeline import PartLink, Solver, Support, link_from_pa
 from stiffmap.model.link.readers import FIELDS, read_field
 from stiffmap.model.link.result import Link
 from stiffmap.model.link.solve import Material, Setup
-from stiffmap.model.link.transport import Floats, standard_errors
+from stiffmap.model.link.transport import standard_errors
 from stiffmap.ui.cli.inputs import in_si
 from stiffmap.ui.cli.options import argument, flag, option, written
 from stiffmap.ui.cli.output import Answer

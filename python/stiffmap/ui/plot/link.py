@@ -11,10 +11,11 @@ from matplotlib.figure import SubFigure
 from mpl_toolkits.mplot3d import Axes3D
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
+from stiffmap.common.broadcasting import Floats
 from stiffmap.model.link.pipeline import PartLink
 from stiffmap.model.link.report import UNIT_FACTOR, unit_name
 from stiffmap.model.link.result import Link
-from stiffmap.model.link.transport import Floats, Ints, standard_errors
+from stiffmap.model.link.transport import Ints, standard_errors
 from stiffmap.ui.plot.style import BLUE, COLOURS, VERMILLION, new_figure, save, wrench_text
 
 GREY = "#999999"

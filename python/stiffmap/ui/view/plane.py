@@ -13,7 +13,7 @@ from contourpy import contour_generator
 from matplotlib.colors import to_rgb
 from numpy.typing import NDArray
 
-from stiffmap.common.broadcasting import Floats
+from stiffmap.common.broadcasting import Floats, Mask
 from stiffmap.common.number_text import length_unit
 from stiffmap.solve.compiled import Status
 from stiffmap.solve.solution import Solution
@@ -87,9 +87,6 @@ def tolerance_level(quantity: str, tolerance: float) -> float | None:
     if quantity in ("deflection", "worst"):
         return tolerance * QUANTITIES[quantity].factor
     return 0.0 if quantity == "margin" else None
-
-
-Mask = NDArray[np.bool_]
 
 
 NO_LINES = np.zeros((0, 2, 3))

@@ -11,13 +11,14 @@ from typing import Any
 
 import numpy as np
 
+from stiffmap.common.broadcasting import Mask
 from stiffmap.common.errors import FileError, reading
 from stiffmap.common.from_above import from_above
 from stiffmap.common.json_text import json_text, parse_json, plain
 from stiffmap.common.number_text import percent, place_text, with_uncertainty
 from stiffmap.common.short import first_of, short_repr, titled
 from stiffmap.experiment.comparison.residual import Summary
-from stiffmap.experiment.experiment import Experiment, Floats, Mask
+from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.noise.checks import Check
 from stiffmap.identification.diagnosis.report.findings import (
     Detectability,

@@ -9,7 +9,8 @@ from itertools import permutations, product
 
 import numpy as np
 
-from stiffmap.experiment.experiment import Experiment, Floats, Mask
+from stiffmap.common.broadcasting import Mask
+from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.prediction.predict import Predictor
 
 

@@ -8,7 +8,8 @@ from functools import partial
 
 import numpy as np
 
-from stiffmap.experiment.experiment import Experiment, Floats, Mask
+from stiffmap.common.broadcasting import Mask
+from stiffmap.experiment.experiment import Experiment, Floats
 from stiffmap.experiment.noise.whitening import LinearProblem
 from stiffmap.identification.diagnosis.slips.axes import Hypothesis, in_setup, of_setup, times
 
