@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from stiffmap.common.broadcasting import Floats
 from stiffmap.model.beams import Section, cantilever_compliance, hollow_section, rectangle_section
-from stiffmap.model.link.transport import Floats, twist_transport
+from stiffmap.model.link.transport import twist_transport
 
 
 def rectangle(width: float, height: float) -> Section:

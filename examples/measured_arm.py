@@ -20,8 +20,8 @@ from pathlib import Path
 import numpy as np
 
 import stiffmap as sm
+from stiffmap.common.broadcasting import Floats, Mask
 from stiffmap.experiment import Predictor
-from stiffmap.experiment.experiment import Floats, Mask
 from stiffmap.experiment.noise.whitening import LinearProblem, nuisance_part
 from stiffmap.identification.calibration import Calibration
 from stiffmap.identification.inference.travel import Profile

@@ -18,8 +18,8 @@ from pathlib import Path
 import numpy as np
 
 import stiffmap as sm
+from stiffmap.common.broadcasting import Floats, Mask
 from stiffmap.experiment import Experiment, Predictor
-from stiffmap.experiment.experiment import Floats, Mask
 from stiffmap.experiment.files.load import load_experiment
 from stiffmap.experiment.noise.whitening import left_unseen
 from stiffmap.identification.numbers import Tolerances
