@@ -22,8 +22,7 @@ import numpy as np
 import stiffmap as sm
 from stiffmap.experiment import simulate
 from stiffmap.experiment.calls import placed
-from stiffmap.identification.planning import estimate, follow
-from stiffmap.identification.planning import plan as design
+from stiffmap.identification.planning import estimate, follow, plan as design
 
 MORE = (12, 16, 24, 32, 48)
 POSES = 40

@@ -10,8 +10,7 @@ from scipy.spatial.transform import Rotation, Slerp
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.model.description import TASK
-from stiffmap.solve.closing import Kinematics as Kinematics
-from stiffmap.solve.closing import Start, close_actuators, close_poses
+from stiffmap.solve.closing import Kinematics as Kinematics, Start, close_actuators, close_poses
 from stiffmap.solve.compiled import Role, Status
 from stiffmap.solve.machine import Machine, hint_metres, takes_machine
 

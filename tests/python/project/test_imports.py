@@ -64,7 +64,7 @@ RANK = {name: i for i, name in enumerate(("_core", *ROOMS))}
 FACE = {"stiffmap", "stiffmap.__main__"}  # names what lies in all rooms
 # Who may load a module by a name that is computed, and what: no reader and no other test sees such an import.
 BY_NAME = {
-    "stiffmap",  # public names, when they are first used
+    "stiffmap.common.public",  # public names, when they are first used; `imported` reads their stubs
     "stiffmap.common.from_above",  # the two methods that hand their work to a room above, as the face of the package says
     "stiffmap.common.python_file",  # files of one folder, and a file that a user wrote
     "stiffmap.ui.cli.commands",  # the module of a command, and what it imports when it runs
@@ -97,13 +97,17 @@ def statements(block: list[ast.stmt]) -> Iterator[ast.stmt]:
 
 
 def imported(path: Path) -> set[str]:
-    """Modules of stiffmap that a file imports, wherever in it."""
-    found = set()
-    for node in statements(ast.parse(path.read_text(encoding="utf-8")).body):
-        if isinstance(node, ast.ImportFrom) and node.module and node.module.split(".")[0] == "stiffmap":
+    """Modules of stiffmap that a file imports, wherever in it; of a package also those from which its stub has its names."""
+    found, stub = set(), path.with_suffix(".pyi")
+    text = path.read_text(encoding="utf-8") + (stub.read_text(encoding="utf-8") if stub.exists() else "")
+    for node in statements(ast.parse(text).body):
+        module = getattr(node, "module", None) or ""
+        if getattr(node, "level", 0):  # of a stub
+            module = f"{module_name(path)}.{module}".rstrip(".")
+        if isinstance(node, ast.ImportFrom) and module.split(".")[0] == "stiffmap":
             for alias in node.names:
-                inner = f"{node.module}.{alias.name}"
-                found.add(inner if inner in MODULES or alias.name == "_core" else node.module)
+                inner = f"{module}.{alias.name}"
+                found.add(inner if inner in MODULES or alias.name == "_core" else module)
         elif isinstance(node, ast.Import):
             found |= {a.name for a in node.names if a.name.split(".")[0] == "stiffmap"}
     return found

@@ -19,7 +19,7 @@ FORMATS = {"stiffmap.model.link.readers"}  # columns of other programs' files be
 
 def test_the_root_holds_the_rooms_and_the_face() -> None:
     found = {p.name for p in PACKAGE.iterdir() if p.name != "__pycache__" and p.suffix != ".so"}
-    assert found == {*ROOMS, "__init__.py", "__main__.py", "_core.pyi", "py.typed"}
+    assert found == {*ROOMS, "__init__.py", "__init__.pyi", "__main__.py", "_core.pyi", "py.typed"}
 
 
 def test_ranked_rooms_are_there() -> None:

@@ -5,14 +5,13 @@ from __future__ import annotations
 import ast
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
 
 import pytest
 
-import stiffmap as sm
-
 ROOT = Path(__file__).parents[3]
-SHOP_WINDOW = ROOT / "python/stiffmap/__init__.py"
+PACKAGE = ROOT / "python/stiffmap"
 
 
 def test_a_misspelt_name_is_an_error_to_mypy(tmp_path: Path) -> None:
@@ -30,15 +29,22 @@ def test_a_misspelt_name_is_an_error_to_mypy(tmp_path: Path) -> None:
     assert 'sample.py:5: error: Module has no attribute "misspelt"' in done.stdout
 
 
-def test_every_lazy_name_is_one_to_type_checkers() -> None:
-    """The quick sibling: names of the table are imported under TYPE_CHECKING, and ``__getattr__`` is hidden there."""
-    tree = ast.parse(SHOP_WINDOW.read_text(encoding="utf-8"))
-    tests = [n for n in tree.body if isinstance(n, ast.If)]
-    (shown,) = (n for n in tests if ast.unparse(n.test) == "TYPE_CHECKING")
-    (hidden,) = (n for n in tests if ast.unparse(n.test) == "not TYPE_CHECKING")
-    names = {a.name for n in shown.body if isinstance(n, ast.ImportFrom) for a in n.names}
-    assert set(sm._HOME) == names
-    assert [n.name for n in hidden.body if isinstance(n, ast.FunctionDef)] == ["__getattr__"]
-    assert not any(isinstance(n, ast.FunctionDef) and n.name == "__getattr__" for n in tree.body)
-    with pytest.raises(AttributeError, match="no attribute 'misspelt'"):
-        sm.misspelt  # type: ignore[attr-defined]  # noqa: B018
+@pytest.mark.parametrize("stub", sorted(PACKAGE.rglob("__init__.pyi")), ids=lambda p: p.parent.name)
+def test_every_name_of_a_stub_is_there_when_it_is_asked_for(stub: Path) -> None:
+    package = import_module(".".join(stub.parent.relative_to(PACKAGE.parent).parts))
+    names = {
+        a.name
+        for n in ast.walk(ast.parse(stub.read_text()))
+        if isinstance(n, ast.ImportFrom)
+        for a in n.names
+    }
+    assert names == {*package.__all__} == {*dir(package)}
+    for name in names:
+        assert getattr(package, name) is not None
+    with pytest.raises(AttributeError, match="attribute misspelt"):
+        package.misspelt  # noqa: B018
+
+
+def test_the_package_is_imported_without_what_it_loads_later() -> None:
+    script = "import sys, stiffmap, stiffmap.experiment.files, stiffmap.workspace.maps.inputs; assert 'xarray' not in sys.modules"
+    assert subprocess.run([sys.executable, "-c", script], check=False).returncode == 0

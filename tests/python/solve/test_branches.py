@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from scipy.special import ellipk
-from tests.python.solve import builders as b
-from tests.python.solve import structures as s
+from tests.python.solve import builders as b, structures as s
 
 import stiffmap as sm
 from stiffmap.model.description import ExternalSpring, Offset, Pose

@@ -18,12 +18,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from stiffmap.common.errors import FileError, StiffmapError
-from stiffmap.common.outputs.keeping import asked_to_replace as asked_to_replace
-from stiffmap.common.outputs.keeping import check_replaceable, is_device, note_written, refused, short
-from stiffmap.common.outputs.keeping import new_file as new_file
-from stiffmap.common.outputs.keeping import one_command as one_command
-from stiffmap.common.outputs.keeping import only_job as only_job
-from stiffmap.common.outputs.keeping import reserved as reserved
+from stiffmap.common.outputs.keeping import (
+    asked_to_replace as asked_to_replace,
+    check_replaceable,
+    is_device,
+    new_file as new_file,
+    note_written,
+    one_command as one_command,
+    only_job as only_job,
+    refused,
+    reserved as reserved,
+    short,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import DTypeLike

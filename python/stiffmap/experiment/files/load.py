@@ -18,8 +18,7 @@ from stiffmap.common.units import name_and_unit
 from stiffmap.common.yaml_text import read as read_yaml
 from stiffmap.experiment.channels import AXES, AXIS_CHANNELS, Channel
 from stiffmap.experiment.experiment import ASKED, WRENCH, Experiment, Floats, Loop
-from stiffmap.experiment.files import columns as read_columns
-from stiffmap.experiment.files import fields
+from stiffmap.experiment.files import columns as read_columns, fields
 from stiffmap.experiment.files.schema import ExperimentFile, ExperimentUnitsModel, file_model
 from stiffmap.experiment.files.table import ANGLES, Units, read_table
 from stiffmap.experiment.readings import kinds

@@ -15,8 +15,7 @@ from stiffmap.common.tables.lines import decimal_comma, even, lines_of
 from stiffmap.common.tables.sheet import STATISTICS
 from stiffmap.common.tables.table import Table
 from stiffmap.common.units import known, name_and_unit, size_of, unit_of
-from stiffmap.experiment.files.fields import base_of, quantity_of
-from stiffmap.experiment.files.fields import known as known_columns
+from stiffmap.experiment.files.fields import base_of, known as known_columns, quantity_of
 from stiffmap.experiment.files.schema import ExperimentFile
 
 COMMON = ("length", "force", "angle")

@@ -10,8 +10,8 @@ from scipy.spatial.transform import Rotation
 
 from stiffmap.common.broadcasting import Floats
 from stiffmap.common.short import first_of
-from stiffmap.common.tables.orientation import VECTOR as ROTATION_VECTOR
 from stiffmap.common.tables.orientation import (
+    VECTOR as ROTATION_VECTOR,
     Orientation,
     homogeneous,
     matrices_of,

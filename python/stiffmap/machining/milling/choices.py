@@ -14,8 +14,7 @@ from stiffmap.common.broadcasting import Floats
 from stiffmap.common.errors import StiffmapError
 from stiffmap.machining.milling.equilibrium import Plant, equilibrium
 from stiffmap.machining.milling.placement import Placements, placements
-from stiffmap.machining.milling.redundancy import Redundancy
-from stiffmap.machining.milling.redundancy import redundancy as best_turns
+from stiffmap.machining.milling.redundancy import Redundancy, redundancy as best_turns
 from stiffmap.machining.milling.setting import Setting, setting
 from stiffmap.machining.process.description import Process
 from stiffmap.machining.process.load import GivenProcess, as_process

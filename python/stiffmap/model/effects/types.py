@@ -8,9 +8,15 @@ from dataclasses import dataclass
 
 from stiffmap.model.description import Joint, MachineDescription, Spring
 from stiffmap.model.description.tree import all_elements
-from stiffmap.model.effects.evidence import Drive, Load, Plan, Reading, Signatures
-from stiffmap.model.effects.evidence import Option as Option
-from stiffmap.model.effects.evidence import Parameter as Parameter
+from stiffmap.model.effects.evidence import (
+    Drive,
+    Load,
+    Option as Option,
+    Parameter as Parameter,
+    Plan,
+    Reading,
+    Signatures,
+)
 
 Place = tuple[str, tuple[str, ...]]
 

@@ -13,8 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import minimize
-from scipy.sparse import csr_matrix, kron
-from scipy.sparse import eye as sparse_eye
+from scipy.sparse import csr_matrix, eye as sparse_eye, kron
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 from scipy.special import chdtrc, ndtr

@@ -12,8 +12,7 @@ from pathlib import Path
 from typing import Literal, NamedTuple
 
 import numpy as np
-from scipy.sparse import csc_matrix, csr_matrix, kron
-from scipy.sparse import eye as sparse_eye
+from scipy.sparse import csc_matrix, csr_matrix, eye as sparse_eye, kron
 from scipy.sparse.linalg import splu
 
 from stiffmap.common.broadcasting import Floats

@@ -13,8 +13,14 @@ from stiffmap.experiment.comparison.residual import Summary
 from stiffmap.machining import compensation
 from stiffmap.solve.machine import Machine
 from stiffmap.ui.cli import options
-from stiffmap.ui.cli.inputs import flags_of, in_si, machine_with, numbers, options_given
-from stiffmap.ui.cli.inputs import gravity as gravity_of
+from stiffmap.ui.cli.inputs import (
+    flags_of,
+    gravity as gravity_of,
+    in_si,
+    machine_with,
+    numbers,
+    options_given,
+)
 from stiffmap.ui.cli.options import argument, how_many, option, written
 from stiffmap.ui.cli.output import Answer
 

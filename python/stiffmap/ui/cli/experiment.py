@@ -22,8 +22,7 @@ from stiffmap.experiment.spreadsheet.guess import Column
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import numbers, options_given, pairs, refuse_unused
 from stiffmap.ui.cli.options import argument, flag, option, written
-from stiffmap.ui.cli.output import Answer
-from stiffmap.ui.cli.output import table as table_of
+from stiffmap.ui.cli.output import Answer, table as table_of
 
 
 def command(

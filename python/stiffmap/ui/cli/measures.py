@@ -13,8 +13,7 @@ from stiffmap.common.outputs import make_folder
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import MM, gravity, in_si, machine_with, numbers, words
 from stiffmap.ui.cli.options import BOX, how_many, option
-from stiffmap.ui.cli.output import Answer, as_text, write_files
-from stiffmap.ui.cli.output import table as table_of
+from stiffmap.ui.cli.output import Answer, as_text, table as table_of, write_files
 from stiffmap.workspace.maps.loading import machine_digest
 from stiffmap.workspace.performance import MeasuresTable, measures
 from stiffmap.workspace.performance.table import MeasureRow

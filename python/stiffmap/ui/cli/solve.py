@@ -25,8 +25,7 @@ from stiffmap.solve.unreachable import why_unreachable
 from stiffmap.ui.cli import options
 from stiffmap.ui.cli.inputs import MM, force_given, machine_at, numbers, position_words
 from stiffmap.ui.cli.options import option, written
-from stiffmap.ui.cli.output import MEANINGS, Answer
-from stiffmap.ui.cli.output import table as table_of
+from stiffmap.ui.cli.output import MEANINGS, Answer, table as table_of
 
 SCALE = [1e3] * 3 + [1.0] * 3
 """m to mm, rad stays: a compliance then is in mm/N, rad/N, mm/(N mm), rad/(N mm)."""

@@ -4,15 +4,6 @@ Lengths in mm, angles in deg; colours that a colour-blind reader can distinguish
 never shown as a value. No display is needed.
 """
 
-from stiffmap.common.arguments import checked
-from stiffmap.ui.plot.error_maps import map_figure
-from stiffmap.ui.plot.forces import ellipse_figure, polar_figure, stress_figure, sweep_figure
-from stiffmap.ui.plot.loaded import loaded_figure, machine_figure
-from stiffmap.ui.plot.paths import mode_figure, path_figure
-from stiffmap.ui.plot.style import save
+from stiffmap.common.public import attached
 
-__all__ = ["ellipse_figure", "loaded_figure", "machine_figure", "map_figure", "mode_figure", "path_figure",
-           "polar_figure", "save", "stress_figure", "sweep_figure"]  # fmt: skip
-
-for _name in __all__:
-    globals()[_name] = checked(globals()[_name])
+__getattr__, __dir__, __all__ = attached(__name__, __file__)

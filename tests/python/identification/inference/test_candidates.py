@@ -11,8 +11,7 @@ from scipy.stats import multivariate_normal
 from tests.python.identification.inference.synthetic import READINGS, columns, parts
 from tests.python.identification.inference.test_amplitudes import dense
 
-from stiffmap.identification.inference import amplitudes
-from stiffmap.identification.inference import chosen as candidates
+from stiffmap.identification.inference import amplitudes, chosen as candidates
 from stiffmap.identification.inference.constants import SIZES
 from stiffmap.identification.inference.places import Place, Shape, possible
 from stiffmap.model.effects import get

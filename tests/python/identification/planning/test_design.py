@@ -11,8 +11,7 @@ import pytest
 import stiffmap as sm
 from stiffmap.experiment import Predictor, simulate
 from stiffmap.experiment.calls import placed
-from stiffmap.identification.planning import estimate, follow
-from stiffmap.identification.planning import plan as design
+from stiffmap.identification.planning import estimate, follow, plan as design
 from stiffmap.identification.planning.changes import monitor as compare
 from stiffmap.machining.compensation import compensate
 from stiffmap.ui.cli.app import main

@@ -17,8 +17,7 @@ from stiffmap.experiment.channels import Channel
 from stiffmap.experiment.virtual.plans import with_distances, with_joints
 from stiffmap.identification.diagnosis.report.result import diagnosed
 from stiffmap.identification.planning.budget import BudgetLine, NumberBudget, budgets
-from stiffmap.identification.planning.changes import Change
-from stiffmap.identification.planning.changes import monitor as compare
+from stiffmap.identification.planning.changes import Change, monitor as compare
 from stiffmap.identification.planning.design import follow
 from stiffmap.identification.planning.estimate import Estimate, estimate
 from stiffmap.ui.cli.app import main

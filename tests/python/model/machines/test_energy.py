@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from tests.python.model.machines import energy as oracle
-from tests.python.model.machines import machine_cases as cases
+from tests.python.model.machines import energy as oracle, machine_cases as cases
 
 import stiffmap as sm
 

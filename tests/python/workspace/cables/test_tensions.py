@@ -13,8 +13,7 @@ from stiffmap import Machine, StiffmapError, force_transmission, inverse_kinemat
 from stiffmap.model.description import Drive, ExternalSpring, Point
 from stiffmap.workspace.cables import structure_matrix, tension_distribution, wrench_feasible
 from stiffmap.workspace.cables.feasible import changed, turned
-from stiffmap.workspace.cables.structure import hanging as hanging_of
-from stiffmap.workspace.cables.structure import lines, scaled
+from stiffmap.workspace.cables.structure import hanging as hanging_of, lines, scaled
 
 SIX = ("x", "y", "z", "rx", "ry", "rz")
 

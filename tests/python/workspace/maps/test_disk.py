@@ -11,8 +11,7 @@ import pytest
 import xarray as xr
 
 import stiffmap as sm
-from stiffmap.workspace.maps import block
-from stiffmap.workspace.maps import error_map as map_module_function
+from stiffmap.workspace.maps import block, error_map as map_module_function
 from stiffmap.workspace.maps.files import read_dataset, write_dataset
 
 BOX = np.array([-0.2, 0.05, 0.3])

@@ -1,0 +1,27 @@
+"""Public names of a package, listed once, in the stub next to it."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from typing import Any
+
+import lazy_loader
+
+
+def attached(package: str, file: str) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
+    """``__getattr__``, ``__dir__`` and ``__all__`` of a package whose stub imports its public names: each is loaded when it is first
+    used; functions check their arguments first."""
+    load, names, every = lazy_loader.attach_stub(package, file)
+
+    def one(name: str) -> Any:
+        value = load(name)
+        if callable(value) and not isinstance(value, type):
+            from stiffmap.common.arguments import checked
+
+            value = checked(value)
+            value.__module__ = package  # where it is found again when it is pickled
+        setattr(sys.modules[package], name, value)
+        return value
+
+    return one, names, every
