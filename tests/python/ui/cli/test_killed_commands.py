@@ -34,7 +34,7 @@ COMMANDS = {
     "map": "map orthoglide-revised --points 3 --z 0 -o out",
     "mill": "mill orthoglide-revised circle --size 20 --process trimming --at 50,50,0 --step 20 -o out",
     "sweep": "sweep orthoglide-revised --at 0,0,0 --direction 1,0,0 --to 300 --points 3 -o out",
-    "diagnose": "diagnose five-bar measured --budget 1 -o out",
+    "diagnose": "diagnose five-bar measured -o out",
     "calibrate": "calibrate five-bar measured -o out",
     "optimize": "optimize small.yaml --processes 1 -o out",
     "plan": "plan orthoglide-revised --identify 'compliance actuator x scale=1' --rows 4 -o out.csv",
