@@ -110,7 +110,14 @@ def test_an_arm_of_a_kilometre_is_refused(unit: str, lengths: float, reach: str,
     rows = [replace(r, d=lengths * r.d, a=lengths * r.a) for r in read_dh(sheet, {}, "standard")]
     with pytest.raises(StiffmapError, match=f"the arm reaches {reach} m: say the unit of its lengths"):
         arm(rows, "standard", "own")
-    assert len(arm(read_dh(sheet, {"a": "mm", "d": "mm"}, "standard"), "standard", "own").legs) == 1
+    rows = read_dh(sheet, {"a": "mm", "d": "mm"}, "standard")
+    made = arm(rows, "standard", "own")
+    low, high = np.array(made.workspace)
+    lengths = sum(abs(r.a) + abs(r.d) for r in rows)
+    assert len(made.legs) == 1 and np.ptp(high - low) < 1e-12
+    assert (
+        0.2 * lengths < (high - low)[0] <= 0.4 * lengths + 1e-12
+    )  # two fifths of a reach of half of them or more
 
 
 @pytest.mark.parametrize(
