@@ -7,4 +7,4 @@ PLACES |= {
     "Machine.view": ("stiffmap.ui.view", "open_view"),
     "Diagnosis.report": ("stiffmap.ui.report.diagnosis.page", "write_report"),
 }
-__getattr__, __dir__, __all__ = attached(__name__, __file__)
+__getattr__, __dir__, __all__ = attached(__name__, __file__, check=True)

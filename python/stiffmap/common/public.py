@@ -9,14 +9,18 @@ from typing import Any
 import lazy_loader
 
 
-def attached(package: str, file: str) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
+def attached(
+    package: str, file: str, *, check: bool = False
+) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
     """``__getattr__``, ``__dir__`` and ``__all__`` of a package whose stub imports its public names: each is loaded when it is first
-    used; functions check their arguments first."""
+    used; with `check`, functions check their arguments first."""
     load, names, every = lazy_loader.attach_stub(package, file)
 
     def one(name: str) -> Any:
+        if name not in every:
+            raise AttributeError(f"module {package!r} has no attribute {name!r}")
         value = load(name)
-        if callable(value) and not isinstance(value, type):
+        if check and callable(value) and not isinstance(value, type):
             from stiffmap.common.arguments import checked
 
             value = checked(value)

@@ -1,5 +1,5 @@
 """Measured data: experiments as files, prediction of every reading, residuals, virtual experiments."""
 
-import lazy_loader
+from stiffmap.common.public import attached
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+__getattr__, __dir__, __all__ = attached(__name__, __file__)

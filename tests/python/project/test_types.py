@@ -41,7 +41,7 @@ def test_every_name_of_a_stub_is_there_when_it_is_asked_for(stub: Path) -> None:
     assert names == {*package.__all__} == {*dir(package)}
     for name in names:
         assert getattr(package, name) is not None
-    with pytest.raises(AttributeError, match="attribute misspelt"):
+    with pytest.raises(AttributeError, match="no attribute 'misspelt'"):
         package.misspelt  # noqa: B018
 
 

@@ -143,6 +143,8 @@ def read_named(place: str | PathLike[str], known: Known) -> NamedTable:
 
 
 def known_sheet(place: str | PathLike[str], known: Known, *, repeated: bool = False) -> Table:
+    """The table of a text, a workbook or a `TableFile`, with what titles say of its rows, and its columns named and in units as they are
+    said; `repeated`: whether names may come again. Raises FileError, also for a remark between the rows."""
     file = table_file(place)
     names = ", ".join(known.usual.get(n, n) for n in known.units)
     layout = layout_of(file, known.has, strict=True, repeated=repeated, names=names, options=known.options)

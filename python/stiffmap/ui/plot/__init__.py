@@ -6,4 +6,4 @@ never shown as a value. No display is needed.
 
 from stiffmap.common.public import attached
 
-__getattr__, __dir__, __all__ = attached(__name__, __file__)
+__getattr__, __dir__, __all__ = attached(__name__, __file__, check=True)
