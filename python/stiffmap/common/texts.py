@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -9,6 +10,9 @@ from stiffmap.common.errors import FileError, reading
 
 HEAD = 1 << 16
 """Bytes that show how a text is written."""
+
+COMMON_CHINESE = re.compile(rb"(?:[\x00-\x7f]|[\xa1-\xa3\xa6\xb0-\xd7][\xa1-\xfe])*")
+"""Signs and the common words in GB 2312, two bytes each; in Latin-1 hardly two such bytes stand next to each other."""
 
 
 def text_of(path: Path) -> str:
@@ -18,7 +22,7 @@ def text_of(path: Path) -> str:
 
 def lines_of(path: Path, newline: str | None = None) -> Iterator[str]:
     """Lines of a text file, ended by `newline` where the file has it or, where that is None, as any system ends them; a byte-order
-    mark passed over; UTF-8 or UTF-16, and a line that is neither is Latin-1. Raises FileError where it cannot be read."""
+    mark passed over; UTF-8 or UTF-16, and a line that is neither is GB 2312 or Latin-1. Raises FileError where it cannot be read."""
     with reading(path), path.open("rb") as raw:
         head = raw.read(HEAD)
     encoding = _encoding(head)
@@ -46,5 +50,6 @@ def _of_latin(line: str) -> str:
     try:
         line.encode()
     except UnicodeEncodeError:
-        return line.encode("utf-8", "surrogateescape").decode("latin-1")
+        raw = line.encode("utf-8", "surrogateescape")
+        return raw.decode("gb18030" if COMMON_CHINESE.fullmatch(raw) else "latin-1")
     return line

@@ -41,6 +41,8 @@ DISPLAY_UNITS = {
     "1/m": (1e-3, "1/mm"),
 }
 """In which results are printed, by the unit of SI; others as they are."""
+HALF_WIDTH = str.maketrans("（）［］，：　", "()[],: ")
+"""Brackets and signs of a Chinese or Japanese keyboard as Latin ones."""
 QUANTITIES = {"m": "length", "N": "force", "N*m": "moment", "rad": "angle"}
 """By the unit of SI."""
 GRAVITY = Fraction("9.80665")
@@ -77,9 +79,9 @@ def _table(*rows: tuple[str, str, Fraction | float]) -> dict[str, Unit]:
 
 SPELLINGS = {
     "length": _table(
-        ("m|metres|meters", "m", 1), ("cm", "cm", 1),
-        ("mm|millimetres|millimeters|millimetre|millimeter|millimètres|milímetros", "mm", 1),
-        ("um|µm|μm|micron|microns|1/1000mm|0.001mm|mm/1000", "um", 1),
+        ("m|metres|meters|米", "m", 1), ("cm", "cm", 1),
+        ("mm|millimetres|millimeters|millimetre|millimeter|millimètres|milímetros|毫米", "mm", 1),
+        ("um|µm|μm|micron|microns|微米|1/1000mm|0.001mm|mm/1000", "um", 1),
         ("in|inch|inches|zoll|\"|''", "in", 1),
         ("mil|mils|thou|in/1000|1/1000in|0.001in|thousandths", "in", 1e-3),
         ("tenth|tenths|0.0001in|1/10000in", "in", 1e-4),
@@ -87,17 +89,17 @@ SPELLINGS = {
         ("1/10mm|0.1mm|mm/10|zehntel", "um", 100),
     ),
     "force": _table(
-        ("n|newton", "N", 1), ("kn", "kN", 1), ("dan", "N", 10), ("kgf|kp|kilopond", "N", GRAVITY),
+        ("n|newton|牛|牛顿", "N", 1), ("kn", "kN", 1), ("dan", "N", 10), ("kgf|kp|kilopond", "N", GRAVITY),
         ("gf|p", "N", GRAVITY / 1000), ("lbf|lb|lbs|pound", "N", POUND), ("kip", "kN", POUND),
         ("ozf|oz", "N", POUND / 16),
     )
     | {w: Unit("N", float(GRAVITY * MASSES[w]), True) for w in MASSES},
     "angle": _table(
-        ("rad", "rad", 1), ("mrad|mm/m", "mrad", 1), ("urad|µrad|μrad|um/m|µm/m", "mrad", 1e-3),
-        ("deg|°|grad|degree|degrees", "deg", 1), ("arcmin|'", "deg", 1 / 60), ("arcsec|sec", "deg", 1 / 3600), ("gon", "deg", 0.9),
+        ("rad|弧度", "rad", 1), ("mrad|mm/m", "mrad", 1), ("urad|µrad|μrad|um/m|µm/m", "mrad", 1e-3),
+        ("deg|°|grad|degree|degrees|度", "deg", 1), ("arcmin|'", "deg", 1 / 60), ("arcsec|sec", "deg", 1 / 3600), ("gon", "deg", 0.9),
     ),
     "moment": _table(
-        ("nm|n*m", "N*m", 1), ("nmm|n*mm", "N*mm", 1), ("ncm|n*cm", "N*mm", 10), ("knm|kn*m", "kN*m", 1),
+        ("nm|n*m|牛米", "N*m", 1), ("nmm|n*mm", "N*mm", 1), ("ncm|n*cm", "N*mm", 10), ("knm|kn*m", "kN*m", 1),
         ("kgfm|kpm|kgf*m|kp*m|mkp", "N*m", GRAVITY),
         ("lbfft|ftlbf|ftlb|lbf*ft|lb*ft|ft*lbf|ft*lb", "N*m", float(POUND) * 0.3048),
         ("lbfin|inlbf|inlb|lbf*in|lb*in|in*lbf|in*lb", "N*m", float(POUND) * 0.0254),
@@ -131,6 +133,7 @@ def known(quantity: str | None = None) -> str:
 
 def name_and_unit(header: str) -> tuple[str, str]:
     """``x [mm]`` is x in mm; an empty unit where none stands in brackets, as in joint[1] and T(1,2)."""
+    header = header.translate(HALF_WIDTH)
     if not header.rstrip().endswith(("]", ")")):  # an endless header of brackets takes seconds
         return header.strip(), ""
     match = re.fullmatch(

@@ -16,6 +16,7 @@ from stiffmap.common.tables.lines import Spelling, is_finite
 from stiffmap.common.tables.pose_table import read_pose_table
 from stiffmap.common.tables.sheet import read_sheet
 from stiffmap.common.tables.table_file import TableFile
+from stiffmap.common.texts import text_of
 from stiffmap.experiment.files.table import read_table
 from stiffmap.machining.process import load_process
 from stiffmap.machining.toolpath.load import load_path
@@ -34,6 +35,7 @@ SPELLINGS = {
     "UTF-16": ("x [mm],y [mm],z [mm]\n50.5,0,700\n0,-20.25,700\n", "utf-16"),
     "UTF-16 without a mark": ("x [mm],y [mm],z [mm]\n50.5,0,700\n0,-20.25,700\n", "utf-16-le"),
     "Latin-1 with a remark": ("# gemessen in Köln\nx [µm],y [cm],z [m]\n50500,0,0.7\n0,-2.025,0.7\n", "latin-1"),
+    "GB 2312 with full-width brackets": ("序号,X坐标（毫米）,Y坐标（毫米）,Z坐标（米）\n1,50.5,0,0.7\n2,0,-20.25,0.7\n", "gb2312"),
     "numpy.savetxt": ("# x[mm] y[mm] z[mm]\n5.05e+01 0.0e+00 7.0e+02\n0.0e+00 -2.025e+01 7.0e+02\n", "utf-8"),
     "units in a line of their own": ("X;Y;Z\nmm;mm;mm\n50.5;0;700\n0;-20.25;700\n", "utf-8"),
     "units in the cells": ("x;y;z\n50,5 mm;0 mm;700 mm\n0 mm;-20,25mm;700 mm\n", "utf-8"),
@@ -556,3 +558,16 @@ def test_a_robots_program_is_said_to_be_one(
     (tmp_path / name).write_text("P[1] 1 2 3\n")
     with pytest.raises(FileError, match=r"a robot's program .* is not read; expected a machine file or URDF"):
         reader(tmp_path / name)
+
+
+@pytest.mark.parametrize(
+    ("encoding", "text"),
+    [
+        ("latin-1", "Größe Ø12 ±5 µm, déplacée, GRÖSSE, «ça», 10 °, Übung, Señal, é½"),
+        ("gb18030", "序号，坐标X（毫米）力矩 误差±5 ℃ μ 激光跟踪仪"),
+        ("utf-8", "坐标 Größe"),
+    ],
+)
+def test_letters_are_those_of_their_encoding(encoding: str, text: str, tmp_path: Path) -> None:
+    (tmp_path / "text").write_text(f"1\n{text}\n", encoding=encoding)
+    assert text_of(tmp_path / "text") == f"1\n{text}\n"

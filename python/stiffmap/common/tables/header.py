@@ -313,11 +313,11 @@ def split_unit(header: str) -> tuple[str, str]:
     return (match[1].strip(), match[2].strip()) if match else (header.strip(), "")
 
 
-FORCE = "force|kraft|last|load|effort|charge|forza|carico|fuerza|carga"
-MOMENT = "moment|torque|drehmoment|momento|couple"
+FORCE = "force|kraft|last|load|effort|charge|forza|carico|fuerza|carga|力|载荷|负载|受力"
+MOMENT = "moment|torque|drehmoment|momento|couple|力矩|扭矩"
 DEFLECTION = (
     "defl|deflection|(directional )?deformation|displ?\\.?|displacement|d[ée]placement|fl[èe]che|verschiebung|verlagerung|verformung|durchbiegung|"
-    "spostamento|freccia|desplazamiento|deflexión|flecha"
+    "spostamento|freccia|desplazamiento|deflexión|flecha|位移|变形|挠度"
 )
 OF_SOME = re.compile(f"(?i){DEFLECTION}|{FORCE}|{MOMENT}")
 """In a title whose unit is not that of all columns."""
@@ -326,18 +326,22 @@ IN_SI = re.compile(
     r".*/joint_states/.*/position"
 )
 """Fields of logs that are in SI by their format: messages of ROS, and UR's RTDE."""
-COMMANDED = "target|cmd|nom|nominal|command|commanded|ref|desired|begin|r?soll?(?:wert)?"
-MEASURED = "act|actual|meas|measured|achieved|attained|end|r?ist(?:wert)?|gemessen|mess?|mesur[ée]e?"
+COMMANDED = "target|cmd|nom|nominal|command|commanded|ref|desired|begin|r?soll?(?:wert)?|理论|名义|指令|目标"
+MEASURED = (
+    "act|actual|meas|measured|achieved|attained|end|r?ist(?:wert)?|gemessen|mess?|mesur[ée]e?|实测|实际|测量"
+)
+FILLED = re.compile("方向|向|坐标|位置|轴|值")
+"""What Chinese headers have next to the name of an axis."""
 PATTERNS: tuple[tuple[str, str], ...] = (
-    ("id", r"#|id|nr\.?|no\.?|lfd\.? ?nr\.?|number|nummer|row|zeile|punkt|messpunkt|point|(mess)?punkt[ -]?nr\.?|point no\.?|punto"),
-    ("temperature", r"t|temp|temperature|temperatur"),
+    ("id", r"#|id|nr\.?|no\.?|lfd\.? ?nr\.?|number|nummer|row|zeile|punkt|messpunkt|point|(mess)?punkt[ -]?nr\.?|point no\.?|punto|序号|编号|点号"),
+    ("temperature", r"t|temp|temperature|temperatur|温度"),
     ("order", r"order|reihenfolge|sequence"),
     ("setup", r"set-?up|aufbau|aufspannung"),
     ("branch", r"branch|richtung der last|loading"),
     *((f"f{a}", rf"f ?_?{a}|({FORCE})[ _.]?(in |en |f[ _]?)?{a}|{a} ?({FORCE})") for a in "xyz"),
     *((f"m{a}", rf"m ?_?{a}|({MOMENT})[ _.]?(in |en |m[ _]?)?{a}") for a in "xyz"),
     *((f"u_d{a}", rf"(u|±|sigma|std|uncertainty) ?_?d?{a}") for a in "xyz"),
-    *((f"d{a}", rf"(d|delta|δ|{DEFLECTION}|abweichung|error|dev|deviation|[ée]cart|(dial )?gau?ge|dial|indicator|(mess)?uhr|dti|clock|comparateur|comparatore|comparador|reading|auslenkung|weg|dehnung)[ _.]?(in |en |[dδ][ _]?)?{a}|{a} ?_?(dif|diff|difference|dev|deviation|err|error|abweichung)|{a}[ _-]?({DEFLECTION}|dial|gau?ge|uhr|reading)") for a in "xyz"),
+    *((f"d{a}", rf"(d|delta|δ|{DEFLECTION}|abweichung|error|dev|deviation|[ée]cart|(dial )?gau?ge|dial|indicator|(mess)?uhr|dti|clock|comparateur|comparatore|comparador|reading|auslenkung|weg|dehnung|误差|偏差)[ _.]?(in |en |[dδ][ _]?)?{a}|{a} ?_?(dif|diff|difference|dev|deviation|err|error|abweichung)|{a}[ _-]?({DEFLECTION}|dial|gau?ge|uhr|reading)") for a in "xyz"),
     *((f"p{a}", rf"p_?{a}") for a in "xyz"),
     *((f"approach_{a}", rf"(approach|travel|anfahrt|anfahrrichtung|fahrrichtung)[ _.-]?(in |dir(ection)?[ _.-]?)?{a}") for a in "xyz"),
     ("ll", r"l|ll|(measured |gemessene )?(length|länge|laenge)|(draw[ -]?)?wire( ?length)?|(cable|string|ball-?bar|bar) ?length|seil(zug)?(länge)?|distance|abstand"),
@@ -349,5 +353,5 @@ PATTERNS: tuple[tuple[str, str], ...] = (
 @lru_cache(KEPT)
 def meaning_of(name: str) -> str:
     """``x``, ``fz``, ``dx``, ``temperature``, ``id`` and the like, of a name without its unit; empty for what is none of them."""
-    plain = re.sub(r"\s+", " ", name.strip().lower())
+    plain = FILLED.sub("", re.sub(r"\s+", " ", name.strip().lower()))
     return next((m for m, pattern in PATTERNS if re.fullmatch(pattern, plain)), "")

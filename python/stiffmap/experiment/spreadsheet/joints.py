@@ -28,7 +28,7 @@ NUMBERED = rf"(?!.*(?:veloc|accel|effort|torque|current))(?:{BEFORE}{{}}(?:joint
 JOINT = re.compile(NUMBERED.format("", r"\d"), re.IGNORECASE)
 OF_MESSAGE = re.compile(r"(?i)(.*[/.])position(\[?\d+\]?)")
 """A joint of a message that names its joints next to it: ``field.name0`` says whose ``field.position0`` is."""
-BY_INSTRUMENT = r"(?:meas(?:ured|\.)?|gemessen|mesuré|misurat[oa]|medid[oa]|(?:laser[ _-]?)?tracker|smr|reflector|reflektor|cmm)"
+BY_INSTRUMENT = r"(?:meas(?:ured|\.)?|gemessen|mesuré|misurat[oa]|medid[oa]|(?:laser[ _-]?)?tracker|smr|reflector|reflektor|cmm|实测|测量)"
 MEASURED = rf"([xyz])[ _.-]?{BY_INSTRUMENT}|{BY_INSTRUMENT}(?:[ _.-]?(?:position|pos|point))?[ _.-]?([xyz])"
 """A header of a measured position, next to joints."""
 MOST_TURNS = 4.0 * math.pi

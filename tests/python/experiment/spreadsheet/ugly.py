@@ -197,6 +197,8 @@ LATER: dict[str, Ugly] = {
 "11 units behind an underscore":Ugly("x_m,y_m,fx_N,dx_um,dy_um\n0,0.4,100,12.5,-3\n0.05,0.4,100,14,-2.5\n0,0.45,-100,-13,3.5\n"),
 "12 touched points are the places":Ugly("px [m];py [m];Fx [N];dx [µm];dy [µm]\n0;0,4;100;12,5;-3,0\n0,05;0,4;100;14,0;-2,5\n0;0,45;-100;-13,0;3,5\n"),
 "13 French":Ugly("X (mm);Y (mm);Effort X (daN);Flèche X (µm);Flèche Y (µm)\n0;400;10;12,5;-3,0\n50;400;10;14,0;-2,5\n0;450;-10;-13,0;3,5\n",encoding="latin-1"),
+"13 Chinese":Ugly("点号,X坐标（毫米）,Y坐标（毫米）,X方向力（牛）,X向位移（微米）,Y向位移（微米）\n1,0,400,100,12.5,-3.0\n2,50,400,100,14.0,-2.5\n3,0,450,-100,-13.0,3.5\n",encoding="gb2312"),
+"13 Chinese, units behind a sign, UTF-8":Ugly("序号,位置X/mm,位置Y/mm,载荷X/N,变形X/μm,变形Y/μm\n1,0,400,100,12.5,-3.0\n2,50,400,100,14.0,-2.5\n3,0,450,-100,-13.0,3.5\n"),
 "14 before and after, and the commanded place":Ugly("x [mm];y [mm];Fx [N];X before [mm];Y before [mm];X after [mm];Y after [mm]\n0;400;100;1;401;1.0125;400.997\n50;400;100;51;401;51.014;400.9975\n0;450;-100;1;451;0.987;451.0035\n"),
 "15 OpenDocument":Ugly("Test of 12 March\n\nx [mm];y [mm];Fx [N];dx [µm];dy [µm]\n0;400;100;12.5;-3.0\n50;400;100;14.0;-2.5\n0;450;-100;-13.0;3.5\n",name="sheet.ods"),
 "16 units in cells with decimal commas":Ugly("X;Y;Last Fx;dX;dY\n0 mm;400 mm;100 N;12,5 µm;-3,0µm\n50 mm;400 mm;100 N;14 µm;-2,5 µm\n0 mm;450 mm;-100 N;-13,0 µm;3,5 µm\n"),

@@ -121,26 +121,39 @@ def close_to(found: Callable[[], float], wanted: float) -> bool:
     return found() == pytest.approx(wanted, rel=1e-6)
 
 
-def test_decimals_are_taken_and_shown_in_every_field(browser: Any) -> None:
+def entered(page: Any, name: str, text: str) -> Any:
+    box = page.get_by_role("textbox", name=name)
+    box.fill(text)
+    box.press("Enter")
+    return box
+
+
+def test_decimals_are_taken_in_every_field_after_longer_numbers_were_refused_or_undone(browser: Any) -> None:
     with View(model_of(sm.load_machine("orthoglide-revised"))) as view:
         page = opened(browser, view)
         for tab, fields in FIELDS.items():
             page.get_by_role("tab", name=tab).click()
+            before = {name: page.get_by_role("textbox", name=name).input_value() for name, *_ in fields}
+            boxes = {n: entered(page, n, "9000.125" if n.startswith("Tool,") else "123.4567") for n in before}
+            page.wait_for_timeout(500)  # the page sends the last key late
+            view._viewer.act(lambda m: m.reset())
+            for name, box in boxes.items():
+                assert until(lambda b=box, t=before[name]: b.input_value() == t, 10), (
+                    name,
+                    box.input_value(),
+                )
             for name, text, value, wanted in fields:
-                box = page.get_by_role("textbox", name=name)
-                box.fill(text)
-                box.press("Enter")
+                box = entered(page, name, text)
                 near = partial(close_to, lambda v=value: v(view), wanted)
                 shown = partial(close_to, lambda b=box: float(b.input_value()), float(text))
-                assert until(near, 10), (name, value(view))
+                assert until(near, 10), (name, value(view), view._viewer.error)
                 assert until(shown, 10), (name, box.input_value())
-        page.get_by_role("tab", name="Numbers").click()
         page.get_by_role("button", name="All as in the file").click()
         own = next(iter(view._viewer.controls.numbers.all.values()))
-        shown = page.get_by_role("textbox", name="Value, SI")
-        assert until(lambda: float(shown.input_value()) == pytest.approx(own, rel=1e-9)), (
+        box = page.get_by_role("textbox", name="Value, SI")
+        assert until(lambda: float(box.input_value()) == pytest.approx(own, rel=1e-9)), (
             own,
-            shown.input_value(),
+            box.input_value(),
         )
 
 
@@ -162,32 +175,6 @@ def test_what_came_late_to_a_page_does_not_stay_in_place_of_what_was_typed(shown
     field.remove_update_callback(late)
     page.wait_for_timeout(1e3 * (PAUSE + 1.5))
     assert box.input_value() == "37.5"
-
-
-def test_numbers_are_taken_after_a_longer_one_was_refused_or_undone(browser: Any) -> None:
-    with View(model_of(sm.load_machine("orthoglide-revised"))) as view:
-        page = opened(browser, view)
-
-        def enter(box: Any, text: str) -> None:
-            box.fill(text)
-            box.press("Enter")
-
-        for tab, fields in FIELDS.items():
-            page.get_by_role("tab", name=tab).click()
-            for name, text, value, wanted in fields:
-                box = page.get_by_role("textbox", name=name)
-                before = box.input_value()
-                enter(box, "9000.125" if name.startswith("Tool,") else "123.4567")
-                page.wait_for_timeout(500)  # the page sends the last key late
-                view._viewer.act(lambda m: m.reset())
-                assert until(lambda b=box, t=before: b.input_value() == t, 10), (name, box.input_value())
-                enter(box, text)
-                near = partial(close_to, lambda v=value: v(view), wanted)
-                shown = partial(close_to, lambda b=box: float(b.input_value()), float(text))
-                assert until(near, 10), (name, value(view), view._viewer.error)
-                assert until(shown, 10), (name, box.input_value())
-                view._viewer.act(lambda m: m.reset())
-                assert until(lambda b=box, t=before: b.input_value() == t, 10), (name, box.input_value())
 
 
 def test_a_number_whose_first_digits_are_refused_is_typed(shown: tuple[View, Any]) -> None:
