@@ -128,7 +128,7 @@ def _read(path: Path, sheet: str | None, layout: Layout) -> Table:
     if first is None and not above:
         raise NoTableError(f"the {'sheet' if page else 'file'} is empty", file=str(path))
     if first is not None and (layout.header or (found is None and layout.numbered)):
-        found = first[0], _names(first[1], layout.header, str(path), first[0])
+        found = first[0], with_header(first[1], layout.header, str(path), first[0])
     if first is None or found is None:
         more = f"; expected its names of columns, such as {layout.names}" if layout.names else ""
         if first and layout.options:
@@ -232,8 +232,8 @@ def _checked(header: Sequence[str], file: str, line: int) -> list[str]:
     return [h or f"column {i + 1}" for i, h in enumerate(header[:width])]
 
 
-def _names(first: Sequence[str], given: Sequence[str], file: str, line: int) -> list[str]:
-    """Names of columns that a person says, or their numbers."""
+def with_header(first: Sequence[str], given: Sequence[str], file: str, line: int | None = None) -> list[str]:
+    """Names of columns that a person says, or their numbers. Raises FileError for more names than columns."""
     if len(given) > len(first):
         what = f"--header: expected at most {len(first)} names, one for each column; found {len(given)}"
         raise FileError(what, file=file, line=line)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import partial, reduce
+from operator import attrgetter
 from os import PathLike
 from pathlib import Path
 
@@ -15,7 +16,8 @@ from stiffmap.common.fingerprints import file_digest
 from stiffmap.common.outputs import new_file, putting
 from stiffmap.common.short import short_repr
 from stiffmap.common.tables.header import RECORD
-from stiffmap.common.tables.sheet import Layout, read_sheet
+from stiffmap.common.tables.sheet import Layout, read_sheet, with_header
+from stiffmap.common.tables.side_by_side import side_by_side
 from stiffmap.common.tables.table import Table, column_letter
 from stiffmap.common.tables.table_file import TableFile, layout_of
 from stiffmap.common.tables.workbook import WORKBOOKS, sheet_names
@@ -73,7 +75,7 @@ class FromTable:
 
 def experiment_from_table(
     machine: str | PathLike[str] | None,
-    table: str | PathLike[str],
+    table: str | PathLike[str] | Sequence[str | PathLike[str]],
     folder: str | PathLike[str],
     *,
     columns: Mapping[str, str] | None = None,
@@ -100,7 +102,8 @@ def experiment_from_table(
         Shipped name or machine file; or None and `dh`, a table of Denavit and Hartenberg of which ``machine.yaml`` is made in the
         folder, in the `dh_convention` ``standard`` or ``modified``.
     table, folder
-        A workbook or a text; where the experiment is written.
+        A workbook or a text, or several with rows of the same points, such as joints of a controller and places of a tracker, whose
+        columns stand side by side; where the experiment is written.
     columns
         What a column is, by its header or number: ``{"dx": "Uhr 1 [µm]"}``, repeats ``"Uhr 1|Uhr 2"``, the other sign
         ``{"fz": "-Last [kg]"}``. What is left out is guessed.
@@ -123,7 +126,9 @@ def experiment_from_table(
         raise StiffmapError("experiment: give either --machine or --dh")
     loaded = None if machine is None else load_machine(str(machine))
     drives = {} if loaded is None else drives_of(loaded)
-    file, output = given_path(table, "table", "a spreadsheet"), given_path(folder, "folder", "a folder")
+    several = [table] if isinstance(table, str | PathLike) else [*table]
+    file, *more = [given_path(t, "table", "a spreadsheet") for t in several]
+    output = given_path(folder, "folder", "a folder")
     wrote = None if instrument is None else load_instrument(instrument)
     quantity = quantity or (wrote.quantity if wrote else "deflection")
     one_of(quantity, ("deflection", "position"), "quantity")
@@ -149,14 +154,15 @@ def experiment_from_table(
         return Machine(arm(rows, dh_convention, output.name, f"from {Path(dh).name}", m.middle()))
 
     deflection, alone = quantity == "deflection", rows is not None
-    wanted = _Wanted(file, layout, drives, wrote, difference, deflection, given, declared_for, alone)
+    wanted = _Wanted((file, *more), layout, drives, wrote, difference, deflection, given, declared_for, alone)
     m, found = _fitting(file, sheet, wanted.understood, ask)
     own = m.sheet
     _refuse_units(given.units, m, drives, () if rows is None else QUANTITIES)
     quantity = "position" if m.placed or "ll" in found.units else quantity
     declared = str(output / "machine.yaml") if machine is None else str(machine)
-    title = f"from {own.file.replace(str(file), file.name)}"
-    kept = {"source": file.name, "sha256": file_digest(file), **(record or {})}
+    title = f"from {reduce(lambda text, f: text.replace(str(f), f.name), (file, *more), own.file)}"
+    source, digest = (", ".join(map(of, (file, *more))) for of in (attrgetter("name"), file_digest))
+    kept = {"source": source, "sha256": digest, **(record or {})}
     with putting(output, "experiment.yaml") as fresh:
         write_folder(found, m, fresh, declared, quantity, title, kept)
         try:
@@ -211,7 +217,8 @@ def _fitting(
 class _Wanted:
     """What is wanted of each sheet."""
 
-    file: Path
+    files: Sequence[Path]
+    """Whose columns stand side by side."""
     layout: Layout
     drives: Mapping[str, bool]
     """That it may command: name -> whether it slides."""
@@ -224,9 +231,20 @@ class _Wanted:
     """The machine that it commands, by its joints `alone`."""
     alone: bool
 
+    def _read(self, name: str | None) -> Table:
+        first, *more = self.files
+        if not more:
+            return read_sheet(first, name, self.layout)
+        header = self.layout.header
+        each = replace(self.layout, header=(), numbered=self.layout.numbered or bool(header))
+        table = side_by_side([read_sheet(first, name, each), *(read_sheet(f, None, each) for f in more)])
+        return (
+            replace(table, header=tuple(with_header(table.header, header, table.file))) if header else table
+        )
+
     def understood(self, name: str | None, ask: dialogue.Ask | None) -> tuple[Meant, ImportedSheet]:
         """One sheet."""
-        form = read_sheet(self.file, name, self.layout)
+        form = self._read(name)
         kept = dialogue.remembered(form)
         m = Meant.of_sheet(form, self.given if kept is None else kept.below(self.given))
         if kept is not None:

@@ -31,6 +31,9 @@ def command(
     file: options.TablePath = argument(
         "Spreadsheet: .xlsx, .xls, .ods, .csv, .txt (any separator and decimal sign)."
     ),
+    more: list[Path] | None = argument(
+        "Further tables whose rows are of the same points, such as what a tracker read.", None
+    ),
     output: Path = written("Folder of the experiment.", ...),
     machine: str | None = option("Declared machine: shipped name or machine file; or give --dh."),
     dh: Path | None = option(
@@ -74,7 +77,7 @@ def command(
     refuse_unused(context, {"without dh": "dh_convention"})
     table = table_file(file)
     made = experiment_from_table(
-        machine, table.path, output, columns=table.columns, units=table.units, constants=_numbers(constant, "set"), noise=_numbers(noise, "noise"), dh=dh, dh_convention=dh_convention,
+        machine, [table.path, *(more or ())], output, columns=table.columns, units=table.units, constants=_numbers(constant, "set"), noise=_numbers(noise, "noise"), dh=dh, dh_convention=dh_convention,
         difference=difference, quantity=quantity, instrument=instrument, sheet=table.sheet, header=table.header,
         which=table.which, record=pairs(record, "record"),
         ask=_prompt if dialogue else None, overwrite=overwrite,

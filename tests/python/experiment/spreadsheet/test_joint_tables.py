@@ -244,6 +244,37 @@ def test_columns_go_by_name_by_number_or_as_they_are_mapped(
         Predictor(sm.load_machine("ur10"), e)()  # the folder is a valid one
 
 
+@pytest.mark.parametrize("named", [True, False])
+def test_joints_and_places_stand_in_files_of_their_own(named: bool, tmp_path: Path) -> None:
+    poses, dh, q = session(tmp_path)
+    actual = np.genfromtxt(poses, delimiter=",", names=True)
+    actual = np.column_stack([actual[a] - actual[f"{a.lower()}_dif"] for a in "XYZ"])
+    head = (
+        ("Point;" + ";".join(f"A{i}" for i in range(1, 7)), "Point,X [mm],Y [mm],Z [mm]")
+        if named
+        else ("", "")
+    )
+    order = np.random.default_rng(1).permutation(len(q)) if named else np.arange(len(q))
+    points = [[f"P{i}"] if named else [] for i in range(len(q))]
+
+    def rows(values: np.ndarray, sign: str, of: np.ndarray) -> str:
+        return "\n".join(sign.join([*points[i], *(f"{v:.10g}" for v in values[i])]) for i in of)
+
+    joints = write(tmp_path, "joints.csv", f"{head[0]}\n{rows(np.degrees(q), ';', np.arange(len(q)))}\n")
+    places = write(tmp_path, "tracker.txt", f"{head[1]}\n{rows(actual, ',', order)}\n")
+    more = [] if named else ["--header", "A1,A2,A3,A4,A5,A6,px,py,pz", "--unit", "joints=deg"]
+    out = tmp_path / "out"
+    arguments = ["experiment", "new", joints, places, "--dh", dh, "-o", str(out), *UNITS, *more]
+    assert main(arguments) == 0
+    e = sm.load_experiment(out)
+    assert e.command == pytest.approx(q[order], abs=1e-9) and (e.frame, e.tool) == ("unknown", "unknown")
+    assert e.seen == pytest.approx(1e-3 * actual[order], abs=1e-9)
+    machine = sm.load_machine(out / "machine.yaml")
+    assert left(machine.with_effect("zero_offset", element="elbow", error=2e-4), out) < 1e-6
+    record = (out / "experiment.yaml").read_text(encoding="utf-8")
+    assert "source: joints.csv, tracker.txt" in record and "from joints.csv and tracker.txt" in record
+
+
 @pytest.mark.parametrize(
     "head", ["X meas [mm],Y meas [mm],Z meas [mm]", "x_measured [mm],y_measured [mm],z_measured [mm]"]
 )
