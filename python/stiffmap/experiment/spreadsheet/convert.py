@@ -155,8 +155,10 @@ def _ask(m: Meant, known_: set[str], joints: bool) -> None:
         )
     if not known_ & set(READINGS):
         places = "--map px='HEADER' (py, pz) for measured positions; of differences " if joints else ""
-        seen = map(m.sheet.find, () if joints else load_instrument("tracker").measured.values())
-        names = [n for i in seen if i is not None and (n := m.sheet.names[i]).lower() not in ("x", "y", "z")]
+        asked = [c.index for c in m.guessed if c.meaning in POSE]
+        patterns = () if joints else load_instrument("tracker").measured.values()
+        seen = (i for p in patterns if (i := m.sheet.find(p, asked)) is not None)
+        names = [n for i in seen if (n := m.sheet.names[i]).lower() not in POSE]
         if {1.0, -1.0} <= {*map(side_of_run, runs := [h for h in m.sheet.header if side_of_run(h)])}:
             m.ask_column(
                 f"which column is a reading? Of runs in both directions, say --map dx='{'|'.join(runs)}' (dy, dz)",

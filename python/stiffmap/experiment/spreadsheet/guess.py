@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from stiffmap.common.tables.header import meaning_of, split_unit
+from stiffmap.common.tables.header import MEASURED, meaning_of, split_unit
 from stiffmap.common.tables.table_file import find_column
 from stiffmap.common.units import TIMES, unit_of
 from stiffmap.experiment.channels import AXES
@@ -18,6 +18,8 @@ TORQUE = re.compile(r"^[tT](?=[ _]?[xyzXYZ]$)")
 """Tx, Ty, Tz of a load cell, where the unit is one of moments or, next to Fx, Fy, Fz, one that nobody knows."""
 AXIS = r"(?i)(?:(?<![a-z])|(?<=\b[dp]))[xyz](?![a-z])"
 """In a header."""
+MEASURED_AXIS = rf"\*[ ._-]?({MEASURED})|({MEASURED})[ ._-]?\*"
+"""A header of a measured coordinate, with a star for its axis."""
 READINGS = (*AXES, "dd", "ll", *SEEN)
 
 

@@ -16,6 +16,7 @@ from stiffmap.experiment.files.fields import READ, SEEN, quantity_of
 from stiffmap.experiment.poses.handeye import own_frame
 from stiffmap.experiment.spreadsheet.answers import Meant
 from stiffmap.experiment.spreadsheet.guess import guess
+from stiffmap.experiment.spreadsheet.turned import turns_behind
 
 FOLDER = Path(__file__).parent / "instruments"
 KEYS = {"title", "quantity", "columns", "measured", "circle", "units"}
@@ -115,7 +116,8 @@ def as_readings(m: Meant, instrument: Instrument) -> set[str]:
     if at:
         read = np.column_stack([_si(m, own, r, instrument) for r, (own, _) in at.items()])
         asked = np.column_stack([_si(m, command, r[-1], instrument) for r, (_, command) in at.items()])
-        apart = len(at) == 3 and own_frame(1e-3 * read, 1e-3 * asked) is not None
+        turns = turns_behind(m, at["dz"][1]) if "dz" in at else None
+        apart = len(at) == 3 and own_frame(1e-3 * read, 1e-3 * asked, turns) is not None
         for (reading, (own, command)), values in zip(
             at.items(), (read if apart else read - asked).T, strict=True
         ):

@@ -12,13 +12,13 @@ from stiffmap.common.broadcasting import Floats, Mask
 from stiffmap.common.errors import StiffmapError
 from stiffmap.common.short import first_of
 from stiffmap.common.tables.cells import Cells
-from stiffmap.common.tables.header import MEASURED
 from stiffmap.common.tables.table import Table
 from stiffmap.experiment.channels import AXES
 from stiffmap.experiment.files.fields import POSE, SEEN
 from stiffmap.experiment.poses.handeye import own_frame
 from stiffmap.experiment.spreadsheet.answers import Meant, Question
-from stiffmap.experiment.spreadsheet.guess import AXIS, READINGS, Column
+from stiffmap.experiment.spreadsheet.guess import AXIS, MEASURED_AXIS, READINGS, Column
+from stiffmap.experiment.spreadsheet.turned import turns_behind
 from stiffmap.solve.kinematics import forward_kinematics
 from stiffmap.solve.machine import Machine
 
@@ -35,7 +35,6 @@ NINES = [*(round(10.0**k - 0.1**j, 4) for k in range(3, 9) for j in range(5)), 9
 """999, 9999.99, overload and no number of SCPI, and the like, which stand for no reading."""
 BEYOND = 5.0
 """How many times the others such a number is, where it is the only one of its row."""
-MEASURED_AXIS = rf"\*[ ._-]?({MEASURED})|({MEASURED})[ ._-]?\*"
 SELDOM = 0.5
 """Share of rows that have places of their own, at most, where a ball stood in sockets."""
 ALIKE = 1e-3
@@ -52,7 +51,8 @@ def seen_next_to_commands(m: Meant) -> None:
     if m.columns or not set(SEEN) <= set(of) or (commanded := commands(m)) is None:
         return
     m.placed = True
-    if own_frame(m.metres([of[s] for s in SEEN], SEEN), commanded) is not None:
+    turns = turns_behind(m, of.get("z"))
+    if own_frame(m.metres([of[s] for s in SEEN], SEEN), commanded, turns) is not None:
         names = ", ".join(f"'{m.sheet.header[of[s]]}'" for s in SEEN)
         m.head |= {"frame": "unknown", "tool": "unknown"}
         m.said.append(
@@ -71,7 +71,8 @@ def in_base_axes(m: Meant, machine: Callable[[], Machine]) -> None:
     if commanded is None:
         return
     seen = m.metres([m.unloaded[a] for a in AXES[:3]], AXES[:3])
-    frame = own_frame(seen, commanded, None if pose is None else pose.rotation)
+    last = next((c.index for c in m.guessed if c.meaning == "z"), None)
+    frame = own_frame(seen, commanded, turns_behind(m, last) if pose is None else pose.rotation)
     if frame is None:
         return
     good = commanded[np.isfinite(commanded).all(axis=1)]

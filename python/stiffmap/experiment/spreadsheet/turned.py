@@ -24,7 +24,7 @@ from stiffmap.experiment.experiment import Integers
 from stiffmap.experiment.files.fields import EULER, POSE, QUATERNION, SEEN, SEEN_TURNED, VECTOR
 from stiffmap.experiment.poses.handeye import FEWEST, turns_apart
 from stiffmap.experiment.spreadsheet.answers import Meant
-from stiffmap.experiment.spreadsheet.guess import READINGS
+from stiffmap.experiment.spreadsheet.guess import AXIS, MEASURED_AXIS, READINGS
 from stiffmap.solve.kinematics import forward_kinematics
 from stiffmap.solve.machine import Machine
 
@@ -68,7 +68,8 @@ def oriented(m: Meant, machine: Callable[[], Machine]) -> None:
         return
     if turns == ROTATION_VECTOR:
         # a reading, unless it stands right behind the position and something else is read
-        others = set(READINGS) & set(meanings) - set(AXES[3:])
+        places = (re.fullmatch(MEASURED_AXIS, re.sub(AXIS, "*", n).lower()) for n in m.sheet.names)
+        others = set(READINGS) & set(meanings) - set(AXES[3:]) or any(places)
         said = not seen and set(AXES[3:]) & set(m.noise)
         if said or not others or columns[0] != meanings[position[2]] + 1:
             return
@@ -102,6 +103,15 @@ def oriented(m: Meant, machine: Callable[[], Machine]) -> None:
     else:
         m.head["orientation"] = {"against": "base"} | ({"euler": turns} if of_pose is EULER else {})
     m.said.append(f"{shown} are the orientation: {found.words}")
+
+
+def turns_behind(m: Meant, z: int | None) -> Floats | None:
+    """(n, 3, 3) orientations that are commanded next to positions whose last column is `z`; None where there are none."""
+    found = orientation_of(m.sheet)
+    if z is None or min(found.columns, default=0) != z + 1:
+        return None
+    values = _in_rad(m, found)
+    return None if values is None else matrices_of(values, found.turns)
 
 
 def _in_rad(m: Meant, found: Orientation) -> Floats | None:

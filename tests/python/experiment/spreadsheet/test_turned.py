@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -181,3 +182,52 @@ def test_a_unit_of_joints_is_for_those_without_one(tmp_path: Path) -> None:
     assert main(["experiment", "new", *files, "-o", str(tmp_path / "rad")]) == 0
     assert e.command is not None
     np.testing.assert_allclose(sm.load_experiment(tmp_path / "rad").command, e.command, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("heads", "numbers"),
+    [
+        ("RX [rad],RY [rad],RZ [rad]", lambda r: r.as_rotvec()),
+        ("A,B,C", lambda r: r.as_euler("ZYX", degrees=True)),
+        ("Roll [deg],Pitch [deg],Yaw [deg]", lambda r: r.as_euler("xyz", degrees=True)),
+        ("qw,qx,qy,qz", lambda r: r.as_quat()[:, [3, 0, 1, 2]]),
+        ("r11,r12,r13,r21,r22,r23,r31,r32,r33", lambda r: r.as_matrix().reshape(-1, 9)),
+    ],
+)
+@pytest.mark.parametrize("asked", [True, False])
+def test_a_target_off_the_tool_was_seen_next_to_commanded_poses(
+    heads: str, numbers: Callable[[Rotation], np.ndarray], asked: bool, tmp_path: Path
+) -> None:
+    turned = Rotation.from_euler("xyz", np.random.default_rng(2).uniform(-60, 60, (15, 3)), degrees=True)
+    commanded = np.random.default_rng(3).uniform([500, -300, 200], [800, 300, 600], (15, 3))
+    spot = commanded + turned.apply([50, 10, 120])
+    places = Rotation.from_rotvec([0.1, 0.02, 2.0]).apply(spot) + [1500, 200, -300]
+    cells = np.hstack([commanded, numbers(turned), places])
+    head = f"X [mm],Y [mm],Z [mm],{heads},X meas [mm],Y meas [mm],Z meas [mm]"
+    rows = "\n".join(",".join(f"{v:.9f}" for v in row) for row in cells)
+    file = tmp_path / "sheet.csv"
+    file.write_text(f"{head}\n{rows}\n")
+    columns = {f"p{a.lower()}": f"{a} meas" for a in "XYZ"} if asked else {}
+    instrument = None if asked else "tracker"
+    made = sm.experiment_from_table("ur10", file, tmp_path / "e", columns=columns, instrument=instrument)
+    e = made.experiment
+    assert (e.frame, e.tool) == ("unknown", "unknown")
+    assert e.seen == pytest.approx(1e-3 * places, abs=1e-9)
+    assert e.rotation == pytest.approx(turned.as_matrix(), abs=1e-6)
+
+
+def test_differences_of_a_target_off_the_tool_are_turned_into_base_axes(tmp_path: Path) -> None:
+    rng = np.random.default_rng(2)
+    turned = Rotation.from_euler("xyz", rng.uniform(-60, 60, (15, 3)), degrees=True)
+    commanded = rng.uniform([500, -300, 200], [800, 300, 600], (15, 3))
+    frame = Rotation.from_rotvec([0.1, 0.02, 2.0])
+    unloaded = frame.apply(commanded + turned.apply([50, 10, 120])) + [1500, 200, -300]
+    moved = rng.normal([0, 0, -0.3], 0.02, (15, 3))
+    cells = np.hstack([commanded, turned.as_rotvec(), unloaded, unloaded + frame.apply(moved)])
+    places = [f"{a} {what} [mm]" for what in ("unloaded", "loaded") for a in "XYZ"]
+    head = ",".join(["X [mm]", "Y [mm]", "Z [mm]", "RX [rad]", "RY [rad]", "RZ [rad]", *places])
+    rows = "\n".join(",".join(f"{v:.9f}" for v in row) for row in cells)
+    file = tmp_path / "sheet.csv"
+    file.write_text(f"{head}\n{rows}\n")
+    made = sm.experiment_from_table("ur10", file, tmp_path / "e", constants={"fz": -100.0})
+    assert made.experiment.reading[:, :3] == pytest.approx(1e-3 * moved, abs=1e-8)
