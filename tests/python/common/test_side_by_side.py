@@ -41,7 +41,7 @@ def test_points_of_one_name_stand_next_to_each_other(tmp_path: Path) -> None:
     assert [*table.columns[0]] == [*table.columns[3]] == ["P3", "P1"]
     assert [table.numbers(i).tolist() for i in (1, 2, 4, 6)] == [[3.5, 1.5], [0.3, 0.1], [7.5, 1], [9, 3]]
     assert [*table.lines] == [4, 5]
-    assert table.aside == (f"row 3 of {tmp_path / 'a.csv'}, in no other file",)
+    assert table.aside == (f"row 3 of {tmp_path / 'a.csv'}, which no other table has",)
 
 
 @pytest.mark.parametrize("header", ["Target,X [mm],Y [mm],Z [mm]", "id,X [mm],Y [mm],Z [mm]"])

@@ -37,7 +37,9 @@ def _joined(a: Table, b: Table) -> Table:
     left = list[str]()
     for t, at in sides:
         if lost := [str(t.lines[i]) for i in sorted({*range(len(t))} - {*at})]:
-            left.append(f"row{'s' * (len(lost) > 1)} {first_of(lost, 3)} of {t.file}, in no other file")
+            left.append(
+                f"row{'s' * (len(lost) > 1)} {first_of(lost, 3)} of {t.file}, which no other table has"
+            )
     columns = tuple(_taken(c, at) for t, at in sides for c in t.columns)
     return replace(
         b, file=f"{a.file} and {b.file}", header=(*a.header, *header), columns=columns,

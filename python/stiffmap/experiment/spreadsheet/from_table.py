@@ -50,8 +50,8 @@ from stiffmap.experiment.spreadsheet.together import named_targets, together
 from stiffmap.experiment.spreadsheet.turned import oriented, positioned
 from stiffmap.solve.machine import Machine, load_machine
 
-Understand = Callable[[str | None, dialogue.Ask | None], tuple[Meant, ImportedSheet]]
-"""What is meant by a sheet of that name, with answers to its questions."""
+Understand = Callable[[Sequence[str | None], dialogue.Ask | None], tuple[Meant, ImportedSheet]]
+"""What is meant by the sheets of these names, side by side, with answers to questions."""
 
 
 @short_repr
@@ -199,16 +199,22 @@ def _fitting(
     """The sheet that fits with the answers in use, and what was understood of it."""
     names = sheet_names(file) if sheet is None and file.suffix.lower() in WORKBOOKS else [sheet]
     if len(names) == 1:
-        return understood(sheet, ask)
+        return understood([sheet], ask)
     reasons: dict[str, StiffmapError] = {}
     for name in names:
         try:
-            return understood(name, None)
+            return understood([name], None)
         except StiffmapError as problem:
             reasons[str(name)] = problem
-    tables = [n for n, p in reasons.items() if isinstance(p, Question) and p.waits]
+    parts = {n: p for n, p in reasons.items() if isinstance(p, Question)}
+    if len(parts) > 1:
+        try:
+            return understood([*parts], None)
+        except StiffmapError as problem:
+            reasons["' and '".join(parts)] = problem
+    tables = [n for n, p in parts.items() if p.waits]
     if ask is not None and tables:
-        return understood(tables[0], ask)
+        return understood([tables[0]], ask)
     lines = "; ".join(f"'{n}': {str(p).removeprefix(str(file)).lstrip(':, ')}" for n, p in reasons.items())
     raise StiffmapError(f"{file}: none of its {len(names)} sheets fits (--sheet NAME reads one). {lines}")
 
@@ -231,20 +237,24 @@ class _Wanted:
     """The machine that it commands, by its joints `alone`."""
     alone: bool
 
-    def _read(self, name: str | None) -> Table:
+    def _read(self, names: Sequence[str | None]) -> Table:
         first, *more = self.files
-        if not more:
-            return read_sheet(first, name, self.layout)
+        if not more and len(names) == 1:
+            return read_sheet(first, names[0], self.layout)
         header = self.layout.header
         each = replace(self.layout, header=(), numbered=self.layout.numbered or bool(header))
-        table = side_by_side([read_sheet(first, name, each), *(read_sheet(f, None, each) for f in more)])
+        table = side_by_side(
+            [read_sheet(first, n, each) for n in names] + [read_sheet(f, None, each) for f in more]
+        )
         return (
             replace(table, header=tuple(with_header(table.header, header, table.file))) if header else table
         )
 
-    def understood(self, name: str | None, ask: dialogue.Ask | None) -> tuple[Meant, ImportedSheet]:
-        """One sheet."""
-        form = self._read(name)
+    def understood(
+        self, names: Sequence[str | None], ask: dialogue.Ask | None
+    ) -> tuple[Meant, ImportedSheet]:
+        """One sheet, or some side by side."""
+        form = self._read(names)
         kept = dialogue.remembered(form)
         m = Meant.of_sheet(form, self.given if kept is None else kept.below(self.given))
         if kept is not None:

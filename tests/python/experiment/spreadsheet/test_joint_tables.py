@@ -244,35 +244,49 @@ def test_columns_go_by_name_by_number_or_as_they_are_mapped(
         Predictor(sm.load_machine("ur10"), e)()  # the folder is a valid one
 
 
-@pytest.mark.parametrize("named", [True, False])
-def test_joints_and_places_stand_in_files_of_their_own(named: bool, tmp_path: Path) -> None:
+@pytest.mark.parametrize("form", ["names", "numbers alone", "sheets"])
+def test_joints_and_places_stand_in_tables_of_their_own(form: str, tmp_path: Path) -> None:
     poses, dh, q = session(tmp_path)
     actual = np.genfromtxt(poses, delimiter=",", names=True)
     actual = np.column_stack([actual[a] - actual[f"{a.lower()}_dif"] for a in "XYZ"])
-    head = (
-        ("Point;" + ";".join(f"A{i}" for i in range(1, 7)), "Point,X [mm],Y [mm],Z [mm]")
-        if named
-        else ("", "")
-    )
-    order = np.random.default_rng(1).permutation(len(q)) if named else np.arange(len(q))
-    points = [[f"P{i}"] if named else [] for i in range(len(q))]
-
-    def rows(values: np.ndarray, sign: str, of: np.ndarray) -> str:
-        return "\n".join(sign.join([*points[i], *(f"{v:.10g}" for v in values[i])]) for i in of)
-
-    joints = write(tmp_path, "joints.csv", f"{head[0]}\n{rows(np.degrees(q), ';', np.arange(len(q)))}\n")
-    places = write(tmp_path, "tracker.txt", f"{head[1]}\n{rows(actual, ',', order)}\n")
-    more = [] if named else ["--header", "A1,A2,A3,A4,A5,A6,px,py,pz", "--unit", "joints=deg"]
+    plain = form == "numbers alone"
+    order = np.arange(len(q)) if plain else np.random.default_rng(1).permutation(len(q))
+    joints, places = ([[*([] if plain else [f"P{i}"]), *values[i].tolist()] for i in rows] for values, rows in (
+        (np.degrees(q), range(len(q))), (actual, order)
+    ))  # fmt: skip
+    if not plain:
+        joints.insert(0, ["Point", *(f"A{i}" for i in range(1, 7))])
+        places.insert(0, ["Name", "X [mm]", "Y [mm]", "Z [mm]"])
+    if form == "sheets":
+        openpyxl = pytest.importorskip(
+            "openpyxl", reason="openpyxl is not installed (pip install stiffmap[excel])"
+        )
+        book = openpyxl.Workbook()
+        for row in joints:
+            book.active.append(row)
+        page = book.create_sheet("Tracker")
+        for row in places:
+            page.append(row)
+        book.save(tmp_path / "both.xlsx")
+        files, said = [str(tmp_path / "both.xlsx")], "source: both.xlsx"
+    else:
+        text = [
+            "\n".join(sign.join(map(str, row)) for row in rows)
+            for rows, sign in ((joints, ";"), (places, ","))
+        ]
+        files = [
+            write(tmp_path, name, t) for name, t in zip(("joints.csv", "tracker.txt"), text, strict=True)
+        ]
+        said = "title: from joints.csv and tracker.txt"
+    more = ["--header", "A1,A2,A3,A4,A5,A6,px,py,pz", "--unit", "joints=deg"] if plain else []
     out = tmp_path / "out"
-    arguments = ["experiment", "new", joints, places, "--dh", dh, "-o", str(out), *UNITS, *more]
-    assert main(arguments) == 0
+    assert main(["experiment", "new", *files, "--dh", dh, "-o", str(out), *UNITS, *more]) == 0
     e = sm.load_experiment(out)
     assert e.command == pytest.approx(q[order], abs=1e-9) and (e.frame, e.tool) == ("unknown", "unknown")
     assert e.seen == pytest.approx(1e-3 * actual[order], abs=1e-9)
     machine = sm.load_machine(out / "machine.yaml")
     assert left(machine.with_effect("zero_offset", element="elbow", error=2e-4), out) < 1e-6
-    record = (out / "experiment.yaml").read_text(encoding="utf-8")
-    assert "source: joints.csv, tracker.txt" in record and "from joints.csv and tracker.txt" in record
+    assert said in (out / "experiment.yaml").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(
